@@ -1,0 +1,90 @@
+"""Every error that a user can meet, in one tree.
+
+    GraderError                 exit code 3
+    ├── UsageError              2   the command line asks for something that cannot be
+    │   ├── OutputError         2   the output folder cannot be written
+    │   └── RubricError         2   one or more faults in a rubric, all of them named
+    ├── SubmissionError         3   the submission cannot be read
+    │   └── PackageNotFound     3   no package of the lab in it
+    ├── EvidenceError           3   an evidence file cannot be read
+    └── HostError               3   this machine cannot do what is asked
+        ├── RosMissing          3   no ROS 1 here
+        ├── SandboxMissing      3   `--sandbox require`, and none to be had
+        └── ArenaError          3   the managed roscore failed
+
+Each carries one line that says what is wrong and, as `hint`, what to do about it.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """What `grader` returns to the shell."""
+
+    PASSED = 0
+    BELOW_PASS_MARK = 1
+    USAGE = 2
+    NOT_GRADED = 3
+    INCONCLUSIVE = 4
+    INTERRUPTED = 130
+
+
+class GraderError(Exception):
+    """The root. `kind` is the word that `result.json` carries."""
+
+    kind = "grader"
+    exit_code = ExitCode.NOT_GRADED
+
+    def __init__(self, message: str, *, hint: str = "") -> None:
+        super().__init__(message)
+        self.message = message
+        self.hint = hint
+
+
+class UsageError(GraderError):
+    kind = "usage"
+    exit_code = ExitCode.USAGE
+
+
+class OutputError(UsageError):
+    kind = "output"
+
+
+class RubricError(UsageError):
+    """Faults of a rubric, one line each, as `file:line: key.path: what is wrong`."""
+
+    kind = "rubric"
+
+    def __init__(self, faults: list[str], *, hint: str = "") -> None:
+        super().__init__("\n".join(faults), hint=hint)
+        self.faults = faults
+
+
+class SubmissionError(GraderError):
+    kind = "submission"
+
+
+class PackageNotFound(SubmissionError):
+    kind = "package-not-found"
+
+
+class EvidenceError(GraderError):
+    kind = "evidence"
+
+
+class HostError(GraderError):
+    kind = "host"
+
+
+class RosMissing(HostError):
+    kind = "ros-missing"
+
+
+class SandboxMissing(HostError):
+    kind = "sandbox-missing"
+
+
+class ArenaError(HostError):
+    kind = "arena"

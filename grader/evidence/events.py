@@ -1,0 +1,124 @@
+"""What the arena notes beside the messages: one record a JSON channel. Times are the channel's `log_time`s (ns)."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from grader.model.record import Record
+
+EVIDENCE_VERSION = "1"
+METADATA_NAME = "grader.evidence"
+
+
+class ProcessEvent(Record):
+    """`/grader/process`. `role` is `student`, `build` or `grader`; CPU in seconds, memory in bytes (whole tree).
+
+    `stopped_by` is the last signal that the arena sent it (`INT`, `TERM`, `KILL`), None where it ended by itself.
+    `repairs` names what was mended on the copy that ran (`executable bit`, `CRLF`, `shebang`).
+    """
+
+    event: Literal["start", "exit"]
+    name: str
+    role: Literal["student", "build", "grader"]
+    argv: tuple[str, ...] = ()
+    script: str | None = None
+    repairs: tuple[str, ...] = ()
+    exit_code: int | None = None
+    signal: int | None = None
+    stopped_by: str | None = None
+    cpu_s: float | None = None
+    max_rss_bytes: int | None = None
+
+
+class ConsoleLine(Record):
+    """`/grader/console`: one line without its end. Bytes that are not UTF-8 appear as U+FFFD."""
+
+    process: str
+    stream: Literal["stdout", "stderr"]
+    line: str
+    truncated: bool = False
+
+
+class Connection(Record):
+    """A live topic connection as the subscribing node reports it (`getBusInfo`)."""
+
+    topic: str
+    publisher: str
+    subscriber: str
+
+
+class GraphEvent(Record):
+    """`/grader/graph`: the master's state after a change. Topics and services map to the nodes' names."""
+
+    nodes: tuple[str, ...]
+    topic_types: dict[str, str]
+    publishers: dict[str, tuple[str, ...]]
+    subscribers: dict[str, tuple[str, ...]]
+    services: dict[str, tuple[str, ...]]
+    connections: tuple[Connection, ...] = ()
+
+
+class ParamEvent(Record):
+    """`/grader/param`: one change of the parameter server."""
+
+    action: Literal["set", "delete"]
+    name: str
+    caller_id: str
+    value: Any = None
+
+
+class HostEvent(Record):
+    """`/grader/host`: how late a 10 ms timer woke since the last such event (ms), and the load average."""
+
+    samples: int
+    mean_ms: float
+    p95_ms: float
+    max_ms: float
+    load_1min: float
+
+
+class ActorEvent(Record):
+    """`/grader/actor`: what the grader did to the run. For `publish`, `value` is the field `data` as sent."""
+
+    action: Literal["publish", "clock", "interrupt", "param", "note"]
+    actor: str
+    topic: str | None = None
+    type: str | None = None
+    value: Any = None
+    detail: str = ""
+
+
+class RecorderEvent(Record):
+    """`/grader/recorder`: the recorder's connections. `dropped` counts messages past the limit of a channel."""
+
+    event: Literal["connected", "refused", "closed", "limit", "invalid"]
+    topic: str
+    callerid: str
+    messages: int = 0
+    dropped: int = 0
+    detail: str = ""
+
+
+class ScenarioEvent(Record):
+    """`/grader/scenario`: the run's own course. `outcome` is given once, at the end.
+
+    `complete`: everything waited for was seen. `ended`: the student's processes ended first. `timeout`: the limit
+    came first. `host`: the arena or the machine failed (`detail` says how): nothing may be held against a student.
+    """
+
+    event: Literal["begin", "ready", "end"]
+    outcome: Literal["complete", "ended", "timeout", "host"] | None = None
+    detail: str = ""
+
+
+TOPICS: dict[str, type[Record]] = {
+    "/grader/process": ProcessEvent,
+    "/grader/console": ConsoleLine,
+    "/grader/graph": GraphEvent,
+    "/grader/param": ParamEvent,
+    "/grader/host": HostEvent,
+    "/grader/actor": ActorEvent,
+    "/grader/recorder": RecorderEvent,
+    "/grader/scenario": ScenarioEvent,
+}
+PACKAGE_TOPIC = "/grader/package"

@@ -1,0 +1,80 @@
+"""The result of one submission: `result.json`, schema `grader.result/1`. Its keys are an interface."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from grader.model.record import Record
+from grader.model.verdict import EvidenceCitation, FileCitation, Status
+
+RESULT_SCHEMA = "grader.result/1"
+
+
+class CriterionResult(Record):
+    """One line of the report. `points` are those earned, rounded as the rubric says."""
+
+    id: str
+    title: str
+    check: str
+    scenario: str | None
+    status: Status
+    points: float
+    max_points: float
+    message: str
+    expected: str
+    measured: str
+    hint: str
+    reproduce: str
+    citations: tuple[FileCitation | EvidenceCitation, ...]
+
+
+class SubmissionInfo(Record):
+    """Whose work it is: `commit` for a repository, `digest` (sha256 of the package's tree) always."""
+
+    id: str
+    source: str
+    commit: str | None
+    digest: str
+    package: str
+
+
+class RubricInfo(Record):
+    id: str
+    version: str
+    digest: str
+
+
+class EnvironmentInfo(Record):
+    grader: str
+    ros: str
+    python: str
+    sandbox: str
+
+
+class TimingInfo(Record):
+    """Seconds. `cpu_s` is the grader's own, `student_cpu_s` that of the student's processes and build."""
+
+    wall_s: float
+    cpu_s: float
+    student_cpu_s: float
+
+
+class ErrorInfo(Record):
+    kind: str
+    message: str
+    hint: str
+
+
+class GradingResult(Record):
+    schema_: Literal["grader.result/1"] = Field(default="grader.result/1", alias="schema")
+    submission: SubmissionInfo
+    rubric: RubricInfo
+    status: Literal["graded", "inconclusive", "error"]
+    points: float
+    max_points: float
+    criteria: tuple[CriterionResult, ...]
+    environment: EnvironmentInfo
+    timing: TimingInfo
+    error: ErrorInfo | None = None

@@ -1,0 +1,44 @@
+"""What intake hands on: a folder on disk with the lab's package in it, and who it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from grader.model.record import Record
+
+ModeSource = Literal["git", "archive", "disk", "none"]
+
+
+class SourcePackage(Record):
+    """One catkin package of the submission.
+
+    `folder` is absolute on this machine, `path` the same relative to the submission's root (posix, `.` for the
+    root itself). `executable` maps each regular file's path, relative to `folder`, to its executable bit, or to
+    None where the source carries no modes (`mode_source` "none").
+    """
+
+    name: str
+    folder: Path
+    path: str
+    mode_source: ModeSource
+    executable: dict[str, bool | None]
+
+
+class Submission(Record):
+    """`commit` is the full hash where the source is a repository, `archive_sha256` where it is an archive.
+
+    `digest` is the sha256 of the package's tree (paths, executable bits, contents). `packages` are the other
+    packages of the same submission, for dependencies. `hints` are remarks that the report shows, for instance that
+    the package was found under another spelling.
+    """
+
+    id: str
+    source: str
+    root: Path
+    commit: str | None
+    archive_sha256: str | None
+    digest: str
+    package: SourcePackage
+    packages: tuple[SourcePackage, ...]
+    hints: tuple[str, ...] = ()

@@ -1,0 +1,76 @@
+"""What a check says of one criterion."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from grader.model.record import Record
+
+
+class Status(str, Enum):
+    """The seven statuses of a criterion (docs/design.md, Statuses)."""
+
+    PASS = "pass"  # noqa: S105 - a status, not a password
+    PARTIAL = "partial"
+    FAIL = "fail"
+    BLOCKED = "blocked"
+    INCONCLUSIVE = "inconclusive"
+    ERROR = "error"
+    MANUAL = "manual"
+
+
+class FileCitation(Record):
+    """A line of the student's own files; `file` is relative to the package's root, `line` counts from 1."""
+
+    file: str
+    line: int | None = None
+
+
+class EvidenceCitation(Record):
+    """A stretch of an evidence file: `from_ns` to `to_ns` are its `log_time`s, both included."""
+
+    evidence: str
+    topic: str
+    from_ns: int | None = None
+    to_ns: int | None = None
+
+
+Citation = FileCitation | EvidenceCitation
+
+
+class Verdict(Record):
+    """One check's judgement.
+
+    `score` is the share of the points, 0 to 1. `unjudged` marks a verdict that rests on the absence of
+    evidence: the judge turns it into `blocked` where a required criterion explains the absence.
+    """
+
+    status: Status
+    score: float
+    message: str
+    expected: str = ""
+    measured: str = ""
+    hint: str = ""
+    citations: tuple[FileCitation | EvidenceCitation, ...] = ()
+    unjudged: bool = False
+
+
+def passed(message: str, **fields: object) -> Verdict:
+    return Verdict(status=Status.PASS, score=1.0, message=message, **fields)  # type: ignore[arg-type]
+
+
+def partial(score: float, message: str, **fields: object) -> Verdict:
+    return Verdict(status=Status.PARTIAL, score=score, message=message, **fields)  # type: ignore[arg-type]
+
+
+def failed(message: str, **fields: object) -> Verdict:
+    return Verdict(status=Status.FAIL, score=0.0, message=message, **fields)  # type: ignore[arg-type]
+
+
+def unjudged(message: str, **fields: object) -> Verdict:
+    """There is nothing to judge: a fail of its own, or `blocked` where a required criterion explains it."""
+    return Verdict(status=Status.FAIL, score=0.0, message=message, unjudged=True, **fields)  # type: ignore[arg-type]
+
+
+def inconclusive(message: str, **fields: object) -> Verdict:
+    return Verdict(status=Status.INCONCLUSIVE, score=0.0, message=message, **fields)  # type: ignore[arg-type]

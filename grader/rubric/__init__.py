@@ -1,0 +1,1 @@
+"""Rubrics: YAML into typed records, with every fault named at once."""
