@@ -1,0 +1,110 @@
+"""One recorded run as the checks see it: frozen, decoded on demand, no ROS needed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from grader.evidence.decode import Decoder
+from grader.evidence.events import (
+    ActorEvent,
+    ConsoleLine,
+    GraphEvent,
+    HostEvent,
+    ParamEvent,
+    ProcessEvent,
+    RecorderEvent,
+    ScenarioEvent,
+)
+
+
+class Message(NamedTuple):
+    """A recorded message: arrival (ns), number on its channel counted from 0, bytes as sent."""
+
+    log_time_ns: int
+    sequence: int
+    data: bytes
+
+
+
+
+@dataclass(frozen=True, kw_only=True)
+class Channel:
+    """All messages of one publisher on one topic."""
+
+    topic: str
+    callerid: str
+    type: str
+    md5sum: str
+    definition: str
+    latching: bool
+    messages: tuple[Message, ...]
+
+    @property
+    def by_grader(self) -> bool:
+        return is_grader_node(self.callerid)
+
+    @cached_property
+    def times_ns(self) -> tuple[int, ...]:
+        return tuple(m.log_time_ns for m in self.messages)
+
+    @cached_property
+    def values(self) -> tuple[Any, ...]:
+        """Each message decoded to a dict of its fields; None for a message that its definition does not fit."""
+        decoder = Decoder(self.type, self.definition)
+        return tuple(decoder.decode(m.data) for m in self.messages)
+
+    @property
+    def data(self) -> tuple[Any, ...]:
+        """The field `data` of each message (std_msgs), None where it has none."""
+        return tuple(v.get("data") if isinstance(v, dict) else None for v in self.values)
+
+
+def is_grader_node(name: str) -> bool:
+    """The grader's own nodes are `/grader…`, and `/rosout` is part of every ROS system."""
+    return name.startswith("/grader") or name == "/rosout"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """`evidence` is the file's name for citations, `start_ns`/`end_ns` the times of its first and last record."""
+
+    evidence: str
+    scenario: str
+    clock: str
+    warp: float
+    metadata: Mapping[str, str]
+    start_ns: int
+    end_ns: int
+    channels: tuple[Channel, ...] = ()
+    processes: tuple[tuple[int, ProcessEvent], ...] = ()
+    console: tuple[tuple[int, ConsoleLine], ...] = ()
+    graph: tuple[tuple[int, GraphEvent], ...] = ()
+    params: tuple[tuple[int, ParamEvent], ...] = ()
+    host: tuple[tuple[int, HostEvent], ...] = ()
+    actors: tuple[tuple[int, ActorEvent], ...] = ()
+    recorder: tuple[tuple[int, RecorderEvent], ...] = ()
+    course: tuple[tuple[int, ScenarioEvent], ...] = ()
+    attachments: Mapping[str, bytes] = field(default_factory=dict)
+
+    def student_channels(self, topic: str | None = None) -> tuple[Channel, ...]:
+        """Channels of the student's publishers, on one topic or on all."""
+        return tuple(c for c in self.channels if not c.by_grader and topic in {None, c.topic})
+
+    def student_nodes(self) -> tuple[str, ...]:
+        """Every node of the student's that was ever registered, in order of appearance."""
+        seen: dict[str, None] = {}
+        for _, event in self.graph:
+            seen.update(dict.fromkeys(n for n in event.nodes if not is_grader_node(n)))
+        return tuple(seen)
+
+    def lines(self, process: str) -> Iterator[tuple[int, ConsoleLine]]:
+        """What one process printed."""
+        return ((t, line) for t, line in self.console if line.process == process)
+
+    @property
+    def outcome(self) -> ScenarioEvent | None:
+        """How the run ended; None for a file that was cut short."""
+        return next((e for _, e in reversed(self.course) if e.event == "end"), None)
