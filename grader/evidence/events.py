@@ -1,4 +1,4 @@
-"""What the arena notes beside the messages: one record a JSON channel. Times are the channel's `log_time`s (ns)."""
+"""What the arena notes beside the messages: one record a JSON channel. Times are its `log_time`s (ns)."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ METADATA_NAME = "grader.evidence"
 
 
 class ProcessEvent(Record):
-    """`/grader/process`. `role` is `student`, `build` or `grader`; CPU in seconds, memory in bytes (whole tree).
+    """`/grader/process`. `role` is `student`, `build` or `grader`; CPU in seconds, memory in bytes (tree).
 
-    `stopped_by` is the last signal that the arena sent it (`INT`, `TERM`, `KILL`), None where it ended by itself.
+    `stopped_by` is the last signal that the arena sent it (`INT`, `TERM`, `KILL`), None where it ended alone.
     `repairs` names what was mended on the copy that ran (`executable bit`, `CRLF`, `shebang`).
     """
 
@@ -89,7 +89,7 @@ class ActorEvent(Record):
 
 
 class RecorderEvent(Record):
-    """`/grader/recorder`: the recorder's connections. `dropped` counts messages past the limit of a channel."""
+    """`/grader/recorder`: the recorder's connections. `dropped` counts messages past a channel's limit."""
 
     event: Literal["connected", "refused", "closed", "limit", "invalid"]
     topic: str
@@ -102,8 +102,9 @@ class RecorderEvent(Record):
 class ScenarioEvent(Record):
     """`/grader/scenario`: the run's own course. `outcome` is given once, at the end.
 
-    `complete`: everything waited for was seen. `ended`: the student's processes ended first. `timeout`: the limit
-    came first. `host`: the arena or the machine failed (`detail` says how): nothing may be held against a student.
+    `complete`: everything waited for was seen. `ended`: the student's processes ended first. `timeout`: the
+    limit came first. `host`: the arena or the machine failed (`detail` says how): nothing may be held against
+    a student.
     """
 
     event: Literal["begin", "ready", "end"]

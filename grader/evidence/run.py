@@ -28,8 +28,6 @@ class Message(NamedTuple):
     data: bytes
 
 
-
-
 @dataclass(frozen=True, kw_only=True)
 class Channel:
     """All messages of one publisher on one topic."""
@@ -52,7 +50,7 @@ class Channel:
 
     @cached_property
     def values(self) -> tuple[Any, ...]:
-        """Each message decoded to a dict of its fields; None for a message that its definition does not fit."""
+        """Each message decoded to a dict of its fields; None where its definition does not fit."""
         decoder = Decoder(self.type, self.definition)
         return tuple(decoder.decode(m.data) for m in self.messages)
 
@@ -69,7 +67,10 @@ def is_grader_node(name: str) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """`evidence` is the file's name for citations, `start_ns`/`end_ns` the times of its first and last record."""
+    """`evidence` is the file's name for citations, `start_ns`/`end_ns` its first and last record's times.
+
+    `package_json` is the message of `/grader/package`; `reader.package_facts` reads it.
+    """
 
     evidence: str
     scenario: str
@@ -88,6 +89,7 @@ class Run:
     recorder: tuple[tuple[int, RecorderEvent], ...] = ()
     course: tuple[tuple[int, ScenarioEvent], ...] = ()
     attachments: Mapping[str, bytes] = field(default_factory=dict)
+    package_json: bytes | None = None
 
     def student_channels(self, topic: str | None = None) -> tuple[Channel, ...]:
         """Channels of the student's publishers, on one topic or on all."""

@@ -50,16 +50,17 @@ class CountUp(Record):
 
 
 class TextPattern(Record):
-    """Text made by `str.format` from `i` (the message's number) and `time_s` (its time, seconds since 1970)."""
+    """Text made by `str.format` from `i` (the message's number) and `time_s` (its time since 1970)."""
 
     text: str
 
 
 class TopicLine(Record):
-    """One publisher on one topic. `values` shorter than `count` begin again; without a `count` each comes once.
+    """One publisher on one topic. `values` shorter than `count` begin again; without `count` each comes once.
 
-    `times_s` gives every time by hand. `jitter_ms` shifts single messages, round and round. `burst` messages come
-    together. `drop` leaves messages out as if lost on the way, `replace` changes single values, `raw` are bytes in hex.
+    `times_s` gives every time by hand. `jitter_ms` shifts single messages, round and round. `burst` messages
+    come together. `drop` leaves messages out as if lost on the way, `replace` changes single values, `raw`
+    are bytes in hex.
     """
 
     topic: str
@@ -77,7 +78,7 @@ class TopicLine(Record):
     stalls: tuple[Stall, ...] = ()
     burst: Annotated[int, Field(ge=1)] = 1
     drop: tuple[int, ...] = ()
-    replace: dict[int, Any] = {}
+    replace: dict[int, Any] = Field(default_factory=dict)
     md5sum: str | None = None
     definition: str | None = None
 
@@ -133,10 +134,10 @@ class Acted(ActorEvent):
 class Graph(GraphEvent):
     at_s: At = 0.4
     nodes: tuple[str, ...] = ()
-    topic_types: dict[str, str] = {}
-    publishers: dict[str, tuple[str, ...]] = {}
-    subscribers: dict[str, tuple[str, ...]] = {}
-    services: dict[str, tuple[str, ...]] = {}
+    topic_types: dict[str, str] = Field(default_factory=dict)
+    publishers: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    subscribers: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    services: dict[str, tuple[str, ...]] = Field(default_factory=dict)
 
 
 class Host(HostEvent):
@@ -159,14 +160,14 @@ class RecorderLine(RecorderEvent):
 
 
 class TimelineRun(Record):
-    """One run. `graph`, `host` and `recorder` left out are made up from the topics; an empty list means none."""
+    """One run. `graph`, `host` and `recorder` are made up where left out; an empty list means none."""
 
     scenario: str | None = None
     clock: Literal["real", "warped"] = "real"
     warp: Annotated[float, Field(ge=1)] = 1.0
-    metadata: dict[str, str] = {}
+    metadata: dict[str, str] = Field(default_factory=dict)
     topics: tuple[TopicLine, ...] = ()
-    subscribers: dict[str, tuple[str, ...]] = {}
+    subscribers: dict[str, tuple[str, ...]] = Field(default_factory=dict)
     processes: tuple[ProcessLine, ...] = ()
     console: tuple[Printed, ...] = ()
     graph: tuple[Graph, ...] | None = None
@@ -177,5 +178,5 @@ class TimelineRun(Record):
     outcome: Literal["complete", "ended", "timeout", "host"] | None = "complete"
     outcome_detail: str = ""
     end_s: At | None = None
-    attachments: dict[str, str] = {}
+    attachments: dict[str, str] = Field(default_factory=dict)
     package: dict[str, Any] | None = None

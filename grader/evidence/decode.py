@@ -1,0 +1,184 @@
+"""Message bytes to plain values and back, by rosbags, from the recorded definition.
+
+Nothing that ROS or a student generated is ever imported.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any, TypeAlias
+
+import numpy as np
+from rosbags.interfaces import Nodetype
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.base import TypesysError
+from rosbags.typesys.store import Typestore
+
+from grader.evidence.definitions import (
+    PACKAGE,
+    PRIMITIVES,
+    DefinitionError,
+    Field,
+    Types,
+    alias,
+    canonical,
+    parse,
+)
+
+Value: TypeAlias = Any
+"""What a message holds: numbers, text, bytes, lists and dicts of these."""
+
+_CLOCK_FIELDS = {"sec": "secs", "nanosec": "nsecs"}
+
+
+class Decoder:
+    """Decodes the messages of one type. `definition` is the full text as the publisher sent it.
+
+    A definition that cannot be followed makes every message None, and so do bytes that do not fit it exactly.
+    """
+
+    def __init__(self, type: str, definition: str) -> None:  # noqa: A002 - ROS's own word
+        self._plan = _plan(type, definition)
+
+    @property
+    def usable(self) -> bool:
+        """False where the definition itself could not be followed."""
+        return self._plan is not None
+
+    def decode(self, data: bytes) -> Value:
+        """A dict of the message's fields: numbers, bool, str, bytes for `uint8[]`, lists, dicts; or None.
+
+        `time` and `duration` become `{"secs": …, "nsecs": …}`.
+        """
+        if self._plan is None:
+            return None
+        try:
+            return self._plan.decode(data)
+        except (SerdeError, struct.error, ValueError, IndexError, OverflowError):
+            return None
+
+
+class _Plan:
+    def __init__(self, type_: str, definition: str) -> None:
+        self._types: Types = parse(type_, definition)
+        self._type = type_
+        self._store = get_typestore(Stores.EMPTY)
+        self._store.register(get_types_from_msg(canonical(self._types), f"{PACKAGE}/{alias(type_)}"))
+        self._name = f"{PACKAGE}/msg/{alias(type_)}"
+        self._store.get_msgdef(self._name)
+
+    def decode(self, data: bytes) -> dict[str, Any]:
+        return self._plain(self._type, self._store.deserialize_ros1(data, self._name))
+
+    def _plain(self, type_: str, message: object) -> dict[str, Any]:
+        return {f.name: self._value(f, getattr(message, f.attribute)) for f in self._types[type_]}
+
+    def _value(self, field: Field, value: Value) -> Value:
+        if not field.primitive:
+            if field.array:
+                return [self._plain(field.type, item) for item in value]
+            return self._plain(field.type, value)
+        if not field.array:
+            return value
+        if field.type == "uint8":
+            return value.tobytes()
+        return value if field.type == "string" else value.tolist()
+
+
+@lru_cache(maxsize=256)
+def _plan(type_: str, definition: str) -> _Plan | None:
+    try:
+        return _Plan(type_, definition)
+    except (DefinitionError, TypesysError, SyntaxError, RecursionError):
+        return None
+
+
+def encode(type: str, value: Mapping[str, Any]) -> bytes:  # noqa: A002 - ROS's own word
+    """The bytes of a message of one of ROS Noetic's own types; fields that `value` leaves out are zero.
+
+    Raises ValueError for a type or field that does not exist and for a value that does not fit.
+    """
+    store, name = _noetic(), _ros2_name(type)
+    try:
+        return bytes(store.serialize_ros1(_message(store, name, value), name))
+    except (struct.error, OverflowError, SerdeError, AttributeError, TypeError) as error:
+        raise ValueError(f"{type} cannot hold {value!r}: {error}") from error
+
+
+def definition(type: str) -> str:  # noqa: A002 - ROS's own word
+    """The full definition of one of ROS Noetic's own types. Raises ValueError for any other."""
+    return _described(type)[0]
+
+
+def md5sum(type: str) -> str:  # noqa: A002 - ROS's own word
+    """The type's MD5 sum as ROS computes it. Raises ValueError for a type that is not ROS Noetic's own."""
+    return _described(type)[1]
+
+
+@lru_cache(maxsize=1)
+def _noetic() -> Typestore:
+    return get_typestore(Stores.ROS1_NOETIC)
+
+
+@lru_cache(maxsize=256)
+def _described(type_: str) -> tuple[str, str]:
+    return _noetic().generate_msgdef(_ros2_name(type_), ros_version=1)
+
+
+def _ros2_name(type_: str) -> str:
+    package, _, name = type_.partition("/")
+    full = f"{package}/msg/{name}"
+    if full not in _noetic().fielddefs:
+        raise ValueError(f"ROS Noetic has no message type {type_}")
+    return full
+
+
+def _message(store: Typestore, name: str, value: Mapping[str, Any]) -> object:
+    clock = name.startswith("builtin_interfaces/")
+    fields = [(_CLOCK_FIELDS[n] if clock else n, desc) for n, desc in store.fielddefs[name][1]]
+    if unknown := value.keys() - {n for n, _ in fields}:
+        raise ValueError(f"{name} has no field {', '.join(sorted(unknown))}")
+    kept = [(n, desc) for n, desc in fields if n != "structure_needs_at_least_one_member"]
+    return store.types[name](*[_field(store, desc, value.get(n)) for n, desc in kept])
+
+
+def _field(store: Typestore, desc: Value, value: Value) -> Value:
+    kind, detail = desc
+    if kind == Nodetype.BASE:
+        return _zero(detail[0]) if value is None else _checked(detail[0], value)
+    if kind == Nodetype.NAME:
+        return _message(store, detail, value or {})
+    inner, size = detail
+    items = list(value) if value is not None else [None] * (size if kind == Nodetype.ARRAY else 0)
+    converted = [_field(store, inner, item) for item in items]
+    if inner[0] == Nodetype.BASE and inner[1][0] != "string":
+        return np.array(converted, dtype=_dtype(inner[1][0]))
+    return converted
+
+
+def _dtype(base: str) -> str:
+    return {"byte": "int8", "char": "uint8"}.get(base, base)
+
+
+def _zero(base: str) -> Value:
+    return "" if base == "string" else False if base == "bool" else 0
+
+
+def _checked(base: str, value: Value) -> Value:
+    if base == "string":
+        wanted: tuple[type, ...] = (str,)
+    elif base.startswith("float"):
+        wanted = (int, float)
+    else:
+        wanted = (int,)
+    if not isinstance(value, wanted) or (isinstance(value, bool) and base != "bool"):
+        raise ValueError(f"{value!r} is no {base}")
+    if wanted == (int,) and base != "bool":
+        bits = 8 * PRIMITIVES[_dtype(base)]
+        low, high = (0, 2**bits) if _dtype(base).startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1))
+        if not low <= value < high:
+            raise ValueError(f"{value} is out of range for {base}")
+    return value

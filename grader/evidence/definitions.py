@@ -1,0 +1,203 @@
+"""Reads a recorded ROS 1 message definition into a form that is safe to hand to a code generator.
+
+A student's node sends the definition, and rosbags turns definitions into Python code. So nothing of it is
+passed on but its structure: every type and field gets a name of ours, and what would unroll or nest without
+end is refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+MAX_DEFINITION_BYTES = 64 * 1024
+MAX_FIELDS = 2_000
+MAX_DEPTH = 24
+MAX_UNROLLED = 2_000
+MAX_ARRAY = 1 << 24
+MAX_STEPS = 20_000
+STEPS_PER_BYTE = 64
+
+PACKAGE = "recorded"
+PRIMITIVES = {
+    "bool": 1,
+    "int8": 1,
+    "uint8": 1,
+    "int16": 2,
+    "uint16": 2,
+    "int32": 4,
+    "uint32": 4,
+    "int64": 8,
+    "uint64": 8,
+    "float32": 4,
+    "float64": 8,
+    "string": 4,
+}
+_SYNONYMS = {"byte": "int8", "char": "uint8"}
+_CLOCKS = {"time": ("uint32 secs", "uint32 nsecs"), "duration": ("int32 secs", "int32 nsecs")}
+_FIELD = re.compile(
+    r"(?P<type>[A-Za-z]\w*(?:/[A-Za-z]\w*)?)\s*(?P<array>\[(?P<size>\d{0,9})\])?\s+(?P<name>[A-Za-z]\w*)",
+    re.ASCII,
+)
+_NAME = re.compile(r"[A-Za-z]\w*/[A-Za-z]\w*", re.ASCII)
+
+
+class DefinitionError(ValueError):
+    """The definition is no ROS 1 message definition, or not one that is safe to follow."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Field:
+    """`attribute` is its name in generated code. `size` is a fixed array's, None for one that grows."""
+
+    name: str
+    attribute: str
+    type: str
+    array: bool
+    size: int | None
+
+    @property
+    def primitive(self) -> bool:
+        return self.type in PRIMITIVES
+
+    @property
+    def line(self) -> str:
+        kind = self.type if self.primitive else alias(self.type)
+        brackets = "" if not self.array else f"[{'' if self.size is None else self.size}]"
+        return f"{kind}{brackets} {self.attribute}"
+
+
+Types = dict[str, tuple[Field, ...]]
+
+
+def parse(type_: str, definition: str) -> Types:
+    """The fields of each type that `definition` (full text with `MSG:` parts) needs, the message's own first.
+
+    Raises DefinitionError for everything that is not plainly a sound definition.
+    """
+    if len(definition.encode(errors="replace")) > MAX_DEFINITION_BYTES:
+        raise DefinitionError("the definition is too long")
+    if not _NAME.fullmatch(type_):
+        raise DefinitionError(f"no message type: {type_!r}")
+    sections: dict[str, tuple[str, ...]] = {}
+    for name, lines in _sections(type_, definition):
+        if sections.setdefault(name, lines) != lines:
+            raise DefinitionError(f"{name} is defined twice")
+    sections.update(_CLOCKS)
+    types = {name: tuple(_fields(name, lines)) for name, lines in sections.items()}
+    bounds = _Bounds(types)
+    bounds.check(type_, depth=0)
+    return {type_: types[type_]} | {name: types[name] for name in bounds.known}
+
+
+def alias(type_: str) -> str:
+    """A name that says nothing but is the same for the same type: letters and digits only."""
+    return "T" + type_.encode().hex()
+
+
+def canonical(types: Types) -> str:
+    """The same definitions in names of ours, the message's own first and without its `MSG:` line."""
+    parts = ["".join(f"{field.line}\n" for field in fields) for fields in types.values()]
+    headings = [f"MSG: {PACKAGE}/{alias(name)}\n" for name in types]
+    separator = "=" * 80 + "\n"
+    return parts[0] + "".join(f"{separator}{h}{p}" for h, p in zip(headings[1:], parts[1:], strict=True))
+
+
+def _sections(type_: str, definition: str) -> Iterator[tuple[str, tuple[str, ...]]]:
+    name: str | None = type_
+    lines: list[str] = []
+    for raw in definition.split("\n"):
+        line = raw.split("#", 1)[0].strip()
+        if line and set(line) == {"="}:
+            yield _named(name), tuple(lines)
+            name, lines = None, []
+        elif name is None and line:
+            if not line.startswith("MSG: "):
+                raise DefinitionError("a part of the definition has no `MSG:` line")
+            name = line.removeprefix("MSG: ").strip()
+        elif line and "=" not in line:  # with one it is a constant, and constants are not sent
+            lines.append(line)
+    yield _named(name), tuple(lines)
+
+
+def _named(name: str | None) -> str:
+    if name is None or not _NAME.fullmatch(name):
+        raise DefinitionError(f"no message type: {name!r}")
+    return name
+
+
+def _fields(owner: str, lines: tuple[str, ...]) -> Iterator[Field]:
+    if len(lines) > MAX_FIELDS:
+        raise DefinitionError(f"{owner} has too many fields")
+    names: set[str] = set()
+    for number, line in enumerate(lines):
+        match = _FIELD.fullmatch(line)
+        if match is None or match["name"] in names:
+            raise DefinitionError(f"not a field: {line!r}")
+        names.add(match["name"])
+        yield Field(
+            name=match["name"],
+            attribute=f"f{number}",
+            type=_resolved(owner, match["type"]),
+            array=match["array"] is not None,
+            size=int(match["size"]) if match["size"] else None,
+        )
+
+
+def _resolved(owner: str, type_: str) -> str:
+    if type_ in PRIMITIVES or type_ in _CLOCKS or "/" in type_:
+        return type_
+    if type_ in _SYNONYMS:
+        return _SYNONYMS[type_]
+    return "std_msgs/Header" if type_ == "Header" else f"{owner.split('/', 1)[0]}/{type_}"
+
+
+class _Bound(NamedTuple):
+    """What decoding one value takes at least: bytes, steps, and levels of nesting."""
+
+    size: int
+    steps: int
+    levels: int
+
+
+class _Bounds:
+    """Follows every type once. Steps stay in proportion to bytes: few bytes cannot cost much time."""
+
+    def __init__(self, types: Types) -> None:
+        self._types = types
+        self.known: dict[str, _Bound] = {}
+
+    def check(self, type_: str, *, depth: int) -> _Bound:
+        """Raises DefinitionError for loops, missing types and what grows out of proportion."""
+        if type_ in self.known:
+            return self.known[type_]
+        if depth > MAX_DEPTH or type_ not in self._types:
+            raise DefinitionError(f"{type_} nests too deeply or is not defined")
+        fields = self._types[type_]
+        inner = [self._field(field, depth) for field in fields]
+        bound = _Bound(
+            size=sum(b.size for b in inner),
+            steps=1 + sum(b.steps for b in inner),
+            levels=1 + max((b.levels for b in inner), default=0),
+        )
+        unrolled = sum(f.size or 1 for f in fields if f.type not in PRIMITIVES or f.type == "string")
+        if bound.levels > MAX_DEPTH or unrolled > MAX_UNROLLED:
+            raise DefinitionError(f"{type_} nests too deeply or has too long arrays")
+        if bound.steps > min(MAX_STEPS, STEPS_PER_BYTE * (1 + bound.size)):
+            raise DefinitionError(f"{type_} grows out of proportion")
+        self.known[type_] = bound
+        return bound
+
+    def _field(self, field: Field, depth: int) -> _Bound:
+        plain = field.primitive
+        one = _Bound(PRIMITIVES[field.type], 1, 0) if plain else self.check(field.type, depth=depth + 1)
+        if not field.array:
+            return one
+        if one.size == 0 or (field.size or 0) > MAX_ARRAY:
+            raise DefinitionError(f"{field.name} is an array without end")
+        if field.size is None:
+            return _Bound(4, 1, one.levels)
+        at_once = plain and field.type != "string"
+        return _Bound(field.size * one.size, 1 if at_once else 1 + field.size * one.steps, one.levels)

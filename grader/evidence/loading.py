@@ -1,0 +1,156 @@
+"""One pass over a container's records that gives a `Run`."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import PurePath
+from typing import Any
+
+from mcap import records as mcap
+
+from grader.errors import EvidenceError
+from grader.evidence.container import ContainerError, records
+from grader.evidence.events import EVIDENCE_VERSION, METADATA_NAME, PACKAGE_TOPIC, TOPICS
+from grader.evidence.run import Channel, Message, Run
+
+MAX_MESSAGES = 2_000_000
+MAX_CHANNELS = 4_096
+
+_FIELDS = {
+    "processes": "/grader/process",
+    "console": "/grader/console",
+    "graph": "/grader/graph",
+    "params": "/grader/param",
+    "host": "/grader/host",
+    "actors": "/grader/actor",
+    "recorder": "/grader/recorder",
+    "course": "/grader/scenario",
+}
+
+
+class Loading:
+    """Collects by channel and decodes nothing; only the grader's own JSON channels are read into records."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._schemas: dict[int, mcap.Schema] = {}
+        self._channels: dict[int, mcap.Channel] = {}
+        self._messages: dict[int, list[Message]] = defaultdict(list)
+        self._attachments: dict[str, bytes] = {}
+        self._metadata: dict[str, str] | None = None
+
+    def read(self, data: bytes) -> Run:
+        """Raises EvidenceError for another format, and what `container.records` and pydantic raise."""
+        count = 0
+        for record in records(data):
+            if isinstance(record, mcap.Message):
+                count += 1
+                if count > MAX_MESSAGES:
+                    raise ContainerError(f"more than {MAX_MESSAGES} messages")
+                self._messages[record.channel_id].append(
+                    Message(record.log_time, record.sequence, record.data)
+                )
+            else:
+                self._describe(record)
+        if unknown := self._messages.keys() - self._channels.keys():
+            raise ContainerError(f"messages on channels that are not there: {sorted(unknown)}")
+        for messages in self._messages.values():
+            messages.sort(key=lambda message: message.log_time_ns)
+        return self._run()
+
+    def _describe(self, record: mcap.McapRecord) -> None:
+        if isinstance(record, mcap.Schema):
+            self._schemas.setdefault(record.id, record)
+        elif isinstance(record, mcap.Channel):
+            self._channels.setdefault(record.id, record)
+            if len(self._channels) > MAX_CHANNELS:
+                raise ContainerError(f"more than {MAX_CHANNELS} channels")
+        elif isinstance(record, mcap.Attachment):
+            self._attachments[record.name] = record.data
+        elif isinstance(record, mcap.Metadata) and record.name == METADATA_NAME and self._metadata is None:
+            self._metadata = record.metadata
+
+    def _run(self) -> Run:
+        about = self._about()
+        times = [t for m in self._messages.values() for t in (m[0].log_time_ns, m[-1].log_time_ns)]
+        own: dict[str, Any] = {}
+        if self._metadata is not None:
+            own = {name: self._events(topic) for name, topic in _FIELDS.items()}
+            own["package_json"] = self._package()
+        return Run(
+            evidence=self._name,
+            metadata=self._metadata or {},
+            start_ns=min(times, default=0),
+            end_ns=max(times, default=0),
+            channels=self._ros_channels(),
+            attachments=self._attachments,
+            **about,
+            **own,
+        )
+
+    def _about(self) -> dict[str, Any]:
+        if self._metadata is None:
+            return {"scenario": PurePath(self._name).stem, "clock": "real", "warp": 1.0}
+        version = self._metadata.get("format")
+        if version != EVIDENCE_VERSION:
+            raise EvidenceError(
+                f"{self._name}: evidence of format {version!r}, and this grader reads {EVIDENCE_VERSION!r}",
+                hint="use the version of the grader that recorded it",
+            )
+        try:
+            scenario, clock = self._metadata["scenario"], self._metadata["clock"]
+            return {"scenario": scenario, "clock": clock, "warp": float(self._metadata["warp"])}
+        except (KeyError, ValueError) as error:
+            raise ContainerError("its metadata does not say scenario, clock and warp") from error
+
+    def _ros_channels(self) -> tuple[Channel, ...]:
+        """Channels that differ in nothing (a publisher that connected twice) become one."""
+        merged: dict[tuple[str, str, str, str, str], tuple[bool, list[Message]]] = {}
+        for number, channel in self._channels.items():
+            if channel.message_encoding != "ros1":
+                continue
+            schema = self._schemas.get(channel.schema_id)
+            about = channel.metadata
+            key = (
+                channel.topic,
+                about.get("callerid", ""),
+                schema.name if schema else "",
+                about.get("md5sum", ""),
+                schema.data.decode(errors="replace") if schema else "",
+            )
+            _, messages = merged.setdefault(key, (about.get("latching") in {"1", "true", "True"}, []))
+            messages.extend(self._messages.get(number, ()))
+        return tuple(
+            Channel(
+                topic=topic,
+                callerid=callerid,
+                type=type_,
+                md5sum=md5sum,
+                definition=definition,
+                latching=latching,
+                messages=tuple(sorted(messages, key=lambda message: message.log_time_ns)),
+            )
+            for (topic, callerid, type_, md5sum, definition), (latching, messages) in merged.items()
+        )
+
+    def _json(self, topic: str) -> list[Message]:
+        """Messages on the grader's own channel; one of that name that a node published is no JSON channel."""
+        found = [
+            message
+            for number, channel in self._channels.items()
+            if channel.topic == topic and channel.message_encoding == "json" and self._described(channel)
+            for message in self._messages.get(number, ())
+        ]
+        return sorted(found, key=lambda message: message.log_time_ns)
+
+    def _described(self, channel: mcap.Channel) -> bool:
+        schema = self._schemas.get(channel.schema_id)
+        return schema is not None and schema.encoding == "jsonschema"
+
+    def _events(self, topic: str) -> tuple[tuple[int, Any], ...]:
+        read = TOPICS[topic].model_validate_json
+        return tuple((message.log_time_ns, read(message.data)) for message in self._json(topic))
+
+    def _package(self) -> bytes | None:
+        messages = self._json(PACKAGE_TOPIC)
+        return messages[-1].data if messages else None

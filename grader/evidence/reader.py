@@ -1,0 +1,152 @@
+"""Reads evidence files: our own, and MCAP or bag files that other tools recorded from ROS 1."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.exceptions import McapError
+from pydantic import ValidationError
+from zstandard import ZstdError
+
+from grader.errors import EvidenceError
+from grader.evidence import bag
+from grader.evidence.container import MAX_FILE_BYTES, ContainerError
+from grader.evidence.loading import Loading
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+
+_DAMAGE = (
+    McapError,
+    ZstdError,
+    struct.error,
+    ValueError,
+    RuntimeError,
+    EOFError,
+    KeyError,
+    OverflowError,
+    MemoryError,
+)
+
+
+def load_run(source: Path | BinaryIO) -> Run:
+    """One recorded run. A file without the grader's metadata is a real-time run named after the file.
+
+    Raises EvidenceError, in one line that names the file, for whatever cannot be read to its end.
+    """
+    if not isinstance(source, Path):
+        name = Path(str(getattr(source, "name", "evidence.mcap"))).name
+        return _load(name, source.read(MAX_FILE_BYTES + 1))
+    with _readable(source):
+        with source.open("rb") as file:
+            head = file.read(len(bag.MAGIC))
+        if head == bag.MAGIC:
+            return bag.load_bag(source)
+        return _load(source.name, source.read_bytes(), shown=str(source))
+
+
+def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
+    """The runs of these files by scenario; a folder stands for its `*.mcap` and those of `evidence/` in it.
+
+    Raises EvidenceError where nothing is found, a file cannot be read, or two files hold the same scenario.
+    """
+    runs: dict[str, Run] = {}
+    origin: dict[str, Path] = {}
+    for path in _files(paths):
+        run = load_run(path)
+        if run.scenario in runs:
+            raise EvidenceError(
+                f"{origin[run.scenario]} and {path} both hold the scenario {run.scenario!r}",
+                hint="give the evidence of one submission at a time",
+            )
+        runs[run.scenario], origin[run.scenario] = run, path
+    return runs
+
+
+def package_facts(run: Run) -> PackageFacts:
+    """The package facts that the run carries (`package.mcap` does). Raises EvidenceError without any."""
+    if run.package_json is None:
+        raise EvidenceError(
+            f"{run.evidence}: holds no package facts", hint="give package.mcap of the same recording"
+        )
+    try:
+        return PackageFacts.model_validate_json(run.package_json)
+    except ValidationError as error:
+        raise EvidenceError(f"{run.evidence}: the package facts cannot be read: {_first(error)}") from error
+
+
+def _load(name: str, data: bytes, *, shown: str = "") -> Run:
+    shown = shown or name
+    if len(data) > MAX_FILE_BYTES:
+        raise EvidenceError(f"{shown}: larger than {MAX_FILE_BYTES >> 20} MiB")
+    if not data:
+        raise EvidenceError(f"{shown}: the file is empty")
+    try:
+        return Loading(name).read(data)
+    except ValidationError as error:
+        raise EvidenceError(
+            f"{shown}: a record of the grader's own cannot be read: {_first(error)}"
+        ) from error
+    except ContainerError as error:
+        raise EvidenceError(f"{shown}: not sound MCAP: {error}") from error
+    except _DAMAGE as error:
+        raise EvidenceError(f"{shown}: {_damage(data)}", hint="record it again, or copy it again") from error
+
+
+def _damage(data: bytes) -> str:
+    if not data.startswith(b"\x89MCAP"):
+        return "not an MCAP file"
+    return "damaged" if data.endswith(b"\x89MCAP0\r\n") else "cut short: it has no end"
+
+
+def _first(error: ValidationError) -> str:
+    """The first of pydantic's complaints in one line."""
+    fault = error.errors(include_url=False, include_input=False)[0]
+    place = ".".join(str(part) for part in fault["loc"])
+    return f"{error.title}{'.' + place if place else ''}: {fault['msg']}"
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    try:
+        if path.exists() and not path.is_file():
+            raise EvidenceError(f"{path}: not a file")
+        if path.exists() and path.stat().st_size > MAX_FILE_BYTES:
+            raise EvidenceError(f"{path}: larger than {MAX_FILE_BYTES >> 20} MiB")
+        yield
+    except OSError as error:
+        raise EvidenceError(f"{path}: {error.strerror or type(error).__name__}") from error
+
+
+def _files(paths: Iterable[Path]) -> list[Path]:
+    found: dict[Path, Path] = {}
+    for path in paths:
+        inside = _mcap_files(path) if path.is_dir() else [path]
+        if not inside:
+            raise EvidenceError(f"{path}: no evidence (*.mcap) in this folder or in evidence/ below it")
+        for file in inside:
+            found.setdefault(file.resolve(), file)
+    if not found:
+        raise EvidenceError(
+            "no evidence given", hint="name evidence files or a folder of a graded submission"
+        )
+    return list(found.values())
+
+
+def _mcap_files(folder: Path) -> list[Path]:
+    with _listable(folder):
+        places = (folder, folder / "evidence")
+        return [
+            f for p in places for f in sorted(p.glob("*.mcap")) if f.is_file() and not f.name.startswith(".")
+        ]
+
+
+@contextmanager
+def _listable(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise EvidenceError(f"{folder}: {error.strerror or type(error).__name__}") from error

@@ -1,0 +1,254 @@
+"""Writes evidence files. Equal calls in equal order give equal bytes."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+from collections.abc import Mapping
+from contextlib import suppress
+from io import BufferedIOBase
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any, BinaryIO, TypeAlias, cast
+
+from mcap.writer import CompressionType, Writer
+from pydantic import ValidationError
+from pydantic_core import PydanticSerializationError
+from typing_extensions import Self
+
+from grader import __version__
+from grader.errors import GraderError, HostError, OutputError
+from grader.evidence.events import EVIDENCE_VERSION, METADATA_NAME, PACKAGE_TOPIC, TOPICS
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+
+ReadableBuffer: TypeAlias = Any
+
+CHUNK_BYTES = 256 * 1024
+MAX_DEPTH = 32
+_FULL = {
+    errno.ENOSPC: "the disk is full",
+    errno.EDQUOT: "the disk quota is used up",
+    errno.EIO: "the disk failed",
+}
+
+
+class EvidenceStream:
+    """Evidence into any binary stream. Not for several threads at once. `finish` must come last."""
+
+    def __init__(
+        self, stream: IO[bytes], *, scenario: str, clock: str, warp: float, metadata: Mapping[str, str]
+    ) -> None:
+        self._mcap = Writer(
+            stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD, enable_data_crcs=True
+        )
+        self._mcap.start(profile="ros1", library=f"ros-lab-grader {__version__}")
+        own = {"format": EVIDENCE_VERSION, "scenario": scenario, "clock": clock, "warp": f"{warp:g}"}
+        entries = {**metadata, **own}
+        self._mcap.add_metadata(METADATA_NAME, {_text(k): _text(v) for k, v in entries.items()})
+        self._schemas: dict[tuple[str, bytes], int] = {}
+        self._channels: dict[tuple[str, str, str, str], list[int]] = {}
+        self._events: dict[str, list[int]] = {}
+
+    def register_channel(
+        self,
+        *,
+        topic: str,
+        callerid: str,
+        type: str,  # noqa: A002 - ROS's own word
+        md5sum: str,
+        definition: str,
+        latching: bool,
+    ) -> None:
+        """Makes a publisher's channel, which is there even if no message ever comes. Again: no effect."""
+        key = (topic, callerid, type, md5sum)
+        if key in self._channels:
+            return
+        schema = self._schema(_text(type), "ros1msg", definition.encode(errors="replace"))
+        about = {"callerid": callerid, "md5sum": md5sum, "latching": "1" if latching else "0", "topic": topic}
+        number = self._mcap.register_channel(
+            _text(topic), "ros1", schema, {name: _text(value) for name, value in about.items()}
+        )
+        self._channels[key] = [number, 0]
+
+    def message(
+        self,
+        *,
+        topic: str,
+        callerid: str,
+        type: str,  # noqa: A002 - ROS's own word
+        md5sum: str,
+        definition: str,
+        latching: bool,
+        log_time_ns: int,
+        data: bytes,
+    ) -> None:
+        """One message as sent, with its arrival (ns). The channel is made on first use."""
+        channel = self._channels.get((topic, callerid, type, md5sum))
+        if channel is None:
+            self.register_channel(
+                topic=topic,
+                callerid=callerid,
+                type=type,
+                md5sum=md5sum,
+                definition=definition,
+                latching=latching,
+            )
+            channel = self._channels[topic, callerid, type, md5sum]
+        self._mcap.add_message(channel[0], log_time_ns, data, log_time_ns, channel[1])
+        channel[1] += 1
+
+    def event(self, topic: str, log_time_ns: int, record: Record) -> None:
+        """One event on the JSON channel `topic` (one of `events.TOPICS`), whose record it must be."""
+        if type(record) is not TOPICS.get(topic):
+            raise TypeError(f"{type(record).__name__} does not belong on {topic}")
+        self._json(topic, log_time_ns, record)
+
+    def package(self, facts: PackageFacts, log_time_ns: int) -> None:
+        """The package facts, on `/grader/package`."""
+        self._json(PACKAGE_TOPIC, log_time_ns, facts)
+
+    def attach(self, name: str, data: bytes, log_time_ns: int, media_type: str) -> None:
+        """A file of the package as it was judged."""
+        self._mcap.add_attachment(log_time_ns, log_time_ns, _text(name), _text(media_type), data)
+
+    def finish(self) -> None:
+        """Writes what is left and the index. The stream stays open."""
+        self._mcap.finish()  # type: ignore[no-untyped-call] # mcap leaves this one out
+
+    def _json(self, topic: str, log_time_ns: int, record: Record) -> None:
+        data = _encoded(record)
+        channel = self._events.get(topic)
+        if channel is None:
+            model = json.dumps(type(record).model_json_schema(), sort_keys=True).encode()
+            schema = self._schema(f"grader.{type(record).__name__}", "jsonschema", model)
+            channel = self._events[topic] = [self._mcap.register_channel(topic, "json", schema), 0]
+        self._mcap.add_message(channel[0], log_time_ns, data, log_time_ns, channel[1])
+        channel[1] += 1
+
+    def _schema(self, name: str, encoding: str, data: bytes) -> int:
+        key = (name, data)
+        if key not in self._schemas:
+            self._schemas[key] = self._mcap.register_schema(name, encoding, data)
+        return self._schemas[key]
+
+
+class EvidenceWriter(EvidenceStream):
+    """An evidence file that appears whole or not at all: `with EvidenceWriter(path, …) as evidence: …`.
+
+    It is written beside `path` as `<name>.part` and takes its name when the block ends well. Every method raises
+    OutputError where the folder cannot be written and HostError where the disk gives out.
+    """
+
+    def __init__(
+        self, path: Path, *, scenario: str, clock: str, warp: float, metadata: Mapping[str, str]
+    ) -> None:
+        self._path = path
+        self._part = path.with_name(path.name + ".part")
+        self._file = _open(self._part)
+        stream = _Guarded(self._file, path)
+        try:
+            super().__init__(
+                cast("IO[bytes]", stream), scenario=scenario, clock=clock, warp=warp, metadata=metadata
+            )
+        except BaseException:
+            self.abort()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self.abort()
+
+    def close(self) -> None:
+        """Finishes the file and gives it its name."""
+        try:
+            self.finish()
+            self._file.flush()
+            os.fsync(self._file.fileno())
+            self._file.close()
+            self._part.replace(self._path)
+        except OSError as error:
+            self.abort()
+            raise _translated(error, self._path) from error
+        except BaseException:
+            self.abort()
+            raise
+
+    def abort(self) -> None:
+        """Leaves nothing behind."""
+        with suppress(OSError):  # what could not be flushed is thrown away anyway
+            self._file.close()
+        with suppress(OSError):
+            self._part.unlink()
+
+
+class _Guarded(BufferedIOBase):
+    """The part of a stream that the MCAP writer uses, with the machine's errors in one line."""
+
+    def __init__(self, file: BinaryIO, path: Path) -> None:
+        self._file = file
+        self._path = path
+
+    def write(self, data: ReadableBuffer) -> int:
+        try:
+            return self._file.write(data)
+        except OSError as error:
+            raise _translated(error, self._path) from error
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+
+def _open(part: Path) -> BinaryIO:
+    try:
+        part.parent.mkdir(parents=True, exist_ok=True)
+        return part.open("wb")
+    except OSError as error:
+        raise _translated(error, part) from error
+
+
+def _translated(error: OSError, path: Path) -> GraderError:
+    if error.errno in _FULL:
+        return HostError(
+            f"cannot write {path}: {_FULL[error.errno]}", hint="make room there, or choose another folder"
+        )
+    reason = error.strerror or type(error).__name__
+    return OutputError(f"cannot write {path}: {reason}", hint="choose a folder that can be written")
+
+
+def _text(text: str) -> str:
+    """Names come from hostile programs: what is not text becomes question marks."""
+    return text.encode(errors="replace").decode()
+
+
+def _encoded(record: Record) -> bytes:
+    """The record as JSON that can be read again; what could not be is brought into a form that can."""
+    try:
+        data = record.model_dump_json().encode()
+        if "value" in type(record).model_fields:
+            type(record).model_validate_json(data)
+    except (PydanticSerializationError, ValidationError, UnicodeEncodeError):
+        return type(record).model_validate(_plain(record)).model_dump_json().encode()
+    return data
+
+
+def _plain(value: object, depth: int = 0) -> Any:  # noqa: ANN401 - JSON
+    if depth > MAX_DEPTH:
+        return "(nested too deeply)"
+    if isinstance(value, Record):
+        value = dict(value)
+    if isinstance(value, dict):
+        return {_text(str(key)): _plain(item, depth + 1) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item, depth + 1) for item in value]
+    if value is None or isinstance(value, (bool, int, float)):
+        return value
+    return _text(str(value))
