@@ -9,7 +9,8 @@ from pydantic import Field
 from grader.model.record import Record
 
 Seconds = Annotated[float, Field(ge=0)]
-Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")]
+NAME_PATTERN = r"^[a-z][a-z0-9-]*$"
+Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 
 
 class Start(Record):
@@ -28,7 +29,8 @@ class Start(Record):
 class Probe(Record):
     """Messages that the grader makes up for this run and publishes once the student's node has subscribed.
 
-    `text` random strings, `integers` random values of the type's range, and the values of `among`, shuffled together.
+    `text` random strings, `integers` random values of the type's range, and the values of `among`, shuffled
+    together.
     """
 
     topic: str
@@ -42,17 +44,17 @@ class Probe(Record):
 class Until(Record):
     """When a run has seen enough. All conditions that are given must hold.
 
-    `window_s`: that long after the first message on every topic of `topics` (a topic that stays silent stops being
-    waited for when `silent_s` have passed since the first message on another). `messages`: so many messages on each
-    topic. `connected`: a student's publisher and a student's subscriber are connected over the topic. `heard`: every
-    probe's value was printed.
-    A run gives up when no message came within `first_message_s`, when all topics that are waited for have been silent
-    for `silent_s`, or after `limit_s`.
+    `window_s`: that long after the first message on every topic of `topics` (a topic that stays silent stops
+    being waited for when `silent_s` have passed since the first message on another). `messages`: so many messages
+    on each topic. `connected`: a student's publisher and a student's subscriber are connected over the topic.
+    `heard`: every probe's value was printed.
+    A run gives up when no message came within `first_message_s`, when all topics that are waited for have been
+    silent for `silent_s`, or after `limit_s`.
     """
 
     window_s: Seconds | None = None
     topics: tuple[str, ...] = ()
-    messages: dict[str, int] = {}
+    messages: Annotated[dict[str, int], Field(default_factory=dict)]
     connected: tuple[str, ...] = ()
     heard: bool = False
     first_message_s: Seconds = 20.0
@@ -74,14 +76,14 @@ class Scenario(Record):
 class Criterion(Record):
     """One line of the report. `with` holds the check's own parameters.
 
-    `requires` names criteria that explain why there may be nothing to judge here: this criterion is then `blocked`.
+    `requires` names criteria that explain why there may be nothing to judge here: this one is then `blocked`.
     """
 
     id: Name
     title: str
     points: Annotated[float, Field(ge=0)]
     check: str
-    parameters: Annotated[dict[str, Any], Field(alias="with")] = {}
+    parameters: Annotated[dict[str, Any], Field(alias="with", default_factory=dict)]
     scenario: Name | None = None
     requires: tuple[Name, ...] = ()
     visibility: Literal["visible", "hidden"] = "visible"
@@ -90,7 +92,10 @@ class Criterion(Record):
 
 
 class Rubric(Record):
-    """A lab. `pass_mark` in points; without one, every visible criterion must be reached. `digits` rounds points."""
+    """A lab. `pass_mark` in points; without one, every visible criterion must be reached.
+
+    `digits` is how many decimals points keep.
+    """
 
     schema_: Annotated[Literal["grader.rubric/1"], Field(alias="schema")]
     id: Name

@@ -1,0 +1,1 @@
+"""One plain function a command: keyword arguments as parsed, the exit code as its result."""

@@ -1,0 +1,76 @@
+"""The one place that prints errors and picks exit codes."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+
+from grader.errors import ExitCode, GraderError, RubricError
+
+SIGPIPE_CODE = 141  # what a shell reports for a program that a closed pipe ended
+
+
+def guarded(command: Callable[[], int], *, debug: bool) -> int:
+    """Run the command; whatever it raises becomes lines on stderr and an exit code."""
+    try:
+        code = int(command())
+        flush()
+    except BrokenPipeError:
+        _drop_stdout()
+        return SIGPIPE_CODE
+    except KeyboardInterrupt:
+        _say("grader: interrupted")
+        return ExitCode.INTERRUPTED
+    except GraderError as error:
+        _trace(debug)
+        report(error)
+        return error.exit_code
+    except Exception as error:  # noqa: BLE001 - the last place: nobody above could show it in one line
+        _trace(debug)
+        _say(f"grader: internal error: {type(error).__name__}: {_line(error)}{'' if debug else DEBUG_HINT}")
+        return ExitCode.NOT_GRADED
+    return code
+
+
+DEBUG_HINT = " (run with --debug for the traceback)"
+
+
+def report(error: GraderError) -> None:
+    """One line that says what is wrong, one that says what to do. A rubric's faults have a line each."""
+    faults = error.faults if isinstance(error, RubricError) else [error.message]
+    for fault in faults:
+        _say(f"grader: error: {_line(fault)}")
+    if error.hint:
+        _say(f"  hint: {_line(error.hint)}")
+
+
+def flush() -> None:
+    """Send what was printed, so that a closed pipe is met here and not while the interpreter ends."""
+    if sys.stdout is not None:
+        sys.stdout.flush()
+
+
+def _line(text: object) -> str:
+    from grader.report.text import visible  # noqa: PLC0415 - not needed where nothing goes wrong
+
+    return visible(str(text))
+
+
+def _say(line: str) -> None:
+    with suppress(OSError, ValueError):  # a closed stderr leaves nowhere to complain to
+        print(line, file=sys.stderr, flush=True)
+
+
+def _trace(debug: bool) -> None:
+    if debug:
+        with suppress(OSError, ValueError):
+            traceback.print_exc()
+
+
+def _drop_stdout() -> None:
+    """Let the interpreter's own flush at its end go nowhere."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,55 @@
+"""`grader`: parse, dispatch, exit code."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib import import_module
+from io import TextIOWrapper
+from types import FrameType
+
+from grader.cli.errors import guarded
+from grader.cli.parser import build_parser
+
+
+def run(argv: Sequence[str]) -> int:
+    """Run one command line and return its exit code. Prints its errors itself; raises nothing."""
+    _prepare_streams()
+    _prepare_signals()
+    return guarded(lambda: _dispatch(argv), debug="--debug" in argv)
+
+
+def _dispatch(argv: Sequence[str]) -> int:
+    try:
+        options = vars(build_parser().parse_args(argv))
+    except SystemExit as done:  # --help and --version end this way
+        return int(done.code or 0)
+    options.pop("debug", None)
+    module = import_module(f"grader.cli.commands.{options.pop('module')}")
+    return int(module.run(**options))
+
+
+def _prepare_streams() -> None:
+    """A character that the terminal's encoding lacks is written out; a closed stream swallows."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: PTH123, SIM115 - a stream for the whole life
+        stream = getattr(sys, name)
+        if isinstance(stream, TextIOWrapper):
+            with suppress(ValueError):
+                stream.reconfigure(errors="backslashreplace")
+
+
+def _prepare_signals() -> None:
+    """A terminated grader cleans up as an interrupted one does. A shell's `&` must not leave Ctrl-C ignored."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGTERM, _interrupt)
+
+
+def _interrupt(_number: int, _frame: FrameType | None) -> None:
+    raise KeyboardInterrupt

@@ -1,0 +1,154 @@
+"""What the command line can say. Imports nothing heavy: `--help` is quick."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import NoReturn
+
+from grader import __version__
+from grader.errors import UsageError
+
+EXIT_CODES = """exit codes:
+  0    passed: the pass mark is reached (by default every visible criterion)
+  1    graded, below the pass mark
+  2    the command line or a rubric is wrong
+  3    could not be graded
+  4    inconclusive: a criterion could not be judged
+  130  interrupted
+"""
+
+
+class Parser(argparse.ArgumentParser):
+    """argparse, with its errors as ours: one line and exit code 2."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise UsageError."""
+        raise UsageError(message, hint=f"see {self.prog} --help")
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The whole command line. Each command sets `module`, and its options are its function's keywords."""
+    common = _common()
+    parser = Parser(
+        prog="grader",
+        description="Grades introductory ROS 1 labs.",
+        epilog=EXIT_CODES,
+        parents=[common],
+        allow_abbrev=False,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"grader {__version__}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True, title="commands", parser_class=Parser)
+    adder = _Adder(commands, common)
+    _grading(adder)
+    _evidence(adder)
+    _authoring(adder)
+    return parser
+
+
+def _common() -> argparse.ArgumentParser:
+    common = argparse.ArgumentParser(add_help=False)
+    common.add_argument(
+        "--debug", action="store_true", default=argparse.SUPPRESS, help="show tracebacks of errors"
+    )
+    return common
+
+
+class _Adder:
+    """Adds commands that are made alike."""
+
+    def __init__(self, commands: argparse._SubParsersAction[Parser], common: argparse.ArgumentParser) -> None:
+        self.commands = commands
+        self.common = common
+
+    def __call__(self, name: str, text: str, module: str = "") -> argparse.ArgumentParser:
+        parser = self.commands.add_parser(
+            name,
+            help=text,
+            description=text[0].upper() + text[1:] + ".",
+            epilog=EXIT_CODES,
+            parents=[self.common],
+            allow_abbrev=False,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        parser.set_defaults(module=module or name)
+        return parser
+
+
+def _grading(add: _Adder) -> None:
+    grade = add("grade", "grade one submission: a folder, a .zip or .tar.*, a git URL with @ref")
+    grade.add_argument("source", metavar="SOURCE")
+    _rubric(grade, required=True)
+    _out(grade, "results go to DIR/<submission id>/ (default: ./grader-results)")
+    grade.add_argument("--id", metavar="NAME", dest="submission_id", help="the submission's id")
+    _sandbox(grade)
+    _json(grade)
+
+    check = add("check", "check your own package before handing it in")
+    check.add_argument("path", metavar="PATH", nargs="?", default=".", help="default: this folder")
+    _rubric(check, required=False)
+    check.add_argument("--static", action="store_true", help="look at the files only, run nothing")
+    _out(check, "keep the results in DIR/<submission id>/ (default: they are only shown)")
+    _sandbox(check)
+    _json(check)
+
+
+def _evidence(add: _Adder) -> None:
+    judge = add("judge", "judge recorded evidence again; needs no ROS")
+    judge.add_argument(
+        "evidence", metavar="EVIDENCE", nargs="+", type=Path, help=".mcap files or folders of them"
+    )
+    _rubric(judge, required=True)
+    judge.add_argument(
+        "--out", metavar="FILE", default="-", help="where the criteria go as JSON (default: -)"
+    )
+
+    record = add("record", "record evidence without grading")
+    record.add_argument("source", metavar="SOURCE")
+    _rubric(record, required=False)
+    record.add_argument("--package", metavar="NAME", help="the package, where there are several")
+    record.add_argument("--script", metavar="FILE", action="append", default=[], help="a script to run")
+    record.add_argument("--launch", metavar="FILE", action="append", default=[], help="a launch file to run")
+    record.add_argument("--seconds", metavar="N", type=float, default=10.0, help="how long (default: 10)")
+    _out(record, "evidence goes to DIR", required=True)
+    _sandbox(record)
+
+    inspect = add("inspect", "say what is in an evidence file or a bag: rates, gaps, nodes")
+    inspect.add_argument("file", metavar="FILE", type=Path)
+    _json(inspect)
+
+
+def _authoring(add: _Adder) -> None:
+    _json(add("labs", "list the rubrics that come with the grader"))
+    explain = add("explain", "explain a check or a criterion: what, why, how it is measured, how to fix")
+    explain.add_argument("name", metavar="NAME", help="a check, a criterion, or LAB/criterion")
+    _json(add("doctor", "say what this machine can and cannot do, and what mends it"))
+
+    rubric = add("rubric", "work on rubrics")
+    parts = rubric.add_subparsers(metavar="COMMAND", required=True, title="commands", parser_class=Parser)
+    inner = _Adder(parts, add.common)
+    validate = inner("validate", "check rubric files; every fault is named", "rubric_validate")
+    validate.add_argument("files", metavar="FILE", nargs="+")
+    inner("schema", "print the JSON Schema of rubrics, for editors", "rubric_schema")
+
+
+def _rubric(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    parser.add_argument("--rubric", metavar="ID|FILE", required=required, help="see grader labs")
+
+
+def _out(parser: argparse.ArgumentParser, text: str, *, required: bool = False) -> None:
+    parser.add_argument("--out", metavar="DIR", type=Path, required=required, help=text)
+
+
+def _sandbox(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--sandbox",
+        choices=("auto", "require", "none"),
+        default="auto",
+        help="shut the student's code in: where possible, always, or not at all",
+    )
+
+
+def _json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", dest="as_json", help="print JSON")

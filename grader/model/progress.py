@@ -1,0 +1,36 @@
+"""How a station tells what it is doing, without knowing who shows it."""
+
+from __future__ import annotations
+
+from typing import Literal, Protocol
+
+StepState = Literal["waiting", "running", "done", "failed", "skipped"]
+
+
+class Progress(Protocol):
+    """Whoever shows the course of a run. Safe to call from any thread, cheap enough to call often."""
+
+    def step(
+        self,
+        name: str,
+        state: StepState,
+        detail: str = "",
+        expected_s: float | None = None,
+    ) -> None:
+        """One step (`intake`, `build`, a scenario's name) is now in `state`.
+
+        `detail` says what it does or waits for; `expected_s` is how long the whole step is likely to take.
+        """
+
+
+class Silence:
+    """Shows nothing."""
+
+    def step(
+        self,
+        name: str,
+        state: StepState,
+        detail: str = "",
+        expected_s: float | None = None,
+    ) -> None:
+        """Take note of nothing."""

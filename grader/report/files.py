@@ -1,0 +1,34 @@
+"""The files of one result, each whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from grader.files import atomic_write
+from grader.model.result import GradingResult
+from grader.report.hidden import without_hidden
+from grader.report.junit import junit
+from grader.report.markdown import markdown_report
+from grader.report.result_json import result_bytes
+from grader.report.text import visible
+from grader.rubric.model import Rubric
+
+
+def write_reports(
+    result: GradingResult, out_dir: Path, *, console: str, rubric: Rubric, keep_hidden: bool = True
+) -> tuple[Path, ...]:
+    """Write `result.json`, `report.md`, `junit.xml` and `console.log` into `out_dir`; gives their paths.
+
+    Without `keep_hidden`, hidden criteria are left out and their number said. Raises OutputError.
+    """
+    shown = result if keep_hidden else without_hidden(result, rubric)
+    hidden = len(result.criteria) - len(shown.criteria)
+    files = {
+        "result.json": result_bytes(shown),
+        "report.md": markdown_report(shown, rubric, hidden=hidden).encode(),
+        "junit.xml": junit(shown),
+        "console.log": visible(console, lines=True).encode(),
+    }
+    for name, data in files.items():
+        atomic_write(out_dir / name, data)
+    return tuple(out_dir / name for name in files)

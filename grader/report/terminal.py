@@ -1,0 +1,159 @@
+"""The report in a terminal: points, what was lost, then all. Readable at 80 columns and in a pipe."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import IO
+
+from rich.console import Console, Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from grader.model.result import CriterionResult, GradingResult
+from grader.model.verdict import Status
+from grader.report.text import clip, number, visible
+from grader.report.view import Loss, arrange, places, points_of
+from grader.rubric.model import Rubric
+
+LIMIT = 500
+STYLES = {
+    Status.PASS: "green",
+    Status.PARTIAL: "yellow",
+    Status.FAIL: "red",
+    Status.BLOCKED: "dim",
+    Status.INCONCLUSIVE: "yellow",
+    Status.ERROR: "magenta",
+    Status.MANUAL: "cyan",
+}
+MARKS = {
+    Status.PASS: ("✓", "+"),
+    Status.PARTIAL: ("◐", "~"),
+    Status.FAIL: ("✗", "x"),
+    Status.BLOCKED: ("⊘", "-"),
+    Status.INCONCLUSIVE: ("?", "?"),
+    Status.ERROR: ("!", "!"),
+    Status.MANUAL: ("•", "o"),
+}
+
+
+def open_console(file: IO[str]) -> Console:
+    """A console that takes no text for markup. Colour on a terminal only; 80 columns where there is none."""
+    terminal = file.isatty()
+    return Console(
+        file=file,
+        markup=False,
+        emoji=False,
+        highlight=False,
+        soft_wrap=False,
+        width=None if terminal else 80,
+        legacy_windows=False,
+    )
+
+
+def print_report(result: GradingResult, rubric: Rubric, console: Console, *, hidden: int = 0) -> None:
+    """Print the whole report. `hidden` is how many criteria are left out of it."""
+    Terminal(console).report(result, rubric, hidden)
+
+
+class Terminal:
+    """Prints by the console's own means: `plain` where its encoding has no ✓."""
+
+    def __init__(self, console: Console) -> None:
+        self.console = console
+        self.plain = not _has_marks(console.encoding)
+
+    def report(self, result: GradingResult, rubric: Rubric, hidden: int) -> None:
+        view = arrange(result, rubric)
+        parts: list[RenderableType] = [self._head(result, rubric)]
+        parts += self._losses("Lost", view.lost)
+        parts += self._losses("Still open: no points are lost for good", view.open)
+        parts += self._section("Advice, costs nothing", [self._advice(c) for c in view.advice])
+        parts += self._section("All criteria", [self._table(result.criteria)])
+        if hidden:
+            words = "1 hidden criterion is" if hidden == 1 else f"{hidden} hidden criteria are"
+            parts.append(Text(f"\n{words} left out here."))
+        with self.console.capture() as capture:
+            for part in parts:
+                self.console.print(part, overflow="fold")
+        self.console.file.write("".join(f"{line.rstrip()}\n" for line in capture.get().splitlines()))
+
+    def _head(self, result: GradingResult, rubric: Rubric) -> Text:
+        points = f"{number(result.points)} of {number(result.max_points)} points"
+        text = Text.assemble((points, "bold"), "  ", self._show(result.submission.id), "\n")
+        text.append(self._show(f"{result.rubric.id}: {rubric.title}"), "dim")
+        return text
+
+    def _section(self, title: str, parts: list[RenderableType]) -> list[RenderableType]:
+        return [Text(f"\n{title}", "bold"), *parts] if parts else []
+
+    def _losses(self, title: str, losses: tuple[Loss, ...]) -> list[RenderableType]:
+        width = max((len(loss.criterion.id) for loss in losses), default=0)
+        parts = [self._loss(loss, min(width, 20)) for loss in losses]
+        return self._section(title, [x for part in parts for x in (part, Text())][:-1])
+
+    def _loss(self, loss: Loss, width: int) -> RenderableType:
+        c = loss.criterion
+        head = self._line(c, c.message or c.title, width)
+        rows = [("measured", c.measured), ("expected", c.expected), ("hint", c.hint), ("see", c.reproduce)]
+        rows.append(("where", ", ".join(places(c))))
+        rows.append(("blocks", ", ".join(f"{b.id} {points_of(b)}" for b in loss.blocked)))
+        return Group(head, Padding(self._rows(rows), (0, 0, 0, 4)))
+
+    def _advice(self, criterion: CriterionResult) -> RenderableType:
+        head = self._line(criterion, criterion.message or criterion.title)
+        return Group(head, Padding(self._rows([("hint", criterion.hint)]), (0, 0, 0, 4)))
+
+    def _line(self, criterion: CriterionResult, words: str, width: int = 0) -> Table:
+        """`✗ chatter-rate  0/10  fail  /chatter came at 5.02 Hz, not 10 Hz`, wrapped in its column."""
+        grid = Table.grid(padding=(0, 2, 0, 0))
+        grid.add_column(no_wrap=True, min_width=width + 2)
+        grid.add_column(no_wrap=True, min_width=4)
+        grid.add_column(no_wrap=True)
+        grid.add_column(overflow="fold")
+        style = STYLES[criterion.status]
+        grid.add_row(
+            Text(f"{self._mark(criterion.status)} {self._show(criterion.id)}", style),
+            Text(points_of(criterion)),
+            Text(criterion.status.value, style),
+            Text(self._show(words)),
+        )
+        return grid
+
+    def _rows(self, rows: Iterable[tuple[str, str]]) -> Table:
+        grid = Table.grid(padding=(0, 2, 0, 0))
+        grid.add_column(no_wrap=True, style="dim")
+        grid.add_column(overflow="fold")
+        for name, value in rows:
+            if value:
+                grid.add_row(Text(name), Text(self._show(value)))
+        return grid
+
+    def _table(self, criteria: Iterable[CriterionResult]) -> Table:
+        table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False, header_style="dim", pad_edge=False)
+        table.add_column("points", justify="right", no_wrap=True)
+        table.add_column("status", no_wrap=True)
+        table.add_column("criterion", no_wrap=True)
+        table.add_column("measured", overflow="fold", ratio=1)
+        for c in criteria:
+            points = Text(points_of(c))
+            status = Text(f"{self._mark(c.status)} {c.status.value}", STYLES[c.status])
+            measured = c.measured or (c.title if c.status is Status.PASS else c.message)
+            table.add_row(points, status, Text(self._show(c.id)), Text(self._show(clip(measured, 120))))
+        return table
+
+    def _mark(self, status: Status) -> str:
+        return MARKS[status][1 if self.plain else 0]
+
+    def _show(self, text: str) -> str:
+        """Harmless, of bounded length, and in characters that the terminal's encoding has."""
+        text = visible(clip(text, LIMIT))
+        return text.encode(self.console.encoding, "backslashreplace").decode(self.console.encoding)
+
+
+def _has_marks(encoding: str) -> bool:
+    try:
+        "".join(mark for mark, _ in MARKS.values()).encode(encoding)
+    except (UnicodeEncodeError, LookupError):
+        return False
+    return True

@@ -1,0 +1,87 @@
+"""A result put in the order in which it is read: what was lost first, with what it took along."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from grader.model.result import CriterionResult, GradingResult
+from grader.model.verdict import FileCitation, Status
+from grader.report.text import number
+from grader.rubric.model import Rubric
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loss:
+    """A criterion that was not reached, and those that it blocks (directly or through another)."""
+
+    criterion: CriterionResult
+    blocked: tuple[CriterionResult, ...] = ()
+
+    @property
+    def points(self) -> float:
+        """What it cost, the blocked ones included."""
+        return sum(c.max_points - c.points for c in (self.criterion, *self.blocked))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportView:
+    """`open`: a person or another run must settle it. `advice`: not reached, and worth nothing."""
+
+    lost: tuple[Loss, ...]
+    open: tuple[Loss, ...]
+    advice: tuple[CriterionResult, ...]
+
+
+OPEN = frozenset({Status.INCONCLUSIVE, Status.ERROR, Status.MANUAL})
+
+
+def arrange(result: GradingResult, rubric: Rubric) -> ReportView:
+    """Losses by their cost, the rubric's order where they cost the same."""
+    unreached = [c for c in result.criteria if c.status is not Status.PASS]
+    roots = {c.id: root_of(c, result, rubric) for c in unreached}
+    causes = {root for name, root in roots.items() if root != name}
+    losses = [
+        Loss(criterion=c, blocked=tuple(b for b in unreached if b is not c and roots[b.id] == c.id))
+        for c in unreached
+        if c.id in causes or (roots[c.id] == c.id and c.max_points > 0)
+    ]
+    losses.sort(key=lambda loss: -loss.points)
+    told = {c.id for loss in losses for c in (loss.criterion, *loss.blocked)}
+    return ReportView(
+        lost=tuple(loss for loss in losses if loss.criterion.status not in OPEN),
+        open=tuple(loss for loss in losses if loss.criterion.status in OPEN),
+        advice=tuple(c for c in unreached if c.id not in told),
+    )
+
+
+def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric) -> str:
+    """The id of the criterion that a blocked one comes down to; its own id for any other."""
+    by_id = {c.id: c for c in result.criteria}
+    requires = {c.id: c.requires for c in rubric.criteria}
+    seen = {criterion.id}
+    while criterion.status is Status.BLOCKED:
+        unmet = [by_id[i] for i in requires.get(criterion.id, ()) if i in by_id and i not in seen]
+        cause = next((c for c in unmet if c.status is not Status.PASS), None)
+        if cause is None:
+            break
+        seen.add(cause.id)
+        criterion = cause
+    return criterion.id
+
+
+def points_of(criterion: CriterionResult) -> str:
+    """`5/10`."""
+    return f"{number(criterion.points)}/{number(criterion.max_points)}"
+
+
+def places(criterion: CriterionResult) -> list[str]:
+    """Where it was seen: `src/talker.py:17`, `evidence/real.mcap /chatter 1.2 s to 3.4 s`."""
+    return [_place(citation) for citation in criterion.citations]
+
+
+def _place(citation: object) -> str:
+    if isinstance(citation, FileCitation):
+        return citation.file if citation.line is None else f"{citation.file}:{citation.line}"
+    stretch = [getattr(citation, "from_ns", None), getattr(citation, "to_ns", None)]
+    times = " to ".join(f"{ns / 1e9:.3f} s" for ns in stretch if ns is not None)
+    return f"{getattr(citation, 'evidence', '')} {getattr(citation, 'topic', '')} {times}".rstrip()

@@ -1,0 +1,161 @@
+"""What pydantic found wrong, in an author's words."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import types
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from grader.rubric.model import NAME_PATTERN
+from grader.rubric.source import Fault, KeyPath
+
+NAME_RULE = "must be lower-case letters, digits and hyphens, beginning with a letter"
+MUST_BE = {
+    "string_type": "text",
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "finite_number": "a finite number",
+    "int_type": "a whole number",
+    "int_parsing": "a whole number",
+    "int_from_float": "a whole number",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "dict_type": "a map of keys and values",
+    "model_type": "a map of keys and values",
+}
+BOUNDS = {
+    "greater_than_equal": ("ge", "at least"),
+    "greater_than": ("gt", "more than"),
+    "less_than_equal": ("le", "at most"),
+    "less_than": ("lt", "less than"),
+}
+
+
+def model_faults(model: type[BaseModel], data: object, base: KeyPath = ()) -> list[Fault]:
+    """Every fault of `data` as a `model`, as the key's path (below `base`) and what is wrong there.
+
+    `data` is read as JSON, strictly: text is no number, and a number no text.
+    """
+    try:
+        model.model_validate_json(json.dumps(data), strict=True)
+    except ValidationError as error:
+        found = _friendly(model, data, error.errors(include_url=False))
+        return [((*base, *path), message) for path, message in found]
+    return []
+
+
+def _friendly(model: type[BaseModel], data: object, details: Iterable[ErrorDetails]) -> list[Fault]:
+    """One fault for each path: the members of a union each complain, and are joined by "or"."""
+    by_path: dict[KeyPath, list[str]] = {}
+    for detail in details:
+        path = _data_path(data, detail)
+        message = _message(model, path, detail)
+        by_path.setdefault(path, [])
+        if message not in by_path[path]:
+            by_path[path].append(message)
+    return [(path, ", or ".join(messages)) for path, messages in by_path.items()]
+
+
+def _data_path(data: object, detail: ErrorDetails) -> KeyPath:
+    """The location as far as the data goes: pydantic also puts types' names into it."""
+    path: KeyPath = ()
+    for part in detail["loc"]:
+        if not _holds(data, part):
+            return (*path, part) if detail["type"] == "missing" else path
+        data = data[part]  # type: ignore[index]
+        path = (*path, part)
+    return path
+
+
+def _holds(data: object, part: str | int) -> bool:
+    if isinstance(data, dict):
+        return part in data
+    return isinstance(data, list) and isinstance(part, int) and part < len(data)
+
+
+def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str:
+    kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
+    words = {
+        "missing": lambda: "is missing",
+        "extra_forbidden": lambda: "is not known here" + did_you_mean(str(path[-1]), _keys(model, path[:-1])),
+        "string_pattern_mismatch": lambda: f"{_pattern(context['pattern'])}, not {shown(value)}",
+        "literal_error": lambda: _literal(value, context["expected"]),
+        "too_short": lambda: f"needs at least {context['min_length']}, has {context['actual_length']}",
+    }
+    if kind in words:
+        return words[kind]()
+    if kind in MUST_BE:
+        quotes = ": put it in quotes" if kind == "string_type" and isinstance(value, int | float) else ""
+        return f"must be {MUST_BE[kind]}, not {shown(value)}{quotes}"
+    if kind in BOUNDS:
+        key, bound = BOUNDS[kind]
+        return f"must be {bound} {context[key]:g}, not {shown(value)}"
+    return str(context.get("error", detail["msg"])).removeprefix("Value error, ")
+
+
+def _pattern(pattern: str) -> str:
+    return NAME_RULE if pattern == NAME_PATTERN else f"must match {pattern}"
+
+
+def _literal(value: object, expected: str) -> str:
+    """pydantic gives what it expects as `'real' or 'warped'`."""
+    words = expected.replace(" or ", ", ").replace("'", "").split(", ")
+    near = did_you_mean(value, words) if isinstance(value, str) else ""
+    return f"must be {expected.replace(chr(39), chr(34))}, not {shown(value)}{near}"
+
+
+def shown(value: object) -> str:
+    """The value as YAML's author knows it, cut where it is long."""
+    if isinstance(value, dict):
+        return "a map"
+    if isinstance(value, list):
+        return "a list"
+    if value is None:
+        return "empty"
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 60 else text[:57] + "…"
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """` (did you mean "x"?)`, or nothing."""
+    near = difflib.get_close_matches(word, list(known), n=1)
+    return f' (did you mean "{near[0]}"?)' if near else ""
+
+
+def _keys(model: type[BaseModel], path: KeyPath) -> list[str]:
+    """The keys that the record at `path` knows."""
+    found: object = model
+    for part in path:
+        found = next(_inside(found, part), None)
+    return [f.alias or n for m in _models(found) for n, f in m.model_fields.items()]
+
+
+def _inside(annotation: object, part: str | int) -> Iterator[object]:
+    """The type of what is under `part`."""
+    for model in _models(annotation):
+        for name, field in model.model_fields.items():
+            if part in {name, field.alias}:
+                yield field.annotation
+    origin, arguments = get_origin(_bare(annotation)), get_args(_bare(annotation))
+    if origin is tuple and arguments:
+        yield arguments[0]
+    if origin is dict:
+        yield arguments[1]
+
+
+def _models(annotation: object) -> list[type[BaseModel]]:
+    annotation = _bare(annotation)
+    if get_origin(annotation) in {Union, types.UnionType}:
+        return [model for member in get_args(annotation) for model in _models(member)]
+    return [annotation] if isinstance(annotation, type) and issubclass(annotation, BaseModel) else []
+
+
+def _bare(annotation: object) -> object:
+    return get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation

@@ -1,0 +1,47 @@
+"""The JSON Schema (draft 2020-12) of a rubric, for editors: each check offers its own parameters and docs."""
+
+from __future__ import annotations
+
+from functools import reduce
+from operator import or_
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, create_model
+
+from grader.checks import CHECKS, HEADINGS, Check
+from grader.rubric.model import Criterion, Rubric
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def rubric_schema() -> dict[str, Any]:
+    """The schema; criteria are a union told apart by `check`."""
+    members: Any = reduce(or_, [_criterion(CHECKS[name]) for name in sorted(CHECKS)])
+    member = Annotated[members, Field(discriminator="check")]
+    criteria = Annotated[tuple[member, ...], Field(min_length=1)]
+    model = create_model("Rubric", __base__=Rubric, __doc__=Rubric.__doc__, criteria=(criteria, ...))
+    schema = model.model_json_schema(by_alias=True)
+    return {
+        "$schema": DIALECT,
+        **schema,
+        "title": "A rubric of grader",
+    }
+
+
+def _criterion(check: Check) -> type[Criterion]:
+    """The criterion's record with this check, its parameters and its docs in place."""
+    needs_parameters = any(f.is_required() for f in check.params.model_fields.values())
+    parameters = Field(alias="with") if needs_parameters else Field(alias="with", default_factory=dict)
+    fields: dict[str, Any] = {
+        "check": (Literal[check.name], Field(description=check.title)),
+        "parameters": (check.params, parameters),
+    }
+    if check.needs_run:
+        fields["scenario"] = (Criterion.model_fields["scenario"].annotation, ...)
+    name = "Criterion_" + check.name.replace("-", "_")
+    return create_model(name, __base__=Criterion, __doc__=_docs(check), **fields)
+
+
+def _docs(check: Check) -> str:
+    parts = [f"{heading}: {check.sections[heading]}" for heading in HEADINGS if heading in check.sections]
+    return "\n\n".join([check.title, *parts])

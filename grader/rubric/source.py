@@ -1,0 +1,209 @@
+"""A rubric's YAML as plain data with the line of every key: read as `yaml.safe_load` would, within limits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import yaml
+
+from grader.errors import RubricError
+
+MAX_BYTES = 1_000_000
+MAX_NODES = 100_000
+MAX_DEPTH = 50
+MERGE_TAG = "tag:yaml.org,2002:merge"
+
+KeyPath = tuple[str | int, ...]
+Value: TypeAlias = "dict[str, Any] | list[Any] | str | int | float | None"
+Fault = tuple[KeyPath, str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """`data` as JSON could hold it; `lines` maps each key's path to its line, counted from 1."""
+
+    name: str
+    raw: bytes
+    data: Value
+    lines: dict[KeyPath, int]
+    faults: list[Fault] = field(default_factory=list)
+
+    def line(self, path: KeyPath) -> int:
+        """The line of the key, or of the nearest one above it."""
+        while path and path not in self.lines:
+            path = path[:-1]
+        return self.lines.get(path, 1)
+
+    def fault(self, path: KeyPath, message: str) -> str:
+        """`file:line: key.path: what is wrong`."""
+        where = f"{self.name}:{self.line(path)}: "
+        return where + (f"{dotted(path)}: {message}" if path else message)
+
+
+def dotted(path: KeyPath) -> str:
+    """`criteria[2].with.rate_hz`."""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text
+
+
+def read_source(path: Path, name: str) -> Source:
+    """The file's data. Raises RubricError where it is no YAML that a rubric could be."""
+    raw = _read(path, name)
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise RubricError([f"{name}:{line}: the file is not UTF-8: save it as UTF-8"]) from error
+    return _compose(text, raw, name)
+
+
+def _read(path: Path, name: str) -> bytes:
+    try:
+        with path.open("rb") as file:
+            raw = file.read(MAX_BYTES + 1)
+    except IsADirectoryError as error:
+        raise RubricError([f"{name}: is a folder, not a rubric file"]) from error
+    except FileNotFoundError as error:
+        raise RubricError([f"{name}: there is no such file"], hint="grader labs lists the rubrics") from error
+    except OSError as error:
+        raise RubricError([f"{name}: cannot be read: {error.strerror}"]) from error
+    if len(raw) > MAX_BYTES:
+        raise RubricError([f"{name}: is larger than 1 MB; a rubric is a few kilobytes"])
+    return raw
+
+
+def _compose(text: str, raw: bytes, name: str) -> Source:
+    loader: yaml.SafeLoader | None = None
+    try:
+        loader = yaml.SafeLoader(text)
+        node = loader.get_single_node()
+        if node is None:
+            raise RubricError([f"{name}:1: the file is empty"])
+        reader = _Reader(loader)
+        data = reader.read(node, ())
+    except yaml.YAMLError as error:
+        raise RubricError([_yaml_fault(error, text, name)]) from error
+    except RecursionError as error:
+        raise RubricError([f"{name}:1: is nested too deeply"]) from error
+    finally:
+        if loader is not None:
+            loader.dispose()  # type: ignore[no-untyped-call]
+    return Source(name=name, raw=raw, data=data, lines=reader.lines, faults=reader.faults)
+
+
+def _yaml_fault(error: yaml.YAMLError, text: str, name: str) -> str:
+    """One line out of PyYAML's several."""
+    if isinstance(error, yaml.reader.ReaderError):
+        line = text.count("\n", 0, error.position) + 1
+        return f"{name}:{line}: a character that YAML does not allow (U+{ord(_char(error)):04X})"
+    mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+    problem = getattr(error, "problem", None) or "is not YAML"
+    if "'\\t'" in problem:
+        problem = "a tab: YAML is indented with spaces only"
+    return f"{name}:{mark.line + 1 if mark else 1}: {problem}"
+
+
+def _char(error: yaml.reader.ReaderError) -> str:
+    character = error.character
+    return chr(character) if isinstance(character, int) else str(character)
+
+
+class _Reader:
+    """Walks the composed nodes once, aliases expanded, and counts what it visits."""
+
+    def __init__(self, loader: yaml.SafeLoader) -> None:
+        self.loader = loader
+        self.lines: dict[KeyPath, int] = {}
+        self.faults: list[Fault] = []
+        self.visited = 0
+
+    def read(self, node: yaml.Node, path: KeyPath) -> Value:
+        self.visited += 1
+        if self.visited > MAX_NODES:
+            raise yaml.MarkedYAMLError(
+                problem="too much: aliases multiply to more than a rubric can hold",
+                problem_mark=node.start_mark,
+            )
+        if len(path) > MAX_DEPTH:
+            raise yaml.MarkedYAMLError(problem="is nested too deeply", problem_mark=node.start_mark)
+        self.lines.setdefault(path, node.start_mark.line + 1)
+        if isinstance(node, yaml.MappingNode):
+            return self._mapping(node, path)
+        if isinstance(node, yaml.SequenceNode):
+            return [self.read(item, (*path, index)) for index, item in enumerate(node.value)]
+        return self._scalar(node, path)
+
+    def _mapping(self, node: yaml.MappingNode, path: KeyPath) -> dict[str, Any]:
+        data: dict[str, Any] = {}
+        own: set[str] = set()
+        for merge_node in [value for key, value in node.value if key.tag == MERGE_TAG]:
+            data = {**self._merge(merge_node, path), **data}
+        for key_node, value_node in node.value:
+            key = self._key(key_node, path)
+            if key is None:
+                continue
+            line = key_node.start_mark.line + 1
+            if key in own:
+                self.faults.append(((*path, key), f"is given twice, again in line {line}"))
+                continue
+            own.add(key)
+            data[key] = self.read(value_node, (*path, key))
+            self.lines[(*path, key)] = line
+        return data
+
+    def _merge(self, node: yaml.Node, path: KeyPath) -> dict[str, Any]:
+        """`<<: *anchor`, or a list of them, of which the first wins."""
+        if isinstance(node, yaml.MappingNode):
+            return self._mapping(node, path)
+        if isinstance(node, yaml.SequenceNode) and all(isinstance(n, yaml.MappingNode) for n in node.value):
+            parts = [self._mapping(item, path) for item in reversed(node.value)]
+            return {key: value for part in parts for key, value in part.items()}
+        raise yaml.MarkedYAMLError(problem="<< takes a map or a list of maps", problem_mark=node.start_mark)
+
+    def _key(self, node: yaml.Node, path: KeyPath) -> str | None:
+        if node.tag == MERGE_TAG:
+            return None
+        if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:str":
+            return str(node.value)
+        shown = node.value if isinstance(node, yaml.ScalarNode) else "this"
+        line = node.start_mark.line + 1
+        self.faults.append((path, f"{shown} in line {line} is no text: put the key in quotes"))
+        return None
+
+    def _scalar(self, node: yaml.Node, path: KeyPath) -> Value:
+        try:
+            value = self.loader.construct_object(node)  # type: ignore[no-untyped-call]
+        except (ValueError, OverflowError) as error:
+            problem = f"{node.value[:40]} cannot be read"
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark) from error
+        if value is None or isinstance(value, bool | int | str):
+            return value
+        if isinstance(value, float):
+            return value if math.isfinite(value) else self._refuse(path, f"must be finite, not {node.value}")
+        return self._refuse(path, f"must be text or a number: put {node.value[:40]} in quotes", node.value)
+
+    def _refuse(self, path: KeyPath, message: str, stand_in: Value = 0.0) -> Value:
+        self.faults.append((path, message))
+        return stand_in
+
+
+def as_map(value: object) -> dict[str, Any]:
+    """The value where it is a map, else an empty one."""
+    return value if isinstance(value, dict) else {}
+
+
+def as_maps(value: object) -> list[tuple[int, dict[str, Any]]]:
+    """The maps in a list, each with its place in the list."""
+    items = value if isinstance(value, list) else []
+    return [(index, item) for index, item in enumerate(items) if isinstance(item, dict)]
+
+
+def as_texts(value: object) -> list[tuple[int, str]]:
+    """The texts in a list, each with its place in the list."""
+    items = value if isinstance(value, list) else []
+    return [(index, item) for index, item in enumerate(items) if isinstance(item, str)]
