@@ -168,17 +168,12 @@ def _zero(base: str) -> Value:
 
 
 def _checked(base: str, value: Value) -> Value:
-    if base == "string":
-        wanted: tuple[type, ...] = (str,)
-    elif base.startswith("float"):
-        wanted = (int, float)
-    else:
-        wanted = (int,)
+    wanted = {"string": str, "bool": bool}.get(base, (int, float) if base.startswith("float") else int)
     if not isinstance(value, wanted) or (isinstance(value, bool) and base != "bool"):
         raise ValueError(f"{value!r} is no {base}")
-    if wanted == (int,) and base != "bool":
+    if wanted is int:
         bits = 8 * PRIMITIVES[_dtype(base)]
-        low, high = (0, 2**bits) if _dtype(base).startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1))
-        if not low <= value < high:
+        low = 0 if _dtype(base).startswith("u") else -(1 << bits - 1)
+        if not low <= int(value) < low + (1 << bits):
             raise ValueError(f"{value} is out of range for {base}")
     return value

@@ -137,8 +137,8 @@ class EvidenceStream:
 class EvidenceWriter(EvidenceStream):
     """An evidence file that appears whole or not at all: `with EvidenceWriter(path, …) as evidence: …`.
 
-    It is written beside `path` as `<name>.part` and takes its name when the block ends well. Every method raises
-    OutputError where the folder cannot be written and HostError where the disk gives out.
+    It is written beside `path` as `<name>.part` and takes its name when the block ends well. Every method
+    raises OutputError where the folder cannot be written and HostError where the disk gives out.
     """
 
     def __init__(
@@ -147,11 +147,9 @@ class EvidenceWriter(EvidenceStream):
         self._path = path
         self._part = path.with_name(path.name + ".part")
         self._file = _open(self._part)
-        stream = _Guarded(self._file, path)
+        stream = cast("IO[bytes]", _Guarded(self._file, path))
         try:
-            super().__init__(
-                cast("IO[bytes]", stream), scenario=scenario, clock=clock, warp=warp, metadata=metadata
-            )
+            super().__init__(stream, scenario=scenario, clock=clock, warp=warp, metadata=metadata)
         except BaseException:
             self.abort()
             raise

@@ -1,0 +1,145 @@
+"""What is in an evidence file or bag: rates, nodes, processes, outcome."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from grader.evidence.reader import load_run
+from grader.evidence.run import Channel, Run, is_grader_node
+from grader.evidence.stats import RateStats, rate_stats
+from grader.model.record import Record
+
+
+class ChannelSummary(Record):
+    """One publisher on one topic. `readable`: the recorded definition could be followed and fits the messages."""
+
+    topic: str
+    type: str
+    publisher: str
+    md5sum: str
+    latching: bool
+    by_grader: bool
+    readable: bool
+    bytes: int
+    rate: RateStats
+
+
+class ProcessSummary(Record):
+    """Times in seconds from the file's first record; `exit_s` is None for a process whose end was not recorded."""
+
+    name: str
+    role: str
+    start_s: float | None
+    exit_s: float | None = None
+    exit_code: int | None = None
+    signal: int | None = None
+    stopped_by: str | None = None
+    cpu_s: float | None = None
+    max_rss_bytes: int | None = None
+
+
+class Inspection(Record):
+    """`kind` says who wrote the file: the grader, another tool (`mcap`), or `rosbag`.
+
+    `late_max_ms` is how late the machine's timer woke at worst, None where that was not recorded. `outcome` is None
+    for a file that is not the grader's and for a recording that was cut short.
+    """
+
+    file: str
+    kind: Literal["grader", "mcap", "bag"]
+    scenario: str
+    clock: str
+    warp: float
+    metadata: dict[str, str]
+    start_ns: int
+    duration_s: float
+    messages: int
+    channels: tuple[ChannelSummary, ...]
+    nodes: tuple[str, ...]
+    processes: tuple[ProcessSummary, ...]
+    console_lines: int
+    attachments: tuple[str, ...]
+    late_max_ms: float | None
+    outcome: str | None
+    outcome_detail: str
+
+
+def inspect_file(path: Path) -> Inspection:
+    """Reads an `.mcap` file (ours or another tool's) or a ROS 1 `.bag`. Raises EvidenceError."""
+    run = load_run(path)
+    kind: Literal["grader", "mcap", "bag"] = "mcap"
+    if run.metadata:
+        kind = "grader"
+    elif path.suffix == ".bag":
+        kind = "bag"
+    return inspect_run(run, kind=kind)
+
+
+def inspect_run(run: Run, *, kind: Literal["grader", "mcap", "bag"] = "grader") -> Inspection:
+    """The same of a run that has been read already."""
+    end = run.outcome
+    channels = sorted(run.channels, key=lambda channel: (channel.topic, channel.callerid))
+    return Inspection(
+        file=run.evidence,
+        kind=kind,
+        scenario=run.scenario,
+        clock=run.clock,
+        warp=run.warp,
+        metadata=dict(run.metadata),
+        start_ns=run.start_ns,
+        duration_s=(run.end_ns - run.start_ns) / 1e9,
+        messages=sum(len(channel.messages) for channel in channels),
+        channels=tuple(_channel(channel) for channel in channels),
+        nodes=_nodes(run),
+        processes=_processes(run),
+        console_lines=len(run.console),
+        attachments=tuple(sorted(run.attachments)),
+        late_max_ms=max((event.max_ms for _, event in run.host), default=None),
+        outcome=end.outcome if end else None,
+        outcome_detail=end.detail if end else "",
+    )
+
+
+def _channel(channel: Channel) -> ChannelSummary:
+    return ChannelSummary(
+        topic=channel.topic,
+        type=channel.type,
+        publisher=channel.callerid,
+        md5sum=channel.md5sum,
+        latching=channel.latching,
+        by_grader=channel.by_grader,
+        readable=all(value is not None for value in channel.values),
+        bytes=sum(len(message.data) for message in channel.messages),
+        rate=rate_stats(channel.times_ns),
+    )
+
+
+def _nodes(run: Run) -> tuple[str, ...]:
+    """All nodes ever seen but the grader's, publishers first where the graph was not recorded."""
+    seen = dict.fromkeys(run.student_nodes())
+    seen.update(
+        dict.fromkeys(c.callerid for c in run.channels if c.callerid and not is_grader_node(c.callerid))
+    )
+    return tuple(seen)
+
+
+def _processes(run: Run) -> tuple[ProcessSummary, ...]:
+    """Starts and exits of one name are paired in order."""
+    found: list[ProcessSummary] = []
+    for time_ns, event in run.processes:
+        at_s = (time_ns - run.start_ns) / 1e9
+        known = {"name": event.name, "role": event.role}
+        if event.event == "start":
+            found.append(ProcessSummary(**known, start_s=at_s))
+            continue
+        how = ("exit_code", "signal", "stopped_by", "cpu_s", "max_rss_bytes")
+        ended = ProcessSummary(
+            **known, start_s=None, exit_s=at_s, **{name: getattr(event, name) for name in how}
+        )
+        open_ = next((n for n, p in enumerate(found) if p.name == event.name and p.exit_s is None), None)
+        if open_ is None:
+            found.append(ended)
+        else:
+            found[open_] = ended.model_copy(update={"start_s": found[open_].start_s})
+    return tuple(found)
