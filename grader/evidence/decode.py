@@ -171,9 +171,9 @@ def _checked(base: str, value: Value) -> Value:
     wanted = {"string": str, "bool": bool}.get(base, (int, float) if base.startswith("float") else int)
     if not isinstance(value, wanted) or (isinstance(value, bool) and base != "bool"):
         raise ValueError(f"{value!r} is no {base}")
-    if wanted is int:
+    if isinstance(value, int) and wanted is int:
         bits = 8 * PRIMITIVES[_dtype(base)]
         low = 0 if _dtype(base).startswith("u") else -(1 << bits - 1)
-        if not low <= int(value) < low + (1 << bits):
+        if not low <= value < low + (1 << bits):
             raise ValueError(f"{value} is out of range for {base}")
     return value

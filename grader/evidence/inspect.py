@@ -12,7 +12,7 @@ from grader.model.record import Record
 
 
 class ChannelSummary(Record):
-    """One publisher on one topic. `readable`: the recorded definition could be followed and fits the messages."""
+    """One publisher on one topic. `readable`: the recorded definition fits every message."""
 
     topic: str
     type: str
@@ -26,7 +26,7 @@ class ChannelSummary(Record):
 
 
 class ProcessSummary(Record):
-    """Times in seconds from the file's first record; `exit_s` is None for a process whose end was not recorded."""
+    """Seconds from the file's first record; `exit_s` is None where the end was not recorded."""
 
     name: str
     role: str
@@ -42,8 +42,8 @@ class ProcessSummary(Record):
 class Inspection(Record):
     """`kind` says who wrote the file: the grader, another tool (`mcap`), or `rosbag`.
 
-    `late_max_ms` is how late the machine's timer woke at worst, None where that was not recorded. `outcome` is None
-    for a file that is not the grader's and for a recording that was cut short.
+    `late_max_ms` is how late the machine's timer woke at worst, None where that was not recorded. `outcome`
+    is None for a file that is not the grader's and for a recording that was cut short.
     """
 
     file: str

@@ -15,13 +15,14 @@ _T95 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262)
 
 
 class RateStats(Record):
-    """`mean_hz` is (count - 1) / (last - first). Without two messages at two times there is nothing to say: None.
+    """`mean_hz` is (count - 1) / (last - first), None without two messages at two times.
 
-    `period_low_s` to `period_high_s` is the 95 % confidence interval of the mean period, by batch means: the gaps
-    are cut into up to 10 consecutive batches, and Student's t is applied to the batches' mean periods. That stays
-    honest where gaps depend on each other, as they do with `rospy.Rate`, whose long gap is followed by a short one.
-    `gap_std_s` is the population's, as in `rostopic hz`; `gap_p95_s` is the smallest gap that 95 % do not exceed.
-    `periodic_share` is the share of gaps within ±50 % (ends included) of the nominal period, if one was given.
+    `period_low_s` to `period_high_s` is the 95 % confidence interval of the mean period, by batch means: the
+    gaps are cut into up to 10 consecutive batches, and Student's t is applied to the batches' mean periods.
+    That stays honest where gaps depend on each other, as they do with `rospy.Rate`, whose long gap is
+    followed by a short one. `gap_std_s` is the population's, as in `rostopic hz`; `gap_p95_s` is the smallest
+    gap that 95 % do not exceed. `periodic_share` is the share of gaps within ±50 % (ends included) of the
+    nominal period, if one was given.
     """
 
     count: int
@@ -39,7 +40,7 @@ class RateStats(Record):
 
 
 def rate_stats(times_ns: Sequence[int], *, nominal_hz: float | None = None) -> RateStats:
-    """The rate of messages that arrived at `times_ns` (any order). Raises ValueError if `nominal_hz` is not above 0."""
+    """The rate of messages that arrived at `times_ns`, in any order. Raises ValueError for a `nominal_hz` of 0."""
     if nominal_hz is not None and not nominal_hz > 0:
         raise ValueError("the nominal rate must be above 0 Hz")
     times = sorted(times_ns)

@@ -98,6 +98,8 @@ def _file(given: Facts) -> Facts:
         file["shebang"] = _shebang(file["shebang"], crlf=bool(file.get("crlf", False)))
     elif isinstance(file.get("shebang"), dict):
         file["shebang"] = {**_shebang(file["shebang"].get("text", ""), crlf=False), **file["shebang"]}
+    interpreter = (file.get("shebang") or {}).get("interpreter", "")
+    file.setdefault("python", str(given.get("path", "")).endswith(".py") or interpreter.startswith("python"))
     file["python_fault"] = _fault(file.get("python_fault"), str(given.get("path")))
     return file
 
