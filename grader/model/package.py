@@ -1,4 +1,4 @@
-"""Package facts: what the files of a package say, each with file and line. Parsed once, frozen, never executed.
+"""Package facts: what a package's files say, each with file and line. Parsed once, frozen, never executed.
 
 Paths are posix and relative to the package's root; lines count from 1.
 """
@@ -12,9 +12,10 @@ from grader.model.submission import ModeSource
 
 
 class Fault(Record):
-    """Why a file cannot be read as what it should be. `kind` is the parser's own word (`XMLSyntaxError`, `TabError`).
+    """Why a file cannot be read as what it should be.
 
-    `cause` is the same in a student's words, empty where the message says enough.
+    `kind` is the parser's own word (`XMLSyntaxError`, `TabError`). `cause` says the same in a student's
+    words, empty where the message says enough.
     """
 
     file: str
@@ -64,17 +65,26 @@ class CMakeCall(Record):
 
 
 class CMakeFacts(Record):
-    """`source` says who read it: CMake itself (`trace`, variables expanded, branches taken) or a parser (`parser`)."""
+    """`source` says who read it: CMake itself (`trace`: variables expanded, branches taken) or a `parser`.
+
+    `last_line` is where the last top-level command of the file begins. `stopped_line` is the last line that
+    CMake reached where it gave up before that one; the calls behind it are then the parser's.
+    """
 
     file: str
     source: Literal["trace", "parser"]
     calls: tuple[CMakeCall, ...]
     fault: Fault | None = None
+    last_line: int | None = None
+    stopped_line: int | None = None
 
 
 class Shebang(Record):
-    """The first line of a script after `#!`, without its line ending. `interpreter` is the program it comes down to:
-    for `/usr/bin/env python3` that is `python3`. `found` tells whether ROS's machine has that program."""
+    """The first line of a script after `#!`, without its line ending.
+
+    `interpreter` is the program it comes down to: for `/usr/bin/env python3` that is `python3`. `found` tells
+    whether ROS's machine has that program.
+    """
 
     text: str
     interpreter: str
@@ -85,8 +95,11 @@ class Shebang(Record):
 class SourceFile(Record):
     """One file of the package. `executable` is None where the source carries no modes.
 
-    `link` is the target of a symbolic link. `python_fault` is filled for files that are Python by name or shebang
-    and that ROS's Python does not compile.
+    `link` is the target of a symbolic link as it is written. A link to a file of the same package carries
+    that file's facts; any other has `link_problem`, size 0 and the digest of its target's text. `python`
+    marks files that are Python by name or shebang, `python_fault` those of them that ROS's Python does not
+    compile. `shebang_problem` says why the system cannot start a script by its first line ("" where it can,
+    and for files that are no scripts). `sha256` is empty for a file that cannot be read.
     """
 
     path: str
@@ -95,16 +108,35 @@ class SourceFile(Record):
     executable: bool | None
     mode_source: ModeSource
     link: str | None = None
+    link_problem: str = ""
     shebang: Shebang | None = None
+    shebang_problem: str = ""
     crlf: bool = False
     bom: bool = False
     encoding: str = "utf-8"
     binary: bool = False
+    python: bool = False
     python_fault: Fault | None = None
 
 
+class PythonSlip(Record):
+    """A slip in a Python file that compiles; it shows only when the node runs.
+
+    `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and
+    nodes get none.
+    """
+
+    file: str
+    line: int
+    kind: Literal["not-called", "input"]
+    message: str
+
+
 class LaunchNode(Record):
-    """One `<node>`, its attributes as written; an attribute that is not there is None."""
+    """One `<node>`, its attributes as written; an attribute that is not there is None.
+
+    `remaps` are those in force: those that come before it in `<launch>` and its `<group>`s, then its own.
+    """
 
     pkg: str | None
     type: str | None
@@ -118,7 +150,10 @@ class LaunchNode(Record):
 
 
 class LaunchFile(Record):
-    """`fault` is set where the file is not well-formed or does not begin with `<launch>`."""
+    """`fault` is set where the file is not well-formed or does not begin with `<launch>`.
+
+    Nodes and includes that a literal `if="false"` or `unless="true"` switches off are left out.
+    """
 
     path: str
     root: str | None
@@ -138,6 +173,7 @@ class PackageFacts(Record):
     files: tuple[SourceFile, ...]
     launch_files: tuple[LaunchFile, ...]
     hints: tuple[str, ...] = ()
+    slips: tuple[PythonSlip, ...] = ()
 
     def file(self, path: str) -> SourceFile | None:
         """The file at this path, or None."""

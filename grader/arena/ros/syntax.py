@@ -1,0 +1,193 @@
+"""Reads Python files without running them: `syntax.py ROOT FILE...`, or the files as a JSON array on stdin.
+
+Prints one JSON object a file, as soon as it is known, so that a file which crashes the interpreter can be
+told: `{"file": ..., "faults": [{"kind", "line", "column", "message", "text", "opened", "mixed"}], "slips":
+[{"line", "kind", "message"}]}`. `text` is the faulty line, `opened` the line of a bracket that is never
+closed, `mixed` whether the file indents with tabs and with spaces. Runs under ROS's own Python (3.8 and
+later), standard library only; nothing is imported from ROOT.
+"""
+
+import ast
+import contextlib
+import io
+import json
+import os
+import resource
+import sys
+import tokenize
+import warnings
+
+SIZE_LIMIT_BYTES = 2000000
+MEMORY_LIMIT_BYTES = 1 << 30
+CPU_LIMIT_S = 20
+TEXT_LIMIT = 300
+SLIPS_LIMIT = 100
+PAIRS = {")": "(", "]": "[", "}": "{"}
+ENCODINGS = (SyntaxError, LookupError, UnicodeDecodeError)
+
+
+def main(argv):
+    for limit, value in (
+        (resource.RLIMIT_AS, MEMORY_LIMIT_BYTES),
+        (resource.RLIMIT_CPU, CPU_LIMIT_S),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        resource.setrlimit(limit, (value, value))
+    warnings.simplefilter("ignore")
+    for name in argv[2:] or json.load(sys.stdin):
+        print(json.dumps(check(argv[1], name)), flush=True)
+
+
+def check(root, name):
+    report = {"file": name, "faults": [], "slips": []}
+    try:
+        with open(os.path.join(root, name), "rb") as file:
+            data = file.read(SIZE_LIMIT_BYTES + 1)
+    except OSError as error:
+        report["faults"].append(fault(type(error).__name__, None, None, str(error.strerror)))
+        return report
+    if len(data) > SIZE_LIMIT_BYTES:
+        return report
+    problem = undecodable(data)
+    if problem:
+        report["faults"].append(problem)
+        return report
+    try:
+        compile(data, os.path.basename(name), "exec", dont_inherit=True)
+    except (SyntaxError, ValueError, OverflowError, RecursionError, MemoryError) as error:
+        report["faults"].append(syntax_fault(error, data))
+        return report
+    with contextlib.suppress(
+        RecursionError, MemoryError
+    ):  # it compiles, and is nested too deep to be looked at
+        report["slips"] = slips(ast.parse(data))
+    return report
+
+
+def fault(kind, line, column, message, *, text="", opened=None, mixed=False):
+    return {
+        "kind": kind,
+        "line": line,
+        "column": column,
+        "message": message,
+        "text": text[:TEXT_LIMIT],
+        "opened": opened,
+        "mixed": mixed,
+    }
+
+
+def undecodable(data):
+    """The fault of a file whose bytes are no text. `compile` forgives them in comments, running does not."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return fault("SyntaxError", 1, None, "the file is UTF-16")
+    if b"\0" in data:
+        line = data.count(b"\n", 0, data.index(b"\0")) + 1
+        return fault("ValueError", line, None, "source code cannot contain null bytes")
+    try:
+        encoding, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
+    except ENCODINGS as error:
+        encoding = None if "unknown encoding" in str(error) else "utf-8"
+        if encoding is None:
+            return fault("SyntaxError", 1, None, str(error))
+    try:
+        data.decode(encoding)
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        message = "Non-UTF-8 code starting with '\\x%02x', but no encoding declared" % data[error.start]
+        return fault("SyntaxError", line, None, message)
+    except (LookupError, ValueError) as error:
+        return fault("SyntaxError", 1, None, str(error))
+    return None
+
+
+def syntax_fault(error, data):
+    encoding, _ = tokenize.detect_encoding(io.BytesIO(data).readline)
+    lines = io.StringIO(data.decode(encoding), newline=None).read().split("\n")
+    line = getattr(error, "lineno", None)
+    known = line is not None and 0 < line <= len(lines)
+    begins = {text[0] for text in lines if text[:1] in ("\t", " ") and text.strip()}
+    return fault(
+        type(error).__name__,
+        line if known else None,
+        getattr(error, "offset", None),
+        str(getattr(error, "msg", None) or error),
+        text=lines[line - 1] if known else "",
+        opened=never_closed(data, line) if known else None,
+        mixed=len(begins) > 1,
+    )
+
+
+def never_closed(data, line):
+    """The line of the outermost bracket that is opened up to `line` and not closed by the end of the file."""
+    stack = []
+    try:
+        for token in tokenize.tokenize(io.BytesIO(data).readline):
+            if token.type == tokenize.OP and token.string in "([{":
+                stack.append((token.string, token.start[0]))
+            elif (
+                token.type == tokenize.OP
+                and token.string in PAIRS
+                and stack
+                and stack[-1][0] == PAIRS[token.string]
+            ):
+                stack.pop()
+    except (tokenize.TokenError, SyntaxError):  # the end of the file, or where the tokens end
+        pass
+    return stack[0][1] if stack and stack[0][1] <= line else None
+
+
+def slips(tree):
+    """What compiles and is not meant: names that are not called, and questions to somebody at a keyboard."""
+    functions = {n.name for n in ast.walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
+    found = []
+    for node in ast.walk(tree):
+        name = uncalled(node, functions)
+        if name:
+            message = "`%s` is named but not called: write `%s()`" % (name, name)
+            found.append({"line": node.lineno, "kind": "not-called", "message": message})
+        name = asked(node, functions)
+        if name:
+            message = "`%s()` waits for somebody to type, and a node that is graded gets no input" % name
+            found.append({"line": node.lineno, "kind": "input", "message": message})
+    return sorted(found, key=lambda slip: slip["line"])[:SLIPS_LIMIT]
+
+
+def uncalled(node, functions):
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Attribute):
+        return dotted(node.value)
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Name) and node.value.id in functions:
+        return node.value.id
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+        return dotted(node.operand) if is_shutdown(node.operand) else None
+    if isinstance(node, (ast.While, ast.If)) and is_shutdown(node.test):
+        return dotted(node.test)
+    return None
+
+
+def is_shutdown(node):
+    return (isinstance(node, ast.Attribute) and node.attr == "is_shutdown") or (
+        isinstance(node, ast.Name) and node.id == "is_shutdown"
+    )
+
+
+def asked(node, functions):
+    if not isinstance(node, ast.Call):
+        return None
+    name = dotted(node.func)
+    if name in ("input", "raw_input"):
+        return None if name in functions else name
+    return name if name in ("sys.stdin.read", "sys.stdin.readline", "sys.stdin.readlines") else None
+
+
+def dotted(node):
+    """`a.b.c` as it is written; what stands before the dots and is no name becomes an ellipsis."""
+    parts = []
+    while isinstance(node, ast.Attribute):
+        parts.append(node.attr)
+        node = node.value
+    parts.append(node.id if isinstance(node, ast.Name) else "...")
+    return ".".join(reversed(parts))[:TEXT_LIMIT]
+
+
+if __name__ == "__main__":
+    main(sys.argv)

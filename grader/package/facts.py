@@ -1,0 +1,94 @@
+"""Package facts: everything that a package's files say, read once; nothing of the student's is executed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path, PurePosixPath
+
+from grader.model.package import Fault, PackageFacts, PythonSlip, SourceFile
+from grader.model.submission import SourcePackage
+from grader.package.cmake import read_cmake, refine_cmake
+from grader.package.files import Entry, Interpreters, read_files
+from grader.package.launch import read_launch_files
+from grader.package.manifest import read_manifest
+from grader.package.python import check_syntax
+from grader.package.reading import SOURCE_LIMIT_BYTES
+
+
+def read_package(
+    package: SourcePackage,
+    *,
+    hints: tuple[str, ...] = (),
+    cmake_trace: Path | None = None,
+    cmake_root: str | None = None,
+    python_faults: Mapping[str, Fault] | None = None,
+    interpreters: Interpreters | None = None,
+) -> PackageFacts:
+    """The facts of one package.
+
+    `cmake_trace` is a file that CMake wrote by `--trace-expand --trace-format=json-v1`, `cmake_root` the
+    package's folder as CMake saw it; without a trace, a parser reads `CMakeLists.txt`. `python_faults` are
+    those that ROS's own Python found, by path; without them, this Python looks, in a process of its own.
+    `interpreters` tells whether a program of a shebang is on ROS's machine (an absolute path, or a name
+    behind `env`).
+    """
+    entries = read_files(package, interpreters)
+    manifest, manifest_fault = read_manifest(package.folder)
+    report = check_syntax(package.folder, _python_paths(entries))
+    faults = report.faults if python_faults is None else python_faults
+    files = tuple(entry.file for entry in entries)
+    return PackageFacts(
+        name=package.name,
+        path=package.path,
+        manifest=manifest,
+        manifest_fault=manifest_fault,
+        cmake=read_cmake(package.folder, package.name, trace=cmake_trace, root=cmake_root),
+        files=_with_faults(files, faults),
+        launch_files=read_launch_files(package.folder, ((e.file.path, e.path) for e in _readable(entries))),
+        hints=hints,
+        slips=report.slips,
+    )
+
+
+def with_build_facts(
+    facts: PackageFacts,
+    *,
+    cmake_trace: Path | None = None,
+    cmake_root: str | None = None,
+    python_faults: Mapping[str, Fault] | None = None,
+    python_slips: tuple[PythonSlip, ...] | None = None,
+) -> PackageFacts:
+    """`facts` refined by what the build showed: CMake's own trace, and ROS's own Python on the sources.
+
+    What is None stays as it was. `python_faults` replace all faults found before.
+    """
+    changes: dict[str, object] = {}
+    if cmake_trace is not None and facts.cmake is not None:
+        names = (facts.name, PurePosixPath(facts.path).name)
+        changes["cmake"] = refine_cmake(facts.cmake, names, trace=cmake_trace, root=cmake_root)
+    if python_faults is not None:
+        changes["files"] = _with_faults(facts.files, python_faults)
+    if python_slips is not None:
+        changes["slips"] = python_slips
+    return facts.model_copy(update=changes)
+
+
+def python_paths(facts: PackageFacts) -> tuple[str, ...]:
+    """The files that ROS's Python is to look at: Python by name or shebang, not too large, no links."""
+    return tuple(f.path for f in facts.files if _to_check(f) and f.link is None)
+
+
+def _python_paths(entries: Iterable[Entry]) -> list[str]:
+    return [entry.path for entry in entries if _to_check(entry.file)]
+
+
+def _to_check(file: SourceFile) -> bool:
+    return file.python and not file.link_problem and file.size_bytes <= SOURCE_LIMIT_BYTES
+
+
+def _readable(entries: Iterable[Entry]) -> Iterable[Entry]:
+    return (entry for entry in entries if not entry.file.link_problem)
+
+
+def _with_faults(files: tuple[SourceFile, ...], faults: Mapping[str, Fault]) -> tuple[SourceFile, ...]:
+    return tuple(file.model_copy(update={"python_fault": faults.get(file.path)}) for file in files)

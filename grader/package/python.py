@@ -1,0 +1,131 @@
+"""Python files as a Python reads them, in a process of its own with limits; nothing is imported."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field
+
+from grader.model.package import Fault, PythonSlip
+from grader.model.record import Record
+from grader.package.python_causes import cause_of
+from grader.package.reading import printable
+
+SYNTAX_SCRIPT = Path(__file__).resolve().parents[1] / "arena" / "ros" / "syntax.py"
+_CRASHES_LIMIT = 3
+
+
+class SyntaxReport(Record):
+    """What `syntax.py` said: `checked` are all files that it came to, `faults` by path."""
+
+    checked: tuple[str, ...] = ()
+    faults: dict[str, Fault] = Field(default={})
+    slips: tuple[PythonSlip, ...] = ()
+
+
+class _RawFault(Record):
+    kind: str
+    line: int | None
+    column: int | None
+    message: str
+    text: str = ""
+    opened: int | None = None
+    mixed: bool = False
+
+
+def read_syntax_report(output: bytes | str) -> SyntaxReport:
+    """The report of `grader/arena/ros/syntax.py` from what it printed; foreign lines are passed over."""
+    checked: list[str] = []
+    faults: dict[str, Fault] = {}
+    slips: list[PythonSlip] = []
+    for line in output.splitlines():
+        entry = _entry(line)
+        if entry is None:
+            continue
+        file = printable(entry["file"])
+        checked.append(file)
+        if entry.get("faults"):
+            raw = _RawFault.model_validate(entry["faults"][0])
+            faults[file] = _fault(file, raw)
+        slips += [PythonSlip(file=file, **{**s, "message": printable(s["message"])}) for s in entry["slips"]]
+    return SyntaxReport(checked=tuple(checked), faults=faults, slips=tuple(slips))
+
+
+def _entry(line: bytes | str) -> dict[str, Any] | None:
+    try:
+        entry = json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+    known = isinstance(entry, dict) and isinstance(entry.get("file"), str) and "slips" in entry
+    return entry if known else None
+
+
+def _fault(file: str, raw: _RawFault) -> Fault:
+    cause = cause_of(raw.message, raw.text, column=raw.column, opened=raw.opened, mixed=raw.mixed)
+    return Fault(
+        file=file,
+        line=raw.line,
+        column=raw.column if raw.column and raw.column > 0 else None,
+        kind=raw.kind,
+        message=printable(raw.message) or raw.kind,
+        cause=printable(cause),
+    )
+
+
+def check_syntax(folder: Path, paths: Sequence[str], *, timeout_s: float = 10.0) -> SyntaxReport:
+    """The report on files of `folder`, made by this Python in processes of their own with limits.
+
+    A file that crashes Python gets a fault of kind `PythonCrash`, those that the time does not reach
+    `NotChecked`.
+    """
+    deadline = time.monotonic() + timeout_s
+    report, left = SyntaxReport(), list(paths)
+    for _ in range(_CRASHES_LIMIT + 1):
+        remaining_s = deadline - time.monotonic()
+        if not left or remaining_s <= 0:
+            break
+        found, timed_out = _run(folder, left, remaining_s)
+        done = set(found.checked)
+        left = [path for path in left if printable(path) not in done]
+        report = _joined(report, found)
+        if left:
+            kind, message = (
+                ("NotChecked", "takes too long") if timed_out else ("PythonCrash", "crashes Python")
+            )
+            report = _joined(report, _without_result(left.pop(0), kind, message))
+    for path in left:
+        report = _joined(report, _without_result(path, "NotChecked", "was not reached in time"))
+    return report
+
+
+def _run(folder: Path, paths: list[str], timeout_s: float) -> tuple[SyntaxReport, bool]:
+    command = [sys.executable, "-I", str(SYNTAX_SCRIPT), str(folder)]
+    names = json.dumps(paths).encode("ascii")
+    try:
+        done = subprocess.run(command, input=names, capture_output=True, timeout=timeout_s, check=False)
+    except subprocess.TimeoutExpired as error:
+        return read_syntax_report(error.stdout or b""), True
+    return read_syntax_report(done.stdout), False
+
+
+def _without_result(path: str, kind: str, message: str) -> SyntaxReport:
+    file = printable(path)
+    cause = (
+        f"the syntax of `{file}` could not be checked: reading it {message}" if kind == "PythonCrash" else ""
+    )
+    fault = Fault(file=file, line=None, kind=kind, message=message, cause=cause)
+    return SyntaxReport(checked=(file,), faults={file: fault})
+
+
+def _joined(one: SyntaxReport, two: SyntaxReport) -> SyntaxReport:
+    return SyntaxReport(
+        checked=one.checked + two.checked,
+        faults={**one.faults, **two.faults},
+        slips=one.slips + two.slips,
+    )

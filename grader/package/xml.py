@@ -1,0 +1,120 @@
+"""XML of unknown origin: lxml for structure and lines; no entities, no DTD, no network, no huge trees."""
+
+from __future__ import annotations
+
+import re
+
+from lxml import etree
+
+from grader.model.package import Fault
+
+_TYPOGRAPHIC = re.compile("[\u2018\u2019\u201a\u201b\u201c\u201d\u201e\u2033\u00ab\u00bb]")
+
+# libxml2's message and what it means ({0}, {1}: the pattern's groups, {root}: the root tag)
+_CAUSES = (
+    (r"Document is empty", "the file is empty"),
+    (r"Start tag expected", "something stands before the first tag: the file must begin with `<{root}>`"),
+    (r"Premature end of data in tag (\S+) line (\d+)", "`<{0}>` of line {1} is never closed: add `</{0}>`"),
+    (r"hyphen|must not contain '--'", "`--` may not stand inside a comment `<!-- ... -->`"),
+    (r"Comment not terminated", "a comment is opened by `<!--` and never closed by `-->`"),
+    (r"Extra content at the end", "something stands behind the end of the first block: one `<{root}>` only"),
+    (r"XML declaration allowed only", "delete what comes before `<?xml ... ?>`, blank lines too"),
+    (r"Attribute (\S+) redefined", "the attribute `{0}` is given twice in one tag"),
+    (r"Unescaped '<' not allowed in attr", "a closing quote is missing: the value runs on into the next tag"),
+    (r"AttValue: ['\"] expected", "a closing quote is missing"),
+    (r"AttValue: \" or ' expected", 'the value of an attribute needs quotes: name="value"'),
+    (r"Specification mandates value for attribute (\S+)", '`{0}` has no value: write {0}="..."'),
+    (r"invalid element name", "a `<` begins no tag: no space after `<`, and a plain `<` is written `&lt;`"),
+    (r"EntityRef|Entity '.*' not defined", "a plain `&` is written `&amp;`"),
+    (r"character encoding|not proper UTF-8|Unsupported encoding|switch encoding",
+     "the file is not saved in the encoding that it names: save it as UTF-8"),
+    (r"Invalid character|invalid Char|xmlChar", "an invisible control character: type the line anew"),
+    (r"[Ee]ntity", "entities are not read: write the text out"),
+    (r"Excessive depth", "tags are nested more than 250 deep"),
+    (r"Namespace prefix (\S+)", "`{0}:` stands before a name: no colons in the names of tags and attributes"),
+)  # fmt: skip
+
+
+def parse_xml(
+    data: bytes, file: str, *, root: str, encoding: str | None = None
+) -> tuple[etree._Element | None, Fault | None]:
+    """The root element, or None and the fault. `root` is the tag that the file should begin with.
+
+    `encoding` overrides what the file says of itself. Nothing that a file declares is expanded or fetched.
+    """
+    parser = etree.XMLParser(
+        resolve_entities=False,
+        load_dtd=False,
+        dtd_validation=False,
+        attribute_defaults=False,
+        no_network=True,
+        huge_tree=False,
+        encoding=encoding,
+    )
+    try:
+        element = etree.fromstring(data, parser)
+    except etree.XMLSyntaxError as error:
+        return None, _fault(error, data, file, root)
+    dtd = element.getroottree().docinfo.internalDTD
+    if dtd is not None and dtd.entities():  # type: ignore[union-attr] # lxml-stubs lack it
+        cause = "`<!ENTITY ...>` is not read: delete the `<!DOCTYPE ...>` block and write the text out"
+        return None, Fault(file=file, line=1, kind="Entity", message="declares entities", cause=cause)
+    return element, None
+
+
+def line_of(element: etree._Element) -> int | None:
+    """Where the element begins."""
+    line = element.sourceline
+    return line if isinstance(line, int) else None
+
+
+def _fault(error: etree.XMLSyntaxError, data: bytes, file: str, root: str) -> Fault:
+    line, column = error.position
+    message = re.sub(r", line \d+, column \d+$", "", (error.msg or "not well-formed").strip()).strip()
+    log = [str(entry.message) for entry in error.error_log]  # type: ignore[attr-defined] # lxml-stubs lack it
+    return Fault(
+        file=file,
+        line=line or None,
+        column=column or None,
+        kind="XMLSyntaxError",
+        message=message,
+        cause=cause_of(message, log, _line(data, line), root=root),
+    )
+
+
+def _line(data: bytes, number: int) -> str:
+    lines = data.splitlines()
+    return lines[number - 1].decode("utf-8", "replace") if 0 < number <= len(lines) else ""
+
+
+def cause_of(message: str, log: list[str], line: str, *, root: str) -> str:
+    """libxml2's message in plain words. `log` holds all its messages, `line` the text of the faulty line."""
+    if line.startswith(("<<<<<<<", "=======", ">>>>>>>")):
+        return (
+            "git's merge markers (`<<<<<<<`) are still in the file: keep one version and delete the markers"
+        )
+    if "AttValue" in message and (quote := _TYPOGRAPHIC.search(line)):
+        return f'a typographic quote {quote[0]} was copied from a PDF or a web page: type plain quotes (")'
+    if mismatch := re.search(r"tag mismatch: (\S+) line (\d+) and (\S+)", message):
+        return _mismatch(mismatch[1], mismatch[2], mismatch[3], root)
+    unfinished = next(filter(None, (re.search(r"end of Start Tag (\S+)", m) for m in log)), None)
+    if unfinished and re.search("attribute name|attributes construct", message):
+        return (
+            f"the tag `<{unfinished[1]}` is not finished properly: it needs a space before each attribute, "
+            "quotes round each value, and `>` or `/>` at its end"
+        )
+    for pattern, cause in _CAUSES:
+        if found := re.search(pattern, message):
+            return cause.format(*found.groups(), root=root)
+    return ""
+
+
+def _mismatch(opened: str, line: str, closed: str, root: str) -> str:
+    if opened.lower() == closed.lower():
+        return f"`<{opened}>` of line {line} is closed by `</{closed}>`: capital and small letters must agree"
+    if opened == root:
+        return f"`</{closed}>` closes nothing: `<{opened}>` of line {line} is the only tag that is open here"
+    return (
+        f"`<{opened}>` of line {line} is still open where `</{closed}>` comes: "
+        f"end it with `/>` or with `</{opened}>`"
+    )
