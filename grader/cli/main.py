@@ -37,7 +37,8 @@ def _prepare_streams() -> None:
     """A character that the terminal's encoding lacks is written out; a closed stream swallows."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: PTH123, SIM115 - a stream for the whole life
+            descriptor = os.open(os.devnull, os.O_WRONLY)
+            setattr(sys, name, os.fdopen(descriptor, "w", encoding="utf-8"))
         stream = getattr(sys, name)
         if isinstance(stream, TextIOWrapper):
             with suppress(ValueError):
@@ -45,7 +46,7 @@ def _prepare_streams() -> None:
 
 
 def _prepare_signals() -> None:
-    """A terminated grader cleans up as an interrupted one does. A shell's `&` must not leave Ctrl-C ignored."""
+    """A terminated grader cleans up as an interrupted one does. A shell's `&` leaves SIGINT alive too."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)
         signal.signal(signal.SIGTERM, _interrupt)

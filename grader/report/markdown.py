@@ -54,9 +54,8 @@ def _losses(title: str, losses: tuple[Loss, ...]) -> Iterator[str]:
         yield ""
         yield _text(criterion.message) or _text(criterion.title)
         yield ""
-        yield from _details(criterion)
-        yield from _blocked(loss)
-        yield ""
+        details = [*_details(criterion), *_blocked(loss)]
+        yield from ([*details, ""] if details else [])
 
 
 def _details(criterion: CriterionResult) -> Iterator[str]:

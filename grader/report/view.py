@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from grader.model.result import CriterionResult, GradingResult
-from grader.model.verdict import FileCitation, Status
+from grader.model.verdict import Citation, FileCitation, Status
 from grader.report.text import number
 from grader.rubric.model import Rubric
 
@@ -75,13 +75,14 @@ def points_of(criterion: CriterionResult) -> str:
 
 
 def places(criterion: CriterionResult) -> list[str]:
-    """Where it was seen: `src/talker.py:17`, `evidence/real.mcap /chatter 1.2 s to 3.4 s`."""
+    """Where it was seen: `src/talker.py:17`, `real.mcap /chatter, 6.0 s`; exact times are in `result.json`."""
     return [_place(citation) for citation in criterion.citations]
 
 
-def _place(citation: object) -> str:
+def _place(citation: Citation) -> str:
     if isinstance(citation, FileCitation):
         return citation.file if citation.line is None else f"{citation.file}:{citation.line}"
-    stretch = [getattr(citation, "from_ns", None), getattr(citation, "to_ns", None)]
-    times = " to ".join(f"{ns / 1e9:.3f} s" for ns in stretch if ns is not None)
-    return f"{getattr(citation, 'evidence', '')} {getattr(citation, 'topic', '')} {times}".rstrip()
+    stretch = ""
+    if citation.from_ns is not None and citation.to_ns is not None and citation.to_ns > citation.from_ns:
+        stretch = f", {(citation.to_ns - citation.from_ns) / 1e9:.1f} s"
+    return f"{citation.evidence} {citation.topic}{stretch}"

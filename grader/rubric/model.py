@@ -45,11 +45,11 @@ class Until(Record):
     """When a run has seen enough. All conditions that are given must hold.
 
     `window_s`: that long after the first message on every topic of `topics` (a topic that stays silent stops
-    being waited for when `silent_s` have passed since the first message on another). `messages`: so many messages
-    on each topic. `connected`: a student's publisher and a student's subscriber are connected over the topic.
-    `heard`: every probe's value was printed.
-    A run gives up when no message came within `first_message_s`, when all topics that are waited for have been
-    silent for `silent_s`, or after `limit_s`.
+    being waited for when `silent_s` have passed since the first message on another). `messages`: so many
+    messages on each topic. `connected`: a student's publisher and a student's subscriber are connected over the
+    topic. `heard`: every probe's value was printed.
+    A run gives up when no message came within `first_message_s`, when all topics that are waited for have
+    been silent for `silent_s`, or after `limit_s`.
     """
 
     window_s: Seconds | None = None

@@ -1,0 +1,35 @@
+"""`grader grade SOURCE --rubric ID|FILE`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from grader import pipeline
+from grader.cli.display import open_progress
+from grader.cli.show import show
+from grader.errors import ExitCode
+from grader.files import check_writable
+from grader.rubric.load import load_rubric
+
+DEFAULT_OUT = Path("grader-results")
+
+
+def run(
+    *,
+    source: str,
+    rubric: str,
+    out: Path | None = None,
+    submission_id: str | None = None,
+    sandbox: str = "auto",
+    as_json: bool = False,
+) -> ExitCode:
+    """Grade one submission into `out/<submission id>/` and show the report."""
+    loaded = load_rubric(rubric)
+    folder = out or DEFAULT_OUT
+    check_writable(folder)
+    options = pipeline.GradeOptions(
+        sandbox=sandbox, submission_id=submission_id, static_only=False, keep_hidden=True
+    )
+    with open_progress() as progress:
+        result = pipeline.grade(source, loaded, folder, options, progress)
+    return show(result, loaded.rubric, folder / result.submission.id, as_json=as_json)

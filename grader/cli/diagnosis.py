@@ -1,0 +1,166 @@
+"""Looks at this machine, one row for each thing that grading needs. Changes nothing."""
+
+from __future__ import annotations
+
+import locale
+import os
+import platform
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
+
+from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
+from grader.arena.sandbox import why_not
+from grader.errors import RosMissing
+from grader.model.record import Record
+
+PROGRAMS = {"git": "git", "cmake": "cmake", "make": "make", "c++": "g++"}
+ROS_PROGRAMS = ("catkin_make", "roslaunch", "rosrun", "rospack")
+ROS_MODULES = {
+    "rospy": "python3-rospy",
+    "rosgraph": "python3-rosgraph",
+    "rosmaster": "python3-rosmaster",
+    "roslaunch": "python3-roslaunch",
+    "std_msgs": "python3-std-msgs",
+    "rosgraph_msgs": "python3-rosgraph-msgs",
+    "geometry_msgs": "python3-geometry-msgs",
+    "sensor_msgs": "python3-sensor-msgs",
+}
+FIND_MODULES = (
+    "import importlib.util, sys; print(*[m for m in sys.argv[1:] if not importlib.util.find_spec(m)])"
+)
+GIB = 1 << 30
+MIN_MEMORY_BYTES, MIN_DISK_BYTES = GIB, GIB
+
+
+class Row(Record):
+    """`missing`: grading is not fully possible. `limited`: it is, but less safely or more slowly."""
+
+    name: str
+    state: Literal["ok", "limited", "missing"]
+    detail: str
+    mend: str = ""
+
+
+def diagnose() -> tuple[Row, ...]:
+    """Every row, in the order in which things are needed."""
+    return (_python(), *_programs(), *_ros(), _sandbox(), _user(), *_resources(), _hostname(), _encoding())
+
+
+def _python() -> Row:
+    return Row(name="Python", state="ok", detail=f"{platform.python_version()} ({sys.executable})")
+
+
+def _programs() -> Iterator[Row]:
+    for name, package in PROGRAMS.items():
+        path = shutil.which(name)
+        if path:
+            yield Row(name=name, state="ok", detail=path)
+        else:
+            yield Row(name=name, state="missing", detail="not found", mend=f"apt-get install {package}")
+
+
+def _ros() -> Iterator[Row]:
+    try:
+        ros = find_ros()
+    except RosMissing as error:
+        yield Row(name="ROS 1", state="missing", detail=error.message, mend=error.hint)
+        return
+    if ros is None:
+        yield Row(name="ROS 1", state="missing", detail="not found", mend=INSTALL_HINT)
+        return
+    yield Row(name="ROS 1", state="ok", detail=ros.label)
+    for program in ROS_PROGRAMS:
+        path = ros.program(program)
+        mend = "" if path else INSTALL_HINT
+        yield Row(name=program, state="ok" if path else "missing", detail=path or "not found", mend=mend)
+    yield from _modules(ros)
+
+
+def _modules(ros: RosInstallation) -> Iterator[Row]:
+    """ROS's Python packages, as its own interpreter finds them."""
+    command = [ros.python, "-c", FIND_MODULES, *ROS_MODULES]
+    try:
+        done = subprocess.run(command, env=ros.env, capture_output=True, text=True, check=True, timeout=20)
+    except (OSError, subprocess.SubprocessError) as error:
+        yield Row(name="ROS's Python", state="missing", detail=f"{ros.python}: {error}", mend=INSTALL_HINT)
+        return
+    missing = done.stdout.split()
+    yield Row(name="ROS's Python", state="ok", detail=ros.python)
+    for module, package in ROS_MODULES.items():
+        if module in missing:
+            mend = f"apt-get install {package}" if ros.kind == "debian" else INSTALL_HINT
+            yield Row(name=module, state="missing", detail=f"{ros.python} cannot import it", mend=mend)
+        else:
+            yield Row(name=module, state="ok", detail="found")
+
+
+def _sandbox() -> Row:
+    reason = why_not()
+    if not reason:
+        return Row(name="sandbox", state="ok", detail="bubblewrap, both layers")
+    detail = f"{reason}; students' code runs without a wall around it"
+    if shutil.which("bwrap") is None:
+        return Row(name="sandbox", state="limited", detail=detail, mend="apt-get install bubblewrap")
+    mend = "sysctl -w kernel.unprivileged_userns_clone=1 kernel.apparmor_restrict_unprivileged_userns=0"
+    return Row(name="sandbox", state="limited", detail=detail, mend=mend)
+
+
+def _user() -> Row:
+    if os.geteuid() == 0:
+        return Row(
+            name="user", state="ok", detail="root; students' code runs as an unprivileged user in the sandbox"
+        )
+    return Row(name="user", state="ok", detail=f"uid {os.geteuid()}")
+
+
+def _resources() -> Iterator[Row]:
+    cores = len(os.sched_getaffinity(0))
+    yield Row(
+        name="cores",
+        state="ok" if cores >= 2 else "limited",
+        detail=f"{cores}" if cores >= 2 else "1: runs go one after another, rates may be inconclusive",
+    )
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    yield _amount("memory", memory, MIN_MEMORY_BYTES, "GiB")
+    folder = Path(tempfile.gettempdir())
+    yield _amount("disk", shutil.disk_usage(folder).free, MIN_DISK_BYTES, f"GiB free in {folder}")
+
+
+def _amount(name: str, size_bytes: int, least_bytes: int, unit: str) -> Row:
+    enough = size_bytes >= least_bytes
+    detail = f"{size_bytes / GIB:.1f} {unit}" + (
+        "" if enough else f", {least_bytes / GIB:.0f} would be better"
+    )
+    return Row(name=name, state="ok" if enough else "limited", detail=detail)
+
+
+def _hostname() -> Row:
+    """ROS nodes look their own host up; getent has a time limit where the resolver has none."""
+    name = socket.gethostname()
+    command = [shutil.which("getent") or "/usr/bin/getent", "hosts", name]
+    try:
+        found = subprocess.run(command, capture_output=True, check=False, timeout=5).returncode == 0
+    except (OSError, subprocess.TimeoutExpired):
+        found = False
+    if found:
+        return Row(name="host name", state="ok", detail=f"{name} resolves")
+    mend = f"echo '127.0.1.1 {name}' >> /etc/hosts"
+    return Row(name="host name", state="limited", detail=f"{name} does not resolve", mend=mend)
+
+
+def _encoding() -> Row:
+    name = locale.getpreferredencoding(do_setlocale=False)
+    if name.lower().replace("-", "") == "utf8":
+        return Row(name="encoding", state="ok", detail=name)
+    return Row(
+        name="encoding",
+        state="limited",
+        detail=f"{name}: reports use plain signs",
+        mend="export LC_ALL=C.UTF-8",
+    )

@@ -1,0 +1,158 @@
+"""Shows a run's course on stderr: alive on a terminal, one line at each change of state elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from datetime import datetime
+from typing import IO
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from grader.model.progress import Progress, StepState
+from grader.report.text import clip, visible
+
+REFRESH_HZ = 8
+DETAIL_LIMIT = 160
+WORDS = {
+    "waiting": ("·", "dim"),
+    "running": ("▶", "cyan"),
+    "done": ("✓", "green"),
+    "failed": ("✗", "red"),
+    "skipped": ("-", "dim"),
+}
+ENDED = frozenset({"done", "failed", "skipped"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step:
+    """One step as last heard of. Times are monotonic seconds; a step has begun when it first runs."""
+
+    name: str
+    state: StepState
+    detail: str = ""
+    expected_s: float | None = None
+    begun_s: float | None = None
+    ended_s: float | None = None
+
+    def elapsed_s(self, now_s: float) -> float | None:
+        if self.begun_s is None:
+            return None
+        return (now_s if self.ended_s is None else self.ended_s) - self.begun_s
+
+
+class Steps:
+    """The steps in order of appearance. Any thread may tell of one."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self.clock = clock
+        self.lock = threading.Lock()
+        self.steps: dict[str, Step] = {}
+        self.begun_s = clock()
+
+    def step(self, name: str, state: StepState, detail: str = "", expected_s: float | None = None) -> None:
+        """Take note (see `grader.model.progress.Progress`)."""
+        now_s = self.clock()
+        with self.lock:
+            before = self.steps.get(name)
+            after = replace(before or Step(name=name, state=state), state=state, detail=detail)
+            if expected_s is not None:
+                after = replace(after, expected_s=expected_s)
+            if after.begun_s is None and state != "waiting":
+                after = replace(after, begun_s=now_s)
+            after = replace(after, ended_s=now_s if state in ENDED else None)
+            self.steps[name] = after
+            self.told(before, after, now_s)
+
+    def told(self, before: Step | None, after: Step, now_s: float) -> None:
+        """For those who show something at each call."""
+
+    def snapshot(self) -> tuple[Step, ...]:
+        with self.lock:
+            return tuple(self.steps.values())
+
+
+class PlainSteps(Steps):
+    """A line with the time of day whenever a step's state changes."""
+
+    def __init__(self, stream: IO[str], clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__(clock)
+        self.stream = stream
+
+    def told(self, before: Step | None, after: Step, now_s: float) -> None:
+        """Print, unless only the detail is new."""
+        if before is not None and before.state == after.state:
+            return
+        stamp = datetime.now().astimezone().strftime("%H:%M:%S")
+        words = [visible(after.name), after.state, _times(after, now_s), _shown(after.detail)]
+        print(stamp, "  ".join(word for word in words if word), file=self.stream, flush=True)
+
+
+class LiveSteps(Steps):
+    """The steps as a table that rich draws again and again; it asks, nobody is held up by it."""
+
+    def __rich__(self) -> Table:
+        now_s = self.clock()
+        steps = self.snapshot()
+        table = Table.grid(padding=(0, 2, 0, 0))
+        for _ in range(3):
+            table.add_column(no_wrap=True)
+        table.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
+        for step in steps:
+            mark, style = WORDS[step.state]
+            name = Text(f"{mark} {visible(step.name)}", style)
+            detail = Text(_shown(step.detail), "dim")
+            table.add_row(name, Text(step.state, style), Text(_times(step, now_s)), detail)
+        table.add_row(
+            Text("total", "bold"), Text(), Text(f"{now_s - self.begun_s:.1f} s"), Text(_left(steps, now_s))
+        )
+        return table
+
+
+@contextmanager
+def open_progress() -> Iterator[Progress]:
+    """Show what is told, on stderr, until the block is left; then the display is cleared away."""
+    console = Console(file=sys.stderr, markup=False, emoji=False, highlight=False)
+    if not console.is_terminal or console.is_dumb_terminal or console.encoding != "utf-8":
+        yield PlainSteps(sys.stderr)
+        return
+    steps = LiveSteps()
+    with Live(
+        steps,
+        console=console,
+        refresh_per_second=REFRESH_HZ,
+        transient=True,
+        redirect_stdout=False,
+        redirect_stderr=False,
+    ):
+        yield steps
+
+
+def _times(step: Step, now_s: float) -> str:
+    """`3.2 s of about 7 s`."""
+    elapsed_s = step.elapsed_s(now_s)
+    if elapsed_s is None:
+        return f"takes about {step.expected_s:.0f} s" if step.expected_s else ""
+    if step.state in ENDED or not step.expected_s:
+        return f"{elapsed_s:.1f} s"
+    return f"{elapsed_s:.1f} s of about {step.expected_s:.0f} s"
+
+
+def _left(steps: tuple[Step, ...], now_s: float) -> str:
+    """Runs go side by side, so the longest of what is left is what is left."""
+    left_s = [
+        (step.expected_s or 0.0) - (step.elapsed_s(now_s) or 0.0) for step in steps if step.state not in ENDED
+    ]
+    longest_s = max(left_s, default=0.0)
+    return f"about {longest_s:.0f} s to go" if longest_s >= 1 else ""
+
+
+def _shown(detail: str) -> str:
+    return visible(clip(detail, DETAIL_LIMIT))

@@ -1,0 +1,43 @@
+"""How `grade` and `check` end: the report on stdout, where the files are, the exit code."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from grader.cli.errors import report
+from grader.cli.outcome import exit_code
+from grader.errors import ExitCode, GraderError
+from grader.model.result import GradingResult
+from grader.report.result_json import result_bytes
+from grader.report.terminal import open_console, print_report
+from grader.rubric.model import Rubric
+
+REPORTS = ("result.json", "report.md", "junit.xml", "console.log")
+
+
+def show(
+    result: GradingResult, rubric: Rubric, folder: Path | None, *, hidden: int = 0, as_json: bool = False
+) -> ExitCode:
+    """Print the result (`hidden` criteria are left out of it already) and give its exit code."""
+    if as_json:
+        sys.stdout.write(result_bytes(result).decode())
+    else:
+        print_report(result, rubric, open_console(sys.stdout), hidden=hidden)
+        _paths(folder)
+    if result.error is not None:
+        report(GraderError(result.error.message, hint=result.error.hint))
+    if result.status == "error":
+        return ExitCode.NOT_GRADED
+    return exit_code(result.criteria, rubric)
+
+
+def _paths(folder: Path | None) -> None:
+    if folder is None:
+        return
+    print("\nReports:")
+    for name in REPORTS:
+        if (folder / name).is_file():
+            print(f"  {folder / name}")
+    if (folder / "evidence").is_dir():
+        print(f"  {folder / 'evidence'}/")

@@ -1,0 +1,150 @@
+from __future__ import annotations
+
+import errno
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from grader.errors import OutputError
+from grader.files import atomic_write, check_writable
+from grader.model.result import ErrorInfo
+from grader.model.verdict import Status
+from grader.report.files import write_reports
+from grader.report.hidden import without_hidden
+from grader.report.result_json import result_bytes
+from grader.report.view import arrange
+from tests.report.hostile import criterion, result, rubric
+
+KEYS = [
+    "schema",
+    "submission",
+    "rubric",
+    "status",
+    "points",
+    "max_points",
+    "criteria",
+    "environment",
+    "timing",
+]
+CRITERION_KEYS = [
+    *("id", "title", "check", "scenario", "status", "points", "max_points"),
+    *("message", "expected", "measured", "hint", "reproduce", "citations"),
+]
+
+
+def hiding(*names: str):
+    plain = rubric()
+    criteria = [
+        c.model_dump(by_alias=True) | {"visibility": "hidden" if c.id in names else "visible"}
+        for c in plain.criteria
+    ]
+    return rubric(criteria=tuple(criteria))
+
+
+def test_result_has_exactly_the_fixed_keys_in_order():
+    data = json.loads(result_bytes(result()))
+    assert list(data) == KEYS
+    assert data["schema"] == "grader.result/1"
+    assert list(data["criteria"][0]) == CRITERION_KEYS
+    assert list(data["submission"]) == ["id", "source", "commit", "digest", "package"]
+    assert data["criteria"][1]["citations"] == [
+        {"file": "src/numeric_talker.py", "line": 17},
+        {
+            "evidence": "real.mcap",
+            "topic": "/chatter",
+            "from_ns": 1_700_000_000_000_000_000,
+            "to_ns": 1_700_000_006_000_000_000,
+        },
+    ]
+
+
+def test_error_is_there_only_where_there_is_one():
+    failed = result(status="error", error=ErrorInfo(kind="host", message="m", hint="h"))
+    assert list(json.loads(result_bytes(failed))) == [*KEYS, "error"]
+
+
+def test_all_files_are_written_and_nothing_beside_them(tmp_path):
+    paths = write_reports(result(), tmp_path / "a" / "b", console="x\x1b[2J\ny", rubric=rubric())
+    assert sorted(p.name for p in paths) == ["console.log", "junit.xml", "report.md", "result.json"]
+    assert sorted(p.name for p in (tmp_path / "a" / "b").iterdir()) == sorted(p.name for p in paths)
+    assert (tmp_path / "a/b/console.log").read_text() == "x\\x1b[2J\ny"
+
+
+def test_hidden_criteria_are_left_out_everywhere(tmp_path):
+    write_reports(result(), tmp_path, console="", rubric=hiding("talker-node", "build"), keep_hidden=False)
+    for name in ("result.json", "junit.xml"):
+        assert "the node printed" not in (tmp_path / name).read_text()
+    assert "2 hidden criteria are not part of this report" in (tmp_path / "report.md").read_text()
+
+
+def test_without_hidden_recounts():
+    shown = without_hidden(result(), hiding("build", "launch"))
+    assert (shown.points, shown.max_points, shown.status) == (12.5, 70, "graded")
+    assert without_hidden(result(), rubric()) == result()
+
+
+def test_blocked_ones_are_folded_under_their_root():
+    view = arrange(result(), rubric())
+    folded = {loss.criterion.id: [b.id for b in loss.blocked] for loss in view.lost}
+    assert folded == {
+        "talker-node": ["counter-start", "counter-step", "counter-wrap"],
+        "chatter-rate": [],
+        "listener-chatter": [],
+    }
+    assert [loss.criterion.id for loss in view.open] == ["build", "launch", "style"]
+    assert [c.id for c in view.advice] == ["talker-name"]
+
+
+def test_a_blocked_criterion_whose_cause_is_not_there_is_told_by_itself():
+    alone = result(criteria=(criterion("counter-step", Status.BLOCKED, 0, 5),))
+    assert [loss.criterion.id for loss in arrange(alone, rubric()).lost] == ["counter-step"]
+
+
+def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
+    target = tmp_path / "result.json"
+    target.write_text("old")
+
+    def full(_descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OutputError) as caught:
+        atomic_write(target, b"new")
+    assert caught.value.message == f"cannot write {target}: No space left on device"
+    assert target.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_an_interrupted_write_leaves_nothing(tmp_path, monkeypatch):
+    def interrupted(_descriptor: int) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "fsync", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        atomic_write(tmp_path / "x", b"new")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_new_files_follow_the_umask(tmp_path):
+    before = os.umask(0o027)
+    try:
+        atomic_write(tmp_path / "x", b"")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "x").stat().st_mode & 0o777 == 0o640
+
+
+@pytest.mark.parametrize("place", ["file", "file/below", "/proc/nowhere", "/proc/1/x"])
+def test_a_folder_that_cannot_be_written_is_told_before(place, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match=r"^cannot write .*: [A-Z]") as caught:
+        check_writable(tmp_path / place)
+    assert "\n" not in caught.value.message
+
+
+def test_the_look_leaves_nothing_behind(tmp_path):
+    check_writable(tmp_path / "new" / "folder")
+    check_writable(tmp_path)
+    assert list(Path(tmp_path).iterdir()) == []
