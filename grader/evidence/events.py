@@ -102,13 +102,14 @@ class RecorderEvent(Record):
 class ScenarioEvent(Record):
     """`/grader/scenario`: the run's own course. `outcome` is given once, at the end.
 
-    `complete`: everything waited for was seen. `ended`: the student's processes ended first. `timeout`: the
-    limit came first. `host`: the arena or the machine failed (`detail` says how): nothing may be held against
-    a student.
+    `complete`: everything waited for was seen. `ended`: the student's processes ended first. `silent`: what was
+    waited for did not come, or stopped coming, though the processes ran. `timeout`: the limit came while it was
+    still coming. `host`: the arena or the machine failed (`detail` says how): nothing may be held against a
+    student.
     """
 
     event: Literal["begin", "ready", "end"]
-    outcome: Literal["complete", "ended", "timeout", "host"] | None = None
+    outcome: Literal["complete", "ended", "silent", "timeout", "host"] | None = None
     detail: str = ""
 
 

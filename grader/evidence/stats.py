@@ -40,7 +40,7 @@ class RateStats(Record):
 
 
 def rate_stats(times_ns: Sequence[int], *, nominal_hz: float | None = None) -> RateStats:
-    """The rate of messages that arrived at `times_ns`, in any order. Raises ValueError for a `nominal_hz` of 0."""
+    """The rate of messages that arrived at `times_ns`, in any order. ValueError for a rate of 0 or below."""
     if nominal_hz is not None and not nominal_hz > 0:
         raise ValueError("the nominal rate must be above 0 Hz")
     times = sorted(times_ns)

@@ -32,7 +32,9 @@ def fill(writer: EvidenceStream, count: int = 30) -> None:
     writer.register_channel(**identity("/silent", "std_msgs/Header"))
     writer.event("/grader/scenario", T0, ScenarioEvent(event="begin"))
     writer.event("/grader/process", T0, ProcessEvent(event="start", name="talker", role="student"))
-    graph = GraphEvent(nodes=("/talker", "/rosout"), topic_types={}, publishers={}, subscribers={}, services={})
+    graph = GraphEvent(
+        nodes=("/talker", "/rosout"), topic_types={}, publishers={}, subscribers={}, services={}
+    )
     writer.event("/grader/graph", T0, graph)
     for n in range(count):
         at = T0 + n * 100 * MS
@@ -40,7 +42,9 @@ def fill(writer: EvidenceStream, count: int = 30) -> None:
         writer.message(**identity("/numeric", "std_msgs/Int8"), log_time_ns=at, data=data)
         text = decode.encode("std_msgs/String", {"data": f"hello {n}"})
         writer.message(**identity("/chatter", "std_msgs/String"), log_time_ns=at + 1, data=text)
-        writer.event("/grader/console", at + 2, ConsoleLine(process="talker", stream="stdout", line=f"hé {n}"))
+        writer.event(
+            "/grader/console", at + 2, ConsoleLine(process="talker", stream="stdout", line=f"hé {n}")
+        )
     writer.package(complete_facts({"name": "lab1"}), T0)
     writer.attach("src/talker.py", b"#!/usr/bin/env python3\n", T0, "text/x-python")
     end = T0 + count * 100 * MS

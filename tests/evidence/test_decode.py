@@ -14,10 +14,22 @@ from grader.evidence import decode
 from grader.evidence.decode import Decoder
 from grader.evidence.definitions import MAX_DEFINITION_BYTES, DefinitionError, parse
 
-INTEGERS = {
-    f"std_msgs/{sign}Int{bits}": (bits, sign) for sign in ("", "U") for bits in (8, 16, 32, 64)
-}
+INTEGERS = {f"std_msgs/{sign}Int{bits}": (bits, sign) for sign in ("", "U") for bits in (8, 16, 32, 64)}
 SEPARATOR = "=" * 80
+EVERY_KIND = """bool flag
+byte b
+char c
+float32[2] pair
+uint8[] raw
+int8[3] small
+string[2] words
+duration d
+demo/Point[] points
+int32 FOO=3  # constants are not sent
+{separator}
+MSG: demo/Point
+float64 x
+"""
 
 
 def decoder_for(type_: str) -> Decoder:
@@ -86,23 +98,7 @@ def test_nested_messages_come_back_as_another_reader_reads_them(log):
 
 
 def test_another_reader_agrees_on_every_kind_of_field():
-    definition = "\n".join(  # `byte` is signed and `char` is not
-        [
-            "bool flag",
-            "byte b",
-            "char c",
-            "float32[2] pair",
-            "uint8[] raw",
-            "int8[3] small",
-            "string[2] words",
-            "duration d",
-            "demo/Point[] points",
-            "int32 FOO=3  # constants are not sent",
-            SEPARATOR,
-            "MSG: demo/Point",
-            "float64 x",
-        ]
-    )
+    definition = EVERY_KIND.format(separator=SEPARATOR)
     data = b"\x01\xff\xff" + b"\0\0\x80?\0\0\0@" + b"\x02\0\0\0\x01\x02" + b"\x01\xff\x03"
     data += b"\x01\0\0\0a\x02\0\0\0bc" + b"\xff\xff\xff\xff\x05\0\0\0" + b"\x01\0\0\0" + b"\0\0\0\0\0\0\xf0?"
     value = Decoder("demo/All", definition).decode(data)
@@ -117,18 +113,25 @@ def test_another_reader_agrees_on_every_kind_of_field():
         "d": {"secs": -1, "nsecs": 5},
         "points": [{"x": 1.0}],
     }
-    schema = type("Schema", (), {"id": 1, "name": "demo/All", "encoding": "ros1msg", "data": definition.encode()})
+    schema = type(
+        "Schema", (), {"id": 1, "name": "demo/All", "encoding": "ros1msg", "data": definition.encode()}
+    )
     other = DecoderFactory().decoder_for("ros1", schema)(data)
     assert (other.b, other.c, list(other.small), other.points[0].x) == (-1, 255, [1, -1, 3], 1.0)
 
 
-@given(st.binary(max_size=40), st.sampled_from(["std_msgs/String", "rosgraph_msgs/Log", "std_msgs/Int8MultiArray"]))
+@given(
+    st.binary(max_size=40),
+    st.sampled_from(["std_msgs/String", "rosgraph_msgs/Log", "std_msgs/Int8MultiArray"]),
+)
 def test_any_bytes_give_a_value_or_none(data, type_):
     value = decoder_for(type_).decode(data)
     assert value is None or isinstance(value, dict)
 
 
-@pytest.mark.parametrize("data", [b"", b"\0\0", b"\x01\0\0\0", b"\xff\xff\xff\xffabc", b"\x01\0\0\0ab", b"\x01\0\0\0\xff"])
+@pytest.mark.parametrize(
+    "data", [b"", b"\0\0", b"\x01\0\0\0", b"\xff\xff\xff\xffabc", b"\x01\0\0\0ab", b"\x01\0\0\0\xff"]
+)
 def test_bytes_that_do_not_fit_a_string_give_none(data):
     assert decoder_for("std_msgs/String").decode(data) is None
 
@@ -140,7 +143,10 @@ def test_bytes_that_do_not_fit_a_string_give_none(data):
         ("demo/A", "# only a comment\n\n"),
         ("demo/A", "int8  a \r\n\tint16 b # two\r\n"),
         ("Demo/class_", "string class\nint8 import\nint8 f0"),
-        ("demo/A", "Header header\n" + SEPARATOR + "\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id"),
+        (
+            "demo/A",
+            "Header header\n" + SEPARATOR + "\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id",
+        ),
         ("demo/A", "string NOTE=a # b = c\nB b\n" + SEPARATOR + "\nMSG: demo/B\nint8 x"),
         ("demo/A", "std_msgs/Empty nothing\nint8 x\n" + SEPARATOR + "\nMSG: std_msgs/Empty\n"),
     ],

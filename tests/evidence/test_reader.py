@@ -26,7 +26,9 @@ def refused(source) -> str:
     return caught.value.message
 
 
-def foreign(*, compression=CompressionType.ZSTD, json_topic=None, metadata=None, data=b"{}", schema="jsonschema") -> bytes:
+def foreign(
+    *, compression=CompressionType.ZSTD, json_topic=None, metadata=None, data=b"{}", schema="jsonschema"
+) -> bytes:
     stream = BytesIO()
     writer = Writer(stream, compression=compression)
     writer.start(profile="ros1")
@@ -109,14 +111,20 @@ def test_json_channels_of_another_tool_are_not_the_graders():
 
 
 def test_a_record_that_does_not_fit_is_named():
-    message = refused(BytesIO(foreign(json_topic="/grader/process", metadata=OWN, data=b'{"event": "burst"}')))
+    message = refused(
+        BytesIO(foreign(json_topic="/grader/process", metadata=OWN, data=b'{"event": "burst"}'))
+    )
     assert "ProcessEvent.event" in message
     assert "evidence.mcap" in message
 
 
 @pytest.mark.parametrize(
     ("metadata", "reason"),
-    [({**OWN, "format": "2"}, "format '2'"), ({}, "format None"), ({**OWN, "warp": "fast"}, "scenario, clock and warp")],
+    [
+        ({**OWN, "format": "2"}, "format '2'"),
+        ({}, "format None"),
+        ({**OWN, "warp": "fast"}, "scenario, clock and warp"),
+    ],
 )
 def test_metadata_that_is_not_ours_to_read(metadata, reason):
     assert reason in refused(BytesIO(foreign(metadata=metadata)))
@@ -150,7 +158,9 @@ def test_a_flipped_byte_is_refused_or_harmless():
             assert run.console == expected.console
 
 
-@pytest.mark.parametrize("content", [b"hello", b"PK\x03\x04", os.urandom(4096), b"\x89MCAP0\r\n", b"\x89MCAP0\r\n" * 2])
+@pytest.mark.parametrize(
+    "content", [b"hello", b"PK\x03\x04", os.urandom(4096), b"\x89MCAP0\r\n", b"\x89MCAP0\r\n" * 2]
+)
 def test_what_is_no_mcap_is_refused(tmp_path, content):
     path = tmp_path / "x.mcap"
     path.write_bytes(content)

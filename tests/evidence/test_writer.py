@@ -1,4 +1,4 @@
-"""Files that are whole or absent, the same bytes for the same run, and readable by tools that are not ours."""
+"""Files that are whole or absent, the same bytes for the same run, readable by tools that are not ours."""
 
 from __future__ import annotations
 
@@ -84,14 +84,14 @@ def test_an_abort_keeps_the_file_that_was_there(tmp_path):
 
 def test_a_folder_that_is_a_file_is_one_line(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="cannot write .*evidence.mcap") as caught:
+    with pytest.raises(OutputError, match=r"cannot write .*evidence\.mcap") as caught:
         EvidenceWriter(tmp_path / "file" / "evidence.mcap", **ABOUT)
     assert "\n" not in caught.value.message
 
 
 def test_a_full_disk_is_the_machine_not_the_submission():
     class Full(BytesIO):
-        def write(self, data):
+        def write(self, _data):
             raise OSError(errno.ENOSPC, "No space left on device")
 
     guarded = writer_module._Guarded(Full(), ABOUT["scenario"])
@@ -104,7 +104,10 @@ def test_a_disk_that_fills_up_while_recording_leaves_nothing(tmp_path, monkeypat
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(writer_module.os, "fsync", fails)
-    with pytest.raises(HostError, match="the disk is full"), EvidenceWriter(tmp_path / "a.mcap", **ABOUT) as writer:
+    with (
+        pytest.raises(HostError, match="the disk is full"),
+        EvidenceWriter(tmp_path / "a.mcap", **ABOUT) as writer,
+    ):
         fill(writer)
     assert list(tmp_path.iterdir()) == []
 
@@ -112,9 +115,15 @@ def test_a_disk_that_fills_up_while_recording_leaves_nothing(tmp_path, monkeypat
 def test_what_is_no_text_is_still_written():
     stream = BytesIO()
     writer = EvidenceStream(stream, **{**ABOUT, "metadata": {"source": "caf\udce9"}})
-    strange = {**identity("/c", "std_msgs/String"), "callerid": "/n\udcff", "definition": "string data # \udcff\n"}
+    strange = {
+        **identity("/c", "std_msgs/String"),
+        "callerid": "/n\udcff",
+        "definition": "string data # \udcff\n",
+    }
     writer.message(**strange, log_time_ns=T0, data=b"\x01\0\0\0a")
-    writer.event("/grader/process", T0, ProcessEvent(event="start", name="a", role="student", argv=("caf\udce9",)))
+    writer.event(
+        "/grader/process", T0, ProcessEvent(event="start", name="a", role="student", argv=("caf\udce9",))
+    )
     writer.event("/grader/console", T0, ConsoleLine(process="a", stream="stdout", line="\0\x1b[31m\ud800"))
     writer.finish()
     stream.seek(0)
@@ -132,7 +141,9 @@ def nested(depth):
     return value
 
 
-@pytest.mark.parametrize("value", [nested(5), nested(150), nested(600), {1: 2}, 10**400, float("nan"), "\ud800", b"\xff"])
+@pytest.mark.parametrize(
+    "value", [nested(5), nested(150), nested(600), {1: 2}, 10**400, float("nan"), "\ud800", b"\xff"]
+)
 def test_no_parameter_makes_the_file_unreadable(value):
     stream = BytesIO()
     writer = EvidenceStream(stream, **ABOUT)
