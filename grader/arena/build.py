@@ -1,0 +1,120 @@
+"""Builds the workspace as handed in, in the sandbox, and learns from it what only ROS's own programs can say."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+from grader.arena.place import Place
+from grader.arena.ros_env import keep_ros_variables, parse_env
+from grader.arena.session import ArenaSession
+from grader.arena.workspace import read_untrusted
+from grader.evidence.events import ScenarioEvent
+from grader.evidence.writer import EvidenceWriter
+from grader.model.record import Record
+
+BUILD_S = 120.0
+STEP_S = 20.0
+ROSRUN_S = 4.0
+TRACE = "cmake-trace.json"
+SYNTAX = "syntax.jsonl"
+ENVIRONMENT = "environment"
+
+
+class BuildOutcome(Record):
+    """`trace` and `syntax` are copies that no student's process can reach; `root` is the package as CMake saw it."""
+
+    ok: bool
+    trace: Path | None
+    root: str
+    syntax: Path | None
+    cpu_s: float
+    student_cpu_s: float
+
+
+async def build(
+    place: Place, writer: EvidenceWriter, python_files: Iterable[str], answers: Iterable[str]
+) -> tuple[Place, BuildOutcome]:
+    """Run `catkin_make`, then `rosrun` on each script of `answers` as handed in; what they print is evidence.
+    `python_files` are compiled by ROS's own Python, and not run.
+
+    Returns the place with the built workspace's environment. Raises ArenaError where the arena fails.
+    """
+    (place.folder / "bin" / "python-files.json").write_text(json.dumps(list(python_files)))
+    async with ArenaSession(place, writer, master=False) as arena:
+        arena.course(ScenarioEvent(event="begin"))
+        arena.start(place.spec("catkin_make", _catkin_make(place), role="build", build=True))
+        arena.start(place.spec("syntax", _syntax(place), role="grader", build=True))
+        ended = await arena.wait(lambda: "catkin_make" in arena.live.ended, BUILD_S)
+        if not ended:
+            await arena.interrupt("catkin_make", int_s=2.0, term_s=1.0)
+        await arena.wait(lambda: "syntax" in arena.live.ended, STEP_S)
+        ok = arena.exit_codes.get("catkin_make") == 0
+        built = await _with_setup(place, arena) if ok else _from_source(place)
+        for script in answers:
+            await _answer(built, arena, script)
+        outcome = "complete" if ended else "timeout"
+        arena.course(ScenarioEvent(event="end", outcome=outcome, detail="" if ended else f"build over {BUILD_S:g} s"))
+        await arena.finish()
+    return built, BuildOutcome(
+        ok=ok,
+        trace=_keep(place, TRACE),
+        root=place.package_folder,
+        syntax=_keep(place, SYNTAX),
+        cpu_s=arena.cpu_s,
+        student_cpu_s=arena.student_cpu_s,
+    )
+
+
+def _catkin_make(place: Place) -> list[str]:
+    cmakelists = f"{place.package_folder}/CMakeLists.txt"
+    return [
+        "catkin_make", "-C", place.inside_workspace, "-j2", "--no-color", "--cmake-args",
+        f"-DPYTHON_EXECUTABLE={place.ros.python}", "--trace-expand", "--trace-format=json-v1",
+        f"--trace-source={cmakelists}", f"--trace-redirect={place.output}/{TRACE}",
+    ]  # fmt: skip
+
+
+def _syntax(place: Place) -> list[str]:
+    """ROS's own Python compiles every script of the package, and runs none."""
+    script = 'python3 -I "$1/grader-syntax.py" "$2" < "$1/python-files.json" > "$3"'
+    return ["/bin/sh", "-c", script, "sh", place.shims, place.package_folder, f"{place.output}/{SYNTAX}"]
+
+
+async def _with_setup(place: Place, arena: ArenaSession) -> Place:
+    """The environment that `source devel/setup.bash` gives."""
+    script = 'source "$1/devel/setup.bash" && env -0 > "$2"'
+    argv = ["/bin/bash", "-c", script, "bash", place.inside_workspace, f"{place.output}/{ENVIRONMENT}"]
+    arena.start(place.spec("setup.bash", argv, role="build", build=True))
+    await arena.wait(lambda: "setup.bash" in arena.live.ended, STEP_S)
+    dump = read_untrusted(place.workspace.output / ENVIRONMENT)
+    if not dump or arena.exit_codes.get("setup.bash") != 0:
+        return _from_source(place)
+    return replace(place, env=keep_ros_variables(parse_env(dump)))
+
+
+def _from_source(place: Place) -> Place:
+    """Without a build: ROS still finds the package's sources."""
+    path = f"{place.inside_workspace}/src:{place.ros.env.get('ROS_PACKAGE_PATH', '')}"
+    return replace(place, env={"ROS_PACKAGE_PATH": path.rstrip(":")})
+
+
+async def _answer(place: Place, arena: ArenaSession, script: str) -> None:
+    """What `rosrun` says to a script that is not as it should be, on the package as handed in."""
+    name = f"rosrun {script}"
+    arena.start(place.spec(name, ["rosrun", place.package, script], role="student", build=True))
+    if not await arena.wait(lambda: name in arena.live.ended, ROSRUN_S):
+        await arena.interrupt(name, int_s=1.0, term_s=1.0)
+
+
+def _keep(place: Place, name: str) -> Path | None:
+    """Copy a file that the build left, as far as it is one."""
+    data = read_untrusted(place.workspace.output / name)
+    if data is None:
+        return None
+    kept = place.folder / "kept" / name
+    kept.parent.mkdir(exist_ok=True)
+    kept.write_bytes(data)
+    return kept

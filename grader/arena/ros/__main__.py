@@ -1,0 +1,174 @@
+"""The managed roscore: reads commands (one JSON object a line) on stdin, writes frames (`wire`) on stdout.
+
+Runs under ROS's own interpreter and imports nothing but the standard library and ROS. The first line configures it:
+`master` (false for a build, which needs none), `port`, `limits`, `suffix` (of its nodes' names), `rosout` (a process
+spec, or null). When stdin ends, all ends.
+"""
+
+import base64
+import ctypes
+import json
+import os
+import resource
+import signal
+import threading
+
+from host import Lateness
+from loop import Loop
+from processes import Process, kill_orphans
+from wire import Wire
+
+PR_SET_CHILD_SUBREAPER = 36
+OWN_PREFIX = "/grader"
+FINISH_S = 2.0
+
+
+class Arena:
+    def __init__(self, wire, config):
+        self._wire = wire
+        self._limits = config["limits"]
+        self._processes = {}
+        self._finishing = False
+        self._clock = None
+        self._master = None
+        self._input = b""
+        self.loop = Loop()
+        self.loop.on_child(self._reap)
+        self._lateness = Lateness(wire)
+        self._lateness.start()
+        if config["master"]:
+            self._start_master(config)
+        os.set_blocking(0, False)
+        self.loop.add_reader(0, self._command_bytes)
+        wire.status("ready", uri=os.environ.get("ROS_MASTER_URI", ""))
+
+    def _start_master(self, config):
+        from actor import Actor, SlaveApi  # noqa: PLC0415 - a build needs no ROS imports
+        from master import RecordingMaster, serve  # noqa: PLC0415
+        from recorder import Recorder  # noqa: PLC0415
+
+        name = OWN_PREFIX + "_{}" + config["suffix"]
+        self._recorder = Recorder(self.loop, self._wire, name.format("recorder"), self._limits)
+        self._master = RecordingMaster(self.loop, self._wire, self._recorder, OWN_PREFIX)
+        os.environ["ROS_MASTER_URI"] = serve(self._master, config["port"])
+        self._actor = Actor(self.loop, self._wire, name.format("actor"))
+        self._actor.uri = serve(SlaveApi(self._actor), 0)
+        if config["rosout"]:
+            self._spawn(config["rosout"])
+
+    def _command_bytes(self):
+        try:
+            chunk = os.read(0, 1 << 16)
+        except BlockingIOError:
+            return
+        if not chunk:
+            self.loop.remove_reader(0)
+            self._finish({})
+            return
+        *lines, self._input = (self._input + chunk).split(b"\n")
+        for line in lines:
+            command = json.loads(line.decode())
+            getattr(self, "_" + command.pop("do"))(command)
+
+    def _start(self, command):
+        self._spawn(command["spec"])
+
+    def _spawn(self, spec):
+        spec["env"].setdefault("ROS_MASTER_URI", os.environ.get("ROS_MASTER_URI", "http://localhost:11311"))
+        try:
+            self._processes[spec["name"]] = Process(self.loop, self._wire, spec, self._limits, self._exited)
+        except OSError as error:
+            self._wire.status("spawn-failed", name=spec["name"], detail=str(error))
+
+    def _interrupt(self, command):
+        if command["name"] not in self._processes:
+            return
+        self._wire.event("/grader/actor", {"action": "interrupt", "actor": "grader", "detail": command["name"]})
+        self._processes[command["name"]].stop(command["int_s"], command["term_s"])
+
+    def _advertise(self, command):
+        self._actor.advertise(self._master, command["fields"])
+
+    def _publish(self, command):
+        self._actor.publish(command["topic"], base64.b64decode(command["data"]))
+        self._wire.event("/grader/actor", command["record"])
+
+    def _warp(self, command):
+        from actor import CLOCK, Clock  # noqa: PLC0415 - only where there is a master
+
+        self._master.setParam(OWN_PREFIX, "/use_sim_time", True)
+        self._actor.advertise(self._master, CLOCK)
+        self._clock = Clock(self._actor, command["warp"], command["step_s"])
+        record = {"action": "clock", "actor": "grader", "topic": "/clock", "value": command["warp"]}
+        self._wire.event("/grader/actor", record)
+        self._clock.start()
+
+    def _rewarp(self, command):
+        self._clock.set_warp(command["warp"])
+        record = {"action": "clock", "actor": "grader", "topic": "/clock", "value": command["warp"]}
+        record["detail"] = command["detail"]
+        self._wire.event("/grader/actor", record)
+
+    def _graph(self, _command):
+        """Ask the nodes for their connections, beside the loop: a node that never answers must not stop it."""
+
+        def ask():
+            record = self._master.graph(connections=True)
+            self._wire.event("/grader/graph", record)
+            self._wire.status("graph", connections=record["connections"])
+
+        threading.Thread(target=ask, daemon=True).start()
+
+    def _finish(self, _command):
+        """Stop what is left, say what that was, and end."""
+        if self._finishing:
+            return
+        self._finishing = True
+        if self._clock:
+            self._clock.stop()
+        for process in list(self._processes.values()):
+            if process.role == "student":
+                for pid in process.left_behind():
+                    self._wire.status("left-behind", name=process.name, pid=pid)
+            process.kill()
+        if self._master:
+            self._recorder.finish()
+        self.loop.call_later(FINISH_S, self.loop.stop)
+        self._end_when_empty()
+
+    def _exited(self, process):
+        del self._processes[process.name]
+        usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+        self._wire.status("exited", name=process.name, children_cpu_s=usage.ru_utime + usage.ru_stime)
+        self._end_when_empty()
+
+    def _end_when_empty(self):
+        if self._finishing and not self._processes:
+            self._lateness.stop()
+            if self._master:
+                self._wire.event("/grader/graph", self._master.graph())
+            self.loop.stop()
+
+    def _reap(self):
+        for process in list(self._processes.values()):
+            process.reap()
+
+
+def main():
+    libc = ctypes.CDLL(None, use_errno=True)
+    libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    wire = Wire(os.dup(1))
+    os.dup2(2, 1)
+    with open(0, "rb", buffering=0, closefd=False) as commands:
+        config = json.loads(commands.readline().decode())
+    arena = Arena(wire, config)
+    arena.loop.run()
+    kill_orphans()
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    wire.status("done", cpu_s=usage.ru_utime + usage.ru_stime, max_rss_bytes=usage.ru_maxrss * 1024)
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,48 @@
+"""How late this machine wakes a process that asked for 10 ms: the measure of whether a rate may be judged."""
+
+import os
+import threading
+import time
+
+PERIOD_S = 0.01
+REPORT_S = 0.5
+
+
+class Lateness:
+    def __init__(self, wire):
+        self._wire = wire
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def start(self):
+        self._thread.start()
+
+    def stop(self):
+        self._stopped.set()
+        self._thread.join()
+
+    def _run(self):
+        late_ms = []
+        report_at = time.monotonic() + REPORT_S
+        stopping = False
+        while not stopping:
+            before = time.monotonic()
+            stopping = self._stopped.wait(PERIOD_S)
+            after = time.monotonic()
+            if not stopping:
+                late_ms.append(max(0.0, (after - before - PERIOD_S) * 1e3))
+            if late_ms and (stopping or after >= report_at):
+                self._report(late_ms)
+                late_ms = []
+                report_at = after + REPORT_S
+
+    def _report(self, late_ms):
+        late_ms.sort()
+        record = {
+            "samples": len(late_ms),
+            "mean_ms": round(sum(late_ms) / len(late_ms), 3),
+            "p95_ms": round(late_ms[int(0.95 * (len(late_ms) - 1))], 3),
+            "max_ms": round(late_ms[-1], 3),
+            "load_1min": round(os.getloadavg()[0], 2),
+        }
+        self._wire.event("/grader/host", record)

@@ -1,0 +1,145 @@
+"""The ROS master of one arena: ros_comm's own, with the recorder inside and its graph told to the grader."""
+
+import threading
+
+import rosmaster.master_api
+from rosgraph.xmlrpc import XmlRpcNode
+from tcpros import ProtocolError, call, slave_api
+
+GRAPH_QUIET_S = 0.02
+BUS_INFO_S = 0.5
+
+
+class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
+    """A node's publishers are recorded before it can publish (see `recorder`)."""
+
+    def __init__(self, loop, wire, recorder, own_prefix):
+        super().__init__(3)
+        self._loop = loop
+        self._wire = wire
+        self._recorder = recorder
+        self._own_prefix = own_prefix
+        self._graph_due = False
+        self.listening = threading.Event()
+        # Unset, every rospy.loginfo asks the master for it, and a SIGINT during that call locks the node up for ever.
+        self.param_server.set_param("/rosout_disable_topics_generation", False)
+
+    def _ready(self, uri):
+        super()._ready(uri)
+        self.listening.set()
+
+    def registerPublisher(self, caller_id, topic, topic_type, caller_api):
+        answer = super().registerPublisher(caller_id, topic, topic_type, caller_api)
+        if answer[0] == 1 and not caller_id.startswith(self._own_prefix):
+            self._recorder.connect(topic, caller_id, caller_api)
+        self._graph_changed()
+        return answer
+
+    def unregisterPublisher(self, caller_id, topic, caller_api):
+        return self._after(super().unregisterPublisher(caller_id, topic, caller_api))
+
+    def registerSubscriber(self, caller_id, topic, topic_type, caller_api):
+        return self._after(super().registerSubscriber(caller_id, topic, topic_type, caller_api))
+
+    def unregisterSubscriber(self, caller_id, topic, caller_api):
+        return self._after(super().unregisterSubscriber(caller_id, topic, caller_api))
+
+    def registerService(self, caller_id, service, service_api, caller_api):
+        if str(service).endswith("/get_loggers"):
+            self._recorder.gate(caller_id)
+        return self._after(super().registerService(caller_id, service, service_api, caller_api))
+
+    def getParam(self, caller_id, key):
+        if key == "/use_sim_time":
+            self._recorder.gate(caller_id)
+        return super().getParam(caller_id, key)
+
+    def unregisterService(self, caller_id, service, service_api):
+        return self._after(super().unregisterService(caller_id, service, service_api))
+
+    def setParam(self, caller_id, key, value):
+        answer = super().setParam(caller_id, key, value)
+        self._param("set", key, caller_id, value)
+        return answer
+
+    def deleteParam(self, caller_id, key):
+        answer = super().deleteParam(caller_id, key)
+        self._param("delete", key, caller_id, None)
+        return answer
+
+    def shutdown(self, caller_id, msg=""):
+        """A student's node has no business ending the master: refused, and noted."""
+        self._wire.event(
+            "/grader/actor",
+            {"action": "note", "actor": str(caller_id), "detail": "asked the master to shut down; refused"},
+        )
+        return -1, "refused", 0
+
+    def graph(self, *, connections=False):
+        """The state as a GraphEvent's fields."""
+        with self.ps_lock:
+            publishers = self.publishers.get_state()
+            subscribers = self.subscribers.get_state()
+            services = self.services.get_state()
+            types = dict(self.topics_types)
+            apis = {name: ref.api for name, ref in self.reg_manager.nodes.items()}
+        record = {
+            "nodes": sorted(apis),
+            "topic_types": types,
+            "publishers": dict(publishers),
+            "subscribers": dict(subscribers),
+            "services": dict(services),
+        }
+        if connections:
+            publishing = {node for _, nodes in publishers for node in nodes}
+            record["connections"] = [
+                found
+                for node in sorted(publishing)
+                if not node.startswith(self._own_prefix) and apis.get(node)
+                for found in self._connections(node, apis[node])
+            ]
+        return record
+
+    def _connections(self, node, api):
+        """The node's outgoing connections, as the node itself reports them."""
+        try:
+            entries = call(slave_api(api, BUS_INFO_S).getBusInfo, self._own_prefix)
+        except ProtocolError:
+            return
+        for entry in entries if isinstance(entries, list) else ():
+            if isinstance(entry, list) and len(entry) >= 5 and entry[2] == "o":
+                subscriber, topic = str(entry[1]), str(entry[4])
+                if not subscriber.startswith(self._own_prefix):
+                    yield {"topic": topic, "publisher": node, "subscriber": subscriber}
+
+    def _after(self, answer):
+        self._graph_changed()
+        return answer
+
+    def _graph_changed(self):
+        """Registrations come in bursts: tell the grader once they pause."""
+        self._loop.call_soon(self._schedule_graph)
+
+    def _schedule_graph(self):
+        if not self._graph_due:
+            self._graph_due = True
+            self._loop.call_later(GRAPH_QUIET_S, self._tell_graph)
+
+    def _tell_graph(self):
+        self._graph_due = False
+        self._wire.event("/grader/graph", self.graph())
+
+    def _param(self, action, key, caller_id, value):
+        if isinstance(value, (bytes, bytearray)) or type(value).__name__ in ("Binary", "DateTime"):
+            value = repr(value)
+        record = {"action": action, "name": str(key), "caller_id": str(caller_id), "value": value}
+        self._wire.event("/grader/param", record)
+
+
+def serve(handler, port, patience_s=5.0):
+    """Serve the XML-RPC API of a handler that sets its event `listening`; return its URI."""
+    node = XmlRpcNode(port, handler)
+    node.start()
+    if not handler.listening.wait(patience_s):
+        raise OSError("no XML-RPC server on port {} after {} s".format(port, patience_s))
+    return node.uri

@@ -1,0 +1,290 @@
+"""Runs processes, reads what they print, stops them, and counts what they used."""
+
+import json
+import os
+import signal
+import subprocess
+
+LINE_BYTES_MAX = 4096
+READ_BYTES = 65536
+WATCH_S = 0.5
+PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+
+
+class Process:
+    """One process tree. `spec`: name, role, argv, env, cwd, sandboxed, script, repairs."""
+
+    def __init__(self, loop, wire, spec, limits, on_exit):
+        self.name = spec["name"]
+        self.role = spec["role"]
+        self.alive = True
+        self._loop = loop
+        self._wire = wire
+        self._limits = limits
+        self._on_exit = on_exit
+        self._lines = 0
+        self._bytes = 0
+        self._stopped_by = None
+        self._peak_bytes = 0
+        self._cpu_s = 0.0
+        self._inner_pid = None
+        self._open_streams = 0
+        self._status = None
+        self._spawn(spec)
+        self._event("start", argv=spec["argv_shown"], script=spec["script"], repairs=spec["repairs"])
+        loop.call_later(WATCH_S, self._watch)
+
+    def interrupt(self):
+        """What Ctrl-C in the terminal does: SIGINT for the whole foreground process group."""
+        self._stopped_by = "INT"
+        self._signal_group(signal.SIGINT)
+
+    def stop(self, int_s, term_s):
+        """INT, then TERM after `int_s`, then KILL after another `term_s`."""
+        if not self.alive:
+            return
+        self.interrupt()
+        self._loop.call_later(int_s, lambda: self._escalate("TERM", signal.SIGTERM))
+        self._loop.call_later(int_s + term_s, self.kill)
+
+    def kill(self):
+        if self.alive:
+            self._stopped_by = "KILL"
+            self._signal_group(signal.SIGKILL)
+            if self._status is None:
+                _kill(self.pid, signal.SIGKILL)
+
+    def reap(self):
+        """Take the exit status if there is one; tell it once the last output is read.
+
+        bubblewrap's own process does not wait for its namespace, so the usage of what ran in there comes with the
+        namespace's init, which the arena inherits.
+        """
+        if self._status is None:
+            pid, status, usage = os.wait4(self.pid, os.WNOHANG)
+            if pid == 0:
+                return
+            self._popen.returncode = status
+            self._status = status
+            self._count(usage)
+            if self._inner_pid is None:
+                self._signal_group(signal.SIGKILL)
+            self._loop.call_later(WATCH_S, self._finish)
+        if self._inner_pid is not None:
+            try:
+                pid, _, usage = os.wait4(self._inner_pid, os.WNOHANG)
+            except ChildProcessError:
+                return  # bubblewrap's still: it comes to the arena when that ends
+            if pid == 0:
+                return
+            self._inner_pid = None
+            self._count(usage)
+        self._finish_when_read()
+
+    def _count(self, usage):
+        self._cpu_s += usage.ru_utime + usage.ru_stime
+        self._peak_bytes = max(self._peak_bytes, usage.ru_maxrss * 1024)
+
+    def _spawn(self, spec):
+        argv = list(spec["argv"])
+        info_r = None
+        pass_fds = ()
+        if spec["sandboxed"]:
+            info_r, info_w = os.pipe()
+            argv = [str(info_w) if a == "{info_fd}" else a for a in argv]
+            pass_fds = (info_w,)
+        self._popen = subprocess.Popen(
+            argv,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=spec["env"],
+            cwd=spec["cwd"],
+            pass_fds=pass_fds,
+            start_new_session=True,
+        )
+        self.pid = self._popen.pid
+        if info_r is not None:
+            os.close(info_w)
+            self._read_info(info_r)
+        for name, pipe in (("stdout", self._popen.stdout), ("stderr", self._popen.stderr)):
+            self._open_streams += 1
+            _Stream(self, name, pipe)
+
+    def _read_info(self, info_r):
+        """bubblewrap says which process is the first one of the new PID namespace."""
+        text = b""
+
+        def readable():
+            nonlocal text
+            chunk = os.read(info_r, 4096)
+            text += chunk
+            if chunk and b"}" not in text:
+                return
+            self._loop.remove_reader(info_r)
+            os.close(info_r)
+            if text:
+                self._inner_pid = json.loads(text.decode())["child-pid"]
+
+        self._loop.add_reader(info_r, readable)
+
+    def _signal_group(self, number):
+        """The inner process leads a session of its own; its namespace's init ignores what it has no handler for."""
+        try:
+            os.killpg(self._inner_pid or self.pid, number)
+        except (ProcessLookupError, PermissionError):
+            pass  # already over
+
+    def _escalate(self, name, number):
+        if self.alive and self._stopped_by != "KILL":
+            self._stopped_by = name
+            for pid in self._tree():
+                _kill(pid, number)
+
+    def _tree(self):
+        """The student's own processes, without bubblewrap's two."""
+        tree = _descendants(self.pid)
+        return [pid for pid in tree if pid != self._inner_pid]
+
+    def left_behind(self):
+        """Process ids of the tree that still run."""
+        return self._tree() if self.alive else []
+
+    def _watch(self):
+        if not self.alive:
+            return
+        tree = [self.pid, *_descendants(self.pid)]
+        size = sum(map(_resident_bytes, tree))
+        self._peak_bytes = max(self._peak_bytes, size)
+        if size > self._limits["memory_bytes"]:
+            self._limit("memory", "{} MB in {} processes".format(size >> 20, len(tree)))
+        elif len(tree) > self._limits["processes"]:
+            self._limit("processes", "{} processes".format(len(tree)))
+        else:
+            self._loop.call_later(WATCH_S, self._watch)
+
+    def _limit(self, what, detail):
+        note = "stopped by the grader: limit of {}: {}".format(what, detail)
+        self._wire.event("/grader/actor", {"action": "note", "actor": self.name, "detail": note})
+        self.kill()
+
+    def line(self, stream, data, cut):
+        """One line of output; past the limits, output is read and thrown away."""
+        self._lines += 1
+        self._bytes += len(data)
+        if self._lines > self._limits["output_lines"] or self._bytes > self._limits["output_bytes"]:
+            if self._limits["output_lines"] + 1 == self._lines or self._bytes - len(data) <= self._limits["output_bytes"]:
+                self._console(stream, "… output past the limit is left out", True)
+                self._lines = self._limits["output_lines"] + 1
+                self._bytes = self._limits["output_bytes"] + 1
+            return
+        self._console(stream, data.decode("utf-8", "replace"), cut)
+
+    def _console(self, stream, text, cut):
+        record = {"process": self.name, "stream": stream, "line": text, "truncated": cut}
+        self._wire.event("/grader/console", record)
+
+    def stream_closed(self):
+        self._open_streams -= 1
+        self._finish_when_read()
+
+    def _finish_when_read(self):
+        if self._status is not None and self._open_streams == 0 and self._inner_pid is None:
+            self._finish()
+
+    def _finish(self):
+        if not self.alive:
+            return
+        self.alive = False
+        status = self._status
+        code = os.WEXITSTATUS(status) if os.WIFEXITED(status) else None
+        self._event(
+            "exit",
+            exit_code=code,
+            signal=os.WTERMSIG(status) if os.WIFSIGNALED(status) else _signal_of(code),
+            stopped_by=self._stopped_by,
+            cpu_s=round(self._cpu_s, 4),
+            max_rss_bytes=self._peak_bytes,
+        )
+        self._on_exit(self)
+
+    def _event(self, event, **fields):
+        fields.update(event=event, name=self.name, role=self.role)
+        self._wire.event("/grader/process", fields)
+
+
+class _Stream:
+    def __init__(self, process, name, pipe):
+        self._process = process
+        self._name = name
+        self._pipe = pipe
+        self._rest = b""
+        os.set_blocking(pipe.fileno(), False)
+        process._loop.add_reader(pipe, self._readable)
+
+    def _readable(self):
+        try:
+            chunk = os.read(self._pipe.fileno(), READ_BYTES)
+        except BlockingIOError:
+            return
+        if not chunk:
+            if self._rest:
+                self._process.line(self._name, self._rest, False)
+            self._process._loop.remove_reader(self._pipe)
+            self._pipe.close()
+            self._process.stream_closed()
+            return
+        *lines, self._rest = (self._rest + chunk).split(b"\n")
+        for line in lines:
+            self._line(line)
+        if len(self._rest) > LINE_BYTES_MAX:
+            self._line(self._rest)
+            self._rest = b""
+
+    def _line(self, line):
+        cut = len(line) > LINE_BYTES_MAX
+        self._process.line(self._name, line[:LINE_BYTES_MAX].rstrip(b"\r"), cut)
+
+
+def kill_orphans():
+    """End whatever still descends from the arena: without a sandbox, a student's daemon is adopted by it."""
+    for pid in _descendants(os.getpid()):
+        _kill(pid, signal.SIGKILL)
+
+
+def _signal_of(code):
+    """A shell, and bubblewrap, give 128 + n for a child that died of signal n."""
+    return code - 128 if code is not None and 128 < code < 160 else None
+
+
+def _kill(pid, number):
+    try:
+        os.kill(pid, number)
+    except (ProcessLookupError, PermissionError):
+        pass  # already over
+
+
+def _descendants(pid):
+    found = []
+    try:
+        threads = os.listdir("/proc/{}/task".format(pid))
+    except OSError:
+        return found
+    for thread in threads:
+        try:
+            with open("/proc/{}/task/{}/children".format(pid, thread)) as file:
+                children = [int(child) for child in file.read().split()]
+        except OSError:
+            continue
+        for child in children:
+            found.append(child)
+            found.extend(_descendants(child))
+    return found
+
+
+def _resident_bytes(pid):
+    try:
+        with open("/proc/{}/statm".format(pid)) as file:
+            return int(file.read().split()[1]) * PAGE_BYTES
+    except (OSError, IndexError, ValueError):
+        return 0

@@ -1,0 +1,133 @@
+"""Finds ROS 1 on this machine, in the order that docs/design.md gives."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal
+
+from grader.errors import RosMissing
+from grader.model.record import Record
+
+DEBIAN_PACKAGES = (
+    "python3-rospy python3-rosmaster python3-roslaunch rosout rosbash catkin "
+    "python3-std-msgs python3-rosgraph-msgs python3-geometry-msgs python3-sensor-msgs"
+)
+INSTALL_HINT = f"on Debian 12: apt-get install {DEBIAN_PACKAGES} (or: make setup)"
+SYSTEM_PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
+KEPT = ("ROS_", "PYTHONPATH", "CMAKE_PREFIX_PATH", "LD_LIBRARY_PATH", "PKG_CONFIG_PATH", "PATH")
+
+
+class RosInstallation(Record):
+    """`python` is ROS's interpreter, `prefixes` what a sandbox must show of it beside /usr, `env` what `setup.bash`
+    sets (without it: what Debian's packages need)."""
+
+    kind: Literal["setup", "debian", "conda"]
+    where: str
+    distro: str
+    python: str
+    prefixes: tuple[str, ...]
+    env: dict[str, str]
+
+    @property
+    def label(self) -> str:
+        return f"{self.distro} ({self.where})"
+
+    def program(self, name: str) -> str | None:
+        """The path of one of ROS's programs, or None."""
+        return shutil.which(name, path=self.env["PATH"])
+
+
+def find_ros() -> RosInstallation | None:
+    """The ROS 1 to use, or None. `$GRADER_ROS_SETUP` names a `setup.bash`, or `none`."""
+    return _find(os.environ.get("GRADER_ROS_SETUP", ""), os.environ.get("CONDA_PREFIX", ""))
+
+
+def require_ros() -> RosInstallation:
+    ros = find_ros()
+    if ros is None:
+        raise RosMissing("no ROS 1 on this machine", hint=INSTALL_HINT)
+    return ros
+
+
+@lru_cache(maxsize=4)
+def _find(setup: str, conda: str) -> RosInstallation | None:
+    if setup == "none":
+        return None
+    if setup:
+        if not Path(setup).is_file():
+            raise RosMissing(f"$GRADER_ROS_SETUP names no file: {setup}", hint="set it to a setup.bash, or unset it")
+        return _from_setup(Path(setup))
+    for candidate in sorted(Path("/opt/ros").glob("*/setup.bash"), reverse=True):
+        if (candidate.parent / "bin" / "rosmaster").exists():
+            return _from_setup(candidate)
+    return _debian() or _conda(conda)
+
+
+def _from_setup(setup: Path) -> RosInstallation:
+    script = 'source "$1" >/dev/null && env -0'
+    base = {"PATH": SYSTEM_PATH, "HOME": "/nonexistent"}
+    done = subprocess.run(
+        ["/bin/bash", "-c", script, "bash", str(setup)], env=base, capture_output=True, check=False, timeout=30
+    )
+    if done.returncode != 0:
+        raise RosMissing(f"{setup} does not load: {done.stderr.decode(errors='replace').strip()[-200:]}")
+    env = keep_ros_variables(parse_env(done.stdout))
+    python = shutil.which("python3", path=env.get("PATH", SYSTEM_PATH)) or "/usr/bin/python3"
+    distro = env.get("ROS_DISTRO", setup.parent.name)
+    return RosInstallation(
+        kind="setup", where=str(setup), distro=distro, python=python, prefixes=(str(setup.parent),), env=env
+    )
+
+
+def _debian() -> RosInstallation | None:
+    modules = Path("/usr/lib/python3/dist-packages")
+    if not all((modules / name).is_dir() for name in ("rospy", "rosmaster", "std_msgs")):
+        return None
+    version = _debian_version()
+    return RosInstallation(
+        kind="debian",
+        where="Debian's packages",
+        distro=f"ros_comm {version}",
+        python="/usr/bin/python3",
+        prefixes=(),
+        env={"PATH": SYSTEM_PATH, "ROS_PACKAGE_PATH": "/usr/share"},
+    )
+
+
+def _debian_version() -> str:
+    manifest = Path("/usr/share/rosmaster/package.xml")
+    text = manifest.read_text(errors="replace") if manifest.is_file() else ""
+    return text.partition("<version>")[2].partition("</version>")[0].strip() or "1"
+
+
+def _conda(prefix: str) -> RosInstallation | None:
+    if not prefix or not (Path(prefix) / "bin" / "rosmaster").exists():
+        return None
+    env = keep_ros_variables({**os.environ, "PATH": f"{prefix}/bin:{SYSTEM_PATH}"})
+    return RosInstallation(
+        kind="conda",
+        where=prefix,
+        distro=env.get("ROS_DISTRO", "RoboStack"),
+        python=f"{prefix}/bin/python3",
+        prefixes=(prefix,),
+        env=env,
+    )
+
+
+def parse_env(dump: bytes) -> dict[str, str]:
+    """What `env -0` printed."""
+    pairs = (entry.partition("=") for entry in dump.decode(errors="replace").split("\0") if "=" in entry)
+    return {name: value for name, _, value in pairs}
+
+
+def keep_ros_variables(env: Mapping[str, str]) -> dict[str, str]:
+    """Only what ROS set: no secret of the shell's goes on to a student's process."""
+    kept = {k: v for k, v in env.items() if k.startswith(KEPT)}
+    for name in ("ROS_MASTER_URI", "ROS_IP", "ROS_HOSTNAME"):
+        kept.pop(name, None)
+    return kept

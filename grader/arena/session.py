@@ -1,0 +1,224 @@
+"""One arena from the grader's side: starts it, commands it, writes what it tells into the evidence."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import secrets
+import time
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from grader.arena.frames import Frame, FrameReader
+from grader.arena.live import Live
+from grader.arena.place import Place
+from grader.errors import ArenaError
+from grader.evidence.events import TOPICS, ScenarioEvent
+from grader.evidence.run import is_grader_node
+from grader.evidence.writer import EvidenceWriter
+
+ARENA = Path(__file__).parent / "ros"
+ROSOUT = ("/usr/lib/rosout/rosout", "lib/rosout/rosout")
+READY_S = 15.0
+END_S = 5.0
+READ_BYTES = 1 << 18
+PORT = 11311
+JSON_TOPICS = {topic for topic in TOPICS if topic != "/grader/scenario"}
+
+
+class ArenaSession:
+    """`async with ArenaSession(…) as arena`: inside, the managed roscore runs (or, without `master`, only processes).
+
+    Raises ArenaError when it does not start or dies.
+    """
+
+    def __init__(self, place: Place, writer: EvidenceWriter, *, master: bool = True) -> None:
+        self.live = Live()
+        self.cpu_s = 0.0
+        self.student_cpu_s = 0.0
+        self.exit_codes: dict[str, int | None] = {}
+        self.left_behind: list[str] = []
+        self._place = place
+        self._writer = writer
+        self._master = master
+        self._changed = asyncio.Event()
+        self._channels: dict[int, dict[str, Any]] = {}
+        self._ready = False
+        self._done = False
+        self.rosout_up = False
+        self._failure = ""
+        self._stderr: deque[str] = deque(maxlen=20)
+
+    async def __aenter__(self) -> ArenaSession:
+        argv = self._place.sandbox.outer([self._place.ros.python, "-s", "-B", str(ARENA)])
+        self._process = await asyncio.create_subprocess_exec(
+            *argv,
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.PIPE,
+            env=self._place.arena_env(),
+            cwd="/",
+            start_new_session=True,
+        )
+        self._tasks = [asyncio.create_task(self._read_frames()), asyncio.create_task(self._read_errors())]
+        try:
+            self.send(**self._config())
+            if not await self.wait(lambda: self._ready, READY_S):
+                raise ArenaError(f"the managed roscore did not start: {self._why()}", hint="grader doctor")
+        except BaseException:
+            await self._end()
+            raise
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self._end()
+
+    def send(self, **command: Any) -> None:
+        """Hand the arena one command (grader/arena/ros/__main__.py has a method for each)."""
+        if self._process.stdin is not None and not self._process.stdin.is_closing():
+            self._process.stdin.write(json.dumps(command).encode() + b"\n")
+
+    def start(self, spec: dict[str, Any]) -> None:
+        self.live.running.add(spec["name"])
+        self.send(do="start", spec=spec)
+
+    async def interrupt(self, name: str, *, int_s: float, term_s: float) -> None:
+        """Ctrl-C; TERM after `int_s`, KILL after another `term_s`. Returns when the process has ended."""
+        self.send(do="interrupt", name=name, int_s=int_s, term_s=term_s)
+        await self.wait(lambda: name in self.live.ended, int_s + term_s + END_S)
+
+    def course(self, event: ScenarioEvent) -> None:
+        self._writer.event("/grader/scenario", time.time_ns(), event)
+
+    async def wait(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+        """Wait until the condition holds; False when it does not in time. Raises ArenaError if the arena dies."""
+        deadline = time.monotonic() + timeout_s
+        while not condition():
+            if self._failure:
+                raise ArenaError(f"the managed roscore ended: {self._why()}", hint="grade again")
+            left = deadline - time.monotonic()
+            if left <= 0:
+                return False
+            self._changed.clear()
+            with contextlib.suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(self._changed.wait(), left)
+        return True
+
+    async def finish(self) -> None:
+        """Let the arena stop what is left and give its last frames."""
+        self.send(do="finish")
+        await self.wait(lambda: self._done, END_S)
+
+    def _config(self) -> dict[str, Any]:
+        return {
+            "master": self._master,
+            "port": PORT if self._place.sandbox.bubblewrap else 0,
+            "limits": self._place.limits.model_dump(),
+            "suffix": "_" + secrets.token_hex(4),
+            "rosout": self._rosout_spec() if self._master else None,
+        }
+
+    def _rosout_spec(self) -> dict[str, Any] | None:
+        for name in ROSOUT:
+            for prefix in ("/", *self._place.ros.prefixes):
+                program = Path(prefix) / name
+                if program.exists():
+                    return self._place.spec("rosout", [str(program)], role="grader", copy=False)
+        return None
+
+    async def _read_frames(self) -> None:
+        assert self._process.stdout is not None  # noqa: S101 - a pipe was asked for
+        frames = FrameReader()
+        try:
+            while chunk := await self._process.stdout.read(READ_BYTES):
+                for frame in frames.feed(chunk):
+                    self._take(frame)
+                self._changed.set()
+        finally:
+            if not self._done:
+                self._failure = self._failure or "its output ended"
+            self._changed.set()
+
+    async def _read_errors(self) -> None:
+        assert self._process.stderr is not None  # noqa: S101 - a pipe was asked for
+        async for line in self._process.stderr:
+            self._stderr.append(line.decode(errors="replace").rstrip())
+
+    def _take(self, frame: Frame) -> None:
+        if frame.kind == "M":
+            self._message(frame)
+        elif frame.kind == "E":
+            self._event(frame)
+        elif frame.kind == "S":
+            self._status(frame.fields)
+        else:
+            fields = frame.fields
+            self._channels[fields.pop("id")] = fields
+            self._writer.register_channel(**fields)
+
+    def _message(self, frame: Frame) -> None:
+        fields = self._channels[frame.channel]
+        self._writer.message(**fields, log_time_ns=frame.time_ns, data=frame.data)
+        if not is_grader_node(fields["callerid"]):
+            self.live.message(fields["topic"], 1, time.monotonic())
+
+    def _event(self, frame: Frame) -> None:
+        topic, record = frame.fields["topic"], frame.fields["record"]
+        self._writer.event(topic, frame.time_ns, TOPICS[topic].model_validate(record))
+        if topic == "/grader/graph":
+            self.rosout_up = self.rosout_up or "/rosout" in record["nodes"]
+            self.live.graph_changed_s = time.monotonic()
+        elif topic == "/grader/console":
+            self.live.printed(record["line"], time.monotonic())
+        elif topic == "/grader/process" and record["event"] == "exit":
+            self._exited(record)
+
+    def _exited(self, record: dict[str, Any]) -> None:
+        name = record["name"]
+        if record["role"] == "grader":
+            self.cpu_s += record["cpu_s"]
+        else:
+            self.student_cpu_s += record["cpu_s"]
+        self.exit_codes[name] = record["exit_code"]
+        self.live.running.discard(name)
+        if name != "rosout":
+            self.live.ended.add(name)
+
+    def _status(self, fields: dict[str, Any]) -> None:
+        status = fields["status"]
+        if status == "ready":
+            self._ready = True
+        elif status == "subscribed" and not is_grader_node(fields["subscriber"]):
+            self.live.subscribed.add(fields["topic"])
+        elif status == "graph":
+            pairs = [c for c in fields["connections"] if not is_grader_node(c["subscriber"])]
+            self.live.connected = {c["topic"] for c in pairs}
+            self.live.graphs += 1
+        elif status == "left-behind":
+            self.left_behind.append(fields["name"])
+        elif status == "spawn-failed":
+            self._failure = f"{fields['name']} could not be started: {fields['detail']}"
+        elif status == "done":
+            self.cpu_s += fields["cpu_s"]
+            self._done = True
+
+    def _why(self) -> str:
+        return " ".join([self._failure, *list(self._stderr)[-1:]]).strip() or f"exit code {self._process.returncode}"
+
+    async def _end(self) -> None:
+        """End the arena at once: closed commands first, so that it ends what it started, then by force."""
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+        try:
+            await asyncio.wait_for(self._process.wait(), 1.5)
+        except (asyncio.TimeoutError, asyncio.CancelledError):
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self._process.pid, 9)
+            await self._process.wait()
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)

@@ -1,0 +1,134 @@
+"""Fresh workspaces on disk: one as handed in, to build; one source tree with the repairs, to run.
+
+Student code writes only into the first, and the grader never follows what it finds there. Both hold the lab's package
+and those packages of the same submission that it depends on, nothing else.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import stat
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from grader.model.package import PackageFacts, SourceFile
+from grader.model.record import Record
+from grader.model.submission import SourcePackage, Submission
+from grader.package.manifest import read_manifest
+
+IGNORED = {".git", "build", "devel", "install", "__pycache__"}
+SHEBANG = b"#!/usr/bin/env python3\n"
+READ_MAX = 8 << 20
+
+
+class Workspace(Record):
+    """`built` is the catkin workspace to build (`src/` in it), `repaired` the `src/` that runs; `folder` is the
+    package's folder name in both, `repairs` what was mended, by path."""
+
+    built: Path
+    repaired: Path
+    output: Path
+    folder: str
+    repairs: dict[str, tuple[str, ...]]
+
+
+def make_workspace(place: Path, submission: Submission, facts: PackageFacts, scripts: Iterable[str], uid: int | None) -> Workspace:
+    """Copy the packages twice below `place`; `scripts` are the paths that get their repairs in the second copy."""
+    built, repaired, output = place / "ws", place / "run" / "src", place / "out"
+    output.mkdir()
+    for package in needed_packages(submission):
+        for source_tree in (built / "src", repaired):
+            _copy(package, source_tree / _folder_name(package))
+    folder = _folder_name(submission.package)
+    repairs = {path: tuple(_repair(repaired / folder / path, facts.file(path))) for path in scripts}
+    for path in (built, output):
+        _give_to(path, uid)
+    return Workspace(built=built, repaired=repaired, output=output, folder=folder, repairs=repairs)
+
+
+def needed_packages(submission: Submission) -> list[SourcePackage]:
+    """The lab's package and its dependencies within the submission, the lab's first."""
+    others = {p.name: p for p in submission.packages if p.name != submission.package.name}
+    needed = [submission.package]
+    for package in needed:
+        manifest, _ = read_manifest(package.folder)
+        for name in sorted({d.name for d in manifest.dependencies} if manifest else ()):
+            if name in others:
+                needed.append(others.pop(name))
+    return needed
+
+
+def read_untrusted(path: Path, limit_bytes: int = READ_MAX) -> bytes | None:
+    """A regular file that student code may have written: no link is followed, no pipe waited for. None if it is none."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError:
+        return None
+    with os.fdopen(descriptor, "rb") as file:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            return None
+        return file.read(limit_bytes)
+
+
+def _folder_name(package: SourcePackage) -> str:
+    """The package's name where it can be a folder: spaces and accents of the student's path stay behind."""
+    name = "".join(c if c.isascii() and (c.isalnum() or c in "_-") else "_" for c in package.name)
+    return name or "package"
+
+
+def _copy(package: SourcePackage, target: Path) -> None:
+    """Copy a package's tree, links as links, with the modes that its source gives."""
+    for folder, folders, files in os.walk(package.folder):
+        top = Path(folder) == package.folder
+        folders[:] = [f for f in folders if f not in IGNORED or (not top and f != ".git")]
+        here = target / Path(folder).relative_to(package.folder)
+        here.mkdir(parents=True, exist_ok=True)
+        for name in [*files, *(f for f in folders if (Path(folder) / f).is_symlink())]:
+            _copy_entry(Path(folder) / name, here / name, package)
+
+
+def _copy_entry(source: Path, target: Path, package: SourcePackage) -> None:
+    if source.is_symlink():
+        target.symlink_to(source.readlink())
+    elif source.is_file():
+        shutil.copyfile(source, target)
+        executable = package.executable.get(source.relative_to(package.folder).as_posix())
+        if executable is None:
+            executable = package.mode_source == "none" and _starts_as_script(source)
+        target.chmod(0o755 if executable else 0o644)
+
+
+def _starts_as_script(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(2) == b"#!"
+
+
+def _repair(path: Path, facts: SourceFile | None) -> Iterator[str]:
+    """Mend what keeps `rosrun` from running a script, and name each thing mended."""
+    if facts is None or path.is_symlink() or not path.is_file():
+        return
+    if facts.executable is False:
+        yield "executable bit"
+    path.chmod(0o755)
+    shebang = facts.shebang
+    if shebang is not None and not shebang.crlf and shebang.found is not False:
+        return
+    text = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
+    if shebang is not None:
+        yield "line ending of the shebang" if shebang.crlf else f"shebang ({shebang.text})"
+        text = text.partition(b"\n")[2]
+    else:
+        yield "shebang (none)"
+        text = text if text.split(b"\n", 1)[0].strip() else text.partition(b"\n")[2]
+    path.write_bytes(SHEBANG + text.replace(b"\r\n", b"\n"))
+
+
+def _give_to(path: Path, uid: int | None) -> None:
+    """The build writes as the student: hand the tree over before anything of the student's runs."""
+    if uid is None:
+        return
+    os.chown(path, uid, uid)
+    for folder, folders, files in os.walk(path):
+        for name in (*folders, *files):
+            os.chown(Path(folder) / name, uid, uid, follow_symlinks=False)
