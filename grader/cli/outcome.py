@@ -27,6 +27,8 @@ def exit_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
         return ExitCode.BELOW_PASS_MARK
     visible = {c.id for c in rubric.criteria if c.visibility == "visible"}
     needed = [c for c in shown if c.id in visible and c.max_points > 0 and c.status is not Status.MANUAL]
+    if not needed:
+        return ExitCode.INCONCLUSIVE
     return ExitCode.PASSED if all(c.status is Status.PASS for c in needed) else ExitCode.BELOW_PASS_MARK
 
 

@@ -47,8 +47,8 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _common() -> argparse.ArgumentParser:
-    common = argparse.ArgumentParser(add_help=False)
+def _common() -> Parser:
+    common = Parser(add_help=False)
     common.add_argument(
         "--debug", action="store_true", default=argparse.SUPPRESS, help="show tracebacks of errors"
     )
@@ -58,7 +58,7 @@ def _common() -> argparse.ArgumentParser:
 class _Adder:
     """Adds commands that are made alike."""
 
-    def __init__(self, commands: argparse._SubParsersAction[Parser], common: argparse.ArgumentParser) -> None:
+    def __init__(self, commands: argparse._SubParsersAction[Parser], common: Parser) -> None:
         self.commands = commands
         self.common = common
 

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from grader.cli.errors import report
-from grader.cli.outcome import exit_code
+from grader.cli.outcome import UNSETTLED, exit_code
 from grader.errors import ExitCode, GraderError
 from grader.model.result import GradingResult
 from grader.report.result_json import result_bytes
@@ -17,19 +17,30 @@ REPORTS = ("result.json", "report.md", "junit.xml", "console.log")
 
 
 def show(
-    result: GradingResult, rubric: Rubric, folder: Path | None, *, hidden: int = 0, as_json: bool = False
+    result: GradingResult,
+    rubric: Rubric,
+    folder: Path | None,
+    *,
+    hidden: int = 0,
+    as_json: bool = False,
+    static: bool = False,
 ) -> ExitCode:
-    """Print the result (`hidden` criteria are left out of it already) and give its exit code."""
+    """Print the result (`hidden` criteria are left out of it already) and give its exit code.
+
+    With `static` nothing was run on purpose: the exit code is that of the criteria that could be judged.
+    """
     if as_json:
         sys.stdout.write(result_bytes(result).decode())
     else:
         print_report(result, rubric, open_console(sys.stdout), hidden=hidden)
+        if static:
+            print("\nNothing was run (--static): what needs a run is still open.")
         _paths(folder)
     if result.error is not None:
         report(GraderError(result.error.message, hint=result.error.hint))
     if result.status == "error":
         return ExitCode.NOT_GRADED
-    return exit_code(result.criteria, rubric)
+    return exit_code([c for c in result.criteria if not static or c.status not in UNSETTLED], rubric)
 
 
 def _paths(folder: Path | None) -> None:

@@ -75,7 +75,7 @@ def points_of(criterion: CriterionResult) -> str:
 
 
 def places(criterion: CriterionResult) -> list[str]:
-    """Where it was seen: `src/talker.py:17`, `real.mcap /chatter, 6.0 s`; exact times are in `result.json`."""
+    """Where it was seen: `src/talker.py:17`, `real.mcap /chatter, 6.0 s`."""
     return [_place(citation) for citation in criterion.citations]
 
 

@@ -49,7 +49,7 @@ def _place(
 ) -> Iterator[Fault]:
     scenario, check = criterion.get("scenario"), criterion.get("check")
     if scenario is None:
-        if check in checks and checks[check].needs_run:
+        if isinstance(check, str) and check in checks and checks[check].needs_run:
             yield (*path, "scenario"), f'is missing: "{check}" judges a run'
     elif isinstance(scenario, str) and scenario not in scenarios:
         yield (*path, "scenario"), f'there is no scenario "{scenario}"{did_you_mean(scenario, scenarios)}'

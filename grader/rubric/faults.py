@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import types
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Annotated, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -82,7 +82,7 @@ def _holds(data: object, part: str | int) -> bool:
 
 def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str:
     kind, context, value = detail["type"], detail.get("ctx", {}), detail["input"]
-    words = {
+    words: dict[str, Callable[[], str]] = {
         "missing": lambda: "is missing",
         "extra_forbidden": lambda: "is not known here" + did_you_mean(str(path[-1]), _keys(model, path[:-1])),
         "string_pattern_mismatch": lambda: f"{_pattern(context['pattern'])}, not {shown(value)}",

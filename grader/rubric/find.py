@@ -30,7 +30,7 @@ def locate(name_or_path: str) -> tuple[Path, str]:
         path = rubrics_folder() / f"{name_or_path}.yaml"
         return path, _short(path)
     path = Path(name_or_path)
-    if path.suffix in SUFFIXES or len(path.parts) > 1 or path.is_file():
+    if path.suffix in SUFFIXES or "/" in name_or_path or path.is_file():
         return path, name_or_path
     raise RubricError(
         [f'there is no rubric "{name_or_path}"{did_you_mean(name_or_path, rubric_ids())}'],

@@ -46,8 +46,8 @@ class Until(Record):
 
     `window_s`: that long after the first message on every topic of `topics` (a topic that stays silent stops
     being waited for when `silent_s` have passed since the first message on another). `messages`: so many
-    messages on each topic. `connected`: a student's publisher and a student's subscriber are connected over the
-    topic. `heard`: every probe's value was printed.
+    messages on each topic. `connected`: a student's publisher and a student's subscriber are connected over
+    the topic. `heard`: every probe's value was printed.
     A run gives up when no message came within `first_message_s`, when all topics that are waited for have
     been silent for `silent_s`, or after `limit_s`.
     """

@@ -63,8 +63,3 @@ def _until(path: KeyPath, until: dict[str, Any], has_probes: bool) -> Iterator[F
 def _topic(path: KeyPath, topic: object) -> Iterator[Fault]:
     if isinstance(topic, str) and not topic.startswith("/"):
         yield path, f'a topic begins with a slash: "/{topic}"'
-
-
-def _topic(path: KeyPath, topic: object) -> Iterator[Fault]:
-    if isinstance(topic, str) and not topic.startswith("/"):
-        yield path, f'a topic begins with a slash: "/{topic}"'

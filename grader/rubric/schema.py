@@ -21,6 +21,7 @@ def rubric_schema() -> dict[str, Any]:
     criteria = Annotated[tuple[member, ...], Field(min_length=1)]
     model = create_model("Rubric", __base__=Rubric, __doc__=Rubric.__doc__, criteria=(criteria, ...))
     schema = model.model_json_schema(by_alias=True)
+    schema["properties"]["scenarios"]["additionalProperties"] = False
     return {
         "$schema": DIALECT,
         **schema,

@@ -15,6 +15,7 @@ MAX_BYTES = 1_000_000
 MAX_NODES = 100_000
 MAX_DEPTH = 50
 MERGE_TAG = "tag:yaml.org,2002:merge"
+PLAIN_TAGS = frozenset({"tag:yaml.org,2002:map", "tag:yaml.org,2002:seq"})
 
 KeyPath = tuple[str | int, ...]
 Value: TypeAlias = "dict[str, Any] | list[Any] | str | int | float | None"
@@ -92,7 +93,7 @@ def _compose(text: str, raw: bytes, name: str) -> Source:
         raise RubricError([f"{name}:1: is nested too deeply"]) from error
     finally:
         if loader is not None:
-            loader.dispose()  # type: ignore[no-untyped-call]
+            loader.dispose()
     return Source(name=name, raw=raw, data=data, lines=reader.lines, faults=reader.faults)
 
 
@@ -131,6 +132,10 @@ class _Reader:
             )
         if len(path) > MAX_DEPTH:
             raise yaml.MarkedYAMLError(problem="is nested too deeply", problem_mark=node.start_mark)
+        if not isinstance(node, yaml.ScalarNode) and node.tag not in PLAIN_TAGS:
+            raise yaml.MarkedYAMLError(
+                problem=f"the tag {node.tag} is not for rubrics", problem_mark=node.start_mark
+            )
         self.lines.setdefault(path, node.start_mark.line + 1)
         if isinstance(node, yaml.MappingNode):
             return self._mapping(node, path)
@@ -177,7 +182,7 @@ class _Reader:
 
     def _scalar(self, node: yaml.Node, path: KeyPath) -> Value:
         try:
-            value = self.loader.construct_object(node)  # type: ignore[no-untyped-call]
+            value = self.loader.construct_object(node)
         except (ValueError, OverflowError) as error:
             problem = f"{node.value[:40]} cannot be read"
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark) from error

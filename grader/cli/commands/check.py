@@ -1,0 +1,41 @@
+"""`grader check [PATH]`: the student's own look before handing in."""
+
+from __future__ import annotations
+
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+
+from grader import pipeline
+from grader.cli.choice import choose
+from grader.cli.display import open_progress
+from grader.cli.show import show
+from grader.errors import ExitCode
+from grader.files import check_writable
+from grader.report.hidden import hidden_ids, without_hidden
+
+
+def run(
+    *,
+    path: str = ".",
+    rubric: str | None = None,
+    static: bool = False,
+    out: Path | None = None,
+    sandbox: str = "auto",
+    as_json: bool = False,
+) -> ExitCode:
+    """Grade the package at `path` with hidden criteria left out; with `static`, from its files alone."""
+    loaded, source = choose(Path(path), rubric)
+    if out is not None:
+        check_writable(out)
+    options = pipeline.GradeOptions(
+        sandbox=sandbox, submission_id=None, static_only=static, keep_hidden=False
+    )
+    with ExitStack() as stack:
+        folder = out or Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="grader-")))
+        with open_progress() as progress:
+            result = pipeline.grade(source, loaded, folder, options, progress)
+        shown = without_hidden(result, loaded.rubric)
+        kept = folder / result.submission.id if out is not None else None
+        hidden = len(hidden_ids(loaded.rubric))
+        return show(shown, loaded.rubric, kept, hidden=hidden, as_json=as_json, static=static)

@@ -1,0 +1,52 @@
+from __future__ import annotations
+
+import json
+
+import pytest
+import yaml
+from jsonschema import Draft202012Validator
+
+from grader.checks import CHECKS
+from grader.rubric.load import all_rubrics
+from grader.rubric.schema import rubric_schema
+from tests.rubric.samples import SOUND
+
+VALIDATOR = Draft202012Validator(rubric_schema())
+
+
+def test_the_schema_is_one():
+    Draft202012Validator.check_schema(rubric_schema())
+    assert json.loads(json.dumps(rubric_schema())) == rubric_schema()
+
+
+def test_every_check_offers_its_parameters_and_its_docs():
+    definitions = rubric_schema()["$defs"]
+    for name, check in CHECKS.items():
+        criterion = definitions["Criterion_" + name.replace("-", "_")]
+        assert criterion["properties"]["check"]["const"] == name
+        assert check.title in criterion["description"]
+        assert "with" in criterion["properties"]
+
+
+def test_sound_rubrics_are_valid():
+    for text in [SOUND, *(loaded.path.read_text(encoding="utf-8") for loaded in all_rubrics())]:
+        assert [error.message for error in VALIDATOR.iter_errors(yaml.safe_load(text))] == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("check: rate", "check: rat"),
+        ("rate_hz: 10}", "rate_hz: ten}"),
+        ("rate_hz: 10}", "rate_hz: 10, x: 1}"),
+        (", rate_hz: 10}", "}"),
+        ("points: 40", "points: -1"),
+        ("title: A sample\n", ""),
+        ("id: sample", "id: Sample Lab"),
+        ("window_s: 5", "windw_s: 5"),
+        ("  real:\n", "  Real Run:\n"),
+    ],
+)
+def test_spoiled_rubrics_are_refused(old, new):
+    assert old in SOUND
+    assert not VALIDATOR.is_valid(yaml.safe_load(SOUND.replace(old, new, 1)))
