@@ -1,0 +1,85 @@
+"""A folder, an archive or a git URL becomes a folder on disk with the lab's package in it; nothing is run."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from grader.errors import OutputError, SubmissionError
+from grader.intake.find import enclosing_package, find_packages
+from grader.intake.git import Git
+from grader.intake.limits import Limits
+from grader.intake.names import printable, safe_name
+from grader.intake.open import describe, locate, open_source
+from grader.intake.source import Source, parse_source
+from grader.model.submission import Submission
+
+__all__ = ["Limits", "enclosing_package", "find_packages", "open_submission", "safe_name"]
+
+
+def open_submission(
+    source: str,
+    *,
+    package: str,
+    workdir: Path,
+    submission_id: str | None = None,
+    git_timeout_s: float = 120.0,
+    limits: Limits | None = None,
+) -> Submission:
+    """The submission that `source` names, with the lab's `package` found in it.
+
+    A folder is used in place and never written to. An archive or a repository comes to lie in a new folder
+    below `workdir`, which is made where it is missing and belongs to the caller. All of git's work together
+    takes at most `git_timeout_s` seconds.
+
+    Raises UsageError for a source that does not exist, OutputError for a `workdir` that cannot be written,
+    PackageNotFound where the package is not there, SubmissionError for all else that is wrong with it.
+    """
+    parsed = _parsed(source)
+    with _base(workdir) as base:
+        try:
+            git = Git(base / "git-home", timeout_s=git_timeout_s)
+            opened = open_source(parsed, git, base, limits or Limits())
+            located = locate(opened, package)
+            submission = describe(located, git)
+        except OSError as error:
+            raise _unreadable(parsed.given, error) from error
+    if submission_id is None:
+        return submission
+    return submission.model_copy(update={"id": safe_name(submission_id)})
+
+
+def _parsed(source: str) -> Source:
+    try:
+        return parse_source(source)
+    except OSError as error:
+        raise _unreadable(printable(source), error) from error
+
+
+def _unreadable(given: str, error: OSError) -> SubmissionError:
+    where = f" at {printable(str(error.filename))}" if error.filename else ""
+    return SubmissionError(
+        f"{given} cannot be read: {error.strerror or error}{where}", hint="Check its permissions (`ls -l`)."
+    )
+
+
+@contextmanager
+def _base(workdir: Path) -> Iterator[Path]:
+    """A new folder below `workdir`. If opening fails nothing of it stays."""
+    try:
+        workdir.mkdir(parents=True, exist_ok=True)
+        base = Path(tempfile.mkdtemp(prefix="source-", dir=workdir)).resolve()
+    except OSError as error:
+        raise OutputError(
+            f"the work folder {workdir} cannot be written: {error.strerror}", hint="Choose another folder."
+        ) from error
+    try:
+        yield base
+    except BaseException:
+        shutil.rmtree(base, ignore_errors=True)
+        raise
+    if not (base / "tree").exists():
+        shutil.rmtree(base, ignore_errors=True)

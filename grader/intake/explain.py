@@ -1,0 +1,95 @@
+"""What git says, in a user's words: one line with the cause, and what to do."""
+
+from __future__ import annotations
+
+import re
+
+from grader.errors import SubmissionError
+from grader.intake.git import GitFailed, GitMissing, GitTimeout
+from grader.intake.names import printable
+from grader.intake.source import Source
+
+_PRIVATE = (
+    "If it is private, store its credentials with git first: `git ls-remote URL` must work without asking."
+)
+_NETWORK = "Check the address and the network, and try `git ls-remote URL`."
+_PAGE = "This looks like a page of the website: give the repository's own address, then @branch."
+# In this order: the first that fits what git said is the cause.
+_CAUSES: tuple[tuple[str, str, str], ...] = (
+    (
+        r"Host key verification failed",
+        "this machine does not know the server's ssh key",
+        "Connect once by hand (`ssh HOST`) and accept the key.",
+    ),
+    (
+        r"Permission denied|publickey",
+        "the server refused the ssh key",
+        "Add a key of this machine to the account (`ssh -T git@HOST` shows it), or use the https:// address.",
+    ),
+    (
+        r"Could not resolve host|Couldn't resolve host|Name or service not known|Temporary failure in name",
+        "the server's name was not found",
+        _NETWORK,
+    ),
+    (
+        (
+            r"Connection refused|Connection timed out|Failed to connect|Network is unreachable"
+            r"|No route to host|Couldn't connect|unable to connect"
+        ),
+        "the server cannot be reached",
+        _NETWORK,
+    ),
+    (
+        r"SSL|certificate",
+        "the server's certificate is not trusted by this machine",
+        "Ask for the server's certificate to be installed, or use the ssh address.",
+    ),
+    (
+        (
+            r"could not read (Username|Password)|terminal prompts disabled|Authentication failed"
+            r"|Access denied|error: 40[13]|HTTP 40[13]"
+        ),
+        "it does not exist, or it needs a password",
+        _PRIVATE,
+    ),
+    (
+        (
+            r"not found|does not exist|does not appear to be a git repository|not a git repository|error: 404"
+            r"|not valid: is this a git|[Nn]o such (file|repository|project)"
+        ),
+        "there is no such repository",
+        f"Check the address. {_PRIVATE}",
+    ),
+    (
+        r"No space left|unable to write|cannot create|could not create",
+        "it could not be written to this machine's disk",
+        "Free some room (`df -h`) and try again.",
+    ),
+)
+
+
+def explained(failure: GitFailed, source: Source) -> SubmissionError:
+    """The error to raise for what git said about `source`."""
+    if isinstance(failure, GitMissing):
+        return SubmissionError(
+            f"{source.given}: git is not installed here, so no repository can be read",
+            hint="Install it (`sudo apt install git`), or give a folder or an archive.",
+        )
+    if isinstance(failure, GitTimeout):
+        return SubmissionError(
+            f"{source.given}: {failure.stderr}",
+            hint="Check the network, or clone it by hand and give the folder.",
+        )
+    for pattern, cause, hint in _CAUSES:
+        if re.search(pattern, failure.stderr):
+            page = re.search(r"/(tree|blob)/|/-/", source.url)
+            return SubmissionError(f"{source.given}: {cause}", hint=_PAGE if page else hint)
+    return SubmissionError(f"{source.given}: git says: {said(failure, source)}", hint=_NETWORK)
+
+
+def said(failure: GitFailed, source: Source) -> str:
+    """The line of git's that names the cause, without a password that the address may hold."""
+    lines = [line.strip() for line in failure.stderr.splitlines() if line.strip()]
+    fatal = [line for line in lines if line.startswith(("fatal:", "error:", "remote:"))]
+    line = (fatal or lines or ["nothing"])[-1].removeprefix("fatal: ").removeprefix("error: ")
+    return printable(line.replace(source.url, source.given) if source.url else line)

@@ -1,0 +1,123 @@
+"""Finds packages as catkin does, in any tree, however its neighbours are broken."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.intake.manifest import MANIFEST, manifest_name
+from grader.intake.names import encodable, printable
+from grader.intake.tree import NO_CONTENT, Folder, is_file, is_there, walk
+
+# Where catkin puts what it makes: a copy of a package in there is none.
+BUILD_SPACES = frozenset({"build", "devel", "install"})
+IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "AMENT_IGNORE", "COLCON_IGNORE"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """A folder that is, or could be, a package. `path` is relative to the root, `.` for that itself.
+
+    `manifest` is the name that its `package.xml` gives, None where none can be read. `ignored_by` is the
+    marker file that hides it from catkin. `has_manifest` is false for what only looks like a package.
+    """
+
+    path: str
+    folder: Path
+    manifest: str | None
+    has_manifest: bool = True
+    has_cmake: bool = False
+    ignored_by: str | None = None
+
+    @property
+    def name(self) -> str:
+        """What ROS calls it, or the folder's name where nothing better is known."""
+        return self.manifest if self.manifest and encodable(self.manifest) else printable(self.folder.name)
+
+    @property
+    def depth(self) -> int:
+        return 0 if self.path == "." else self.path.count("/") + 1
+
+
+def find_candidates(root: Path, *, leave_out: Path | None = None) -> list[Candidate]:
+    """The packages below `root`, nearest first, and each folder that has only a `CMakeLists.txt` or `src/`.
+
+    Not entered: packages, `build/`, `devel/`, `install/`, hidden folders, links, `leave_out`.
+    Raises OSError where `root` itself cannot be read.
+    """
+    found = []
+    ignored: dict[str, str] = {}
+    for folder in walk(root, tolerant=True):
+        hidden = ignored.get(folder.path) or _marker(folder)
+        candidate = _candidate(root, folder, hidden)
+        if candidate is not None:
+            found.append(candidate)
+        folder.folders[:] = [] if candidate and candidate.has_manifest else _entered(root, folder, leave_out)
+        if hidden:
+            ignored.update({folder.inside(name): hidden for name in folder.folders})
+    return found
+
+
+def find_packages(root: Path) -> list[tuple[str, Path]]:
+    """The packages that catkin would find below `root`, nearest first, as (name, folder).
+
+    If there are none, but `root` lies inside a package, then that one.
+    Raises OSError where `root` cannot be read.
+    """
+    found = [c for c in find_candidates(root) if c.has_manifest and c.ignored_by is None]
+    if found:
+        return [(candidate.name, candidate.folder) for candidate in found]
+    around = enclosing_package(root)
+    return [(manifest_name(around, root=around) or printable(around.name), around)] if around else []
+
+
+def enclosing_package(path: Path) -> Path | None:
+    """The package that `path` lies in or is, or None.
+
+    Within a repository the outermost, as catkin looks no further than the first manifest on its way down;
+    elsewhere the nearest, as nothing tells where the student's own folders end.
+    """
+    found: list[Path] = []
+    here = path.resolve()
+    for folder in (here, *here.parents):
+        if is_file(folder / MANIFEST):
+            found.append(folder)
+        if is_there(folder / ".git"):
+            return found[-1] if found else None
+    return found[0] if found else None
+
+
+def _marker(folder: Folder) -> str | None:
+    present = {entry.name for entry in folder.others} | set(folder.folders)
+    marker = min(IGNORE_MARKERS & present, default=None)
+    return folder.inside(marker) if marker else None
+
+
+def _candidate(root: Path, folder: Folder, ignored_by: str | None) -> Candidate | None:
+    files = {entry.name for entry in folder.others}
+    place = root / folder.path
+    if MANIFEST in files:
+        name = manifest_name(place, root=root)
+        return Candidate(path=folder.path, folder=place, manifest=name, ignored_by=ignored_by)
+    has_cmake = "CMakeLists.txt" in files
+    if not has_cmake and "src" not in folder.folders:
+        return None
+    return Candidate(
+        path=folder.path,
+        folder=place,
+        manifest=None,
+        has_manifest=False,
+        has_cmake=has_cmake,
+        ignored_by=ignored_by,
+    )
+
+
+def _entered(root: Path, folder: Folder, leave_out: Path | None) -> list[str]:
+    return [
+        name
+        for name in folder.folders
+        if name not in BUILD_SPACES
+        and name not in NO_CONTENT
+        and not name.startswith(".")
+        and root / folder.inside(name) != leave_out
+    ]

@@ -1,0 +1,192 @@
+"""git as a subprocess that asks nothing, waits for nobody and runs nothing that a repository brings along."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO
+
+_QUIET = {
+    "core.hooksPath": os.devnull,
+    "core.fsmonitor": "false",
+    "core.pager": "cat",
+    "core.autocrlf": "false",
+    "core.symlinks": "true",
+    "credential.interactive": "false",
+    "fetch.recurseSubmodules": "false",
+    "submodule.recurse": "false",
+    "protocol.ext.allow": "never",
+    "gc.auto": "0",
+    "maintenance.auto": "false",
+}
+# What a hook or another git sets (GIT_DIR, GIT_INDEX_FILE, …) would lead us to another repository; what says
+# how to reach a server stays.
+_NETWORK_KEPT = re.compile(
+    r"GIT_(SSH.*|SSL_.*|PROXY_.*|HTTP_.*|CONFIG_(GLOBAL|SYSTEM|NOSYSTEM|COUNT|(KEY|VALUE)_\d+)|EXEC_PATH)"
+)
+
+
+class GitFailed(Exception):  # noqa: N818 - an outcome, translated before a user meets it
+    """git ended with an error; `stderr` is what it said, in English."""
+
+    def __init__(self, stderr: str) -> None:
+        super().__init__(stderr)
+        self.stderr = stderr
+
+
+class GitMissing(GitFailed):
+    """There is no git on this machine."""
+
+
+class GitTimeout(GitFailed):
+    """git was stopped because its time was up."""
+
+
+class Git:
+    """All calls together take at most `timeout_s`. `home` is a folder of ours for git's own settings."""
+
+    def __init__(self, home: Path, *, timeout_s: float) -> None:
+        self.timeout_s = timeout_s
+        self._deadline = time.monotonic() + timeout_s
+        self._home = home
+        self._ssh_command: str | None = None
+        home.mkdir(parents=True, exist_ok=True)
+        # Only a file of settings is heeded for this key by every git since 2.25, by `upload-pack` too.
+        (home / ".gitconfig").write_text("[safe]\n\tdirectory = *\n", encoding="utf-8")
+
+    def run(self, *args: str, cwd: Path, remote: bool = False) -> bytes:
+        """What `git *args` prints in `cwd`. `remote` lets it use the network and the user's own settings.
+
+        Raises GitFailed, GitMissing or GitTimeout.
+        """
+        with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+            with self._started(args, cwd, remote=remote, stdout=out, stderr=err) as process:
+                try:
+                    code = process.wait(max(0.0, self._deadline - time.monotonic()))
+                except subprocess.TimeoutExpired:
+                    raise GitTimeout(f"no answer within {self.timeout_s:g} s") from None
+            out.seek(0)
+            err.seek(0)
+            if code != 0:
+                raise GitFailed(err.read().decode("utf-8", "replace"))
+            return out.read()
+
+    def records(self, *args: str, cwd: Path) -> Iterator[bytes]:
+        """The NUL-ended records that git prints, one by one, so that a caller can stop an endless listing."""
+        with self._started(
+            args, cwd, remote=False, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        ) as process:
+            stream = process.stdout
+            assert stream is not None  # noqa: S101 - opened with PIPE
+            rest = b""
+            with stream:
+                while block := stream.read(1 << 16):
+                    if time.monotonic() > self._deadline:
+                        raise GitTimeout(f"no end within {self.timeout_s:g} s")
+                    *whole, rest = (rest + block).split(b"\0")
+                    yield from whole
+            if process.wait() != 0:
+                raise GitFailed(f"git {args[0]} failed")
+
+    @contextmanager
+    def _started(
+        self,
+        args: tuple[str, ...],
+        cwd: Path,
+        *,
+        remote: bool,
+        stdout: IO[bytes] | int,
+        stderr: IO[bytes] | int,
+    ) -> Iterator[subprocess.Popen[bytes]]:
+        options = [part for key, value in _QUIET.items() for part in ("-c", f"{key}={value}")]
+        try:
+            process = subprocess.Popen(
+                ["git", *options, *args],  # noqa: S607 - the user's git, wherever it is
+                cwd=cwd,
+                env=self._remote_environment(cwd) if remote else self._local_environment(),
+                stdin=subprocess.DEVNULL,
+                stdout=stdout,
+                stderr=stderr,
+                start_new_session=True,
+            )
+        except FileNotFoundError:
+            raise GitMissing("git is not installed") from None
+        try:
+            yield process
+        finally:
+            _end(process)
+
+    def _local_environment(self) -> dict[str, str]:
+        """For repositories on this machine: no settings but ours, so no filter, no helper and no network."""
+        kept = {key: value for key, value in os.environ.items() if not key.startswith(("GIT_", "XDG_CONFIG"))}
+        return {
+            **kept,
+            **_ASK_NOTHING,
+            "HOME": str(self._home),
+            "GIT_CONFIG_GLOBAL": str(self._home / ".gitconfig"),
+            "GIT_CONFIG_NOSYSTEM": "1",
+            "GIT_ALLOW_PROTOCOL": "file",
+            "GIT_NO_LAZY_FETCH": "1",
+        }
+
+    def _remote_environment(self, cwd: Path) -> dict[str, str]:
+        """For servers: the user's settings hold the credentials, the proxy, and perhaps a mirror on this disk."""
+        kept = {
+            key: value
+            for key, value in os.environ.items()
+            if not key.startswith("GIT_") or _NETWORK_KEPT.fullmatch(key)
+        }
+        environment = {**kept, **_ASK_NOTHING, "GIT_ALLOW_PROTOCOL": "https:http:ssh:git:file"}
+        if "GIT_SSH" not in kept or "GIT_SSH_COMMAND" in kept:
+            environment["GIT_SSH_COMMAND"] = self._ssh(kept, cwd)
+        return environment
+
+    def _ssh(self, environment: dict[str, str], cwd: Path) -> str:
+        """The user's ssh command, told to fail where it would ask and to leave no connection open."""
+        if self._ssh_command is None:
+            self._ssh_command = (
+                environment.get("GIT_SSH_COMMAND") or _configured_ssh(environment, cwd) or "ssh"
+            )
+        try:
+            program = Path(shlex.split(self._ssh_command)[0]).name
+        except (ValueError, IndexError):
+            return self._ssh_command
+        return (
+            f"{self._ssh_command} -o BatchMode=yes -o ControlMaster=no"
+            if program == "ssh"
+            else self._ssh_command
+        )
+
+
+_ASK_NOTHING = {
+    "LC_ALL": "C",
+    "GIT_TERMINAL_PROMPT": "0",
+    "GIT_ASKPASS": "",
+    "SSH_ASKPASS": "",
+    "SSH_ASKPASS_REQUIRE": "never",
+    "GCM_INTERACTIVE": "never",
+    "GIT_LFS_SKIP_SMUDGE": "1",
+    "GIT_OPTIONAL_LOCKS": "0",
+}
+
+
+def _configured_ssh(environment: dict[str, str], cwd: Path) -> str:
+    command = ["git", "config", "--get", "core.sshCommand"]
+    found = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False)
+    return found.stdout.strip()
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Ends git and whatever it started (ssh, a helper), also where Ctrl-C came first."""
+    if process.poll() is None:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()

@@ -1,0 +1,43 @@
+"""The one thing that finding a package needs of its manifest: the name."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from lxml import etree
+
+MANIFEST = "package.xml"
+_LARGEST_BYTES = 1 << 20
+
+
+def manifest_name(folder: Path, *, root: Path) -> str | None:
+    """`<name>` in the folder's `package.xml`, as far as it can be read; None where it cannot.
+
+    A manifest that is not well-formed still gives its name where that comes before the fault. One that is a
+    link out of `root` is not read.
+    """
+    path = folder / MANIFEST
+    real = os.path.realpath(path)
+    if os.path.commonpath([real, os.path.realpath(root)]) != os.path.realpath(root):
+        return None
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(_LARGEST_BYTES + 1)
+    except OSError:
+        return None
+    return None if len(data) > _LARGEST_BYTES else _name(data)
+
+
+def _name(data: bytes) -> str | None:
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, recover=True)
+    try:
+        root = etree.fromstring(data.lstrip(), parser)
+    except (etree.XMLSyntaxError, ValueError):
+        return None
+    # An empty document gives no root at all in this mode.
+    for child in root if root is not None else ():
+        if isinstance(child.tag, str) and etree.QName(child).localname == "name":
+            text = [child.text or "", *(part.tail or "" for part in child)]
+            return " ".join("".join(text).split()) or None
+    return None

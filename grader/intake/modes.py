@@ -1,0 +1,111 @@
+"""Who may say whether a file is executable: git's index for tracked files, the archive, or else the disk."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.intake.find import BUILD_SPACES
+from grader.intake.git import Git, GitFailed, GitMissing
+from grader.intake.names import listing, printable
+from grader.intake.tree import Entry, is_there
+from grader.model.submission import ModeSource
+
+_SCRIPTS = (".py", ".sh", ".bash")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Modes:
+    """`executable` maps every regular file's path below the package to its bit, None where nobody knows."""
+
+    source: ModeSource
+    executable: dict[str, bool | None]
+    hints: tuple[str, ...] = ()
+
+
+def archive_modes(entries: Iterable[Entry], known: Mapping[str, bool | None], *, path: str) -> Modes:
+    """The archive's word. `path` is the package's folder in the archive."""
+    prefix = "" if path == "." else f"{path}/"
+    executable = {entry.path: known.get(prefix + entry.path) for entry in entries if entry.kind == "file"}
+    carried = any(bit is not None for bit in executable.values())
+    return Modes(source="archive" if carried else "none", executable=executable)
+
+
+def folder_modes(entries: Iterable[Entry], folder: Path, git: Git) -> Modes:
+    """git's word where the folder has tracked files, the disk's for the rest and where there is no git."""
+    on_disk = {entry.path: entry.executable for entry in entries if entry.kind == "file"}
+    index, hints = _index(folder, git)
+    tracked = {path: bit for path, bit in index.items() if path in on_disk}
+    if not tracked:
+        return Modes(source="disk", executable=dict(on_disk), hints=hints)
+    hints = (*hints, *_differences(folder, on_disk, tracked), *_untracked(folder, on_disk, tracked))
+    return Modes(source="git", executable={**on_disk, **tracked}, hints=hints)
+
+
+def _index(folder: Path, git: Git) -> tuple[dict[str, bool], tuple[str, ...]]:
+    """The tracked files below the folder with git's executable bit, and a hint where git cannot be asked."""
+    if not any(is_there(place / ".git") for place in (folder, *folder.parents)):
+        return {}, ()
+    try:
+        listed = git.run("ls-files", "--stage", "-z", cwd=folder)
+    except GitMissing:
+        return {}, ("git is not installed here: executable bits were read from the disk",)
+    except GitFailed as failure:
+        said = printable((failure.stderr.strip().splitlines() or [""])[-1])
+        return {}, (f"git cannot read this repository ({said}): executable bits were read from the disk",)
+    index = {}
+    for record in filter(None, listed.split(b"\0")):
+        meta, _, path = record.partition(b"\t")
+        if not meta.startswith(b"160000"):
+            index[os.fsdecode(path)] = meta.startswith(b"100755")
+    return index, ()
+
+
+def _is_script(folder: Path, path: str) -> bool:
+    """Hints are for scripts of the student's own: on some disks (Windows under WSL) every file is executable."""
+    if any(part in BUILD_SPACES or part.startswith((".", "__")) for part in path.split("/")[:-1]):
+        return False
+    if path.endswith(_SCRIPTS):
+        return True
+    try:
+        with (folder / path).open("rb") as stream:
+            return stream.read(2) == b"#!"
+    except OSError:
+        return False
+
+
+def _differences(folder: Path, on_disk: Mapping[str, bool], tracked: Mapping[str, bool]) -> list[str]:
+    hints = []
+    differing = (path for path, in_git in sorted(tracked.items()) if on_disk[path] != in_git)
+    for path in differing:
+        if not _is_script(folder, path):
+            continue
+        shown = printable(path)
+        if tracked[path]:
+            hints.append(f"{shown} is executable in git but not on this disk: chmod +x {shlex.quote(shown)}")
+        else:
+            hints.append(
+                f"{shown} is executable on this disk but not in git: "
+                f"git update-index --chmod=+x {shlex.quote(shown)}; git commit -m 'Make it executable'; git push"
+            )
+    return hints
+
+
+def _untracked(folder: Path, on_disk: Mapping[str, bool], tracked: Mapping[str, bool]) -> list[str]:
+    new = sorted(path for path in on_disk.keys() - tracked.keys() if _is_script(folder, path))
+    return (
+        [f"not in git yet, so not handed in by a push: {listing(new)} (git add, git commit)"] if new else []
+    )
+
+
+def head_commit(folder: Path, git: Git) -> str | None:
+    """The full hash that is checked out around `folder`; None where there is no repository or no commit."""
+    if not any(is_there(place / ".git") for place in (folder, *folder.parents)):
+        return None
+    try:
+        return git.run("rev-parse", "--verify", "--quiet", "HEAD^{commit}", cwd=folder).decode().strip()
+    except GitFailed:
+        return None

@@ -1,0 +1,58 @@
+"""Names that can be shown, stored and used as a file's name, whatever the submission calls itself."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import unicodedata
+
+MAX_NAME = 100
+_LETTERS = str.maketrans(
+    {"ß": "ss", "æ": "ae", "Æ": "AE", "ø": "o", "Ø": "O", "œ": "oe", "Œ": "OE", "ł": "l", "Ł": "L"}
+    | {"đ": "d", "Đ": "D", "ð": "d", "þ": "th", "\N{LATIN SMALL LETTER DOTLESS I}": "i"}
+)
+_ARCHIVE_SUFFIX = re.compile(r"\.(zip|tar|tar\.(gz|xz|bz2)|tgz|txz|tbz2?)$", re.IGNORECASE)
+_SHOWN_AT_MOST = 5
+
+
+def safe_name(text: str) -> str:
+    """`text` as a file's name: `[A-Za-z0-9._-]`, 1 to 100 characters, not hidden, never `.` or `..`.
+
+    Accents are dropped. Where letters had to be given up, or the name was too long, a short hash of the whole
+    keeps two such names apart.
+    """
+    plain = unicodedata.normalize("NFKD", text.translate(_LETTERS))
+    plain = "".join(char for char in plain if not unicodedata.combining(char))
+    lost = any(ord(char) > 127 and not char.isspace() for char in plain)
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", plain).lstrip(".-").rstrip(".-")
+    if not lost and len(name) <= MAX_NAME:
+        return name or "submission"
+    digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+    return f"{name[: MAX_NAME - 9].rstrip('.-') or 'submission'}-{digest}"
+
+
+def printable(text: str) -> str:
+    """`text` on one line, with a readable escape (`\\xe9`) for what no terminal or JSON file can hold."""
+    shown = text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
+    return "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in shown)
+
+
+def encodable(text: str) -> bool:
+    """Whether `text` is UTF-8; a file's name on Linux need not be."""
+    return not any("\ud800" <= char <= "\udfff" for char in text)
+
+
+def archive_stem(name: str) -> str:
+    """A file's name without the ending that makes it an archive: `lab1.tar.gz` is `lab1`."""
+    return _ARCHIVE_SUFFIX.sub("", name)
+
+
+def is_archive_name(name: str) -> bool:
+    return _ARCHIVE_SUFFIX.search(name) is not None
+
+
+def listing(names: list[str]) -> str:
+    """The first few of `names` for a message, and how many more there are."""
+    shown = ", ".join(printable(name) for name in names[:_SHOWN_AT_MOST])
+    more = len(names) - _SHOWN_AT_MOST
+    return f"{shown} and {more} more" if more > 0 else shown

@@ -1,0 +1,151 @@
+"""SOURCE on disk: in place for a folder, below the work folder for an archive or a repository."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from grader.errors import SubmissionError
+from grader.intake.archive import unpack
+from grader.intake.choose import Choice, choose, not_found
+from grader.intake.digest import tree_digest
+from grader.intake.find import Candidate, enclosing_package, find_candidates
+from grader.intake.git import Git
+from grader.intake.limits import Limits
+from grader.intake.modes import Modes, archive_modes, folder_modes, head_commit
+from grader.intake.names import encodable, printable, safe_name
+from grader.intake.repository import clone
+from grader.intake.source import Source
+from grader.intake.tree import Entry, is_there, list_entries
+from grader.model.submission import SourcePackage, Submission
+
+_ODD_NAMES_SHOWN = 3
+
+
+@dataclass(frozen=True, kw_only=True)
+class Opened:
+    """`archive_modes` is set for an archive, `commit` for a clone; a folder used in place has neither yet.
+
+    `leave_out` is the grader's own work folder, which may lie inside of `root`.
+    """
+
+    source: Source
+    name: str
+    root: Path
+    leave_out: Path
+    in_place: bool = False
+    commit: str | None = None
+    archive_sha256: str | None = None
+    archive_modes: Mapping[str, bool | None] | None = None
+    git_links: tuple[str, ...] = ()
+    hints: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Located:
+    """The lab's package, and all the candidates it was chosen from."""
+
+    opened: Opened
+    candidates: list[Candidate]
+    choice: Choice
+
+
+def open_source(source: Source, git: Git, base: Path, limits: Limits) -> Opened:
+    """What `source` stands for, on disk. New folders are made below `base`, under the source's own name."""
+    into = base / "tree" / safe_name(source.name)
+    opened = Opened(source=source, name=source.name, root=into, leave_out=base)
+    if source.kind == "repository":
+        cloned = clone(source, git, into, limits)
+        return replace(
+            opened, root=cloned.root, commit=cloned.commit, git_links=cloned.git_links, hints=cloned.hints
+        )
+    path = source.path
+    assert path is not None  # noqa: S101 - folders and archives have one
+    if source.kind == "folder":
+        return replace(opened, root=path.resolve(), in_place=True)
+    unpacked = unpack(path, into, limits)
+    return replace(
+        opened, archive_sha256=unpacked.sha256, archive_modes=unpacked.executable, hints=unpacked.hints
+    )
+
+
+def locate(opened: Opened, wanted: str) -> Located:
+    """The lab's package in what was opened. A folder inside the package (`lab1/src`) stands for the package.
+
+    Raises PackageNotFound, or SubmissionError for an empty folder.
+    """
+    if not any(path.name != ".git" for path in opened.root.iterdir()):
+        raise SubmissionError(
+            f"{opened.source.given} is empty, it holds no file",
+            hint="Give the folder that holds the package.",
+        )
+    located = _locate(opened, wanted)
+    around = enclosing_package(opened.root) if opened.in_place else None
+    if located is None and around is not None:
+        located = _locate(replace(opened, name=around.name, root=around), wanted)
+    if located:
+        return located
+    candidates = find_candidates(opened.root, leave_out=opened.leave_out)
+    raise not_found(opened.root, candidates, wanted, opened.git_links)
+
+
+def _locate(opened: Opened, wanted: str) -> Located | None:
+    candidates = find_candidates(opened.root, leave_out=opened.leave_out)
+    choice = choose(candidates, wanted)
+    return Located(opened=opened, candidates=candidates, choice=choice) if choice else None
+
+
+def describe(located: Located, git: Git) -> Submission:
+    """The record that the next station reads. Raises OSError for a file that cannot be read."""
+    opened, choice = located.opened, located.choice
+    chosen = choice.package
+    entries = list_entries(chosen.folder, leave_out=opened.leave_out)
+    modes = _modes(opened, chosen, entries, git)
+    others = [c for c in located.candidates if c.has_manifest and not c.ignored_by and c.name != chosen.name]
+    return Submission(
+        id=safe_name(opened.name),
+        source=opened.source.given,
+        root=opened.root,
+        commit=_commit(opened, chosen, modes, git),
+        archive_sha256=opened.archive_sha256,
+        digest=tree_digest(chosen.folder, entries, modes.executable),
+        package=_package(chosen, modes),
+        packages=tuple(_other(opened, candidate, git) for candidate in others),
+        hints=(*opened.hints, *choice.hints, *modes.hints, *_odd_names(modes)),
+    )
+
+
+def _commit(opened: Opened, chosen: Candidate, modes: Modes, git: Git) -> str | None:
+    """A folder that merely lies somewhere in a repository, untracked, is not of that repository's commit."""
+    if not opened.in_place:
+        return opened.commit
+    is_top = is_there(opened.root / ".git") or is_there(chosen.folder / ".git")
+    return head_commit(chosen.folder, git) if is_top or modes.source == "git" else None
+
+
+def _modes(opened: Opened, candidate: Candidate, entries: list[Entry], git: Git) -> Modes:
+    if opened.archive_modes is not None:
+        return archive_modes(entries, opened.archive_modes, path=candidate.path)
+    return folder_modes(entries, candidate.folder, git)
+
+
+def _other(opened: Opened, candidate: Candidate, git: Git) -> SourcePackage:
+    entries = list_entries(candidate.folder, leave_out=opened.leave_out, tolerant=True)
+    return _package(candidate, _modes(opened, candidate, entries, git))
+
+
+def _package(candidate: Candidate, modes: Modes) -> SourcePackage:
+    """A name that is not UTF-8 fits no record; the digest counts its file all the same."""
+    return SourcePackage(
+        name=candidate.name,
+        folder=candidate.folder,
+        path=printable(candidate.path),
+        mode_source=modes.source,
+        executable={path: bit for path, bit in modes.executable.items() if encodable(path)},
+    )
+
+
+def _odd_names(modes: Modes) -> list[str]:
+    odd = [printable(path) for path in modes.executable if not encodable(path)]
+    return [f"a file's name is not UTF-8, so it is left out: {name}" for name in odd[:_ODD_NAMES_SHOWN]]

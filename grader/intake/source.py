@@ -1,0 +1,181 @@
+"""Reads SOURCE as it stands on the command line: which folder, archive or repository, and which `@ref`."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+from urllib.parse import unquote
+
+from grader.errors import SubmissionError, UsageError
+from grader.intake.names import archive_stem, printable
+from grader.intake.tree import is_file, is_there
+
+_SCHEMES = ("https", "http", "ssh", "git", "file")
+_URL = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<authority>[^/]*)(?P<path>/.*)?", re.DOTALL)
+# As git reads it: a colon before any slash. One letter before it would be a drive of Windows.
+_SCP = re.compile(
+    r"(?P<host>(?:[\w.+-]+@)?(?:[\w.-]{2,}|\[[0-9a-fA-F:.]+\])):(?P<path>(?!:|//).+)", re.DOTALL
+)
+_HOST_AND_PATH = re.compile(r"(www\.|[\w-]+\.(com|org|edu|net|io|ac\.uk)/)")
+_NO_REF = re.compile(r"[\x00-\x20~^:?*\[\\\x7f]|\.\.|@\{|//|^[/-]|[/.]$")
+_SOURCES = "Give a folder, a .zip or .tar.gz, or a git URL with an optional @branch, @tag or @commit."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """`given` may be shown: it holds no password. `path` is set where the source lies on this machine.
+
+    `url`, `ref` and `inside` (the folder of it that was asked for) are for a repository; `remote` tells
+    whether reaching it takes the user's own git settings.
+    """
+
+    kind: Literal["folder", "archive", "repository"]
+    given: str
+    name: str
+    path: Path | None = None
+    url: str = ""
+    ref: str | None = None
+    inside: str = "."
+    remote: bool = False
+
+
+def parse_source(text: str) -> Source:
+    """SOURCE, read. A path that exists wins over every other reading of the same text.
+
+    Raises UsageError for what is neither there nor a git URL, SubmissionError for what cannot be a source.
+    """
+    local = _existing(text)
+    if local is not None:
+        return _local(local, None, text)
+    if match := _URL.fullmatch(text):
+        return _from_url(text, match)
+    splits = list(_splits(text))
+    for left, ref in splits:
+        if _is_ref(ref) and (found := _existing(left)):
+            return _local(found, ref, text)
+    if match := _SCP.fullmatch(text):
+        return _from_scp(text, match)
+    for left, ref in splits:
+        if _existing(left):
+            raise UsageError(f"{ref!r} cannot be the name of a branch, tag or commit", hint=_SOURCES)
+    web = "A web address begins with https://. " if _HOST_AND_PATH.match(text) else ""
+    raise UsageError(f"{printable(text) or 'an empty SOURCE'} does not exist", hint=web + _SOURCES)
+
+
+def _existing(text: str) -> Path | None:
+    if not text or "\0" in text:
+        return None
+    for candidate in (text, os.path.expanduser(text)):  # noqa: PTH111 - Path.expanduser raises without a home
+        if os.path.lexists(candidate):
+            return Path(os.path.abspath(candidate))  # noqa: PTH100 - keeps links in the name
+    return None
+
+
+def _splits(text: str) -> list[tuple[str, str]]:
+    """Every way to cut `text` in two at an `@`, the longest left side first."""
+    cuts = [match.start() for match in re.finditer("@", text)]
+    return [(text[:cut], text[cut + 1 :]) for cut in reversed(cuts)]
+
+
+def _is_ref(text: str) -> bool:
+    return bool(text) and _NO_REF.search(text) is None
+
+
+def _local(path: Path, ref: str | None, text: str, *, clone: bool = False) -> Source:
+    given = printable(text)
+    if path.is_dir():
+        if ref is None and not clone and not _is_git_folder(path):
+            return Source(kind="folder", given=given, name=_folder_name(path), path=path)
+        return _local_repository(path, ref, given)
+    if not path.is_file():
+        what = "is a link to what is not there" if path.is_symlink() else "is no folder and no file"
+        raise SubmissionError(f"{given} {what}", hint=_SOURCES)
+    if ref is not None:
+        raise UsageError(f"{printable(path.name)} is a file: only a repository has @{ref}", hint=_SOURCES)
+    return Source(kind="archive", given=given, name=archive_stem(path.name), path=path)
+
+
+def _local_repository(path: Path, ref: str | None, given: str) -> Source:
+    name = _folder_name(path).removesuffix(".git")
+    path = path.resolve()
+    around = (p for p in (path, *path.parents) if is_there(p / ".git"))
+    top = path if _is_git_folder(path) else next(around, None)
+    if top is None:
+        raise SubmissionError(
+            f"{given}: {printable(str(path))} is no git repository",
+            hint="Give a folder that is no repository by its plain path, without file:// and without @.",
+        )
+    inside = path.relative_to(top).as_posix()
+    return Source(
+        kind="repository", given=given, name=name, path=path, url=top.as_uri(), ref=ref, inside=inside
+    )
+
+
+def _is_git_folder(path: Path) -> bool:
+    """A bare repository, or the `.git` of one that is not."""
+    return is_file(path / "HEAD") and is_there(path / "objects") and is_there(path / "refs")
+
+
+def _folder_name(path: Path) -> str:
+    real = path.resolve()
+    return real.parent.name if real.name == ".git" else real.name
+
+
+def _from_url(text: str, match: re.Match[str]) -> Source:
+    scheme, authority, path = match["scheme"].lower(), match["authority"], match["path"] or ""
+    if scheme not in _SCHEMES:
+        raise UsageError(f"{scheme}:// is no address of a git repository", hint=_SOURCES)
+    if scheme == "file" and authority in ("", "localhost"):
+        return _from_file_url(path, text)
+    path, ref = _split_remote(path)
+    if not path.strip("/") or not authority:
+        raise UsageError(f"{printable(text)} names no repository", hint=_SOURCES)
+    shown = f"{scheme}://{_without_password(scheme, authority)}{path}" + (f"@{ref}" if ref else "")
+    url = f"{scheme}://{authority}{path}"
+    return Source(kind="repository", given=printable(shown), name=_last(path), url=url, ref=ref, remote=True)
+
+
+def _from_file_url(path: str, text: str) -> Source:
+    for candidate in dict.fromkeys((path, unquote(path))):
+        whole: list[tuple[str, str | None]] = [(candidate, None)]
+        for left, ref in whole + [(left, ref) for left, ref in _splits(candidate) if _is_ref(ref)]:
+            if found := _existing(left):
+                return _local(found, ref, text, clone=True)
+    raise SubmissionError(
+        f"{printable(text)}: there is no such folder on this machine", hint="Check the path after file://."
+    )
+
+
+def _from_scp(text: str, match: re.Match[str]) -> Source:
+    path, ref = _split_remote(match["path"])
+    url = f"{match['host']}:{path}"
+    return Source(kind="repository", given=printable(text), name=_last(path), url=url, ref=ref, remote=True)
+
+
+def _split_remote(path: str) -> tuple[str, str | None]:
+    """The path of a remote repository and its ref. An `@` that begins a folder's name (`/@user/`) is none."""
+    if path.rstrip("/").endswith(".git"):
+        return path, None
+    cut = path.find(".git@") + 4 if ".git@" in path else -1
+    if cut < 0:
+        cut = next((at.start() for at in re.finditer(r"(?<=[^/])@", path)), -1)
+    if cut < 0:
+        return path, None
+    path, ref = path[:cut], path[cut + 1 :]
+    if not _is_ref(ref):
+        raise UsageError(f"{ref!r} cannot be the name of a branch, tag or commit", hint=_SOURCES)
+    return path, ref
+
+
+def _last(path: str) -> str:
+    name = re.split(r"[/:]", unquote(path).rstrip("/"))[-1]
+    return name.removesuffix(".git")
+
+
+def _without_password(scheme: str, authority: str) -> str:
+    """A token may stand in the place of the user of a web address, so nothing of that part is shown."""
+    user, at, host = authority.rpartition("@")
+    return host if scheme in ("http", "https") else f"{user.partition(':')[0]}{at}{host}"
