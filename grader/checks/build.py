@@ -1,0 +1,125 @@
+"""Whether the package builds."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from grader.checks.registry import NoParams, check
+from grader.checks.support.text import seconds, shown
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.verdict import (
+    EvidenceCitation,
+    FileCitation,
+    Verdict,
+    failed,
+    inconclusive,
+    passed,
+    unjudged,
+)
+
+CATKIN_MAKE = "catkin_make"
+INSTALL_ROS = "install ROS 1: `make setup`, or `apt-get install python3-rospy catkin`, then grade again"
+_CMAKE_ERROR = re.compile(
+    r"^CMake Error(?: at (?P<file>[^:()]+):(?P<line>\d+) \((?P<call>\w+)\))?:?\s*(?P<text>.*)"
+)
+_COMPILER_ERROR = re.compile(r"^(?P<file>[^:\s][^:]*):(?P<line>\d+):(?:\d+:)? (?:fatal )?error: (?P<text>.*)")
+_OTHER_ERROR = re.compile(
+    r"(?P<text>.*(?:\berror:|undefined reference|No rule to make target|[A-Za-z]+Error:|\*\*\*).*)"
+)
+
+
+class BuildError(NamedTuple):
+    """The first error that the build printed; `kind` is `cmake`, `compiler` or `other`."""
+
+    kind: str
+    text: str
+    file: str
+    line: int | None
+
+
+@check("build", params=NoParams)
+def build(package: PackageFacts, build: Run) -> Verdict:
+    """The package builds.
+
+    What it checks
+        That `catkin_make` succeeds in a fresh workspace which holds this package, and the packages of the
+        same repository that it depends on.
+
+    Why it matters on a robot
+        On the robot the workspace is built from what was pushed. What only builds beside files on your own
+        machine does not exist there.
+
+    How it is measured
+        By the exit code of `catkin_make`; the first error that it printed is quoted. Nodes are run all the
+        same, from their sources.
+
+    How to fix
+        Clone your repository into a new workspace, run `catkin_make`, and mend the first error: the later
+        ones often follow from it.
+    """
+    expected = "catkin_make exits with 0"
+    found = {e.event: (t, e) for t, e in build.processes if e.name == CATKIN_MAKE}
+    if "start" not in found and "exit" not in found:
+        reason = build.metadata.get("not_run") or (build.outcome.detail if build.outcome else "")
+        message = f"the package was not built{': ' + reason if reason else ''}"
+        return inconclusive(message, expected=expected, measured="not built", hint=INSTALL_ROS)
+    if "exit" not in found:
+        return inconclusive("the recording of the build was cut short", expected=expected, hint="grade again")
+    end_ns, end = found["exit"]
+    took = seconds(end_ns - found.get("start", found["exit"])[0])
+    if end.exit_code == 0:
+        return passed("catkin_make succeeded", expected=expected, measured=f"exit code 0 after {took}")
+    if end.stopped_by is not None:
+        return failed(
+            f"catkin_make had not finished after {took} and was stopped",
+            expected=expected,
+            measured=f"stopped after {took}",
+            hint="look for a command in CMakeLists.txt that waits or never ends",
+        )
+    error = _first_error([c.line for _, c in build.console if c.process == CATKIN_MAKE])
+    place = _place(error, package)
+    explained = package.manifest is None or (error is not None and error.kind == "cmake")
+    verdict = unjudged if explained else failed
+    return verdict(
+        f"catkin_make failed: {error.text}" if error else "catkin_make failed without naming an error",
+        expected=expected,
+        measured=f"exit code {end.exit_code}",
+        hint="run catkin_make in a fresh clone and mend the first error that it prints",
+        citations=(place or EvidenceCitation(evidence=build.evidence, topic="/grader/console"),),
+    )
+
+
+def _first_error(lines: Sequence[str]) -> BuildError | None:
+    """The first line that fits: a compiler's error comes before make's summary of it."""
+    for index, line in enumerate(lines):
+        if match := _CMAKE_ERROR.match(line):
+            place = f"{match['file']}:{match['line']}: " if match["file"] else ""
+            text = f"{place}{match['text'] or _paragraph(lines[index + 1 :])}"
+            number = int(match["line"]) if match["line"] else None
+            return BuildError("cmake", shown(text), match["file"] or "", number)
+        if match := _COMPILER_ERROR.match(line):
+            text = f"{match['file'].rpartition('/')[2]}:{match['line']}: {match['text']}"
+            return BuildError("compiler", shown(text), match["file"], int(match["line"]))
+    other = next((m["text"] for m in map(_OTHER_ERROR.match, lines) if m), None)
+    return BuildError("other", shown(other), "", None) if other else None
+
+
+def _paragraph(lines: Sequence[str]) -> str:
+    """The text of a CMake error: the first paragraph after its heading, which is indented."""
+    words: list[str] = []
+    for line in lines:
+        if words and not line.strip():
+            break
+        words += line.split()
+    return " ".join(words)
+
+
+def _place(error: BuildError | None, package: PackageFacts) -> FileCitation | None:
+    """The error's place if it lies in the package: the longest of the package's paths that ends it."""
+    if error is None or not error.file:
+        return None
+    fits = [f.path for f in package.files if ("/" + error.file).endswith("/" + f.path)]
+    return FileCitation(file=max(fits, key=len), line=error.line) if fits else None

@@ -1,0 +1,218 @@
+"""Whether a counter begins, counts and starts again as it should."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from grader.checks.registry import check
+from grader.checks.support.counting import Count, Step, cite, counts, first_values, longest
+from grader.checks.support.ending import explain_end
+from grader.checks.support.process import early_end
+from grader.checks.support.text import listed, number, plural, seconds
+from grader.checks.support.wrapping import WrapParams, judge_wraps
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+
+CONNECT_NS = 1_000_000_000
+
+
+class StartParams(Record):
+    topic: str
+    start: int = 0
+
+
+class StepParams(Record):
+    """`maximum` is the last value before the wrap; `rate_hz` the nominal rate, to know a flood."""
+
+    topic: str
+    maximum: int = 127
+    rate_hz: Annotated[float, Field(gt=0)] = 10.0
+    min_steps: Annotated[int, Field(ge=1)] = 10
+
+
+@check("counter-start", params=StartParams)
+def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdict:
+    """The counter begins with the right value.
+
+    What it checks
+        That the very first value published on the topic is the one that the handout asks for.
+
+    Why it matters on a robot
+        Whoever counts along, to find lost messages or to number pictures, begins with the first one. Off by
+        one at the start is off by one for ever.
+
+    How it is measured
+        The recorder is connected before the publisher's registration returns, so the first message is never
+        missed.
+
+    How to fix
+        Set the counter before the loop, publish it, and only then add one. `rostopic echo <topic>`, started
+        before the node, shows the first value.
+    """
+    expected = f"{params.start} is the first value on {params.topic}"
+    found = counts(run, params.topic)
+    if not found:
+        return _nothing(package, run, params.topic).model_copy(update={"expected": expected})
+    first = found[0]
+    fields = {
+        "expected": expected,
+        "measured": f"{first_values(first.values)}",
+        "citations": cite(run, params.topic, first.times_ns[0], first.times_ns[0]),
+    }
+    if first.values[0] == params.start and first.sequences[0] == 0:
+        return passed(f"{params.topic} begins with {params.start}", **fields)
+    if first.sequences[0] > 0 or _recorder_was_late(run, params.topic, first.callerid):
+        message = f"the recorder missed the first messages on {params.topic}"
+        return inconclusive(message, hint="grade again", **fields)
+    hint = f"set the counter to {params.start} before the loop, and add one after publish(…), not before"
+    message = f"the first value on {params.topic} is {number(first.values[0])}, not {params.start}"
+    return failed(message, hint=hint, **fields)
+
+
+@check("counter-step", params=StepParams)
+def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict:
+    """The counter goes up by one.
+
+    What it checks
+        That every value is the one before plus one. Where the counter starts again is judged apart
+        (`counter-wrap`).
+
+    Why it matters on a robot
+        A counter in a message is how a receiver sees that something was lost. One that skips or repeats by
+        itself raises false alarms, or hides real losses.
+
+    How it is measured
+        Value by value. Values that are missing where there is also a gap in time were lost by the machine,
+        not by the program: nothing is taken for those. In a flood of messages the publisher itself throws
+        some away; skips are not judged then.
+
+    How to fix
+        Add one to the counter in one place only, once in each turn of the loop. `rostopic echo <topic>`
+        shows the values.
+    """
+    expected = f"each value on {params.topic} is the one before plus one"
+    count = longest(run, params.topic)
+    if count is None:
+        return _nothing(package, run, params.topic).model_copy(update={"expected": expected})
+    steps = _judged_steps(count, params)
+    wrong = [s for s in steps if s.change in {0, -1} or s.change > 1]
+    right = sum(s.change == 1 for s in steps)
+    verdict = (
+        _wrong_steps(count, wrong, run, params)
+        or _too_few(len(steps), run, package, params)
+        or (passed if right else failed)(f"all {plural(right, 'step')} are +1")
+    )
+    at = wrong[0] if wrong else Step(0, 0, 0, count.times_ns[0], count.times_ns[-1], 0)
+    return verdict.model_copy(
+        update={
+            "expected": expected,
+            "measured": f"{right} of {plural(len(steps), 'step')} +1, {first_values(count.values)}",
+            "citations": cite(run, params.topic, at.from_ns, at.to_ns),
+        }
+    )
+
+
+@check("counter-wrap", params=WrapParams)
+def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict:
+    """The counter starts again at its maximum.
+
+    What it checks
+        That the counter goes back to its first value when it has reached the maximum, several times over.
+
+    Why it matters on a robot
+        A number in a message has a fixed width. A program that counts past it dies, or goes on with a wrong
+        number, after the minutes or hours in which nobody tested it.
+
+    How it is measured
+        The clock is run faster, so that a node with `rospy.Rate` comes around twice in seconds; one with
+        `time.sleep` is watched in real time. "Resetting back to zero at 127" can be read in two ways, and
+        both are right: after 127 comes 0, or after 126 comes 0.
+
+    How to fix
+        Reset the counter before a value that does not fit is published: `counter = (counter + 1) % 128`, or
+        `if counter > 127: counter = 0` between adding one and publishing.
+    """
+    low, high = params.minimum, params.maximum
+    expected = f"after {high} comes {low}, after {high - 1} comes {high} or {low}; {params.wraps} times"
+    count = longest(run, params.topic)
+    if count is None:
+        return _nothing(package, run, params.topic).model_copy(update={"expected": expected})
+    verdict, seen = judge_wraps(count, run, package, params)
+    turn = f"{number(seen.before)}→{number(seen.after)}" if seen else "no reset"
+    lowest, highest = number(min(count.values)), number(max(count.values))
+    measured = f"{plural(len(count.values), 'value')}, {lowest} to {highest}, {turn}"
+    at = (seen.from_ns, seen.to_ns) if seen else (count.times_ns[0], count.times_ns[-1])
+    return verdict.model_copy(
+        update={"expected": expected, "measured": measured, "citations": cite(run, params.topic, *at)}
+    )
+
+
+def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
+    """There is no counter on the topic."""
+    if any(c.messages for c in run.student_channels(topic)):
+        return unjudged(f"{topic} carries no numbers", measured="no number")
+    ended = early_end(run)
+    cause = f": the node ended ({explain_end(ended, run, package).cause})" if ended else ""
+    return unjudged(f"no message came on {topic}{cause}", measured="no message")
+
+
+def _recorder_was_late(run: Run, topic: str, callerid: str) -> bool:
+    """It was connected more than the second later that `registerPublisher` waits for it."""
+    registered = min((t for t, e in run.graph if callerid in e.publishers.get(topic, ())), default=None)
+    events = ((t, e) for t, e in run.recorder if e.topic == topic and e.callerid == callerid)
+    connected = min((t for t, e in events if e.event == "connected"), default=None)
+    return registered is not None and connected is not None and connected - registered > CONNECT_NS
+
+
+def _judged_steps(count: Count, params: StepParams) -> list[Step]:
+    """All of them, without the repeats of a counter that stays at its maximum: that is the wrap's fault."""
+    steps = list(count.steps)
+    if count.values[-1] == params.maximum and count.stuck > 1:
+        del steps[len(steps) - (count.stuck - 1) :]
+    return steps
+
+
+def _wrong_steps(count: Count, wrong: list[Step], run: Run, params: StepParams) -> Verdict | None:
+    if not wrong:
+        return None
+    skips = [s for s in wrong if s.change > 1]
+    lost = [s for s in skips if count.lost_on_the_way(s, s.change)]
+    own = [s for s in wrong if s not in lost]
+    flood = count.is_flood(run, params.rate_hz)
+    if flood and len(skips) == len(wrong):
+        message = f"{params.topic} is flooded, so its publisher drops values: {plural(len(skips), 'skip')}"
+        return unjudged(message, hint="first make the loop sleep, then look at the counter again")
+    if not own:
+        missing = sum(int(s.change) - 1 for s in lost)
+        message = f"{plural(missing, 'value')} of {params.topic} got lost on the way, with a gap in time"
+        return inconclusive(message, hint="grade again while the machine has less to do")
+    first = own[0]
+    after = seconds(first.to_ns - count.times_ns[0])
+    comes = f"after {number(first.before)} comes {number(first.after)}"
+    place = f"{comes} (value {first.number + 1}, {after} after the first)"
+    usual = count.usual_step()
+    if usual not in {None, 1}:
+        message = _usual_fault(usual or 0.0)
+    else:
+        kinds = {0: "repeats a value", -1: "goes back"}
+        message = listed(dict.fromkeys(kinds.get(int(s.change), "skips values") for s in own))
+    hint = "add one to the counter in one place only, once in each turn of the loop"
+    return failed(f"the counter {message}: {place}", hint=hint)
+
+
+def _usual_fault(usual: float) -> str:
+    if usual == 0:
+        return "stays at one value"
+    return f"counts in steps of {number(usual)}" if usual > 0 else "counts down"
+
+
+def _too_few(steps: int, run: Run, package: PackageFacts, params: StepParams) -> Verdict | None:
+    if steps >= params.min_steps:
+        return None
+    ended = early_end(run)
+    cause = f": the node ended ({explain_end(ended, run, package).cause})" if ended else ""
+    return unjudged(f"only {plural(steps + 1, 'value')} came on {params.topic}{cause}")

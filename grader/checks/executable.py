@@ -1,0 +1,196 @@
+"""Whether `rosrun` can run a script as it was handed in."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import PurePosixPath
+from typing import NamedTuple
+
+from grader.checks.build import CATKIN_MAKE
+from grader.checks.registry import check
+from grader.checks.support.text import listed, near_names, shown
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts, Shebang, SourceFile
+from grader.model.record import Record
+from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed
+
+RIGHT_SHEBANG = "#!/usr/bin/env python3"
+NODE_FOLDERS = ("scripts", "src", "nodes", "bin")
+
+
+class ExecutableParams(Record):
+    """`path` is where the handout puts the script; it is found by its name in other folders too."""
+
+    path: str
+
+
+class Obstacle(NamedTuple):
+    """Why `rosrun` cannot run the file, and the command that mends it."""
+
+    why: str
+    mend: str
+
+
+@check("executable", params=ExecutableParams)
+def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> Verdict:
+    """The script can be run as a node.
+
+    What it checks
+        That the script is there, has its executable bit, and begins with a `#!` line which names an
+        interpreter that exists. An executable wrapper that the build makes of it (`catkin_install_python`)
+        does as well.
+
+    Why it matters on a robot
+        `rosrun` and `roslaunch` only find files that may be executed, and the `#!` line is all that tells
+        the robot that a file is Python. It works in your editor and fails on the robot.
+
+    How it is measured
+        The bit comes from git's tree for a repository, from the archive's entries or from the disk. The
+        first line is read as the kernel reads it: a line that ends in CR LF, a byte order mark or a blank
+        line in front of it break it. A script in another folder counts, with a hint.
+
+    How to fix
+        `chmod +x <file>`, then `git update-index --chmod=+x <file>` and push; write `#!/usr/bin/env
+        python3` as the very first line; `dos2unix <file>` for a file from Windows. `ls -lF` shows
+        executable files with a `*`.
+    """
+    expected = f"{params.path}, executable, beginning with {RIGHT_SHEBANG}"
+    found = find_script(package, params.path)
+    if found is None:
+        return _missing(package, params.path, expected)
+    obstacles = [*_shebang_obstacles(package, found), *_mode_obstacles(found)]
+    measured = f"{found.path}: {_mode(found)}, {_first_line(found)}"
+    line = (FileCitation(file=found.path, line=1),)
+    elsewhere = found.path != params.path
+    hint = f"the handout puts it at {params.path}; move it there" if elsewhere else ""
+    if has_wrapper(package, build, found.path):
+        advice = f" (without it: {obstacles[0].why})" if obstacles else ""
+        message = f"the build makes an executable wrapper of {found.path}{advice}"
+        return passed(message, expected=expected, measured=measured, hint=hint, citations=line)
+    if obstacles:
+        return failed(
+            f"{found.path} {' and '.join(o.why for o in obstacles)}{_rosrun_answer(build, found.path)}",
+            expected=expected,
+            measured=measured,
+            hint="; ".join(o.mend for o in obstacles),
+            citations=line,
+        )
+    if found.executable is None:
+        message = (
+            f"whether {found.path} is executable cannot be seen: what was handed in carries no file modes"
+        )
+        mend = "hand in a git repository or a .tar.gz, which keep the executable bit"
+        return inconclusive(message, expected=expected, measured=measured, hint=mend, citations=line)
+    message = f"{found.path} is executable and names {_interpreter(found)}"
+    return passed(message, expected=expected, measured=measured, hint=hint, citations=line)
+
+
+def find_script(package: PackageFacts, path: str) -> SourceFile | None:
+    """The file at this path, or one of the same name in another folder (those for nodes first)."""
+    name = PurePosixPath(path).name
+    same = [f for f in package.files if PurePosixPath(f.path).name == name and not _is_product(f.path)]
+
+    def rank(file: SourceFile) -> tuple[bool, bool, bool, str]:
+        folder = PurePosixPath(file.path).parts[0]
+        return file.path != path, folder not in NODE_FOLDERS, file.executable is False, file.path
+
+    return min(same, key=rank, default=None)
+
+
+def has_wrapper(package: PackageFacts, build: Run, path: str) -> bool:
+    """The build worked, and `catkin_install_python` names this script."""
+    built = any(e.event == "exit" and e.name == CATKIN_MAKE and e.exit_code == 0 for _, e in build.processes)
+    calls = package.cmake.calls if package.cmake else ()
+    named = (a for c in calls if c.name == "catkin_install_python" for a in c.args)
+    return built and any(a == path or a.endswith("/" + path) for a in named)
+
+
+def _missing(package: PackageFacts, path: str, expected: str) -> Verdict:
+    names = {PurePosixPath(f.path).name: f.path for f in package.files if not _is_product(f.path)}
+    wanted = PurePosixPath(path)
+    near = [names[n] for n in near_names(wanted.name, names)]
+    near += [p for n, p in names.items() if n == wanted.stem and p not in near]
+    scripts = [p for n, p in names.items() if n.endswith(".py")]
+    seen = f"; there is {listed(near)}" if near else ""
+    return failed(
+        f"{path} is not in the package{seen}",
+        expected=expected,
+        measured=f"scripts: {listed(sorted(scripts))}" if scripts else "no Python script in the package",
+        hint=f"git mv {near[0]} {path}" if near else f"write {path}, then git add {path}, commit and push",
+        citations=tuple(FileCitation(file=p) for p in near[:3]),
+    )
+
+
+def _mode_obstacles(file: SourceFile) -> Iterator[Obstacle]:
+    if file.executable is False and not file.link:
+        yield Obstacle(
+            "has no executable bit",
+            f"chmod +x {file.path}, then git update-index --chmod=+x {file.path}, commit and push",
+        )
+
+
+def _shebang_obstacles(package: PackageFacts, file: SourceFile) -> Iterator[Obstacle]:
+    shebang = file.shebang
+    if file.link is not None:
+        if shebang is None and not _link_leads_on(package, file):
+            yield Obstacle(f"is a link to {file.link}, which is not there", "hand in the file itself")
+    elif file.bom:
+        mend = "save it as UTF-8 without BOM"
+        yield Obstacle("begins with an invisible byte order mark, so its #! line does not work", mend)
+    elif shebang is None:
+        mend = f"write {RIGHT_SHEBANG} as the very first line, with nothing above it"
+        yield Obstacle("does not begin with a #! line", mend)
+    elif shebang.crlf:
+        yield Obstacle("has a #! line that ends in CR LF (from Windows)", f"dos2unix {file.path}")
+    elif fault := _unusable(shebang, file.path):
+        yield Obstacle(
+            f"has the first line #!{shebang.text}: {fault}", f"write {RIGHT_SHEBANG} as the first line"
+        )
+
+
+def _unusable(shebang: Shebang, path: str) -> str:
+    """Why this `#!` line does not lead to a Python that exists, empty if it does."""
+    words = shebang.text.split()
+    if not words or not words[0].startswith("/"):
+        return "it needs the interpreter's whole path, beginning with /"
+    if PurePosixPath(words[0]).name == "env" and len(words) > 2 and not words[1].startswith("-"):
+        return f"env takes {' '.join(words[1:])!r} as one name"
+    if shebang.found is False:
+        return f"there is no {shebang.interpreter} on a ROS machine"
+    if path.endswith(".py") and "python" not in PurePosixPath(shebang.interpreter).name:
+        return f"{shebang.interpreter} does not run Python"
+    return ""
+
+
+def _link_leads_on(package: PackageFacts, file: SourceFile) -> bool:
+    """A link inside the package, to a file of it that can itself be run."""
+    parts: list[str] = []
+    for part in (PurePosixPath(file.path).parent / (file.link or "")).parts:
+        if part == ".." and parts:
+            parts.pop()
+        elif part != ".":
+            parts.append(part)
+    target = package.file("/".join(parts))
+    return target is not None and target.executable is not False and target.shebang is not None
+
+
+def _rosrun_answer(build: Run, path: str) -> str:
+    """The last line of what `rosrun` said to the file as handed in, where the build's recording has it."""
+    lines = [c.line for _, c in build.lines(f"rosrun {PurePosixPath(path).name}") if c.line.strip()]
+    return f"; rosrun answers: {shown(lines[-1])}" if lines else ""
+
+
+def _mode(file: SourceFile) -> str:
+    return {True: "executable", False: "not executable", None: "mode unknown"}[file.executable]
+
+
+def _first_line(file: SourceFile) -> str:
+    return f"#!{shown(file.shebang.text)}" if file.shebang else "no #! line"
+
+
+def _interpreter(file: SourceFile) -> str:
+    return file.shebang.interpreter if file.shebang else "its target's interpreter"
+
+
+def _is_product(path: str) -> bool:
+    return PurePosixPath(path).parts[0] in {"build", "devel", "install"}

@@ -1,0 +1,90 @@
+"""Whether a listener prints what it hears."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from grader.checks.registry import check
+from grader.checks.support.printed import (
+    Line,
+    Probe,
+    in_order,
+    number_places,
+    printed_lines,
+    probes_on,
+    text_places,
+)
+from grader.checks.support.text import plural
+from grader.checks.support.unheard import never_sent, not_printed
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import EvidenceCitation, Verdict, failed, passed
+
+
+class HearsParams(Record):
+    """`template` is what a line has to say of a text, `{value}` being the message: `I heard {value}`."""
+
+    topic: str
+    template: str = "{value}"
+
+
+@check("hears", params=HearsParams)
+def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
+    """The listener prints each message that it hears.
+
+    What it checks
+        That every message on the topic appears in what the node prints or logs, in the order in which it
+        was sent.
+
+    Why it matters on a robot
+        A subscriber that drops some messages, zero or negative numbers for instance, works on most days. On
+        the robot those are the readings that matter.
+
+    How it is measured
+        The grader publishes messages that it makes up for this run. Each has to be on stdout, on stderr or
+        on /rosout, at its time or later. Other words on the line do not matter; a number has to stand for
+        itself (`12` is not in `127`).
+
+    How to fix
+        Subscribe with `rospy.Subscriber('<topic>', <Type>, callback)`, print `data.data` in the callback
+        without any condition, and end with `rospy.spin()`. `rostopic pub <topic> <type> <value>` sends a
+        message by hand.
+    """
+    expected = f"each message on {params.topic} is printed, in order"
+    probes = probes_on(run, params.topic)
+    if not probes:
+        return never_sent(package, run, params.topic).model_copy(update={"expected": expected})
+    lines = printed_lines(run)
+    places = _places(run, probes, lines, params)
+    missing = [] if places is None else [p for p, found in zip(probes, places, strict=True) if not found]
+    if places is None:
+        message = "it prints so many numbers that it cannot be told which of them it heard"
+        verdict = failed(message, hint="print each number once, in the callback")
+    elif missing:
+        verdict = not_printed(package, run, probes, missing, lines)
+    elif not in_order(places):
+        message = f"what came on {params.topic} is printed, but not in the order in which it was sent"
+        verdict = failed(message, hint="print in the callback itself, not later from a variable")
+    else:
+        verdict = passed(f"prints each of the {len(probes)} messages on {params.topic}")
+    first, last = (missing[0], missing[-1]) if missing else (probes[0], probes[-1])
+    sent = EvidenceCitation(
+        evidence=run.evidence, topic="/grader/actor", from_ns=first.at_ns, to_ns=last.at_ns
+    )
+    return verdict.model_copy(
+        update={
+            "expected": expected,
+            "measured": f"{len(probes) - len(missing)} of {plural(len(probes), 'message')} printed",
+            "citations": (*verdict.citations, sent),
+        }
+    )
+
+
+def _places(
+    run: Run, probes: Sequence[Probe], lines: Sequence[Line], params: HearsParams
+) -> list[tuple[int, ...]] | None:
+    if all(isinstance(p.value, int) for p in probes):
+        texts = {e.value for _, e in run.actors if e.action == "publish" and isinstance(e.value, str)}
+        return number_places(probes, lines, texts)
+    return text_places(probes, lines, params.template)

@@ -1,0 +1,204 @@
+"""Whether a launch file brings the nodes up together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import PurePosixPath
+
+from grader.checks.executable import find_script
+from grader.checks.registry import check
+from grader.checks.support.process import lives
+from grader.checks.support.text import listed, near_names, plural, shown
+from grader.evidence.events import GraphEvent
+from grader.evidence.run import Run, is_grader_node
+from grader.model.package import LaunchFile, LaunchNode, PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import (
+    Citation,
+    EvidenceCitation,
+    FileCitation,
+    Verdict,
+    failed,
+    inconclusive,
+    passed,
+)
+
+_ERRORS = ("ERROR: cannot launch", "RLException", "Invalid ", "ERROR:", "process has died", "roslaunch:")
+
+
+class LaunchConnectsParams(Record):
+    """`launch` is the file's name, in whatever folder. `nodes` are names that have to come up."""
+
+    launch: str
+    topic: str
+    nodes: tuple[str, ...] = ()
+
+
+@check("launch-connects", params=LaunchConnectsParams)
+def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParams) -> Verdict:
+    """The launch file brings up nodes that are connected.
+
+    What it checks
+        That the launch file is well-formed, and that `roslaunch` brings up a publisher and a subscriber
+        which are connected over the topic.
+
+    Why it matters on a robot
+        A robot is started with launch files. One wrong attribute in one of them, and a part of the robot is
+        missing without anybody noticing.
+
+    How it is measured
+        `roslaunch` runs the file, which is found by its name anywhere in the package, and the subscribing
+        node itself is asked whom it is connected to. Any two nodes of the package do, under any names.
+
+    How to fix
+        One `<node pkg="…" type="….py" name="…"/>` for each script, with the `.py` and the executable bit.
+        `roslaunch <package> <file>`, then `rosnode list` and `rostopic info <topic>` show what came up.
+    """
+    expected = f"{params.launch} brings up a publisher and a subscriber connected over {params.topic}"
+    file = next((f for f in package.launch_files if PurePosixPath(f.path).name == params.launch), None)
+    found = list(connections(run, params.topic))
+    nodes = run.student_nodes()
+    verdict = (
+        _unreadable(package, file, params)
+        or _not_run(run)
+        or _names_missing(nodes, file, params)
+        or (None if found else _unconnected(package, file, run, params))
+        or passed(f"roslaunch connects {found[0][0]} and {found[0][1]} over {params.topic}")
+    )
+    place: tuple[Citation, ...] = (FileCitation(file=file.path, line=1),) if file else ()
+    measured = f"{plural(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node came up"
+    if file is None or file.fault:
+        measured = "no launch file that can be read"
+    graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
+    return verdict.model_copy(
+        update={
+            "expected": expected,
+            "measured": measured,
+            "citations": verdict.citations or (*place, graph),
+        }
+    )
+
+
+def connections(run: Run, topic: str) -> Iterator[tuple[str, str]]:
+    """Publisher and subscriber, two nodes of the student's that were connected over the topic."""
+    for _, event in run.graph:
+        for one in event.connections:
+            pair = (one.publisher, one.subscriber)
+            if one.topic == topic and pair[0] != pair[1] and not any(map(is_grader_node, pair)):
+                yield pair
+
+
+def _unreadable(
+    package: PackageFacts, file: LaunchFile | None, params: LaunchConnectsParams
+) -> Verdict | None:
+    if file is None:
+        others = [f.path for f in package.launch_files]
+        names = {PurePosixPath(f.path).name: f.path for f in package.files}
+        near = [names[n] for n in near_names(params.launch, names)]
+        seen = f"; there is {listed(dict.fromkeys([*near, *others]))}" if near or others else ""
+        message = f"{params.launch} is not in the package{seen}"
+        hint = f"put it at launch/{params.launch}, then git add, commit and push it"
+        cited = tuple(FileCitation(file=p) for p in (near or others)[:3])
+        return failed(message, hint=hint, citations=cited or (FileCitation(file="package.xml"),))
+    if file.fault is None:
+        return None
+    line = f", line {file.fault.line}" if file.fault.line else ""
+    message = f"{file.path}{line} is not well-formed: {file.fault.cause or file.fault.message}"
+    hint = "close every element, and begin with <launch> and end with </launch>"
+    return failed(message, hint=hint, citations=(FileCitation(file=file.path, line=file.fault.line),))
+
+
+def _not_run(run: Run) -> Verdict | None:
+    if lives(run) or run.graph:
+        return None
+    return inconclusive("roslaunch was not run", hint="grade again")
+
+
+def _names_missing(
+    nodes: tuple[str, ...], file: LaunchFile | None, params: LaunchConnectsParams
+) -> Verdict | None:
+    missing = [n for n in params.nodes if f"/{n.lstrip('/')}" not in nodes]
+    if not missing or not nodes:
+        return None
+    message = f"{listed(missing)} did not come up; there is {listed(nodes)}"
+    cited = (FileCitation(file=file.path, line=1),) if file else ()
+    return failed(message, hint="the `name` in the launch file is the node's name", citations=cited)
+
+
+def _unconnected(
+    package: PackageFacts, file: LaunchFile | None, run: Run, params: LaunchConnectsParams
+) -> Verdict:
+    """Why no two nodes are connected: a wrong attribute, an error of roslaunch's, or what the graph shows."""
+    said = _roslaunch_error(run)
+    quoted = f"; roslaunch says: {said}" if said else ""
+    wrong = next(_wrong_attributes(package, file), None) if file else None
+    if wrong is not None and file is not None:
+        node, message, hint = wrong
+        cited = (FileCitation(file=file.path, line=node.line),)
+        return failed(f"{file.path}, line {node.line}: {message}{quoted}", hint=hint, citations=cited)
+    nodes = run.student_nodes()
+    if len(nodes) < 2:
+        up = f"only {nodes[0]} comes up" if nodes else "no node comes up"
+        count = len(file.nodes) if file else 0
+        declared = (
+            f"; the file has {plural(count, '<node>').replace('s', '') if count == 1 else f'{count} <node>s'}"
+        )
+        return failed(
+            f"{up}{declared}{quoted}", hint="give each script a <node>, and run each alone with rosrun"
+        )
+    return _over_another_topic(run, params, quoted)
+
+
+def _over_another_topic(run: Run, params: LaunchConnectsParams, quoted: str) -> Verdict:
+    others = {
+        c.topic
+        for _, event in run.graph
+        for c in event.connections
+        if c.topic not in {params.topic, "/rosout"} and not is_grader_node(c.subscriber)
+    }
+    if others:
+        message = f"the nodes are connected over {listed(sorted(others))}, not over {params.topic}"
+        return failed(
+            message + quoted, hint=f"both have to use {params.topic}; look for a <remap> or a namespace"
+        )
+    publishers, subscribers = (_nodes_on(run, params.topic, end) for end in ("publishers", "subscribers"))
+    if publishers and subscribers:
+        message = (
+            f"{listed(publishers)} and {listed(subscribers)} are both on {params.topic}, but not connected"
+        )
+        return failed(message + quoted, hint="do both use the same message type?")
+    lacking = "publishes on" if not publishers else "subscribes to"
+    message = f"{listed(run.student_nodes())} came up, but none {lacking} {params.topic}"
+    return failed(message + quoted, hint="launch a talker and a listener")
+
+
+def _nodes_on(run: Run, topic: str, end: str) -> tuple[str, ...]:
+    def nodes(event: GraphEvent) -> tuple[str, ...]:
+        return (event.publishers if end == "publishers" else event.subscribers).get(topic, ())
+
+    found = (n for _, event in run.graph for n in nodes(event) if not is_grader_node(n))
+    return tuple(dict.fromkeys(found))
+
+
+def _wrong_attributes(package: PackageFacts, file: LaunchFile) -> Iterator[tuple[LaunchNode, str, str]]:
+    """Nodes that cannot start by what the file says of them. Names with `$(…)` are roslaunch's to resolve."""
+    for node in file.nodes:
+        missing = [a for a in ("pkg", "type", "name") if not getattr(node, a)]
+        if missing:
+            yield node, f"<node> has no {listed(missing)}", "a <node> needs pkg, type and name"
+        elif "$(" in f"{node.pkg}{node.type}":
+            continue
+        elif near_names(package.name, [str(node.pkg)]):
+            yield node, f"there is no package {node.pkg}", f'write pkg="{package.name}"'
+        elif node.pkg == package.name and find_script(package, str(node.type)) is None:
+            hint = "type is the script's file name, with .py"
+            if find_script(package, f"{node.type}.py"):
+                hint = f'write type="{node.type}.py"'
+            yield node, f"there is no {node.type} in the package", hint
+
+
+def _roslaunch_error(run: Run) -> str:
+    """The first line in which roslaunch, or a node that it started, says what is wrong."""
+    lines = [c.line for _, c in run.console if c.line.strip()]
+    found = (line for mark in _ERRORS for line in lines if mark in line)
+    return shown(next(found, ""))

@@ -1,0 +1,134 @@
+"""What `package.xml` says."""
+
+from __future__ import annotations
+
+from grader.checks.registry import check
+from grader.checks.support.text import listed, near_names
+from grader.model.package import Fault, Manifest, PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
+
+RUNTIME_KINDS = ("depend", "exec_depend", "run_depend")
+BUILD_TOOL_KINDS = ("buildtool_depend", "build_depend", "depend")
+
+
+class ManifestParams(Record):
+    """`name` is the name that the handout gives the package."""
+
+    name: str
+
+
+class DependenciesParams(Record):
+    """`names` are the packages that the nodes need at run time."""
+
+    names: tuple[str, ...]
+
+
+@check("manifest", params=ManifestParams)
+def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
+    """The manifest names the package.
+
+    What it checks
+        That `package.xml` can be read, gives the package the handout's name, and has `catkin` as its build
+        tool.
+
+    Why it matters on a robot
+        A robot's software is found by the names in its manifests. With a broken or misnamed one, `rosrun`
+        and `roslaunch` cannot find the package at all.
+
+    How it is measured
+        The manifest is read with `catkin_pkg`, the library that catkin itself uses, and nothing is
+        executed. A `TODO` licence or maintainer costs nothing here.
+
+    How to fix
+        Open `package.xml` at the line that is named. `<name>` holds the package's name exactly as in the
+        handout, and `<buildtool_depend>catkin</buildtool_depend>` names the build tool.
+    """
+    expected = f"package.xml, readable, name {params.name}, build tool catkin"
+    found = package.manifest
+    if found is None:
+        return _unreadable(package.manifest_fault, expected)
+    if found.name != params.name:
+        slip = " (a slip of the name)" if near_names(params.name, [found.name]) else ""
+        return failed(
+            f"{found.file} names the package {found.name!r}, the handout calls it {params.name!r}{slip}",
+            expected=expected,
+            measured=f"name {found.name}",
+            hint=f"write <name>{params.name}</name> in {found.file}",
+            citations=(FileCitation(file=found.file, line=found.name_line),),
+        )
+    if not _builds_with_catkin(found):
+        return failed(
+            f"{found.file} does not name catkin as its build tool",
+            expected=expected,
+            measured=f"build tool {found.build_type or 'none'}, no dependency on catkin",
+            hint="add <buildtool_depend>catkin</buildtool_depend>",
+            citations=(FileCitation(file=found.file, line=found.name_line),),
+        )
+    place = (FileCitation(file=found.file, line=found.name_line),)
+    return passed(
+        f"{found.file} names {found.name}, built with catkin",
+        expected=expected,
+        measured=f"name {found.name}, format {found.format}",
+        citations=place,
+    )
+
+
+@check("dependencies", params=DependenciesParams)
+def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
+    """The manifest declares what the nodes need at run time.
+
+    What it checks
+        That `package.xml` lists each package which the nodes import, as a dependency at run time.
+
+    Why it matters on a robot
+        Whoever installs the package on the robot asks the manifest what else to install. What is missing
+        there is missing on the robot, and the node stops at its first import.
+
+    How it is measured
+        The names under `<depend>`, `<exec_depend>` and `<run_depend>` are compared with the names that the
+        lab needs. `<build_depend>` alone does not count: it is for building only.
+
+    How to fix
+        Add one `<exec_depend>` line for each package named (`<run_depend>` in a manifest of format 1).
+    """
+    found = package.manifest
+    expected = f"{listed(params.names)} at run time"
+    if found is None:
+        return unjudged("package.xml cannot be read, so its dependencies are not known", expected=expected)
+    declared = [d for d in found.dependencies if d.kind in RUNTIME_KINDS]
+    missing = [n for n in params.names if n not in {d.name for d in declared}]
+    measured = listed(dict.fromkeys(d.name for d in declared)) or "none"
+    if not missing:
+        return passed(f"{found.file} declares {listed(params.names)}", expected=expected, measured=measured)
+    tag = "run_depend" if found.format == 1 else "exec_depend"
+    at_build = [d for d in found.dependencies if d.name in missing]
+    only = f"; {listed(dict.fromkeys(d.name for d in at_build))} only for building" if at_build else ""
+    lines = tuple(FileCitation(file=found.file, line=d.line) for d in at_build)
+    return failed(
+        f"{found.file} does not declare {listed(missing)} for run time{only}",
+        expected=expected,
+        measured=measured,
+        hint="add " + " ".join(f"<{tag}>{n}</{tag}>" for n in missing),
+        citations=lines or (FileCitation(file=found.file, line=found.name_line),),
+    )
+
+
+def _unreadable(fault: Fault | None, expected: str) -> Verdict:
+    if fault is None:
+        hint = "every catkin package has a package.xml beside its CMakeLists.txt"
+        return failed("there is no package.xml", expected=expected, measured="no file", hint=hint)
+    line = f", line {fault.line}" if fault.line else ""
+    return failed(
+        f"{fault.file}{line} cannot be read: {fault.cause or fault.message}",
+        expected=expected,
+        measured=fault.message,
+        hint="open the file at that line and close or correct the element",
+        citations=(FileCitation(file=fault.file, line=fault.line),),
+    )
+
+
+def _builds_with_catkin(found: Manifest) -> bool:
+    """`catkin_package()` refuses a manifest that does not depend on catkin."""
+    depends = any(d.name == "catkin" and d.kind in BUILD_TOOL_KINDS for d in found.dependencies)
+    return depends and found.build_type in {"catkin", ""}

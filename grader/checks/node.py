@@ -1,0 +1,188 @@
+"""Whether a script is a node that lives and ends well."""
+
+from __future__ import annotations
+
+import re
+from typing import Literal
+
+from grader.checks.registry import check
+from grader.checks.support.ending import (
+    ended_after,
+    explain_end,
+    explain_traceback,
+    is_rospys_own,
+    process_tracebacks,
+)
+from grader.checks.support.process import Life, life, lives
+from grader.checks.support.text import listed, near_names, plural, seconds
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import (
+    EvidenceCitation,
+    Verdict,
+    failed,
+    inconclusive,
+    passed,
+    unjudged,
+)
+
+LOOP = "loop with `while not rospy.is_shutdown():` and catch rospy.ROSInterruptException as talker.py does"
+
+
+class NodeLivesParams(Record):
+    """`process` is the scenario's name for it; `min_s` how long it has to live after its first message."""
+
+    process: str
+    min_s: float = 5.0
+
+
+class NodeNameParams(Record):
+    """`names` without the slash; anonymous ones end in `_<digits>_<digits>`, as rospy makes them."""
+
+    names: tuple[str, ...]
+    anonymous: Literal["allowed", "required", "forbidden"] = "allowed"
+
+
+@check("node-lives", params=NodeLivesParams)
+def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verdict:
+    """The script is one node, stays alive and ends on Ctrl-C.
+
+    What it checks
+        That the running script registers with the master as one node, lives as long as it is watched, and
+        ends without a traceback when Ctrl-C is pressed.
+
+    Why it matters on a robot
+        A node that dies takes its part of the robot with it, and one that does not end on Ctrl-C keeps the
+        motors' topic in its hands while you try to stop it.
+
+    How it is measured
+        By what the master lists, by the process's life until 5 s and more after its first message, and by
+        its exit after SIGINT. Any exit code is fine. A traceback `publish() to a closed topic` at the end
+        is a race of rospy's own and costs nothing.
+
+    How to fix
+        Call `rospy.init_node(…)` once. Loop with `while not rospy.is_shutdown():`, sleep with `rospy.Rate`,
+        and catch `rospy.ROSInterruptException` around the call of your main function, as talker.py does.
+    """
+    expected = f"one node, alive {params.min_s:g} s and more after its first message, ending on Ctrl-C"
+    one = life(run, params.process)
+    if one is None:
+        return unjudged(f"{params.process} was not started: there is no script to run", expected=expected)
+    nodes = run.student_nodes()
+    up_ns = _up_ns(one, run)
+    message = f"{_script(one)} is the node {listed(nodes)}, stayed alive and ended on Ctrl-C"
+    verdict = (
+        _early_end(one, run, package)
+        or _registration(one, run, nodes)
+        or _short_watch(one, up_ns, params)
+        or _bad_end(one, run, package)
+        or passed(message)
+    )
+    measured = f"{plural(len(nodes), 'node')} ({listed(nodes) or 'none'}), alive for {seconds(up_ns)}"
+    citations = verdict.citations or (_process_citation(one, run),)
+    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
+
+
+@check("node-name", params=NodeNameParams)
+def node_name(run: Run, params: NodeNameParams) -> Verdict:
+    """The node has the name of the handout.
+
+    What it checks
+        That the node registers under the expected name, plain or anonymous as the lab asks.
+
+    Why it matters on a robot
+        Other people's launch files, remappings and `rosnode info` all go by the node's name, and a second
+        node of the same name throws the first one out.
+
+    How it is measured
+        By the names that the master lists. Anonymous means the base name with `_<digits>_<digits>` after
+        it, as rospy's `anonymous=True` makes it.
+
+    How to fix
+        Give `rospy.init_node('<name>')` the name, with or without `anonymous=True` as the lab asks.
+        `rosnode list` shows it.
+    """
+    nodes = run.student_nodes()
+    kind = {"allowed": "plain or anonymous", "required": "anonymous", "forbidden": "plain"}[params.anonymous]
+    expected = f"{listed((f'/{n}' for n in params.names), 'or')}, {kind}"
+    if not nodes:
+        return unjudged("no node was registered, so there is no name", expected=expected, measured="no node")
+    cite = (EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),)
+    measured = listed(nodes)
+    if fitting := [n for n in nodes if _fits(n, params)]:
+        return passed(f"the node is {fitting[0]}", expected=expected, measured=measured, citations=cite)
+    near = [n for wanted in params.names for n in near_names(f"/{wanted}", nodes)]
+    other = f" ({near[0]} nearly fits)" if near else ""
+    flag = {"required": ", anonymous=True", "forbidden": ""}.get(params.anonymous, "")
+    return failed(
+        f"the node is named {measured}, not {expected}{other}",
+        expected=expected,
+        measured=measured,
+        hint=f"write rospy.init_node('{params.names[0]}'{flag})",
+        citations=cite,
+    )
+
+
+def _fits(node: str, params: NodeNameParams) -> bool:
+    plain = any(node == f"/{name}" for name in params.names)
+    anonymous = any(re.fullmatch(rf"/{re.escape(name)}_\d+_\d+", node) for name in params.names)
+    return (plain and params.anonymous != "required") or (anonymous and params.anonymous != "forbidden")
+
+
+def _up_ns(one: Life, run: Run) -> int:
+    """How long it lived freely after its first message, or after its start where it published none."""
+    channels = (c for c in run.student_channels() if c.topic != "/rosout")
+    first = min((c.times_ns[0] for c in channels if c.messages), default=one.start_ns)
+    return max(0, one.until_ns(run) - first)
+
+
+def _early_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
+    if not one.ended_early:
+        return None
+    end = explain_end(one, run, package)
+    message = f"{_script(one)} ended by itself after {ended_after(one)}: {end.cause}"
+    return failed(message, hint=end.hint, citations=end.citations)
+
+
+def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None:
+    if not nodes:
+        hint = "call rospy.init_node(…) before anything that waits"
+        return failed(f"{_script(one)} runs, but never registers as a node", hint=hint)
+    if len(nodes) > max(1, len(lives(run))):
+        message = f"{_script(one)} registers as {len(nodes)} nodes: {listed(nodes)}"
+        return failed(
+            message, hint="one script is one node: call rospy.init_node(…) once, start no other process"
+        )
+    return None
+
+
+def _short_watch(one: Life, up_ns: int, params: NodeLivesParams) -> Verdict | None:
+    if one.end is not None and up_ns >= params.min_s * 1e9:
+        return None
+    message = f"{_script(one)} was watched for {seconds(up_ns)} only, or its end was not recorded"
+    return inconclusive(message, hint="grade again")
+
+
+def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
+    """How its end after Ctrl-C was wrong, None where it was not."""
+    stopped_by = one.end.stopped_by if one.end else None
+    if stopped_by in {"TERM", "KILL"}:
+        message = f"{_script(one)} did not end on Ctrl-C and had to be stopped with SIG{stopped_by}"
+        return failed(message, hint=f"{LOOP}; a bare `except:` in the loop swallows the Ctrl-C")
+    found = process_tracebacks(run, one.name, after_ns=one.interrupt_ns)
+    own = [f for f in found if not is_rospys_own(f)]
+    if not own:
+        return None
+    end = explain_traceback(own[-1], package)
+    message = f"{_script(one)} ends on Ctrl-C with a traceback: {end.cause}"
+    return failed(message, hint=end.hint or LOOP, citations=end.citations)
+
+
+def _process_citation(one: Life, run: Run) -> EvidenceCitation:
+    span = {"from_ns": one.start_ns, "to_ns": one.end_ns}
+    return EvidenceCitation(evidence=run.evidence, topic="/grader/process", **span)
+
+
+def _script(one: Life) -> str:
+    return one.start.script or one.name

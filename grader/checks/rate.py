@@ -1,0 +1,194 @@
+"""Whether messages come at the rate of the handout."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from grader.checks.registry import check
+from grader.checks.support.ending import explain_end
+from grader.checks.support.gaps import ROUNDING, Rhythm, lateness_ms, limit_reached, rhythm
+from grader.checks.support.process import early_end, observed_until_ns
+from grader.checks.support.text import hertz, number, plural, seconds
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import (
+    Citation,
+    EvidenceCitation,
+    FileCitation,
+    Verdict,
+    failed,
+    inconclusive,
+    passed,
+    unjudged,
+)
+
+FLOOD_FACTOR = 5
+LATE_P95_SHARE = 0.2
+LATE_MAX_SHARE = 0.5
+
+Share = Annotated[float, Field(ge=0, le=1)]
+Positive = Annotated[float, Field(gt=0)]
+
+
+class RateParams(Record):
+    """`tolerance` is the share by which the mean may differ; `tolerance_low` and `_high` are for one side.
+
+    `share_in_bounds` of the gaps have to lie within `gap_tolerance` of the nominal period.
+    """
+
+    topic: str
+    rate_hz: Positive
+    tolerance: Share = 0.05
+    tolerance_low: Share | None = None
+    tolerance_high: Positive | None = None
+    gap_tolerance: Share = 0.5
+    share_in_bounds: Share = 0.95
+    min_window_s: Positive = 5.0
+
+    @property
+    def low_hz(self) -> float:
+        return self.rate_hz * (1 - (self.tolerance if self.tolerance_low is None else self.tolerance_low))
+
+    @property
+    def high_hz(self) -> float:
+        return self.rate_hz * (1 + (self.tolerance if self.tolerance_high is None else self.tolerance_high))
+
+    @property
+    def period_ns(self) -> float:
+        return 1e9 / self.rate_hz
+
+
+@check("rate", params=RateParams)
+def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
+    """The topic has the right rate, evenly.
+
+    What it checks
+        That messages come at the nominal rate, and one at a time: ten messages in one burst every second
+        are not 10 Hz.
+
+    Why it matters on a robot
+        Controllers are tuned to a rate, and watchdogs stop the robot when messages come late. A loop
+        without its sleep fills the network and takes a whole core.
+
+    How it is measured
+        In real time, over at least 5 s after the first message. The mean has to lie within 5 % of the
+        nominal rate, and 95 % of the gaps within half a period of the nominal one (a rubric may set other
+        bounds). One single stall costs nothing. If the grading machine itself was late while a rate failed,
+        nothing is taken: the run is repeated.
+
+    How to fix
+        `rate = rospy.Rate(10)` once before the loop, `rate.sleep()` (with its brackets) once in each turn
+        of it, and nothing slow beside it. `rostopic hz <topic>` shows the rate.
+    """
+    expected = f"{params.low_hz:g} to {params.high_hz:g} Hz on {params.topic}, evenly"
+    if run.clock != "real":
+        return inconclusive("rates are judged in real time only, and this run was warped", expected=expected)
+    full = limit_reached(run, params.topic)
+    until_ns = None if full else observed_until_ns(run)
+    found = rhythm(run.student_channels(params.topic), until_ns, params.period_ns)
+    if found is None:
+        return unjudged(f"no message came on {params.topic}", expected=expected, measured="no message")
+    verdict = (
+        _flood(found, package, params)
+        or _short(found, run, package, params)
+        or _excused(_uneven(found, params), found, run, params)
+        or passed(f"{params.topic} has {hertz(found.mean_hz)}, evenly")
+    )
+    span = EvidenceCitation(
+        evidence=run.evidence, topic=params.topic, from_ns=found.times_ns[0], to_ns=found.times_ns[-1]
+    )
+    citations: tuple[Citation, ...] = (*verdict.citations, span)
+    return verdict.model_copy(update={"expected": expected, "measured": found.text, "citations": citations})
+
+
+def _flood(found: Rhythm, package: PackageFacts, params: RateParams) -> Verdict | None:
+    if len(found.times_ns) < 20 or found.mean_hz < FLOOD_FACTOR * params.rate_hz:
+        return None
+    slips = [s for s in package.slips if "sleep" in s.kind or "sleep" in s.message]
+    where = f" ({slips[0].file}, line {slips[0].line}: {slips[0].message})" if slips else ""
+    return failed(
+        f"{params.topic} is flooded with {hertz(found.mean_hz)}: the loop does not sleep{where}",
+        hint=f"call rate.sleep(), with brackets, in each turn; rate = rospy.Rate({number(params.rate_hz)})",
+        citations=tuple(FileCitation(file=s.file, line=s.line) for s in slips[:3]),
+    )
+
+
+def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -> Verdict | None:
+    """Too little was seen to speak of a rate."""
+    if found.span_ns >= params.min_window_s * 1e9 * (1 - ROUNDING):
+        return None
+    ended = early_end(run)
+    seen = f"{plural(len(found.times_ns), 'message')} in {seconds(found.span_ns)}"
+    if ended is not None:
+        end = explain_end(ended, run, package)
+        message = f"only {seen} on {params.topic}: the node ended ({end.cause})"
+        return unjudged(message, hint=end.hint, citations=end.citations)
+    message = f"only {seen} on {params.topic}, a rate needs {params.min_window_s:g} s"
+    return inconclusive(message, hint="grade again")
+
+
+def _uneven(found: Rhythm, params: RateParams) -> Verdict | None:
+    """What is wrong with the rate, None if nothing is."""
+    mean_hz, period_ns = found.mean_hz, params.period_ns
+    bounds = (period_ns * (1 - params.gap_tolerance), period_ns * (1 + params.gap_tolerance))
+    outside = found.outside(*bounds)
+    allowed = (1 - params.share_in_bounds) * len(found.gaps_ns) + ROUNDING
+    even = len(outside) <= allowed or found.is_single_stall(outside, period_ns)
+    in_bounds = params.low_hz * (1 - ROUNDING) <= mean_hz <= params.high_hz * (1 + ROUNDING)
+    if in_bounds and even:
+        return None
+    topic, nominal = params.topic, number(params.rate_hz)
+    if found.tail_ns > max(5 * period_ns, 0.5e9):
+        lasted = seconds(found.times_ns[-1] - found.times_ns[0])
+        message = f"{topic} falls silent {lasted} after its first message, while its node lives on"
+        return failed(
+            message, hint="publish in a loop `while not rospy.is_shutdown():`, not a fixed number of times"
+        )
+    if in_bounds:
+        share = f"{len(outside)} of {len(found.gaps_ns)} gaps are far from {1 / params.rate_hz:g} s"
+        message = f"{topic} has {hertz(mean_hz)} in the mean, but in bursts or unevenly: {share}"
+        return failed(
+            message, hint="publish one message in each turn of the loop, and sleep once in each turn"
+        )
+    bursts = "" if even else ", and unevenly"
+    direction = "slow" if mean_hz < params.rate_hz else "fast"
+    return failed(
+        f"{topic} is too {direction}: {hertz(mean_hz)} instead of {nominal} Hz{bursts}",
+        hint=_rate_hint(mean_hz / params.rate_hz, nominal),
+    )
+
+
+def _rate_hint(ratio: float, nominal: str) -> str:
+    if abs(ratio - 0.5) < 0.05:
+        return (
+            f"half the rate: does the loop sleep twice? One rate.sleep() in each turn, rospy.Rate({nominal})"
+        )
+    if abs(ratio - 2) < 0.2:
+        return f"twice the rate: does the loop, or a second publisher, publish twice? rospy.Rate({nominal})"
+    if ratio < 1:
+        return f"use rospy.Rate({nominal}) and one rate.sleep() in each turn, with nothing slow beside it"
+    return f"use rospy.Rate({nominal}) and rate.sleep() in each turn"
+
+
+def _excused(verdict: Verdict | None, found: Rhythm, run: Run, params: RateParams) -> Verdict | None:
+    """A rate that fails while the host was late costs nobody anything, unless it is too far off for that."""
+    if verdict is None:
+        return None
+    mean_ms, p95_ms, max_ms = lateness_ms(run, found.times_ns[0], found.until_ns)
+    period_ms = params.period_ns / 1e6
+    late = (
+        mean_ms >= max(params.tolerance, 0.02) / 2 * period_ms
+        or p95_ms >= LATE_P95_SHARE * period_ms
+        or max_ms >= LATE_MAX_SHARE * period_ms
+    )
+    beyond = found.mean_hz >= 2 * params.rate_hz or found.tail_ns / 2e6 > max(max_ms, period_ms)
+    if not late or beyond:
+        return verdict
+    message = (
+        f"{verdict.message}; but the grading machine was late itself "
+        f"(by up to {max_ms:.0f} ms, 95 % within {p95_ms:.0f} ms), so nothing follows from it"
+    )
+    return inconclusive(message, hint="grade again while the machine has less to do")

@@ -1,0 +1,1 @@
+"""What several checks work out of a run before they judge: pure functions, no I/O."""

@@ -1,0 +1,100 @@
+"""The rate of a stream of messages: mean, gaps, and the silence at its end. Times in ns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import pairwise
+
+from pydantic import model_validator
+
+from grader.checks.support.text import hertz, plural
+from grader.evidence.run import Channel, Run
+from grader.model.record import Record
+
+ROUNDING = 1e-6
+
+
+class Rhythm(Record):
+    """`times_ns` in order; `until_ns` is up to when the publisher was watched, the last message or later."""
+
+    times_ns: tuple[int, ...]
+    until_ns: int
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Rhythm:
+        if not self.times_ns or self.until_ns < self.times_ns[-1]:
+            raise ValueError("a rhythm has at least one message, and ends with it or later")
+        return self
+
+    @cached_property
+    def gaps_ns(self) -> tuple[int, ...]:
+        """Between messages, and the silence at the end where it lasted."""
+        tail = (self.tail_ns,) if self.tail_ns else ()
+        return (*(b - a for a, b in pairwise(self.times_ns)), *tail)
+
+    @property
+    def tail_ns(self) -> int:
+        return self.until_ns - self.times_ns[-1]
+
+    @property
+    def span_ns(self) -> int:
+        return self.until_ns - self.times_ns[0]
+
+    @property
+    def mean_hz(self) -> float:
+        """Gaps over time; 0 where there is no gap."""
+        return len(self.gaps_ns) * 1e9 / self.span_ns if self.span_ns > 0 else 0.0
+
+    def outside(self, low_ns: float, high_ns: float) -> list[int]:
+        """Indices of the gaps shorter than `low_ns` or longer than `high_ns`; a bound itself is inside."""
+        slack = high_ns * ROUNDING
+        return [i for i, gap in enumerate(self.gaps_ns) if not low_ns - slack <= gap <= high_ns + slack]
+
+    def is_single_stall(self, outside: Sequence[int], period_ns: float) -> bool:
+        """One message came late and the next on its schedule again: one long gap, then one short one."""
+        match outside:
+            case [late]:
+                return self.gaps_ns[late] > period_ns and late < len(self.gaps_ns) - bool(self.tail_ns)
+            case [late, early]:
+                together = self.gaps_ns[late] + self.gaps_ns[early]
+                return early == late + 1 and abs(together - 2 * period_ns) <= period_ns / 2
+        return False
+
+    @property
+    def text(self) -> str:
+        """`9.98 Hz over 6.0 s (60 messages, gaps 0.098 to 0.103 s)`."""
+        count = plural(len(self.times_ns), "message")
+        if not self.gaps_ns:
+            return count
+        low, high = min(self.gaps_ns) / 1e9, max(self.gaps_ns) / 1e9
+        digits = 3 if high >= 0.01 else 6
+        gaps = f"gaps {low:.{digits}f} to {high:.{digits}f} s"
+        return f"{hertz(self.mean_hz)} over {self.span_ns / 1e9:.1f} s ({count}, {gaps})"
+
+
+def rhythm(channels: Sequence[Channel], until_ns: int | None, period_ns: float) -> Rhythm | None:
+    """All messages of these channels until `until_ns`. Silence at the end counts from 1.5 periods on."""
+    times = sorted(t for c in channels for t in c.times_ns if until_ns is None or t <= until_ns)
+    if not times:
+        return None
+    silent_ns = 0 if until_ns is None else until_ns - times[-1]
+    end_ns = times[-1] + silent_ns if silent_ns > 1.5 * period_ns else times[-1]
+    return Rhythm(times_ns=tuple(times), until_ns=end_ns)
+
+
+def limit_reached(run: Run, topic: str) -> bool:
+    """The recorder stopped taking messages of this topic, because there were too many."""
+    return any(e.topic == topic and (e.event == "limit" or e.dropped) for _, e in run.recorder)
+
+
+def lateness_ms(run: Run, from_ns: int, to_ns: int) -> tuple[float, float, float]:
+    """The worst mean, 95th percentile and maximum of the timer's lateness in this stretch of time."""
+    before = max((t for t, _ in run.host if t <= from_ns), default=from_ns)
+    after = min((t for t, _ in run.host if t >= to_ns), default=to_ns)
+    events = [e for t, e in run.host if before < t <= after]
+    return (
+        max((e.mean_ms for e in events), default=0.0),
+        max((e.p95_ms for e in events), default=0.0),
+        max((e.max_ms for e in events), default=0.0),
+    )

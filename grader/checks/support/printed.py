@@ -1,0 +1,143 @@
+"""What a node printed or logged, and whether probes are among it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from grader.checks.support.traceback import HEADING, tracebacks
+from grader.evidence.run import Run
+
+NUMBERS_PER_LINE = 6
+LINES_PER_PROBE = 8
+LINES_SPARE = 20
+CLOCK_SLACK_NS = 50_000_000
+_ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+_LOG_PREFIX = re.compile(r"^\s*\[\s*(?:DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*(?:\[[^\]]*\]\s*)*:?\s?")
+_ANONYMOUS = re.compile(r"/?[A-Za-z][\w/]*_\d+_\d{9,}")
+_NUMBER = re.compile(r"(?<![\d.])([-+]?)(\d+)(\.\d+)?(?![\d])")
+
+
+class Probe(NamedTuple):
+    """What the grader published, and when."""
+
+    at_ns: int
+    value: object
+
+
+class Line(NamedTuple):
+    """One line of output without the logger's prefix, colours and the node's own name."""
+
+    at_ns: int
+    text: str
+
+
+def probes_on(run: Run, topic: str) -> tuple[Probe, ...]:
+    return tuple(Probe(t, e.value) for t, e in run.actors if e.action == "publish" and e.topic == topic)
+
+
+def printed_lines(run: Run) -> tuple[Line, ...]:
+    """All that the student's processes printed and their nodes logged, by time; tracebacks left out."""
+    students = {e.name for _, e in run.processes if e.role == "student"}
+    lines = [
+        line
+        for process in sorted(students)
+        for stream in ("stdout", "stderr")
+        for line in _without_tracebacks([(t, c.line) for t, c in run.lines(process) if c.stream == stream])
+    ]
+    names = sorted(run.student_nodes(), key=len, reverse=True)
+    return tuple(
+        Line(t, _bare(text, names)) for t, text in sorted([*lines, *_logged(run)], key=lambda line: line[0])
+    )
+
+
+def _logged(run: Run) -> list[tuple[int, str]]:
+    """The messages on /rosout, line by line."""
+    texts = (
+        (t, str(value.get("msg", "")))
+        for channel in run.student_channels("/rosout")
+        for t, value in zip(channel.times_ns, channel.values, strict=True)
+        if isinstance(value, dict)
+    )
+    return [(t, line) for t, text in texts if HEADING not in text for line in text.splitlines()]
+
+
+def _without_tracebacks(lines: Sequence[tuple[int, str]]) -> list[tuple[int, str]]:
+    hidden = {
+        i for found in tracebacks([text for _, text in lines]) for i in range(found.first, found.last + 1)
+    }
+    return [line for index, line in enumerate(lines) if index not in hidden]
+
+
+def _bare(text: str, names: Iterable[str]) -> str:
+    text = _LOG_PREFIX.sub("", _ANSI.sub("", text))
+    for name in names:
+        text = text.replace(name, " ")
+    return _ANONYMOUS.sub(" ", text)
+
+
+def numbers_in(text: str) -> frozenset[int]:
+    """A line's whole numbers: `12` is not in `127` and not in `3.12`. A `-` after a letter may be a dash."""
+    found: set[int] = set()
+    for match in _NUMBER.finditer(text):
+        sign, whole, fraction = match.groups()
+        if len(whole) > 18 or (fraction and fraction.strip(".0")):
+            continue
+        found.add(int(sign + whole))
+        if sign and text[: match.start()][-1:].isalpha():
+            found.add(int(whole))
+    return frozenset(found)
+
+
+def number_places(
+    probes: Sequence[Probe], lines: Sequence[Line], texts: Iterable[str]
+) -> list[tuple[int, ...]] | None:
+    """For each probe the indices of the lines that hold it, at its time or later.
+
+    `texts` are other probes that the lines may show too; digits in them are no numbers. None where so many
+    numbers are printed that any probe would be among them.
+    """
+    hidden = re.compile("|".join(map(re.escape, sorted(texts, key=len, reverse=True))) or r"(?!)")
+    rows = [(line.at_ns, numbers_in(hidden.sub(" ", line.text))) for line in lines]
+    rows = [(t, numbers) for t, numbers in rows if numbers]
+    if len(rows) > LINES_PER_PROBE * (len(probes) + len(set(texts))) + LINES_SPARE:
+        return None
+    return [
+        tuple(
+            i
+            for i, (t, numbers) in enumerate(rows)
+            if p.value in numbers and len(numbers) <= NUMBERS_PER_LINE and t >= p.at_ns - CLOCK_SLACK_NS
+        )
+        for p in probes
+    ]
+
+
+def text_places(probes: Sequence[Probe], lines: Sequence[Line], template: str) -> list[tuple[int, ...]]:
+    """The same for texts, as offsets in all that was printed. A text may be split over lines."""
+    blank = "" if template == "{value}" else " "
+    blob, starts = "", []
+    for line in lines:
+        starts.append((line.at_ns, len(blob)))
+        blob += blank.join(line.text.split()) + blank
+    places = []
+    for probe in probes:
+        begin = next((at for t, at in starts if t >= probe.at_ns - CLOCK_SLACK_NS), len(blob))
+        wanted = template.replace("{value}", str(probe.value))
+        spellings = {
+            blank.join(w.split()) for w in (wanted, template.replace("{value}", repr(probe.value)[1:-1]))
+        }
+        found = {m.start() for w in spellings if w for m in re.finditer(re.escape(w), blob[begin:])}
+        places.append(tuple(sorted(begin + at for at in found)))
+    return places
+
+
+def in_order(places: Sequence[tuple[int, ...]]) -> bool:
+    """Whether one place can be chosen for each probe, each behind the one before."""
+    position = -1
+    for choices in places:
+        later = [place for place in choices if place > position]
+        if not later:
+            return False
+        position = later[0]
+    return True

@@ -1,0 +1,77 @@
+"""The life of the student's processes in a run."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from grader.evidence.events import ProcessEvent
+from grader.evidence.run import Run
+
+
+class Life(NamedTuple):
+    """One process from start to end. `end` is None while it ran on to the end of the recording."""
+
+    name: str
+    start_ns: int
+    start: ProcessEvent
+    end_ns: int | None
+    end: ProcessEvent | None
+    interrupt_ns: int | None
+
+    @property
+    def ended_early(self) -> bool:
+        """It ended before the grader pressed Ctrl-C: by itself, or because it broke a limit."""
+        return self.end is not None and self.interrupt_ns is None and self.end.stopped_by in {None, "KILL"}
+
+    def until_ns(self, run: Run) -> int:
+        """Up to when it could act freely: Ctrl-C, its own end, or the recording's."""
+        times = (t for t in (self.interrupt_ns, self.end_ns) if t is not None)
+        return min(times, default=run.end_ns)
+
+
+def lives(run: Run) -> tuple[Life, ...]:
+    """The student's processes in order of their start."""
+    starts = [(t, e) for t, e in run.processes if e.role == "student" and e.event == "start"]
+    found = []
+    for start_ns, start in starts:
+        end = next(
+            (
+                (t, e)
+                for t, e in run.processes
+                if e.event == "exit" and e.name == start.name and t >= start_ns
+            ),
+            (None, None),
+        )
+        interrupt_ns = _interrupt_ns(run, start.name)
+        if interrupt_ns is not None and end[0] is not None and end[0] < interrupt_ns:
+            interrupt_ns = None
+        found.append(Life(start.name, start_ns, start, end[0], end[1], interrupt_ns))
+    return tuple(found)
+
+
+def life(run: Run, process: str) -> Life | None:
+    """The process of that name; the only one of the run where `process` is empty."""
+    found = lives(run)
+    if not process:
+        return found[0] if len(found) == 1 else None
+    return next((one for one in found if one.name == process), None)
+
+
+def early_end(run: Run) -> Life | None:
+    """The first process of the student's that ended before the grader stopped it."""
+    early = [one for one in lives(run) if one.ended_early]
+    return min(early, key=lambda one: one.end_ns or 0, default=None)
+
+
+def _interrupt_ns(run: Run, process: str) -> int | None:
+    """When the grader pressed Ctrl-C on this process. An interrupt that names no known process is for all."""
+    known = {e.name for _, e in run.processes}
+    pressed = ((t, {e.actor, e.detail} & known) for t, e in run.actors if e.action == "interrupt")
+    return min((t for t, named in pressed if not named or process in named), default=None)
+
+
+def observed_until_ns(run: Run) -> int | None:
+    """Up to when silence is a living node's own: the first Ctrl-C. None where none was recorded."""
+    ends = [one.until_ns(run) for one in lives(run) if not one.ended_early and one.end_ns is not None]
+    pressed = [one.interrupt_ns for one in lives(run) if one.interrupt_ns is not None]
+    return min([*ends, *pressed], default=None)

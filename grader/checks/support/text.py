@@ -1,0 +1,69 @@
+"""Names that nearly fit, and numbers as a student reads them."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable
+
+SIMILARITY = 0.8
+SHOWN_CHARS = 160
+
+
+def near_names(wanted: str, names: Iterable[str]) -> tuple[str, ...]:
+    """Those of `names` that look like a slip of `wanted`: case, namespace, separator, a typing error."""
+    found = [n for n in dict.fromkeys(names) if n != wanted and _is_near(wanted, n)]
+    return tuple(sorted(found, key=lambda n: -_similarity(wanted, n)))
+
+
+def _is_near(wanted: str, name: str) -> bool:
+    last_wanted, last_name = (n.rstrip("/").rpartition("/")[2] for n in (wanted, name))
+    same_words = sorted(_words(last_wanted)) == sorted(_words(last_name)) != []
+    return (
+        same_words
+        or _squeezed(last_wanted) == _squeezed(last_name)
+        or _similarity(wanted, name) >= SIMILARITY
+    )
+
+
+def _similarity(first: str, second: str) -> float:
+    return difflib.SequenceMatcher(None, _squeezed(first), _squeezed(second)).ratio()
+
+
+def _words(name: str) -> list[str]:
+    return re.findall(r"[a-z0-9]+", name.casefold())
+
+
+def _squeezed(name: str) -> str:
+    return "".join(_words(name))
+
+
+def listed(names: Iterable[str], last: str = "and") -> str:
+    """`a, b and c`; at most six of them."""
+    items = list(names)
+    if len(items) > 6:
+        items = [*items[:6], f"{len(items) - 6} more"]
+    return " ".join([", ".join(items[:-1]), last, items[-1]]) if len(items) > 1 else "".join(items)
+
+
+def shown(text: str) -> str:
+    """One line of somebody's output, cut to a length that fits a report."""
+    line = " ".join(text.split())
+    return line if len(line) <= SHOWN_CHARS else line[: SHOWN_CHARS - 1] + "…"
+
+
+def number(value: float) -> str:
+    """A number without a tail of zeros: `9.98`, `128`."""
+    return f"{value:.10g}" if float(value).is_integer() else f"{value:.4g}"
+
+
+def hertz(rate_hz: float) -> str:
+    return f"{rate_hz:.2f} Hz" if rate_hz < 1000 else f"{rate_hz:.0f} Hz"
+
+
+def seconds(duration_ns: float) -> str:
+    return f"{duration_ns / 1e9:.1f} s"
+
+
+def plural(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

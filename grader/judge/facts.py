@@ -1,0 +1,95 @@
+"""The facts that checks ask for by name, out of the recorded runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import PurePosixPath
+
+from pydantic import ValidationError
+
+from grader.checks.executable import find_script
+from grader.checks.registry import Check
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import Verdict, inconclusive
+from grader.rubric.model import Criterion, Rubric
+
+PACKAGE_RUN = "package"
+NOT_RUN = "not_run"
+INSTALL_ROS = (
+    "install ROS 1 with `make setup`, or `apt-get install python3-rospy python3-roslaunch rosbash catkin`, "
+    "and grade again"
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Facts:
+    """Everything that one submission's evidence says. `package` is None where no package was recorded."""
+
+    rubric: Rubric
+    runs: Mapping[str, Run]
+    package: PackageFacts | None
+
+    def of(self, check: Check, criterion: Criterion, params: Record) -> dict[str, object] | Verdict:
+        """The facts by the names that the check asks for, or the verdict where one of them is not there."""
+        found: dict[str, object] = {"params": params}
+        if {"package", "build"} & set(check.facts):
+            if self.package is None:
+                return inconclusive("the evidence holds no package facts", hint="grade the submission again")
+            found |= {"package": self.package, "build": self.runs[PACKAGE_RUN]}
+        if check.needs_run:
+            run = self._run(criterion.scenario or "")
+            if isinstance(run, Verdict):
+                return run
+            found["run"] = run
+        return {name: found[name] for name in check.facts}
+
+    def _run(self, scenario: str) -> Run | Verdict:
+        run = self.runs.get(scenario)
+        if run is None and self._lacks_files(scenario):
+            return self._nothing_started(scenario)
+        if run is None:
+            recorded = self.runs.get(PACKAGE_RUN)
+            reason = recorded.metadata.get(NOT_RUN, "") if recorded else ""
+            message = f"the scenario {scenario!r} was not run{': ' + reason if reason else ''}"
+            return inconclusive(message, hint=INSTALL_ROS if reason else "grade the submission again")
+        outcome = run.outcome
+        if outcome is None:
+            return inconclusive(f"the recording of {scenario!r} was cut short", hint="grade again")
+        if outcome.outcome == "host":
+            why = f": {outcome.detail}" if outcome.detail else ""
+            message = f"the run {scenario!r} failed on the grading machine{why}"
+            return inconclusive(
+                message, hint="`grader doctor` shows what this machine lacks; then grade again"
+            )
+        return run
+
+    def _lacks_files(self, scenario: str) -> bool:
+        """Whether the package has none of the files that the scenario starts: then there was nothing to run."""
+        known = self.rubric.scenarios.get(scenario)
+        if known is None or self.package is None:
+            return False
+        launch_files = {PurePosixPath(f.path).name for f in self.package.launch_files}
+        return not any(
+            (s.script and find_script(self.package, s.script)) or (s.launch and s.launch in launch_files)
+            for s in known.start
+        )
+
+    def _nothing_started(self, scenario: str) -> Run:
+        recorded = self.runs[PACKAGE_RUN]
+        clock = self.rubric.scenarios[scenario].clock
+        return replace(recorded, scenario=scenario, clock=clock, processes=(), console=(), graph=())
+
+
+def try_facts(rubric: Rubric, runs: Mapping[str, Run]) -> Facts:
+    """The facts; `package` is None where none was recorded, or where it is of another version."""
+    recorded = runs.get(PACKAGE_RUN)
+    if recorded is None or recorded.package_json is None:
+        return Facts(rubric=rubric, runs=runs, package=None)
+    try:
+        package = PackageFacts.model_validate_json(recorded.package_json)
+    except ValidationError:
+        return Facts(rubric=rubric, runs=runs, package=None)
+    return Facts(rubric=rubric, runs=runs, package=package)

@@ -1,0 +1,47 @@
+"""What all criteria together come to."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from decimal import Decimal
+from typing import Literal
+
+from grader.judge.points import round_half_up
+from grader.model.result import CriterionResult
+from grader.model.verdict import Status
+from grader.rubric.model import Rubric
+
+OPEN = {Status.INCONCLUSIVE, Status.MANUAL, Status.ERROR}
+
+
+def total_points(rubric: Rubric, results: Sequence[CriterionResult]) -> float:
+    """The sum of the criteria's points, rounded half up to the rubric's digits."""
+    total = sum((Decimal(repr(r.points)) for r in results), Decimal(0))
+    return round_half_up(float(total), rubric.digits)
+
+
+def overall_status(results: Sequence[CriterionResult]) -> Literal["graded", "inconclusive", "error"]:
+    """`error` where a check of ours failed, `inconclusive` where points are still open, `graded` otherwise.
+
+    Advice (0 points) does not hold up a result. No criteria at all are an error: nothing was judged.
+    """
+    counting = [r for r in results if r.max_points > 0]
+    if not counting or any(r.status is Status.ERROR for r in counting):
+        return "error"
+    return "inconclusive" if any(r.status in OPEN for r in counting) else "graded"
+
+
+def reached_pass_mark(rubric: Rubric, results: Sequence[CriterionResult]) -> bool:
+    """Whether the points reach the rubric's mark; without one, every visible criterion has to pass."""
+    if rubric.pass_mark is not None:
+        return total_points(rubric, results) >= rubric.pass_mark
+    visible = {c.id for c in rubric.criteria if c.visibility == "visible" and c.points > 0}
+    judged = [r for r in results if r.id in visible]
+    return bool(judged) and all(r.status is Status.PASS for r in judged)
+
+
+def criteria_bytes(results: Sequence[CriterionResult]) -> bytes:
+    """The criteria as canonical JSON in the rubric's order: the same from `grader grade` and `grader judge`."""
+    data = [r.model_dump(mode="json") for r in results]
+    return (json.dumps(data, ensure_ascii=False, indent=2) + "\n").encode()
