@@ -167,7 +167,7 @@ class _Reader:
 
     def _arguments(self, tokens: list[Token], file: str) -> list[str]:
         try:
-            resolved = resolve_args(self.context, [_escaped(token) for token in tokens])
+            resolved = resolve_args(self.context, [_escaped(t) for t in tokens if t.kind != "COMMENT"])
         except (CMakeError, RecursionError) as error:
             line = tokens[0].line
             cause = "a variable `${...}` is never closed by `}`"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -66,9 +67,11 @@ def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
     root, fault = parse_xml(data, MANIFEST, root="package", encoding="utf-8")
     if root is None:
         return None, fault
-    warnings: list[str] = []
+    said: list[str] = []
     try:
-        return _manifest(_meaning(root, warnings), root, warnings), None
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # catkin_pkg's own use of pyparsing
+            return _manifest(_meaning(root, said), root, said), None
     except (InvalidPackage, AssertionError, ValueError, RecursionError) as error:
         message = str(getattr(error, "msg", error))
     place, cause = explain(message, root)
@@ -79,15 +82,15 @@ def _fault(line: int | None, kind: str, message: str, cause: str) -> Fault:
     return Fault(file=MANIFEST, line=line, kind=kind, message=message, cause=cause)
 
 
-def _meaning(root: etree._Element, warnings: list[str]) -> Package:
+def _meaning(root: etree._Element, said: list[str]) -> Package:
     """What catkin_pkg makes of it. Written anew from the tree, so that no DTD reaches its XML parser."""
     text = etree.tostring(root, encoding="unicode", with_tail=False)
-    package = parse_package_string(text, warnings=warnings)
+    package = parse_package_string(text, warnings=said)
     package.evaluate_conditions(_CONTEXT)
     return package
 
 
-def _manifest(package: Package, root: etree._Element, warnings: list[str]) -> Manifest:
+def _manifest(package: Package, root: etree._Element, said: list[str]) -> Manifest:
     people = tuple(_people(root))
     return Manifest(
         file=MANIFEST,
@@ -99,7 +102,7 @@ def _manifest(package: Package, root: etree._Element, warnings: list[str]) -> Ma
         licenses=tuple(str(text) for text in package.licenses),
         dependencies=tuple(_dependencies(root)),
         build_type=package.get_build_type(),
-        advice=(*warnings, *_advice(package, people)),
+        advice=(*said, *_advice(package, people)),
     )
 
 

@@ -76,7 +76,8 @@ def cause_of(
     closed, `mixed` whether the file indents with tabs and with spaces.
     """
     vague = message.startswith(("invalid syntax", "expected ':'", "invalid decimal", "unexpected EOF"))
-    if "invalid character" in message or "non-printable" in message:
+    odd = "invalid decimal" in message and _strange(text)  # Python 3.10 on `1` and an invisible character
+    if odd or "invalid character" in message or "non-printable" in message:
         return _character(message, text)
     if "unindent does not match" in message and mixed:
         return "tabs and spaces are mixed in the indentation of this file: use four spaces everywhere"
@@ -112,11 +113,18 @@ def _character(message: str, text: str) -> str:
     named = re.search(r"U\+([0-9A-Fa-f]{4,6})", message)
     if named:
         return _character_words(chr(int(named[1], 16)))
-    strange = [c for c in text if ord(c) > 127 and not c.isidentifier() and not unicodedata.combining(c)]
-    strange.sort(key=lambda c: c.isprintable() and not any(c in group for group, _, _ in _TYPOGRAPHIC))
+    strange = sorted(_strange(text), key=lambda c: c.isprintable() and not _is_typographic(c))
     return (
         _character_words(strange[0]) if strange else "this line holds a character that Python does not know"
     )
+
+
+def _strange(text: str) -> list[str]:
+    return [c for c in text if ord(c) > 127 and not c.isidentifier() and not unicodedata.combining(c)]
+
+
+def _is_typographic(char: str) -> bool:
+    return any(char in group for group, _, _ in _TYPOGRAPHIC)
 
 
 def _character_words(char: str) -> str:

@@ -59,7 +59,21 @@ def parse_xml(
     if dtd is not None and dtd.entities():  # type: ignore[union-attr] # lxml-stubs lack it
         cause = "`<!ENTITY ...>` is not read: delete the `<!DOCTYPE ...>` block and write the text out"
         return None, Fault(file=file, line=1, kind="Entity", message="declares entities", cause=cause)
+    _set_first_lines(element, data.split(b"\n"))
     return element, None
+
+
+def _set_first_lines(root: etree._Element, lines: list[bytes]) -> None:
+    """Move each element's line from where its tag ends, which is what libxml2 notes, to where it begins."""
+    earliest = 1
+    for element in root.iter(etree.Element):
+        end = line_of(element) or 1
+        begin = re.compile(
+            rb"<([\w.-]+:)?" + re.escape(etree.QName(element).localname.encode()) + rb"(?![\w.-])"
+        )
+        candidates = range(min(end, len(lines)), earliest - 1, -1)
+        found = next((n for n in candidates if begin.search(lines[n - 1])), end)
+        element.sourceline = earliest = found  # type: ignore[assignment] # lxml-stubs say `...`
 
 
 def line_of(element: etree._Element) -> int | None:
@@ -83,7 +97,7 @@ def _fault(error: etree.XMLSyntaxError, data: bytes, file: str, root: str) -> Fa
 
 
 def _line(data: bytes, number: int) -> str:
-    lines = data.splitlines()
+    lines = data.split(b"\n")
     return lines[number - 1].decode("utf-8", "replace") if 0 < number <= len(lines) else ""
 
 

@@ -1,0 +1,230 @@
+from __future__ import annotations
+
+import json
+import time
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from grader.package.cmake import read_cmake
+from grader.package.cmake_syntax import parse_tree_of
+from grader.package.cmake_trace import split_lists
+
+
+def facts_of(tmp_path, text, **fields):
+    data = text if isinstance(text, bytes) else text.encode()
+    (tmp_path / "CMakeLists.txt").write_bytes(data)
+    return read_cmake(tmp_path, "lab1", **fields)
+
+
+def calls_of(facts, name):
+    return [call.args for call in facts.calls if call.name == name]
+
+
+INSTALL = ("PROGRAMS", "scripts/a.py", "scripts/b.py", "DESTINATION", "lib/lab1")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        (
+            "project(lab1)\nfind_package(catkin)\nCATKIN_INSTALL_PYTHON(PROGRAMS scripts/a.py scripts/b.py "
+            "DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})"
+        ),
+        (
+            "project(lab1)\nset(S scripts/a.py\n  scripts/b.py)\ncatkin_install_python(PROGRAMS ${S} "
+            "DESTINATION lib/${PROJECT_NAME})"
+        ),
+        (
+            "set(D scripts)\nlist(APPEND S ${D}/a.py)\nlist(APPEND S ${D}/b.py)\n"
+            'catkin_install_python(PROGRAMS ${S} DESTINATION "lib/${PROJECT_NAME}")'
+        ),
+        (
+            "project(lab1)\r\n# catkin_install_python(PROGRAMS x)\r\n#[[\r\ncatkin_install_python(x)\r\n"
+            "]]\r\nif(TRUE)\r\ncatkin_install_python(PROGRAMS scripts/a.py # why\r\n scripts/b.py\r\n"
+            "DESTINATION lib/lab1)\r\nendif()\r\nif(FALSE)\r\ncatkin_install_python(no)\r\nendif()"
+        ),
+    ],
+)
+def test_the_parser_expands_what_is_literal(tmp_path, text):
+    facts = facts_of(tmp_path, text)
+    assert facts.fault is None
+    assert calls_of(facts, "catkin_install_python") == [INSTALL]
+
+
+def test_loops_unknown_variables_and_lone_dollars(tmp_path):
+    facts = facts_of(
+        tmp_path,
+        "foreach(n a b)\ninstall(FILES ${n}.py)\nendforeach()\nset(L x y)\nforeach(n IN LISTS L ITEMS z)\n"
+        "add_executable(${n} ${n}.cpp)\nendforeach()\n"
+        'target_link_libraries(x ${catkin_LIBRARIES} $<TARGET_FILE:y> "^a$" $ENV{HOME})\nmessage(hi)\n'
+        "function(f)\ninstall(never)\nendfunction()",
+    )
+    assert calls_of(facts, "install") == [("FILES", "a.py"), ("FILES", "b.py")]
+    assert calls_of(facts, "add_executable") == [(n, f"{n}.cpp") for n in "xyz"]
+    assert calls_of(facts, "target_link_libraries") == [
+        ("x", "${catkin_LIBRARIES}", "$<TARGET_FILE:y>", "^a$", "$ENV{HOME}")
+    ]
+    assert not calls_of(facts, "message")
+
+
+def test_included_files_of_the_package_count_and_no_others(tmp_path):
+    (tmp_path / "cmake").mkdir()
+    (tmp_path / "cmake" / "more.cmake").write_text("install(FILES x)\ninclude(cmake/more.cmake)\n")
+    (tmp_path / "src").mkdir()
+    (tmp_path / "src" / "CMakeLists.txt").write_text("add_executable(n n.cpp)")
+    facts = facts_of(tmp_path, "include(cmake/more.cmake)\ninclude(../../etc/passwd)\nadd_subdirectory(src)")
+    assert [(c.name, c.file, c.line) for c in facts.calls if c.name in {"install", "add_executable"}] == [
+        ("install", "cmake/more.cmake", 1),
+        ("add_executable", "src/CMakeLists.txt", 1),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "cause", "kept"),
+    [
+        (
+            "project(lab1)\nfind_package(catkin\ncatkin_package()\n",
+            2,
+            "`(` of `find_package(` is never closed",
+            1,
+        ),
+        ("project(lab1)\n)\n", 2, "`)` too many", 1),
+        ('project(lab1)\n\nset(a "b)\n', 3, "a quote", 1),
+        ("project(lab1)\nhello world\n", 2, "`hello` is no command", 1),
+        ("project(lab1)\nif(x)\nset(a b)\n", 2, "`if()` is never closed by `endif()`", 1),
+        ("project(lab1)\nendif()\n", 2, "no `if()` before it", 1),
+        ("project(lab1)\nset(a ${b)\ncatkin_package()", 2, "`${...}` is never closed", 3),
+        ("/opt/ros/noetic/share/catkin/cmake/toplevel.cmake", 1, "only the path that a link", 0),
+        ("f" + "(" * 5000, None, "nested too deep", 0),
+        ("if(a)\n" * 60 + "endif()\n" * 60, 51, "nested too deep", 0),
+        ("project(lab1)\nbreak(1)", 1, "", 1),
+        (b"p(a [[ " * 2000, None, "too many", 0),
+        ("project(lab1)".encode("utf-16"), 1, "UTF-16", 0),
+    ],
+)
+def test_faults_keep_what_comes_before(tmp_path, text, line, cause, kept):
+    facts = facts_of(tmp_path, text)
+    assert facts.fault.line == line
+    assert cause in facts.fault.cause
+    assert len(facts.calls) == kept
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "\n",
+        "# caf\xe9\nproject(lab1)".encode("latin-1"),
+        b"\xef\xbb\xbfproject(lab1)",
+        "#[1] odd\nproject(lab1)",
+    ],
+)
+def test_odd_but_good_files(tmp_path, text):
+    facts = facts_of(tmp_path, text)
+    assert facts.fault is None
+    assert calls_of(facts, "project") == ([("lab1",)] if text.strip() else [])
+
+
+def test_missing_files_and_links(tmp_path):
+    assert read_cmake(tmp_path, "lab1") is None
+    (tmp_path / "CMakeLists.txt").symlink_to("/opt/ros/none/toplevel.cmake")
+    assert "link" in read_cmake(tmp_path, "lab1").fault.cause
+    (tmp_path / "CMakeLists.txt").unlink()
+    (tmp_path / "CMakeLists.txt").symlink_to("/etc/passwd")
+    assert read_cmake(tmp_path, "lab1").fault.kind == "OutsideLink"
+
+
+def test_hostile_brackets_end_soon(tmp_path):
+    begin = time.process_time()
+    for text in ("[[ " * 300_000, "x(" + '" ' * 400_000, "#[" * 400_000, "a" * 900_000):
+        assert facts_of(tmp_path, text).fault is not None or text.startswith("#")
+    assert time.process_time() - begin < 5
+
+
+TEXT = (
+    "project(lab1)\nset(S a.py b.py)\nfind_package(catkin REQUIRED)\ninstall(FILES ${S})\ncatkin_package()\n"
+)
+
+
+def trace_file(tmp_path, entries, tail=""):
+    lines = ['{"version":{"major":1,"minor":2}}']
+    for name, args, file, line in entries:
+        lines.append(
+            json.dumps({"args": args, "cmd": name, "file": file, "frame": 1, "line": line, "time": 1.0})
+        )
+    path = tmp_path / "trace.json"
+    path.write_text("\n".join([lines[0], "garbage {", "[" * 100_000, "5", *lines[1:]]) + "\n" + tail)
+    return path
+
+
+WHOLE = [
+    ("PROJECT", ["lab1"], "/ws/src/lab1/CMakeLists.txt", 1),
+    ("find_package", ["catkin", "REQUIRED"], "/ws/src/lab1/CMakeLists.txt", 3),
+    ("if", ["x"], "/ws/src/lab1/CMakeLists.txt", 3),
+    ("include", ["x"], "/ws/src/other/CMakeLists.txt", 1),
+    ("set", ["Z", "1"], "/opt/ros/catkin.cmake", 1),
+    ("install", ["FILES", "a.py;b.py", ""], "/ws/src/lab1/CMakeLists.txt", 4),
+    ("option", ["x"], "/ws/src/lab1/cmake/x.cmake", 1),
+    ("catkin_package", [], "/ws/src/lab1/CMakeLists.txt", 5),
+]
+
+
+@pytest.mark.parametrize("root", [None, "/ws/src/lab1", "/ws/src/lab1/"])
+def test_a_trace_says_what_cmake_was_told(tmp_path, root):
+    facts = facts_of(tmp_path, TEXT, trace=trace_file(tmp_path, WHOLE, '{"args":["cut'), root=root)
+    assert (facts.source, facts.stopped_line, facts.last_line) == ("trace", None, 5)
+    assert [(c.name, c.args, c.file, c.line) for c in facts.calls] == [
+        ("project", ("lab1",), "CMakeLists.txt", 1),
+        ("find_package", ("catkin", "REQUIRED"), "CMakeLists.txt", 3),
+        ("install", ("FILES", "a.py", "b.py"), "CMakeLists.txt", 4),
+        ("option", ("x",), "cmake/x.cmake", 1),
+        ("catkin_package", (), "CMakeLists.txt", 5),
+    ]
+
+
+def test_where_cmake_gives_up_the_parser_goes_on(tmp_path):
+    facts = facts_of(tmp_path, TEXT, trace=trace_file(tmp_path, WHOLE[:2]))
+    assert (facts.source, facts.stopped_line) == ("trace", 3)
+    assert [(c.name, c.line) for c in facts.calls] == [
+        ("project", 1),
+        ("find_package", 3),
+        ("install", 4),
+        ("catkin_package", 5),
+    ]
+    returned = [*WHOLE[:2], ("return", [], "/ws/src/lab1/CMakeLists.txt", 3)]
+    assert len(facts_of(tmp_path, TEXT, trace=trace_file(tmp_path, returned)).calls) == 2
+
+
+def test_a_trace_without_the_package_changes_nothing(tmp_path):
+    plain = facts_of(tmp_path, TEXT)
+    others = [(n, a, f"/ws/{n}/CMakeLists.txt", line) for n, a, _, line in WHOLE]
+    assert facts_of(tmp_path, TEXT, trace=trace_file(tmp_path, others)) == plain
+    assert facts_of(tmp_path, TEXT, trace=trace_file(tmp_path, WHOLE), root="/ws/src/lab") == plain
+    assert facts_of(tmp_path, TEXT, trace=tmp_path / "none") == plain
+    newer = tmp_path / "newer"
+    newer.write_text(trace_file(tmp_path, WHOLE).read_text().replace('"major":1', '"major":2'))
+    assert facts_of(tmp_path, TEXT, trace=newer) == plain
+
+
+def test_lists_are_split_as_cmake_does():
+    assert split_lists(["a;b", "", "c\\;d", ";e;", "\ud800"]) == ("a", "b", "c;d", "e", "\\ud800")
+
+
+@settings(derandomize=True, max_examples=150, deadline=None)
+@given(st.binary(max_size=200), st.integers(0, len(TEXT)))
+def test_never_raises(tmp_path_factory, noise, at):
+    folder = tmp_path_factory.getbasetemp()
+    text = TEXT.encode()
+    for data in (noise, text[:at] + noise + text[at:]):
+        parse_tree_of(data, "CMakeLists.txt")
+        assert facts_of(folder, data).source == "parser"
+        (folder / "noise.json").write_bytes(noise)
+        assert facts_of(folder, data, trace=folder / "noise.json").source == "parser"
+
+
+@settings(derandomize=True, max_examples=150, deadline=None)
+@given(st.text(alphabet='if()endforach"${}[=]#\\;\n x', max_size=60))
+def test_never_raises_on_what_looks_like_cmake(tmp_path_factory, text):
+    assert facts_of(tmp_path_factory.getbasetemp(), text).source == "parser"

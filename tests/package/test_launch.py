@@ -1,0 +1,120 @@
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from grader.package.launch import is_launch_file, parse_launch, read_launch_files
+
+LAUNCH = """<launch>
+  <remap from="a" to="b"/>
+  <!-- <node pkg="lab1" type="old.py" name="old"/> -->
+  <node pkg="lab1" type="talker.py" name="talker" output="screen" launch-prefix="xterm -e" args="-x"/>
+  <group ns="robot">
+    <remap from="c" to="d"/>
+    <node pkg="lab1" type="listener.py"
+          name="listener" ns="n">
+      <remap from="e" to="f"/>
+    </node>
+  </group>
+  <include file="$(find lab1)/launch/other.launch"/>
+  <remap from="late" to="later"/>
+  <node pkg="lab1" type="off.py" name="off" if="false"/>
+  <node pkg="lab1" type="off.py" name="off" unless="1"/>
+  <node pkg="lab1" type="maybe.py" name="maybe" if="$(arg x)"/>
+</launch>
+"""
+
+
+def test_nodes_remaps_includes_and_lines():
+    launch = parse_launch(LAUNCH.encode(), "launch/a.launch")
+    assert launch.fault is None
+    assert [(n.name, n.line) for n in launch.nodes] == [("talker", 4), ("listener", 7), ("maybe", 16)]
+    talker, listener, maybe = launch.nodes
+    assert (talker.output, talker.launch_prefix, talker.args, talker.ns) == ("screen", "xterm -e", "-x", None)
+    assert talker.remaps == (("a", "b"),)
+    assert listener.remaps == (("a", "b"), ("c", "d"), ("e", "f"))
+    assert maybe.remaps == (("a", "b"), ("late", "later"))
+    assert launch.includes == ("$(find lab1)/launch/other.launch",)
+
+
+def test_attributes_that_are_not_there_are_none():
+    (node,) = parse_launch(b'<launch><node type=""/></launch>', "a.launch").nodes
+    assert (node.pkg, node.type, node.name, node.remaps) == (None, "", None, ())
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "cause"),
+    [
+        ("", 1, "the file is empty"),
+        ("hello <launch/>", 1, "something stands before the first tag"),
+        ("<launch>\n<!-- a -- b -->\n</launch>", 2, "`--` may not stand inside a comment"),
+        ("<launch>\n<!-- a\n</launch>", 3, "never closed by `-->`"),
+        (
+            '<launch>\n<node pkg="a">\n</launch>',
+            3,
+            "`<node>` of line 2 is still open where `</launch>` comes",
+        ),
+        ("<launch>\n</node>\n</launch>", 2, "`</node>` closes nothing"),
+        ("<launch>\n<node/>\n", 3, "`<launch>` of line 1 is never closed"),
+        ('<launch\n<node pkg="a"/></launch>', 2, "the tag `<launch` is not finished"),
+        ('<launch>\n<node pkg="a"type="b"/>\n</launch>', 2, "a space before each attribute"),
+        ("<launch>\n<node pkg=a/></launch>", 2, "needs quotes"),
+        ("<launch>\n<node pkg=\u201ca\u201d/></launch>", 2, "typographic quote \u201c"),
+        ('<launch>\n<node pkg="a/>\n<node/></launch>', None, "closing quote is missing"),
+        ("<launch>\n<node pkg/></launch>", 2, "`pkg` has no value"),
+        ('<launch>\n<node a="1" a="2"/></launch>', 2, "`a` is given twice"),
+        ("<launch></launch>\n<launch></launch>", 2, "one `<launch>` only"),
+        ("<launch></launch>\nbye", 2, "one `<launch>` only"),
+        ("<Launch></Launch>", 1, "`<Launch>`; roslaunch wants `<launch>` in small letters"),
+        ("<robot/>", 1, "`<robot>`; roslaunch wants `<launch>`"),
+        ("<launch>\n<launch/></launch>", 2, "a second `<launch>`"),
+        ("<launch>a & b</launch>", 1, "`&amp;`"),
+        ("<launch>\n< node/></launch>", 2, "no space after `<`"),
+        ("<launch>\n<<<<<<< HEAD\n</launch>", 2, "merge markers"),
+        ("\n<?xml version='1.0'?><launch/>", 2, "delete what comes before"),
+        ("<launch>" + "<group>" * 400, None, "nested"),
+    ],
+)
+def test_faults_in_plain_words(text, line, cause):
+    launch = parse_launch(text.encode(), "a.launch")
+    assert launch.nodes == ()
+    assert cause in launch.fault.cause
+    assert line in {None, launch.fault.line}
+
+
+def test_encodings_and_line_ends():
+    text = '<?xml version="1.0" encoding="{}"?>\r\n<launch>\r\n<!-- \xe9 -->\r\n<node name="x"/></launch>'
+    assert parse_launch(text.format("ISO-8859-1").encode("latin-1"), "a.launch").nodes[0].line == 4
+    broken = parse_launch(text.format("UTF-8").encode("latin-1"), "a.launch")
+    assert (broken.fault.line, "UTF-8" in broken.fault.cause) == (3, True)
+    assert parse_launch(b"\xef\xbb\xbf<launch/>", "a.launch").fault is None
+
+
+def test_external_entities_are_not_read(tmp_path):
+    (tmp_path / "secret").write_text("tell-nobody")
+    text = f'<!DOCTYPE l [<!ENTITY x SYSTEM "{tmp_path}/secret">]><launch><node name="n">&x;</node></launch>'
+    launch = parse_launch(text.encode(), "a.launch")
+    assert launch.fault.kind == "Entity"
+    assert "tell-nobody" not in launch.model_dump_json()
+
+
+def test_found_by_name_and_never_followed_out(tmp_path):
+    assert [is_launch_file(p) for p in ("Launch/A.launch", "b.launch.xml", "t.test", "launch.py")] == [
+        True,
+        True,
+        True,
+        False,
+    ]
+    (tmp_path / "out.launch").symlink_to("/etc/passwd")
+    (launch,) = read_launch_files(tmp_path, [("out.launch", "out.launch")])
+    assert launch.fault.kind == "OutsideLink"
+
+
+@settings(derandomize=True, max_examples=150, deadline=None)
+@given(st.binary(max_size=200), st.integers(0, len(LAUNCH)))
+def test_never_raises(noise, at):
+    text = LAUNCH.encode()
+    for data in (noise, text[:at] + noise + text[at:]):
+        launch = parse_launch(data, "a.launch")
+        assert launch.fault is not None or launch.root == "launch"

@@ -1,0 +1,176 @@
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+
+import pytest
+
+from grader.package.python import SYNTAX_SCRIPT, check_syntax, read_syntax_report
+from grader.package.python_causes import cause_of
+
+# Each text, the line of its fault, and words of its cause; all hold under Python 3.8 as under the newest.
+CASES = {
+    "print": ('print "x"\n', 1, "Python 2: `print`"),
+    "print_name": ("x = 1\nprint x\n", 2, "Python 2: `print`"),
+    "except": ("try:\n  pass\nexcept E, e:\n  pass\n", 3, "`except Error as name:`"),
+    "raise": ('raise E, "x"\n', 1, "Python 2"),
+    "exec": ('exec "x"\n', 1, "Python 2: `exec`"),
+    "backticks": ("x = `1`\n", 1, "backticks"),
+    "unequal": ("if 1 <> 2:\n  pass\n", 1, "`!=`"),
+    "long": ("x = 10L\n", 1, "`L`"),
+    "colon_if": ("if x\n  pass\n", 1, "a colon"),
+    "colon_def": ("def f()  # why\n  pass\n", 1, "a colon"),
+    "colon_main": ('if __name__ == "__main__"\n  pass\n', 1, "a colon"),
+    "else_if": ("if x:\n  pass\nelse if y:\n  pass\n", 3, "`elif`"),
+    "assign": ("if x = 1:\n  pass\n", 1, "write `==`"),
+    "bracket": ("x = f(1\ny = 2\n", None, "never closed"),
+    "bracket_end": ("x = f(1\n", 1, "never closed"),
+    "bracket_many": ("x = 1)\n", 1, "too many"),
+    "bracket_kind": ("x = (1]\n", 1, "one kind"),
+    "text": ("x = 'a\n", 1, "a quote is opened"),
+    "quote": ("x = \u2018a\u2019\n", 1, "typographic quote \u2018"),
+    "double_quote": ("x = \u201ca b\u201d\n", 1, "typographic quote \u201c"),
+    "dash": ("x = 1 \u2013 2\n", 1, "typographic dash"),
+    "no_break": ("if 1:\n\u00a0\u00a0x = 1\n", 2, "no-break space (U+00A0)"),
+    "zero_width": ("x = 1\u200b\n", 1, "invisible character (U+200B)"),
+    "wide": ("if x\uff1a\n  pass\n", 1, "plain `:`"),
+    "tabs": ("if 1:\n        x = 1\n\ty = 2\n", 3, "tabs and spaces are mixed"),
+    "tabs_unindent": ("if 1:\n\tif 2:\n\t\tx = 1\n  y = 2\n", 4, "tabs and spaces are mixed"),
+    "indent_missing": ("if 1:\nx = 1\n", 2, "must be indented"),
+    "indent_more": ("x = 1\n  y = 2\n", 2, "further than the one above"),
+    "indent_less": ("if 1:\n    x = 1\n  y = 2\n", 3, "like none of the lines above"),
+    "merge": ("def f():\n    x = 1\n<<<<<<< HEAD\n    y = 1\n", 3, "merge markers"),
+    "return": ("return 1\n", 1, "outside every function"),
+    "plus": ("x++\n", 1, "x += 1"),
+    "async": ("x.async = 1\n", 1, "reserved word"),
+    "shell": ("$ rosrun a b\n", 1, "command for the terminal"),
+    "latin": (b"x = 1\ny = 2  # caf\xe9\n", 2, "not saved as UTF-8"),
+    "latin_text": (b"y = '\xe9'\n", 1, "not saved as UTF-8"),
+    "utf16": ("x = 1\n".encode("utf-16"), 1, "UTF-16"),
+    "null": (b"x = 1\n\0\n", 2, "null bytes"),
+    "coding": (b"# -*- coding: klingon -*-\n", 1, "does not know"),
+    "deep": ("(" * 300 + ")" * 300, None, "nested too deep"),
+}
+GOOD = {
+    "empty": b"",
+    "crlf": b"x = 1\r\nif x:\r\n    y = 2\r\n",
+    "bom": b"\xef\xbb\xbfx = 1\n",
+    "declared": b"# -*- coding: latin-1 -*-\nx = '\xe9'\n",
+    "missing_module": b"import no_such_module_at_all\n",
+    "exits": b"raise SystemExit(7)\n",
+    "warns": b"x = 1 is 1\ny = '\\d'\n",
+}
+
+PYTHONS = [p for p in ("python3.8", "python3.9", "python3.10", "python3.12", "python3.13") if shutil.which(p)]
+
+
+def write(folder, cases):
+    for name, text in cases.items():
+        (folder / f"{name}.py").write_bytes(text if isinstance(text, bytes) else text.encode())
+    return [f"{name}.py" for name in cases]
+
+
+def assert_cases(report):
+    assert set(report.checked) == {f"{name}.py" for name in (*CASES, *GOOD)}
+    assert set(report.faults) == {f"{name}.py" for name in CASES}
+    for name, (_, line, cause) in CASES.items():
+        fault = report.faults[f"{name}.py"]
+        assert cause in fault.cause, (name, fault)
+        assert line in {None, fault.line}, (name, fault)
+
+
+def test_faults_have_line_and_plain_cause(tmp_path):
+    paths = write(tmp_path, {name: text for name, (text, _, _) in CASES.items()}) + write(tmp_path, GOOD)
+    report = check_syntax(tmp_path, paths)
+    assert_cases(report)
+    assert report.faults["tabs.py"].kind == "TabError"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("python", PYTHONS)
+def test_other_pythons_lead_to_the_same_causes(tmp_path, python):
+    paths = write(tmp_path, {name: text for name, (text, _, _) in CASES.items()}) + write(tmp_path, GOOD)
+    done = subprocess.run(
+        [python, "-I", SYNTAX_SCRIPT, tmp_path, *paths], capture_output=True, check=False, timeout=60
+    )
+    if done.returncode and not done.stdout:
+        pytest.skip(f"{python} does not run here")
+    assert_cases(read_syntax_report(done.stdout))
+
+
+def test_nothing_is_executed(tmp_path):
+    (tmp_path / "a.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\n")
+    (tmp_path / "json.py").write_text("raise SystemExit\n")
+    report = check_syntax(tmp_path, ["a.py", "json.py"])
+    assert report.checked == ("a.py", "json.py")
+    assert not (tmp_path / "ran").exists()
+
+
+def test_slips_are_found_and_named(tmp_path):
+    text = (
+        "import rospy, sys\ndef main():\n    rate = rospy.Rate(10)\n    while not rospy.is_shutdown:\n"
+        "        rate.sleep\n        x = input('?')\n        y = raw_input()\n    z = sys.stdin.readline()\n"
+        "    rate.sleep()\n    main.note = 1\n'text'\nif __name__ == '__main__':\n    main\n    f().g\n"
+    )
+    (tmp_path / "a.py").write_text(text)
+    (tmp_path / "own.py").write_text("def input():\n    pass\ninput()\n")
+    slips = check_syntax(tmp_path, ["a.py", "own.py"]).slips
+    assert [(s.file, s.line, s.kind) for s in slips] == [
+        ("a.py", 4, "not-called"),
+        ("a.py", 5, "not-called"),
+        ("a.py", 6, "input"),
+        ("a.py", 7, "input"),
+        ("a.py", 8, "input"),
+        ("a.py", 13, "not-called"),
+        ("a.py", 14, "not-called"),
+    ]
+    assert "`rate.sleep()`" in slips[1].message
+
+
+def test_hostile_source_does_not_stop_the_others(tmp_path):
+    (tmp_path / "bomb.py").write_text("x = " + "-" * 900_000 + "1\n")
+    (tmp_path / "chain.py").write_text("x = a" + ".a" * 400_000 + "\n")
+    (tmp_path / "good.py").write_text("x = 1\n")
+    (tmp_path / "large.py").write_bytes(b"(" * 2_000_001)
+    report = check_syntax(tmp_path, ["bomb.py", "chain.py", "good.py", "large.py", "gone.py"])
+    assert set(report.checked) == {"bomb.py", "chain.py", "good.py", "large.py", "gone.py"}
+    assert report.faults["bomb.py"].kind in {"MemoryError", "RecursionError", "PythonCrash", "SyntaxError"}
+    assert "good.py" not in report.faults
+    assert report.faults["gone.py"].kind == "FileNotFoundError"
+
+
+def test_a_crash_is_laid_to_its_file(tmp_path, monkeypatch):
+    script = tmp_path / "crashing.py"
+    script.write_text(
+        "import json, os, sys, time\n"
+        "for name in json.load(sys.stdin):\n"
+        "    os._exit(9) if name == 'crash' else time.sleep(60) if name == 'slow' else None\n"
+        "    print(json.dumps({'file': name, 'faults': [], 'slips': []}), flush=True)\n"
+    )
+    monkeypatch.setattr("grader.package.python.SYNTAX_SCRIPT", script)
+    report = check_syntax(tmp_path, ["a", "crash", "b", "slow", "c"], timeout_s=2.0)
+    assert {path: fault.kind for path, fault in report.faults.items()} == {
+        "crash": "PythonCrash",
+        "slow": "NotChecked",
+        "c": "NotChecked",
+    }
+
+
+def test_names_of_any_bytes(tmp_path):
+    name = os.fsdecode(b"caf\xe9.py")
+    (tmp_path / name).write_text("x = \n")
+    report = check_syntax(tmp_path, [name])
+    assert report.faults["caf\\udce9.py"].line == 1
+    assert report.model_dump_json()
+
+
+def test_foreign_lines_are_passed_over():
+    report = read_syntax_report(
+        'warning: x\n[]\n{"file": 1}\n{"file": "a.py", "faults": [], "slips": []}\n{"fi'
+    )
+    assert report.checked == ("a.py",)
+
+
+def test_a_message_that_says_enough_has_no_cause():
+    assert cause_of("invalid syntax", "x = a ? b") == ""
