@@ -1,0 +1,49 @@
+# Each target does the set-up that it needs. `make` alone lists them.
+LAB := leeds-comp3631-lab1
+BIN := .venv/bin
+TIMES ?= 10
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.PHONY: help setup demo test lint test-pure test-ros stress bench fixtures fmt clean
+
+help: ## list the targets
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+
+setup: ## ROS 1 and the virtual environment, where they are missing
+	@scripts/setup.sh
+
+demo: setup ## grade the reference solution and one faulty package, for real
+	@rm -rf demo
+	@$(BIN)/grader grade reference_solutions/$(LAB) --rubric $(LAB) --out demo
+	@$(BIN)/grader grade fixtures/$(LAB)/counter-resets-to-1 --rubric $(LAB) --out demo || test $$? -eq 1
+	@echo && echo "The reports:" && ls demo/*/report.md
+
+test: lint test-pure test-ros ## everything: style, types, tests without ROS, tests with ROS
+
+lint: setup ## style and types
+	@$(BIN)/ruff check . fixtures/make.py
+	@$(BIN)/ruff format --check . fixtures/make.py
+	@$(BIN)/mypy
+
+test-pure: setup ## the tests that need no ROS
+	@$(BIN)/python -m pytest -m "not ros"
+
+test-ros: setup ## the tests that run real nodes
+	@$(BIN)/python -m pytest -m ros
+
+stress: setup ## the reference solution and every fixture, TIMES times each
+	@$(BIN)/python tests/stress.py --times $(TIMES)
+
+bench: setup ## the figures of benchmarks/README.md, measured here
+	@$(BIN)/python benchmarks/run.py
+
+fixtures: setup ## write fixtures/<lab>/ anew from fixtures/<lab>.yaml
+	@$(BIN)/python fixtures/make.py
+
+fmt: setup ## bring the code into shape
+	@$(BIN)/ruff check --fix . fixtures/make.py
+	@$(BIN)/ruff format . fixtures/make.py
+
+clean: ## remove what the other targets made
+	rm -rf .venv demo dist .mypy_cache .ruff_cache .pytest_cache

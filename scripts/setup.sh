@@ -1,0 +1,138 @@
+#!/usr/bin/env bash
+# Sets up what `make demo` and `make test` need: ROS 1 where it is missing, and .venv with the grader in it.
+# Runs again in a moment when there is nothing to do.
+set -euo pipefail
+cd -P "$(dirname "${BASH_SOURCE[0]}")/.."
+
+# The grader runs nodes with these, and cannot do without them where ROS 1 comes from Debian.
+ros_packages=(
+  catkin rosbash rosout libroscpp-dev libstd-msgs-dev libgeometry-msgs-dev
+  python3-rospy python3-rosmaster python3-roslaunch python3-rospkg python3-rosbag
+  python3-rosmsg python3-rosnode python3-rosparam python3-rosservice python3-rostest python3-rostopic
+  python3-rosgraph-msgs python3-std-msgs python3-std-srvs
+  python3-geometry-msgs python3-nav-msgs python3-sensor-msgs
+)
+# Students' packages may name these in find_package(): installed along with the others where apt has them.
+ros_extras=(ros-message-generation libnav-msgs-dev libsensor-msgs-dev libstd-srvs-dev)
+# Program to find on PATH, and the package that has it.
+tools=(bwrap:bubblewrap git:git cmake:cmake make:make g++:g++)
+
+say() { printf 'setup: %s\n' "$*"; }
+
+die() {
+  printf 'setup: %s\n' "$*" >&2
+  exit 1
+}
+
+# Where ROS 1 is, if not in Debian's packages: the same order as the grader's own search.
+ros_elsewhere() {
+  local root
+  if [ -n "${GRADER_ROS_SETUP:-}" ]; then
+    [ -f "$GRADER_ROS_SETUP" ] || die "GRADER_ROS_SETUP names $GRADER_ROS_SETUP, which is not there"
+    return 0
+  fi
+  for root in /opt/ros/*/; do # ROS 2 lies here too, and has no rospy
+    if [ -f "$root/setup.bash" ] && [ -d "$root/share/rospy" ]; then return 0; fi
+  done
+  if [ -d /usr/share/rospy ]; then return 1; fi
+  [ -n "${CONDA_PREFIX:-}" ] && [ -d "$CONDA_PREFIX/share/rospy" ]
+}
+
+# Those of the named packages that are not installed, one a line.
+not_installed() {
+  printf '%s\n' "$@" | grep -vxF -f <(
+    dpkg-query -W -f='${db:Status-Status} ${Package}\n' "$@" 2>/dev/null | sed -n 's/^installed //p'
+  )
+}
+
+# Sets `missing` to the packages to install.
+find_missing() {
+  local tool
+  missing=()
+  for tool in "${tools[@]}"; do
+    command -v "${tool%%:*}" >/dev/null || missing+=("${tool#*:}")
+  done
+  if ros_elsewhere; then return; fi
+  command -v dpkg-query >/dev/null ||
+    die "no ROS 1 here, and this is no Debian or Ubuntu: install ROS 1 (RoboStack has it for other systems) and name its setup.bash in GRADER_ROS_SETUP"
+  mapfile -t -O "${#missing[@]}" missing < <(not_installed "${ros_packages[@]}")
+}
+
+# Sets `as_root` to what goes before a command that root has to run.
+find_root() {
+  as_root=()
+  if [ "$(id -u)" -eq 0 ]; then return 0; fi
+  command -v sudo >/dev/null || return 1
+  if sudo -n true 2>/dev/null; then
+    as_root=(sudo -n)
+  elif [ -t 0 ]; then
+    as_root=(sudo)
+  else
+    return 1
+  fi
+}
+
+apt_install() {
+  command -v apt-get >/dev/null || die "install these programs first: $*"
+  find_root || die "ask an administrator for these packages: apt-get install --no-install-recommends $*"
+  say "installing $*"
+  local apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -y -o DPkg::Lock::Timeout=300)
+  "${apt[@]}" update </dev/null || say "apt-get update failed; going on with the package lists that are here"
+  local package wanted=("$@") unknown=()
+  for package in "$@"; do
+    apt-cache show "$package" >/dev/null 2>&1 || unknown+=("$package")
+  done
+  [ "${#unknown[@]}" -eq 0 ] ||
+    die "apt knows no ${unknown[*]}: Debian 12 and Ubuntu 22.04 have ROS 1; elsewhere install it and name its setup.bash in GRADER_ROS_SETUP"
+  if [[ " $* " == *" python3-rospy "* ]]; then
+    for package in "${ros_extras[@]}"; do
+      if apt-cache show "$package" >/dev/null 2>&1; then wanted+=("$package"); fi
+    done
+  fi
+  "${apt[@]}" install --no-install-recommends "${wanted[@]}" </dev/null || die "apt-get could not install $*"
+}
+
+fits() { # Python 3.10 or newer that can make virtual environments
+  "$1" -c 'import ensurepip, sys, venv; sys.exit(sys.version_info < (3, 10))' 2>/dev/null
+}
+
+# Sets `python` to one that fits.
+find_python() {
+  for python in python3 /usr/bin/python3 python3.{14,13,12,11,10}; do
+    if command -v "$python" >/dev/null && fits "$python"; then return 0; fi
+  done
+  return 1
+}
+
+ready() {
+  [ -x .venv/bin/grader ] && [ "$(cat .venv/setup-stamp 2>/dev/null)" = "$1" ] && .venv/bin/python -c 'import grader' 2>/dev/null
+}
+
+whole() { # not half-made, not moved here from another folder, its Python still there
+  grep -qsF "$PWD/.venv/bin/python" .venv/bin/pip && fits .venv/bin/python &&
+    .venv/bin/python -m pip --version >/dev/null 2>&1
+}
+
+make_venv() {
+  if ! whole; then
+    if ! find_python; then
+      command -v apt-get >/dev/null && apt_install python3-venv
+      find_python || die "this needs Python 3.10 or newer with its venv module, as python3 on PATH"
+    fi
+    say "making .venv with $("$python" --version)"
+    "$python" -m venv --clear .venv
+  fi
+  say "installing the grader into .venv"
+  .venv/bin/python -m pip --disable-pip-version-check --no-input install -qq -e '.[dev]' ||
+    die "pip could not install the grader: see above, then run make setup again"
+  printf '%s\n' "$1" >.venv/setup-stamp
+}
+
+find_missing
+if [ "${#missing[@]}" -gt 0 ]; then
+  apt_install "${missing[@]}"
+fi
+stamp="$(cksum <pyproject.toml) $PWD"
+if ! ready "$stamp"; then
+  make_venv "$stamp"
+fi
