@@ -60,22 +60,31 @@ def with_build_facts(
 ) -> PackageFacts:
     """`facts` refined by what the build showed: CMake's own trace, and ROS's own Python on the sources.
 
-    What is None stays as it was. `python_faults` replace all faults found before.
+    What is None stays as it was. `python_faults` replace the faults of all `python_paths`.
     """
     changes: dict[str, object] = {}
     if cmake_trace is not None and facts.cmake is not None:
         names = (facts.name, PurePosixPath(facts.path).name)
         changes["cmake"] = refine_cmake(facts.cmake, names, trace=cmake_trace, root=cmake_root)
     if python_faults is not None:
-        changes["files"] = _with_faults(facts.files, python_faults)
+        asked = set(python_paths(facts))
+        kept = {f.path: f.python_fault for f in facts.files if f.python_fault and f.path not in asked}
+        changes["files"] = _with_faults(facts.files, {**kept, **python_faults})
     if python_slips is not None:
         changes["slips"] = python_slips
     return facts.model_copy(update=changes)
 
 
 def python_paths(facts: PackageFacts) -> tuple[str, ...]:
-    """The files that ROS's Python is to look at: Python by name or shebang, not too large, no links."""
-    return tuple(f.path for f in facts.files if _to_check(f) and f.link is None)
+    """The files that ROS's Python is to look at, in a copy of the package as well as here.
+
+    Python by name or shebang, not too large, no link by absolute path, and a name that is valid Unicode.
+    """
+    return tuple(f.path for f in facts.files if _to_check(f) and not _only_here(f))
+
+
+def _only_here(file: SourceFile) -> bool:
+    return "\\udc" in file.path or (file.link or "").startswith("/")
 
 
 def _python_paths(entries: Iterable[Entry]) -> list[str]:

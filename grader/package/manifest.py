@@ -29,20 +29,6 @@ def read_manifest(folder: Path) -> tuple[Manifest | None, Fault | None]:
     return parse_manifest(data)
 
 
-def dependency_names(folder: Path) -> frozenset[str]:
-    """The names of all packages that the one in `folder` depends on, in whatever way.
-
-    Also where catkin would not take the manifest; empty where it cannot be read as XML at all.
-    """
-    data = read_markup(folder, MANIFEST)
-    if isinstance(data, Fault):
-        return frozenset()
-    root, _ = parse_xml(data, MANIFEST, root="package", encoding="utf-8")
-    if root is None:
-        return frozenset()
-    return frozenset(_text(e) for tag, e in _elements(root) if _is_dependency(tag)) - {""}
-
-
 def _missing(folder: Path, fault: Fault) -> Fault:
     if fault.kind != "Missing":
         return fault

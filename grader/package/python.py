@@ -8,7 +8,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Literal
 
 from pydantic import Field
 
@@ -39,31 +39,40 @@ class _RawFault(Record):
     mixed: bool = False
 
 
+class _RawSlip(Record):
+    line: int
+    kind: Literal["not-called", "input"]
+    message: str
+
+
+class _RawEntry(Record):
+    file: str
+    faults: tuple[_RawFault, ...]
+    slips: tuple[_RawSlip, ...]
+
+
 def read_syntax_report(output: bytes | str) -> SyntaxReport:
     """The report of `grader/arena/ros/syntax.py` from what it printed; foreign lines are passed over."""
     checked: list[str] = []
     faults: dict[str, Fault] = {}
     slips: list[PythonSlip] = []
-    for line in output.splitlines():
-        entry = _entry(line)
-        if entry is None:
-            continue
-        file = printable(entry["file"])
+    for entry in filter(None, map(_entry, output.splitlines())):
+        file = printable(entry.file)
         checked.append(file)
-        if entry.get("faults"):
-            raw = _RawFault.model_validate(entry["faults"][0])
-            faults[file] = _fault(file, raw)
-        slips += [PythonSlip(file=file, **{**s, "message": printable(s["message"])}) for s in entry["slips"]]
+        if entry.faults:
+            faults[file] = _fault(file, entry.faults[0])
+        slips += [
+            PythonSlip(file=file, line=slip.line, kind=slip.kind, message=printable(slip.message))
+            for slip in entry.slips
+        ]
     return SyntaxReport(checked=tuple(checked), faults=faults, slips=tuple(slips))
 
 
-def _entry(line: bytes | str) -> dict[str, Any] | None:
+def _entry(line: bytes | str) -> _RawEntry | None:
     try:
-        entry = json.loads(line)
+        return _RawEntry.model_validate(json.loads(line))
     except (ValueError, RecursionError):
         return None
-    known = isinstance(entry, dict) and isinstance(entry.get("file"), str) and "slips" in entry
-    return entry if known else None
 
 
 def _fault(file: str, raw: _RawFault) -> Fault:

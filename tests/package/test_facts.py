@@ -58,6 +58,21 @@ def test_ros_python_has_the_last_word(tmp_path):
         assert facts.file("src/a.py").python_fault == fault
         assert facts.file("src/bad.py").python_fault is None
     assert later.slips == ()
+
+
+def test_what_ros_python_was_not_asked_keeps_its_fault(tmp_path):
+    package = make_package(tmp_path / "lab1", {os.fsdecode(b"caf\xe9.py"): "x = \n", "b.py": "y = \n"})
+    (package.folder / "here.py").symlink_to(package.folder / "b.py")
+    (package.folder / "there.py").symlink_to("b.py")
+    facts = read_package(package)
+    assert python_paths(facts) == ("b.py", "there.py")
+    assert all(file.python_fault for file in facts.files)
+    refined = with_build_facts(facts, python_faults={})
+    assert [f.path for f in refined.files if f.python_fault] == ["caf\\udce9.py", "here.py"]
+
+
+def test_build_facts_that_are_not_given_change_nothing(tmp_path):
+    given = read_package(make_package(tmp_path / "lab1", FILES))
     assert with_build_facts(given) == given
 
 
