@@ -166,11 +166,9 @@ def test_names_of_any_bytes(tmp_path):
 
 
 def test_foreign_lines_are_passed_over():
-    report = read_syntax_report(
     good = '{"file": "a.py", "faults": [], "slips": []}'
     bad = ["warning: x", "[]", '{"file": 1}', '{"file": "b", "faults": [1], "slips": []}', '{"fi']
     report = read_syntax_report("\n".join([*bad, good, *bad]))
-    )
     assert report.checked == ("a.py",)
 
 
