@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from grader.errors import UsageError
-from grader.intake.find import find_packages
+from grader.intake import find_packages
 from grader.rubric.load import LoadedRubric, find_rubric_for_package, load_rubric
 
 Package = tuple[str, Path]

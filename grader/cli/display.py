@@ -101,7 +101,7 @@ class LiveSteps(Steps):
     def __rich__(self) -> Table:
         now_s = self.clock()
         steps = self.snapshot()
-        table = Table.grid(padding=(0, 2, 0, 0))
+        table = Table.grid(padding=(0, 2, 0, 0), expand=True)
         for _ in range(3):
             table.add_column(no_wrap=True)
         table.add_column(no_wrap=True, overflow="ellipsis", ratio=1)

@@ -1,37 +1,37 @@
-"""From results to exit codes."""
+"""From criteria to exit codes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from grader.errors import ExitCode
+from grader.judge.summary import OPEN, overall_status, reached_pass_mark
 from grader.model.result import CriterionResult
-from grader.model.verdict import Status
 from grader.rubric.model import Rubric
-
-UNSETTLED = frozenset({Status.INCONCLUSIVE, Status.ERROR})
 
 
 def exit_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
-    """Of all criteria that are shown: passed, below the pass mark, or not to be told yet.
+    """Of the criteria that are shown: not graded where the grader itself failed, passed, not settled, or below.
 
-    Where the rubric has a pass mark, points decide; what is still open cannot take reached points away.
-    Without one, every visible criterion that is worth points must be reached, save those that a person marks.
+    A pass mark in points that is reached stays reached, whatever is still open.
     """
     shown = tuple(criteria)
-    if rubric.pass_mark is not None and sum(c.points for c in shown) >= _mark(shown, rubric):
+    status = overall_status(shown)
+    if status == "error":
+        return ExitCode.NOT_GRADED
+    if reached_pass_mark(_in_proportion(rubric, shown), shown):
         return ExitCode.PASSED
-    if any(c.status in UNSETTLED for c in shown):
-        return ExitCode.INCONCLUSIVE
-    if rubric.pass_mark is not None:
-        return ExitCode.BELOW_PASS_MARK
-    visible = {c.id for c in rubric.criteria if c.visibility == "visible"}
-    needed = [c for c in shown if c.id in visible and c.max_points > 0 and c.status is not Status.MANUAL]
-    if not needed:
-        return ExitCode.INCONCLUSIVE
-    return ExitCode.PASSED if all(c.status is Status.PASS for c in needed) else ExitCode.BELOW_PASS_MARK
+    return ExitCode.INCONCLUSIVE if status == "inconclusive" else ExitCode.BELOW_PASS_MARK
 
 
-def _mark(shown: tuple[CriterionResult, ...], rubric: Rubric) -> float:
-    """The pass mark, in proportion where hidden criteria are left out."""
-    return (rubric.pass_mark or 0.0) * sum(c.max_points for c in shown) / (rubric.max_points or 1.0)
+def settled(criteria: Iterable[CriterionResult]) -> tuple[CriterionResult, ...]:
+    """Those that could be judged."""
+    return tuple(c for c in criteria if c.status not in OPEN)
+
+
+def _in_proportion(rubric: Rubric, shown: tuple[CriterionResult, ...]) -> Rubric:
+    """The rubric with its pass mark as large a part of the points that are shown as it is of all."""
+    if rubric.pass_mark is None:
+        return rubric
+    share = sum(c.max_points for c in shown) / (rubric.max_points or 1.0)
+    return rubric.model_copy(update={"pass_mark": rubric.pass_mark * share})

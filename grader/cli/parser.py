@@ -111,7 +111,7 @@ def _evidence(add: _Adder) -> None:
     record.add_argument("--script", metavar="FILE", action="append", default=[], help="a script to run")
     record.add_argument("--launch", metavar="FILE", action="append", default=[], help="a launch file to run")
     record.add_argument("--seconds", metavar="N", type=float, default=10.0, help="how long (default: 10)")
-    _out(record, "evidence goes to DIR", required=True)
+    _out(record, "evidence goes to DIR/<submission id>/evidence/", required=True)
     _sandbox(record)
 
     inspect = add("inspect", "say what is in an evidence file or a bag: rates, gaps, nodes")

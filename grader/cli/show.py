@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from grader.cli.errors import report
-from grader.cli.outcome import UNSETTLED, exit_code
+from grader.cli.outcome import exit_code, settled
 from grader.errors import ExitCode, GraderError
 from grader.model.result import GradingResult
 from grader.report.result_json import result_bytes
@@ -40,7 +40,7 @@ def show(
         report(GraderError(result.error.message, hint=result.error.hint))
     if result.status == "error":
         return ExitCode.NOT_GRADED
-    return exit_code([c for c in result.criteria if not static or c.status not in UNSETTLED], rubric)
+    return exit_code(settled(result.criteria) if static else result.criteria, rubric)
 
 
 def _paths(folder: Path | None) -> None:

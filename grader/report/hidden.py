@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.model.result import GradingResult
+from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
 
@@ -17,14 +17,18 @@ def without_hidden(result: GradingResult, rubric: Rubric) -> GradingResult:
     shown = tuple(c for c in result.criteria if c.id not in hidden_ids(rubric))
     if len(shown) == len(result.criteria):
         return result
-    status = result.status
-    if status == "inconclusive" and not any(c.status in {Status.INCONCLUSIVE, Status.ERROR} for c in shown):
-        status = "graded"
     return result.model_copy(
         update={
             "criteria": shown,
             "points": round(sum(c.points for c in shown), rubric.digits),
             "max_points": sum(c.max_points for c in shown),
-            "status": status,
+            "status": "error" if result.error else _status(shown),
         }
     )
+
+
+def _status(shown: tuple[CriterionResult, ...]) -> str:
+    statuses = {c.status for c in shown if c.max_points > 0}
+    if not statuses or Status.ERROR in statuses:
+        return "error"
+    return "inconclusive" if statuses & {Status.INCONCLUSIVE, Status.MANUAL} else "graded"

@@ -9,14 +9,11 @@ from grader.model.result import GradingResult
 
 
 def result_bytes(result: GradingResult) -> bytes:
-    """The file's bytes, UTF-8. `error` is there only where there is one; whole points are whole numbers."""
+    """The file's bytes, UTF-8. `error` is there only where there is one.
+
+    Numbers and text are written as `judge.summary.criteria_bytes` writes them.
+    """
     data: dict[str, Any] = result.model_dump(mode="json", by_alias=True)
     if data["error"] is None:
         del data["error"]
-    for record in (data, *data["criteria"]):
-        record["points"], record["max_points"] = _plain(record["points"]), _plain(record["max_points"])
     return (json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
-
-
-def _plain(value: float) -> float:
-    return int(value) if float(value).is_integer() else value

@@ -51,6 +51,14 @@ def open_console(file: IO[str]) -> Console:
     )
 
 
+def emit(console: Console, parts: Iterable[RenderableType]) -> None:
+    """Print each part on lines of its own, without the blanks that fill a column."""
+    with console.capture() as capture:
+        for part in parts:
+            console.print(part, overflow="fold")
+    console.file.write("".join(f"{line.rstrip()}\n" for line in capture.get().splitlines()))
+
+
 def print_report(result: GradingResult, rubric: Rubric, console: Console, *, hidden: int = 0) -> None:
     """Print the whole report. `hidden` is how many criteria are left out of it."""
     Terminal(console).report(result, rubric, hidden)
@@ -73,10 +81,7 @@ class Terminal:
         if hidden:
             words = "1 hidden criterion is" if hidden == 1 else f"{hidden} hidden criteria are"
             parts.append(Text(f"\n{words} left out here."))
-        with self.console.capture() as capture:
-            for part in parts:
-                self.console.print(part, overflow="fold")
-        self.console.file.write("".join(f"{line.rstrip()}\n" for line in capture.get().splitlines()))
+        emit(self.console, parts)
 
     def _head(self, result: GradingResult, rubric: Rubric) -> Text:
         points = f"{number(result.points)} of {number(result.max_points)} points"

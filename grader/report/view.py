@@ -32,6 +32,7 @@ class ReportView:
     advice: tuple[CriterionResult, ...]
 
 
+EXPLAINS = frozenset({Status.FAIL, Status.PARTIAL, Status.BLOCKED})
 OPEN = frozenset({Status.INCONCLUSIVE, Status.ERROR, Status.MANUAL})
 
 
@@ -61,7 +62,7 @@ def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric) -
     seen = {criterion.id}
     while criterion.status is Status.BLOCKED:
         unmet = [by_id[i] for i in requires.get(criterion.id, ()) if i in by_id and i not in seen]
-        cause = next((c for c in unmet if c.status is not Status.PASS), None)
+        cause = next((c for c in unmet if c.status in EXPLAINS), None)
         if cause is None:
             break
         seen.add(cause.id)

@@ -14,6 +14,7 @@ from grader.rubric.runs import scenario_faults
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
 
 TOTAL_POINTS = 100
+MANUAL = "manual"  # a person gives the points, no check does
 
 
 def cross_faults(data: object, checks: Mapping[str, Check]) -> list[Fault]:
@@ -36,8 +37,11 @@ def _check(path: KeyPath, criterion: dict[str, Any], checks: Mapping[str, Check]
     name = criterion.get("check")
     if not isinstance(name, str):
         return
+    if name == MANUAL:
+        yield from (((*path, "with"), "a person needs no parameters") for _ in as_map(criterion.get("with")))
+        return
     if name not in checks:
-        yield (*path, "check"), f'there is no check "{name}"{did_you_mean(name, checks)}'
+        yield (*path, "check"), f'there is no check "{name}"{did_you_mean(name, [*checks, MANUAL])}'
         return
     parameters = criterion.get("with", {})
     if isinstance(parameters, dict):

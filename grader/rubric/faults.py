@@ -55,6 +55,8 @@ def _friendly(model: type[BaseModel], data: object, details: Iterable[ErrorDetai
     """One fault for each path: the members of a union each complain, and are joined by "or"."""
     by_path: dict[KeyPath, list[str]] = {}
     for detail in details:
+        if detail["type"] == "too_short" and len(detail["input"]) >= detail["ctx"]["min_length"]:
+            continue  # pydantic counts only the items that are sound
         path = _data_path(data, detail)
         message = _message(model, path, detail)
         by_path.setdefault(path, [])

@@ -9,6 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, create_model
 
 from grader.checks import CHECKS, HEADINGS, Check
+from grader.checks.registry import NoParams
+from grader.rubric.cross import MANUAL
 from grader.rubric.model import Criterion, Rubric
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -16,7 +18,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 def rubric_schema() -> dict[str, Any]:
     """The schema; criteria are a union told apart by `check`."""
-    members: Any = reduce(or_, [_criterion(CHECKS[name]) for name in sorted(CHECKS)])
+    members: Any = reduce(or_, [_manual(), *(_criterion(CHECKS[name]) for name in sorted(CHECKS))])
     member = Annotated[members, Field(discriminator="check")]
     criteria = Annotated[tuple[member, ...], Field(min_length=1)]
     model = create_model("Rubric", __base__=Rubric, __doc__=Rubric.__doc__, criteria=(criteria, ...))
@@ -41,6 +43,15 @@ def _criterion(check: Check) -> type[Criterion]:
         fields["scenario"] = (Criterion.model_fields["scenario"].annotation, ...)
     name = "Criterion_" + check.name.replace("-", "_")
     return create_model(name, __base__=Criterion, __doc__=_docs(check), **fields)
+
+
+def _manual() -> type[Criterion]:
+    fields: dict[str, Any] = {
+        "check": (Literal[MANUAL], ...),
+        "parameters": (NoParams, Field(alias="with", default_factory=NoParams)),
+    }
+    docs = "A person gives the points."
+    return create_model("Criterion_manual", __base__=Criterion, __doc__=docs, **fields)
 
 
 def _docs(check: Check) -> str:

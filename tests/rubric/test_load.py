@@ -5,9 +5,12 @@ import hashlib
 import pytest
 
 from grader.errors import RubricError
+from grader.judge.judge import MANUAL
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import all_rubrics, find_rubric_for_package, load_rubric
 from tests.rubric.samples import SOUND, spoiled
+
+NAME = "must be lower-case letters, digits and hyphens, beginning with a letter"
 
 
 def faults(path) -> list[str]:
@@ -78,7 +81,7 @@ def test_three_faults_are_all_named_with_file_and_line(tmp_path):
         (
             "id: chatter-rate",
             "id: Chatter Rate",
-            '19: criteria[1].id: must be lower-case letters, digits and hyphens, beginning with a letter, not "Chatter Rate"',
+            f'19: criteria[1].id: {NAME}, not "Chatter Rate"',
         ),
         ("title: 10 Hz\n", "title: 10 Hz\n    zzz: yes\n", "21: criteria[1].zzz: is not known here"),
         (
@@ -149,7 +152,7 @@ def test_three_faults_are_all_named_with_file_and_line(tmp_path):
         (
             "  real:\n",
             "  Real Run:\n",
-            '7: scenarios.Real Run: must be lower-case letters, digits and hyphens, beginning with a letter, not "Real Run"',
+            f'7: scenarios.Real Run: {NAME}, not "Real Run"',
         ),
     ],
 )
@@ -266,3 +269,11 @@ def test_the_rubric_of_a_package():
     for loaded in all_rubrics():
         assert find_rubric_for_package(loaded.rubric.package.upper()) == loaded.rubric.id
     assert find_rubric_for_package("no_such_package") is None
+
+
+def test_a_person_may_give_the_points(tmp_path):
+    path = spoiled(
+        tmp_path,
+        ("    check: rate\n    with:\n      topic: /chatter\n      rate_hz: 10\n", f"    check: {MANUAL}\n"),
+    )
+    assert load_rubric(str(path)).rubric.criteria[1].check == MANUAL

@@ -28,6 +28,14 @@ def test_every_check_offers_its_parameters_and_its_docs():
         assert "with" in criterion["properties"]
 
 
+def test_a_criterion_for_a_person_is_valid():
+    by_check = "    check: rate\n    with:\n      topic: /chatter\n      rate_hz: 10\n"
+    assert VALIDATOR.is_valid(yaml.safe_load(SOUND.replace(by_check, "    check: manual\n")))
+    assert not VALIDATOR.is_valid(
+        yaml.safe_load(SOUND.replace("    check: rate\n    with:\n", "    check: manual\n    with:\n"))
+    )
+
+
 def test_sound_rubrics_are_valid():
     for text in [SOUND, *(loaded.path.read_text(encoding="utf-8") for loaded in all_rubrics())]:
         assert [error.message for error in VALIDATOR.iter_errors(yaml.safe_load(text))] == []

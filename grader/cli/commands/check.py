@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from grader import pipeline
+from grader.arena.sandbox import Mode
 from grader.cli.choice import choose
 from grader.cli.display import open_progress
 from grader.cli.show import show
@@ -21,7 +22,7 @@ def run(
     rubric: str | None = None,
     static: bool = False,
     out: Path | None = None,
-    sandbox: str = "auto",
+    sandbox: Mode = "auto",
     as_json: bool = False,
 ) -> ExitCode:
     """Grade the package at `path` with hidden criteria left out; with `static`, from its files alone."""

@@ -6,12 +6,12 @@ import json
 import sys
 
 from rich.console import Console
-from rich.padding import Padding
+from rich.table import Table
 from rich.text import Text
 
 from grader.cli.diagnosis import Row, diagnose
 from grader.errors import ExitCode
-from grader.report.terminal import open_console
+from grader.report.terminal import emit, open_console
 from grader.report.text import visible
 
 STYLES = {"ok": "green", "limited": "yellow", "missing": "red"}
@@ -28,15 +28,14 @@ def run(*, as_json: bool = False) -> ExitCode:
 
 
 def _print(rows: tuple[Row, ...], console: Console) -> None:
-    width = max(len(row.name) for row in rows)
+    grid = Table.grid(padding=(0, 2, 0, 0))
+    for _ in range(2):
+        grid.add_column(no_wrap=True)
+    grid.add_column(overflow="fold")
     for row in rows:
-        line = Text.assemble(
-            (f"{row.state:<8}", STYLES[row.state]), f"{row.name:<{width}}  ", visible(row.detail)
-        )
-        console.print(line)
+        grid.add_row(Text(row.state, STYLES[row.state]), Text(row.name), Text(visible(row.detail)))
         if row.mend:
-            console.print(Padding(Text(f"mend: {visible(row.mend)}", "bold"), (0, 0, 0, 10), expand=False))
+            grid.add_row(Text(), Text("mend:", "bold"), Text(visible(row.mend), "bold"))
     missing = sum(row.state == "missing" for row in rows)
-    console.print(
-        Text(f"\n{missing} missing: grading is not fully possible here" if missing else "\nReady to grade.")
-    )
+    verdict = f"{missing} missing: grading is not fully possible here." if missing else "Ready to grade."
+    emit(console, [grid, Text(f"\n{verdict}")])

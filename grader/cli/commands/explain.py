@@ -10,7 +10,7 @@ from rich.text import Text
 
 from grader.checks import CHECKS, HEADINGS, Check
 from grader.errors import ExitCode, UsageError
-from grader.report.terminal import open_console
+from grader.report.terminal import emit, open_console
 from grader.report.text import number, visible
 from grader.rubric.faults import did_you_mean
 from grader.rubric.find import rubric_ids
@@ -53,7 +53,8 @@ def _criterion_lines(rubric: Rubric, criterion: Criterion) -> Iterator[Line]:
     if criterion.reproduce:
         yield f"see it yourself: {criterion.reproduce}", 2
     yield "", 0
-    yield from _check_lines(CHECKS[criterion.check])
+    if criterion.check in CHECKS:
+        yield from _check_lines(CHECKS[criterion.check])
 
 
 def _check_lines(check: Check) -> Iterator[Line]:
@@ -68,6 +69,5 @@ def _check_lines(check: Check) -> Iterator[Line]:
 
 
 def _print(lines: Iterator[Line]) -> None:
-    console = open_console(sys.stdout)
-    for text, indent in lines:
-        console.print(Padding(Text(visible(text)), (0, 0, 0, indent), expand=False))
+    parts = [Padding(Text(visible(text) or " "), (0, 0, 0, indent)) for text, indent in lines]
+    emit(open_console(sys.stdout), parts)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from grader import pipeline
+from grader.arena.sandbox import Mode
 from grader.cli.display import open_progress
 from grader.cli.show import show
 from grader.errors import ExitCode
@@ -20,7 +21,7 @@ def run(
     rubric: str,
     out: Path | None = None,
     submission_id: str | None = None,
-    sandbox: str = "auto",
+    sandbox: Mode = "auto",
     as_json: bool = False,
 ) -> ExitCode:
     """Grade one submission into `out/<submission id>/` and show the report."""

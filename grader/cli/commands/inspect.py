@@ -3,70 +3,69 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
-from rich.console import Console
+from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from grader.cli.inspection import Inspection, TopicSummary, summarise
 from grader.errors import ExitCode
-from grader.evidence.reader import load_run
-from grader.report.terminal import open_console
+from grader.evidence.inspect import ChannelSummary, Inspection, ProcessSummary, inspect_file
+from grader.report.terminal import emit, open_console
 from grader.report.text import clip, number, visible
-
-SOURCES = ("publisher", "type")
 
 
 def run(*, file: Path, as_json: bool = False) -> ExitCode:
     """Print rates, gaps, nodes and how the run went. Raises EvidenceError."""
-    inspection = summarise(load_run(file))
+    inspection = inspect_file(file)
     if as_json:
         print(inspection.model_dump_json(indent=2))
-        return ExitCode.PASSED
-    console = open_console(sys.stdout)
-    for text in _head(inspection):
-        console.print(Text(visible(text)))
-    if inspection.topics:
-        console.print()
-        _print_topics(inspection.topics, console)
+    else:
+        lines = [Text(visible(clip(line, 500))) for line in _head(inspection)]
+        table: list[RenderableType] = [Text(), _channels(inspection)] if inspection.channels else []
+        emit(open_console(sys.stdout), [*lines, *table])
     return ExitCode.PASSED
 
 
-def _head(inspection: Inspection) -> list[str]:
+def _head(inspection: Inspection) -> Iterator[str]:
     warp = f", {inspection.warp:g} times as fast" if inspection.clock == "warped" else ""
-    counts = f"{inspection.messages} messages, {len(inspection.topics)} channels"
-    lines = [
-        f"{inspection.evidence}: scenario {inspection.scenario}, clock {inspection.clock}{warp}",
-        f"{number(inspection.duration_s)} s, {counts}",
-    ]
+    yield f"{inspection.file}: scenario {inspection.scenario}, clock {inspection.clock}{warp}"
+    counts = f"{inspection.messages} messages, {len(inspection.channels)} channels"
+    yield f"{number(inspection.duration_s)} s, {counts}, {inspection.console_lines} console lines"
     if inspection.outcome:
-        lines.append(f"ended: {inspection.outcome}")
+        yield f"ended: {inspection.outcome} {inspection.outcome_detail}".rstrip()
+    if inspection.late_max_ms is not None:
+        yield f"this machine's timer was at most {inspection.late_max_ms:.1f} ms late"
     if inspection.nodes:
-        lines.append(f"nodes: {' '.join(inspection.nodes)}")
-    lines += [f"process {process.name}: {process.end}" for process in inspection.processes]
-    if inspection.console_lines:
-        lines.append(f"console: {inspection.console_lines} lines")
-    return lines
+        yield f"nodes: {' '.join(inspection.nodes)}"
+    for process in inspection.processes:
+        yield f"process {process.name}: {_end(process)}"
 
 
-def _print_topics(topics: tuple[TopicSummary, ...], console: Console) -> None:
+def _end(process: ProcessSummary) -> str:
+    if process.exit_s is None:
+        return "its end was not recorded"
+    stopped = f", stopped by {process.stopped_by}" if process.stopped_by else ""
+    how = f"signal {process.signal}" if process.signal is not None else f"exit code {process.exit_code}"
+    return f"{how}{stopped}"
+
+
+def _channels(inspection: Inspection) -> Table:
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="dim")
-    table.add_column("topic", overflow="fold")
-    for heading in SOURCES:
+    for heading in ("topic", "publisher", "type"):
         table.add_column(heading, overflow="fold")
-    for heading in ("count", "Hz", "gaps ms min/median/max"):
-        table.add_column(heading, justify="right")
-    for topic in topics:
-        cells = (topic.topic, topic.publisher, topic.type, str(topic.messages), _rate(topic), _gaps(topic))
+    for heading in ("count", "Hz", "gaps in ms"):
+        table.add_column(heading, justify="right", overflow="fold")
+    for channel in inspection.channels:
+        cells = (channel.topic, channel.publisher, channel.type, str(channel.rate.count), *_rate(channel))
         table.add_row(*(Text(visible(clip(cell, 200))) for cell in cells))
-    console.print(table)
+    return table
 
 
-def _rate(topic: TopicSummary) -> str:
-    return "" if topic.rate_hz is None else f"{topic.rate_hz:.2f}"
-
-
-def _gaps(topic: TopicSummary) -> str:
-    gaps = (topic.gap_min_ms, topic.gap_median_ms, topic.gap_max_ms)
-    return "/".join(f"{gap:.1f}" for gap in gaps if gap is not None)
+def _rate(channel: ChannelSummary) -> tuple[str, str]:
+    """Hertz, and the smallest, middle and largest gap."""
+    rate = channel.rate
+    hertz = "" if rate.mean_hz is None else f"{rate.mean_hz:.2f}"
+    gaps_s = (rate.gap_min_s, rate.gap_median_s, rate.gap_max_s)
+    return hertz, " / ".join(f"{gap_s * 1e3:.1f}" for gap_s in gaps_s if gap_s is not None)

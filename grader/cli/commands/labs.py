@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from grader.errors import ExitCode
-from grader.report.terminal import open_console
+from grader.report.terminal import emit, open_console
 from grader.report.text import number
 from grader.rubric.load import all_rubrics
 from grader.rubric.model import Rubric
@@ -27,7 +27,7 @@ def run(*, as_json: bool = False) -> ExitCode:
     for r in rubrics:
         cells = (r.id, r.package, str(len(r.criteria)), number(r.max_points), r.title)
         table.add_row(*map(Text, cells))
-    open_console(sys.stdout).print(table)
+    emit(open_console(sys.stdout), [table])
     return ExitCode.PASSED
 
 

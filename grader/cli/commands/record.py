@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from grader import pipeline
+from grader.arena.sandbox import Mode
 from grader.cli.choice import only_package
 from grader.cli.display import open_progress
 from grader.errors import ExitCode, UsageError
@@ -25,7 +26,7 @@ def run(
     script: list[str],
     launch: list[str],
     seconds: float = 10.0,
-    sandbox: str = "auto",
+    sandbox: Mode = "auto",
 ) -> ExitCode:
     """Record the rubric's scenarios, or one made of the scripts and launch files that are named."""
     if rubric is not None and (script or launch):

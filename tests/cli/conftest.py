@@ -1,0 +1,90 @@
+"""A pipeline and a judge that do what a test says: the command line is tested without ROS."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import grader
+from grader.model.result import GradingResult
+from grader.report.files import write_reports
+from tests.report.hostile import criterion, result
+from tests.rubric.samples import spoiled
+
+COMMANDS = ("grade", "check", "record", "judge")
+
+
+@dataclass(frozen=True, kw_only=True)
+class GradeOptions:
+    sandbox: str
+    submission_id: str | None
+    static_only: bool
+    keep_hidden: bool
+
+
+class FakePipeline(ModuleType):
+    """`outcome` is what `grade` returns, or raises where it is an exception."""
+
+    GradeOptions = GradeOptions
+
+    def __init__(self) -> None:
+        super().__init__("grader.pipeline")
+        self.outcome: GradingResult | BaseException = passing()
+        self.calls: list[tuple] = []
+
+    def grade(self, source, rubric, out: Path, options, progress):
+        """Tell two steps, write the reports, return the result."""
+        self.calls.append((source, rubric.rubric.id, out, options))
+        progress.step("intake", "running", "reading \x1b[31m", 1.0)
+        progress.step("intake", "done")
+        if isinstance(self.outcome, BaseException):
+            raise self.outcome
+        folder = out / self.outcome.submission.id
+        write_reports(self.outcome, folder, console="", rubric=rubric.rubric, keep_hidden=options.keep_hidden)
+        return self.outcome
+
+    def record(self, source, rubric, out: Path, options, progress):
+        """Say where a scenario's evidence would be."""
+        self.calls.append((source, rubric.rubric, out, options))
+        progress.step("record", "done")
+        return [out / f"{name}.mcap" for name in rubric.rubric.scenarios]
+
+
+def passing(status: str = "pass", *, graded: str = "graded") -> GradingResult:
+    """The sample rubric's result: the rate has `status`, the other criterion is reached."""
+    points = 60 if status == "pass" else 0
+    return result(
+        status=graded,
+        points=40 + points,
+        criteria=(
+            criterion("talker-node", "pass", 40, 40, scenario="real"),
+            criterion("chatter-rate", status, points, 60, scenario="real", message="5 Hz \x1b[31m"),
+        ),
+    )
+
+
+def _fresh(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in COMMANDS:
+        monkeypatch.delitem(sys.modules, f"grader.cli.commands.{name}", raising=False)
+
+
+@pytest.fixture
+def pipeline(monkeypatch):
+    """The fake in place of `grader.pipeline`, in freshly imported commands that no other test sees."""
+    fake = FakePipeline()
+    monkeypatch.setitem(sys.modules, "grader.pipeline", fake)
+    monkeypatch.setattr(grader, "pipeline", fake, raising=False)
+    _fresh(monkeypatch)
+    yield fake
+    for name in COMMANDS:
+        sys.modules.pop(f"grader.cli.commands.{name}", None)
+
+
+@pytest.fixture
+def lab(tmp_path) -> str:
+    """A sound rubric's file."""
+    return str(spoiled(tmp_path))

@@ -1,0 +1,187 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from grader import __version__
+from grader.checks import CHECKS
+from grader.cli import diagnosis
+from grader.cli.diagnosis import Row
+from grader.cli.main import run
+from grader.errors import EvidenceError
+from grader.judge.summary import criteria_bytes
+from grader.report.result_json import result_bytes
+from grader.rubric.find import rubric_ids
+from tests.report.hostile import result
+from tests.rubric.samples import spoiled
+
+HELPED = ["grade", "check", "judge", "record", "inspect", "labs", "explain", "doctor", "rubric"]
+HEAVY = ("pydantic", "rich", "lxml", "yaml", "mcap", "rosbags", "numpy", "grader.checks", "grader.pipeline")
+
+
+@pytest.mark.parametrize("argv", [[], *([c] for c in HELPED), ["rubric", "validate"], ["rubric", "schema"]])
+def test_every_command_has_help_with_the_exit_codes(argv, capsys):
+    assert run([*argv, "--help"]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith(f"usage: {' '.join(['grader', *argv])}")
+    assert "130  interrupted" in out
+
+
+def test_version(capsys):
+    assert run(["--version"]) == 0
+    assert capsys.readouterr().out == f"grader {__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("argv", "message"),
+    [
+        ([], "the following arguments are required: COMMAND"),
+        (["grade"], "the following arguments are required: SOURCE, --rubric"),
+        (
+            ["grade", "x", "--rubric", "y", "--sandbox", "maybe"],
+            "argument --sandbox: invalid choice: 'maybe'",
+        ),
+        (["grade", "x", "--rub", "y"], "the following arguments are required: --rubric"),
+        (["rubric"], "the following arguments are required: COMMAND"),
+        (["labs", "\x1b[2J"], "unrecognized arguments: \\x1b[2J"),
+        (["judge", "--rubric", "x"], "the following arguments are required: EVIDENCE"),
+    ],
+)
+def test_a_wrong_command_line_is_one_line_and_a_hint(argv, message, capsys):
+    assert run(argv) == 2
+    error, hint = capsys.readouterr().err.splitlines()
+    assert error.startswith(f"grader: error: {message}")
+    assert hint.startswith("  hint: see grader")
+
+
+def test_help_imports_nothing_heavy():
+    code = "import sys; from grader.cli.main import run; run(['grade', '--help']); print(*sys.modules, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(HEAVY) & set(done.stderr.split()) == set()
+
+
+def test_an_encoding_without_signs_gets_plain_ones(tmp_path):
+    command = [
+        sys.executable,
+        "-m",
+        "grader",
+        "rubric",
+        "validate",
+        str(spoiled(tmp_path, ("A sample", "A ✓"))),
+    ]
+    environment = {"PYTHONIOENCODING": "ascii", "PATH": "/usr/bin:/bin"}
+    done = subprocess.run(command, capture_output=True, env=environment, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_judge_prints_the_criteria_as_result_json_holds_them():
+    graded = result()
+    held = json.loads(result_bytes(graded))["criteria"]
+    assert (json.dumps(held, ensure_ascii=False, indent=2) + "\n").encode() == criteria_bytes(graded.criteria)
+
+
+def test_judge_without_evidence_says_so(tmp_path, capsys):
+    assert (
+        run(["judge", str(tmp_path), "--rubric", str(spoiled(tmp_path)), "--out", str(tmp_path / "x.json")])
+        == 3
+    )
+    assert capsys.readouterr().err.startswith(f"grader: error: {tmp_path}: no evidence (*.mcap)")
+    assert not (tmp_path / "x.json").exists()
+
+
+def test_a_closed_pipe_is_quiet():
+    command = f"{sys.executable} -m grader rubric schema | head -c 10 >/dev/null; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["/bin/bash", "-c", command], capture_output=True, check=False)
+    assert done.stderr == b""
+    assert done.returncode in {0, 141}
+
+
+def test_closed_streams_do_no_harm():
+    done = subprocess.run(
+        ["/bin/bash", "-c", f"{sys.executable} -m grader labs >&- 2>&-"], check=False, timeout=60
+    )
+    assert done.returncode == 0
+
+
+def test_labs(capsys):
+    assert run(["labs", "--json"]) == 0
+    assert [lab["id"] for lab in json.loads(capsys.readouterr().out)] == list(rubric_ids())
+    assert run(["labs"]) == 0
+    assert all(name in capsys.readouterr().out for name in rubric_ids())
+
+
+@pytest.mark.parametrize("name", sorted(CHECKS))
+def test_every_check_is_explained(name, capsys):
+    assert run(["explain", name]) == 0
+    out = capsys.readouterr().out
+    for heading in ("What it checks", "Why it matters on a robot", "How it is measured", "How to fix"):
+        assert heading in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_a_criterion_is_explained_with_its_check(capsys, tmp_path):
+    assert run(["explain", f"{spoiled(tmp_path)}/chatter-rate"]) == 0
+    out = capsys.readouterr().out
+    assert "sample/chatter-rate: 10 Hz" in out
+    assert "60 of 100 points, judged by the check rate" in out
+    assert CHECKS["rate"].title in out
+
+
+def test_explain_has_a_suggestion(capsys):
+    assert run(["explain", "raet"]) == 2
+    assert 'there is no check and no criterion "raet" (did you mean "rate"?)' in capsys.readouterr().err
+
+
+def test_validate_names_every_fault_of_every_file(tmp_path, capsys):
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+    first = spoiled(tmp_path / "a", ("points: 40", "points: x"))
+    second = spoiled(tmp_path / "b", ("points: 60", "points: 50"))
+    sound = spoiled(tmp_path)
+    assert run(["rubric", "validate", str(first), str(second), str(sound)]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == f"{sound}: ok, sample, 2 criteria, 100 points\n"
+    assert shown.err.splitlines() == [
+        f'grader: error: {first}:15: criteria[0].points: must be a number, not "x"',
+        f"grader: error: {second}:12: criteria: the points add up to 90, not to 100",
+    ]
+
+
+def test_schema_is_json(capsys):
+    assert run(["rubric", "schema"]) == 0
+    assert json.loads(capsys.readouterr().out)["$schema"].endswith("2020-12/schema")
+
+
+@pytest.mark.parametrize("content", [b"", b"not mcap", b"\x89MCAP0\r\n", None])
+def test_inspect_says_what_is_wrong_with_a_file(content, tmp_path, capsys):
+    path = tmp_path / "x.mcap"
+    if content is not None:
+        path.write_bytes(content)
+    assert run(["inspect", str(path)]) == EvidenceError.exit_code
+    error = capsys.readouterr().err.splitlines()
+    assert error[0].startswith(f"grader: error: {path}: ")
+    assert len(error) <= 2
+
+
+@pytest.mark.parametrize(("state", "code"), [("ok", 0), ("limited", 0), ("missing", 3)])
+def test_doctor_tells_by_its_exit_code(state, code, capsys, monkeypatch):
+    row = Row(name="ROS 1", state=state, detail="x\x1b", mend="apt-get install ros")
+    monkeypatch.setattr("grader.cli.commands.doctor.diagnose", lambda: (row,))
+    assert run(["doctor"]) == code
+    out = capsys.readouterr().out
+    assert state in out
+    assert "apt-get install ros" in out
+    assert "\x1b" not in out
+    assert run(["doctor", "--json"]) == code
+    assert json.loads(capsys.readouterr().out) == [row.model_dump()]
+
+
+def test_diagnosis_without_ros_names_the_command_that_mends_it(monkeypatch):
+    monkeypatch.setattr(diagnosis, "find_ros", lambda: None)
+    rows = {row.name: row for row in diagnosis.diagnose()}
+    assert rows["ROS 1"].state == "missing"
+    assert "apt-get install" in rows["ROS 1"].mend
+    assert {"Python", "git", "sandbox", "memory", "disk", "host name", "encoding"} <= set(rows)
