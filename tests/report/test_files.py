@@ -80,8 +80,8 @@ def test_hidden_criteria_are_left_out_everywhere(tmp_path):
 
 
 def test_without_hidden_recounts():
-    shown = without_hidden(result(), hiding("build", "launch"))
-    assert (shown.points, shown.max_points, shown.status) == (12.5, 70, "graded")
+    shown = without_hidden(result(), hiding("build", "launch", "style"))
+    assert (shown.points, shown.max_points, shown.status) == (12.5, 60, "graded")
     assert without_hidden(result(), rubric()) == result()
 
 
