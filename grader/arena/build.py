@@ -16,6 +16,7 @@ from grader.evidence.writer import EvidenceWriter
 from grader.model.record import Record
 
 BUILD_S = 120.0
+BUILD_EXPECTED_S = 2.0
 STEP_S = 20.0
 ROSRUN_S = 4.0
 TRACE = "cmake-trace.json"
@@ -52,11 +53,13 @@ async def build(
             await arena.interrupt("catkin_make", int_s=2.0, term_s=1.0)
         await arena.wait(lambda: "syntax" in arena.live.ended, STEP_S)
         ok = arena.exit_codes.get("catkin_make") == 0
-        built = await _with_setup(place, arena) if ok else _from_source(place)
+        built = await _with_setup(place, arena) if ok else place.from_source()
         for script in answers:
             await _answer(built, arena, script)
         outcome = "complete" if ended else "timeout"
-        arena.course(ScenarioEvent(event="end", outcome=outcome, detail="" if ended else f"build over {BUILD_S:g} s"))
+        arena.course(
+            ScenarioEvent(event="end", outcome=outcome, detail="" if ended else f"build over {BUILD_S:g} s")
+        )
         await arena.finish()
     return built, BuildOutcome(
         ok=ok,
@@ -91,14 +94,8 @@ async def _with_setup(place: Place, arena: ArenaSession) -> Place:
     await arena.wait(lambda: "setup.bash" in arena.live.ended, STEP_S)
     dump = read_untrusted(place.workspace.output / ENVIRONMENT)
     if not dump or arena.exit_codes.get("setup.bash") != 0:
-        return _from_source(place)
+        return place.from_source()
     return replace(place, env=keep_ros_variables(parse_env(dump)))
-
-
-def _from_source(place: Place) -> Place:
-    """Without a build: ROS still finds the package's sources."""
-    path = f"{place.inside_workspace}/src:{place.ros.env.get('ROS_PACKAGE_PATH', '')}"
-    return replace(place, env={"ROS_PACKAGE_PATH": path.rstrip(":")})
 
 
 async def _answer(place: Place, arena: ArenaSession, script: str) -> None:

@@ -62,15 +62,28 @@ def settled(live: Live, until: Until, now_s: float) -> Outcome | None:
     """
     if live.ended and not live.running:
         return "ended", ""
-    enough = (_window(live, until, now_s), _messages(live, until), _connected(live, until), _heard(live, until, now_s))
-    if all(enough):
-        return "complete", ""
+    enough = (
+        _window(live, until, now_s),
+        _messages(live, until),
+        _connected(live, until),
+        _heard(live, until, now_s),
+    )
+    if _waits(until):
+        if all(enough):
+            return "complete", ""
+    elif now_s - live.started_s > until.limit_s:
+        return "complete", f"watched for {until.limit_s:g} s"
     silent = _silent(live, until, now_s)
     if silent:
         return "silent", silent
     if now_s - live.started_s > until.limit_s:
         return "timeout", f"not complete after {until.limit_s:g} s"
     return None
+
+
+def _waits(until: Until) -> bool:
+    """Whether anything ends the run before its limit."""
+    return until.window_s is not None or bool(until.messages or until.connected or until.heard)
 
 
 def waiting_for(live: Live, until: Until) -> str:
@@ -90,7 +103,11 @@ def next_look_s(live: Live, until: Until, now_s: float) -> float:
     """How long nothing can change by time alone."""
     looks = [live.started_s + until.limit_s, live.started_s + until.first_message_s]
     for seen in live.topics.values():
-        looks += [seen.first_s + (until.window_s or 0), seen.last_s + until.silent_s, seen.first_s + until.silent_s]
+        looks += [
+            seen.first_s + (until.window_s or 0),
+            seen.last_s + until.silent_s,
+            seen.first_s + until.silent_s,
+        ]
     looks += [live.graph_changed_s + until.silent_s, max(live.last_line_s, live.last_sent_s) + HEARD_S]
     ahead = [look - now_s for look in looks if look > now_s]
     return min([*ahead, 1.0]) + 0.001
@@ -130,7 +147,11 @@ def _silent(live: Live, until: Until, now_s: float) -> str:
     waited = (*until.topics, *until.messages)
     seen = [s for s in live.topics.values() if s.count]
     if waited and not seen:
-        return f"no message within {until.first_message_s:g} s" if now_s > live.started_s + until.first_message_s else ""
+        return (
+            f"no message within {until.first_message_s:g} s"
+            if now_s > live.started_s + until.first_message_s
+            else ""
+        )
     for topic, count in until.messages.items():
         last_s = live.topics[topic].last_s or min(s.first_s for s in seen)
         if live.topics[topic].count < count and now_s > last_s + until.silent_s:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -51,9 +51,16 @@ class Place:
         """Where processes find `python` and the grader's helpers."""
         return SHIMS if self.sandbox.bubblewrap else str(self.folder / "bin")
 
+    def from_source(self) -> Place:
+        """Without a build: ROS still finds the package's sources."""
+        path = f"{self.inside_workspace}/src:{self.ros.env.get('ROS_PACKAGE_PATH', '')}"
+        return replace(self, env={"ROS_PACKAGE_PATH": path.rstrip(":")})
+
     def find_program(self, script: str) -> tuple[str, str] | None:
-        """What `rosrun` would start for a script: (its path for a process, its path in the package), None if it is not
-        there. A program that the build installed wins, as with `rosrun`; then the script's own place, then any other."""
+        """What `rosrun` would start for a script: (its path for a process, its path in the package), or None.
+
+        A program that the build installed wins, as with `rosrun`; then the script's own place, then any other.
+        """
         name = Path(script).name
         package = self.workspace.repaired / self.workspace.folder
         found = self.script_path(script)
@@ -78,11 +85,23 @@ class Place:
         return {"LANG": "C.UTF-8", "ROS_HOSTNAME": "localhost", **self.ros.env, "PATH": _path(self.ros, "")}
 
     def spec(
-        self, name: str, argv: Sequence[str], *, role: str = "student", copy: bool = True, build: bool = False, **more: Any
+        self,
+        name: str,
+        argv: Sequence[str],
+        *,
+        role: str = "student",
+        copy: bool = True,
+        build: bool = False,
+        **more: Any,  # noqa: ANN401 - fields of the spec
     ) -> dict[str, Any]:
         """What the arena needs to start a process. `build` gives it the workspace as handed in, writable; otherwise,
         with `copy`, it gets a copy of its own with the repairs."""
-        shell = ["/bin/sh", "-c", RUN_STEP if copy and not build and self.sandbox.bubblewrap else BUILD_STEP, "sh"]
+        shell = [
+            "/bin/sh",
+            "-c",
+            RUN_STEP if copy and not build and self.sandbox.bubblewrap else BUILD_STEP,
+            "sh",
+        ]
         inner = self.sandbox.inner(
             [*shell, *argv],
             ros=self.ros,

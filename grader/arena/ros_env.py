@@ -60,7 +60,9 @@ def _find(setup: str, conda: str) -> RosInstallation | None:
         return None
     if setup:
         if not Path(setup).is_file():
-            raise RosMissing(f"$GRADER_ROS_SETUP names no file: {setup}", hint="set it to a setup.bash, or unset it")
+            raise RosMissing(
+                f"$GRADER_ROS_SETUP names no file: {setup}", hint="set it to a setup.bash, or unset it"
+            )
         return _from_setup(Path(setup))
     for candidate in sorted(Path("/opt/ros").glob("*/setup.bash"), reverse=True):
         if (candidate.parent / "bin" / "rosmaster").exists():
@@ -72,7 +74,11 @@ def _from_setup(setup: Path) -> RosInstallation:
     script = 'source "$1" >/dev/null && env -0'
     base = {"PATH": SYSTEM_PATH, "HOME": "/nonexistent"}
     done = subprocess.run(
-        ["/bin/bash", "-c", script, "bash", str(setup)], env=base, capture_output=True, check=False, timeout=30
+        ["/bin/bash", "-c", script, "bash", str(setup)],
+        env=base,
+        capture_output=True,
+        check=False,
+        timeout=30,
     )
     if done.returncode != 0:
         raise RosMissing(f"{setup} does not load: {done.stderr.decode(errors='replace').strip()[-200:]}")

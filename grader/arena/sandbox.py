@@ -27,7 +27,8 @@ BUILT_WORKSPACE = "/run/grader/ws"
 SHIMS = "/run/grader/bin"
 ETC = (
     "alternatives", "ld.so.cache", "ld.so.conf", "ld.so.conf.d", "localtime", "timezone", "nsswitch.conf",
-    "os-release", "debian_version", "lsb-release", "python3", "python3.11", "mime.types", "catkin", "ros", "ssl/openssl.cnf",
+    "os-release", "debian_version", "lsb-release", "python3", "python3.11", "mime.types", "catkin", "ros",
+    "ssl/openssl.cnf",
 )  # fmt: skip
 SYNTAX = Path(__file__).parent / "ros" / "syntax.py"
 TMP_BYTES = 256 << 20
@@ -69,7 +70,14 @@ class Sandbox(Record):
         return ["bwrap", "--dev-bind", "/", "/", "--unshare-net", "--die-with-parent", "--", *argv]
 
     def inner(
-        self, argv: Sequence[str], *, ros: RosInstallation, place: Path, binds: Sequence[str], net: bool, info: bool
+        self,
+        argv: Sequence[str],
+        *,
+        ros: RosInstallation,
+        place: Path,
+        binds: Sequence[str],
+        net: bool,
+        info: bool,
     ) -> list[str]:
         """One process tree's layer. `place` is the run's own folder (see `prepare`), `binds` bubblewrap arguments."""
         limits = ["prlimit", f"--fsize={FILE_BYTES}", f"--nofile={OPEN_FILES}", "--core=0"]
@@ -79,12 +87,13 @@ class Sandbox(Record):
         drop = ["setpriv", f"--reuid={self.uid}", f"--regid={self.uid}", "--clear-groups"] if self.uid else []
         return [
             *drop, *limits, "bwrap", *_system(ros), "--proc", "/proc", "--dev", "/dev",
-            "--size", str(TMP_BYTES), "--tmpfs", "/tmp", "--size", str(TMP_BYTES), "--tmpfs", HOME,
+            "--size", str(TMP_BYTES), "--tmpfs", "/tmp",  # noqa: S108 - the sandbox's own
+            "--size", str(TMP_BYTES), "--tmpfs", HOME,
             "--ro-bind", str(place / "etc" / "passwd"), "/etc/passwd",
             "--ro-bind", str(place / "etc" / "group"), "/etc/group",
             "--ro-bind", str(place / "etc" / "hosts"), "/etc/hosts",
             "--ro-bind", str(place / "bin"), SHIMS, *binds,
-            "--uid", "1000", "--gid", "1000", "--hostname", "localhost", "--chdir", HOME,
+            "--remount-ro", "/", "--uid", "1000", "--gid", "1000", "--hostname", "localhost", "--chdir", HOME,
             "--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try",
             *([] if net else ["--unshare-net"]),
             "--cap-drop", "ALL", "--new-session", "--die-with-parent",
@@ -97,7 +106,7 @@ def _system(ros: RosInstallation) -> list[str]:
     for name in ("bin", "sbin", "lib", "lib32", "lib64", "libx32"):
         path = Path("/") / name
         if path.is_symlink():
-            argv += ["--symlink", os.readlink(path), str(path)]
+            argv += ["--symlink", str(path.readlink()), str(path)]
         elif path.is_dir():
             argv += ["--ro-bind", str(path), str(path)]
     for name in ETC:
@@ -139,8 +148,18 @@ def why_not() -> str:
     for program in ("bwrap", "setpriv", "prlimit"):
         if shutil.which(program) is None:
             return f"{program} is not installed"
-    inner = "bwrap --ro-bind / / --proc /proc --unshare-user --unshare-pid --unshare-ipc --new-session -- /bin/true".split()
-    drop = "setpriv --reuid=65534 --regid=65534 --clear-groups".split() if os.geteuid() == 0 else []
-    outer = "bwrap --dev-bind / / --unshare-net --die-with-parent --".split()
+    inner = [
+        "bwrap",
+        "--ro-bind",
+        "/",
+        "/",
+        "--proc",
+        "/proc",
+        "--unshare-user",
+        "--unshare-pid",
+        "/bin/true",
+    ]
+    drop = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"] if os.geteuid() == 0 else []
+    outer = ["bwrap", "--dev-bind", "/", "/", "--unshare-net", "--die-with-parent", "--"]
     done = subprocess.run([*outer, *drop, *inner], capture_output=True, check=False, timeout=20)
     return "" if done.returncode == 0 else done.stderr.decode(errors="replace").strip().splitlines()[-1][:200]

@@ -27,6 +27,8 @@ GRAPH_EVERY_S = 0.25
 CTRL_C_S = 5.0
 LAUNCH_CTRL_C_S = 20.0
 TERM_S = 2.0
+STARTING_S = 1.5
+EXPECTED_HZ = 10.0
 
 Tell = Callable[[str], None]
 
@@ -38,8 +40,20 @@ class ScenarioCost(Record):
     student_cpu_s: float
 
 
+def expected_s(scenario: Scenario) -> float:
+    """About how long a run takes when all is as it should be."""
+    until = scenario.until
+    messages = (
+        max(until.messages.values(), default=0)
+        / EXPECTED_HZ
+        / (scenario.warp if scenario.clock == "warped" else 1)
+    )
+    probing = sum(shot.pause_s for shot in make_shots(scenario.probes))
+    return STARTING_S + (until.window_s or 0) + messages + probing
+
+
 async def run_scenario(
-    name: str, scenario: Scenario, place: Place, path: Path, metadata: Mapping[str, str], tell: Tell
+    name: str, scenario: Scenario, place: Place, *, path: Path, metadata: Mapping[str, str], tell: Tell
 ) -> ScenarioCost:
     """Record the scenario at `path`. An arena that fails still leaves evidence, with the outcome `host`."""
     warp = scenario.warp if scenario.clock == "warped" else 1.0
@@ -55,7 +69,7 @@ async def run_scenario(
                 outcome, detail = await _run(scenario, specs, arena, tell)
                 await _stop(scenario, arena)
                 await arena.finish()
-                arena.course(ScenarioEvent(event="end", outcome=outcome, detail=detail))  # type: ignore[arg-type]
+                arena.course(ScenarioEvent(event="end", outcome=outcome, detail=detail))
         except ArenaError as error:
             session.course(ScenarioEvent(event="end", outcome="host", detail=error.message))
     return ScenarioCost(cpu_s=session.cpu_s, student_cpu_s=session.student_cpu_s)
@@ -96,7 +110,9 @@ async def _send_probes(scenario: Scenario, arena: ArenaSession, tell: Tell) -> N
     live = arena.live
     tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
     await arena.wait(lambda: bool(live.subscribed) or not live.running, scenario.until.first_message_s)
-    await arena.wait(lambda: topics <= live.subscribed or not live.running, SUBSCRIBE_S if live.subscribed else 0.0)
+    await arena.wait(
+        lambda: topics <= live.subscribed or not live.running, SUBSCRIBE_S if live.subscribed else 0.0
+    )
     tell("sending it messages")
     for shot in make_shots(scenario.probes):
         if not live.running:

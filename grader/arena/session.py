@@ -13,6 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from typing_extensions import Self
+
 from grader.arena.frames import Frame, FrameReader
 from grader.arena.live import Live
 from grader.arena.place import Place
@@ -53,7 +55,7 @@ class ArenaSession:
         self._failure = ""
         self._stderr: deque[str] = deque(maxlen=20)
 
-    async def __aenter__(self) -> ArenaSession:
+    async def __aenter__(self) -> Self:
         argv = self._place.sandbox.outer([self._place.ros.python, "-s", "-B", str(ARENA)])
         self._process = await asyncio.create_subprocess_exec(
             *argv,
@@ -67,8 +69,7 @@ class ArenaSession:
         self._tasks = [asyncio.create_task(self._read_frames()), asyncio.create_task(self._read_errors())]
         try:
             self.send(**self._config())
-            if not await self.wait(lambda: self._ready, READY_S):
-                raise ArenaError(f"the managed roscore did not start: {self._why()}", hint="grader doctor")
+            await self._await_ready()
         except BaseException:
             await self._end()
             raise
@@ -77,7 +78,11 @@ class ArenaSession:
     async def __aexit__(self, *_: object) -> None:
         await self._end()
 
-    def send(self, **command: Any) -> None:
+    async def _await_ready(self) -> None:
+        if not await self.wait(lambda: self._ready, READY_S):
+            raise ArenaError(f"the managed roscore did not start: {self._why()}", hint="grader doctor")
+
+    def send(self, **command: Any) -> None:  # noqa: ANN401 - JSON
         """Hand the arena one command (grader/arena/ros/__main__.py has a method for each)."""
         if self._process.stdin is not None and not self._process.stdin.is_closing():
             self._process.stdin.write(json.dumps(command).encode() + b"\n")
@@ -207,7 +212,10 @@ class ArenaSession:
             self._done = True
 
     def _why(self) -> str:
-        return " ".join([self._failure, *list(self._stderr)[-1:]]).strip() or f"exit code {self._process.returncode}"
+        return (
+            " ".join([self._failure, *list(self._stderr)[-1:]]).strip()
+            or f"exit code {self._process.returncode}"
+        )
 
     async def _end(self) -> None:
         """End the arena at once: closed commands first, so that it ends what it started, then by force."""

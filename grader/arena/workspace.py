@@ -33,7 +33,9 @@ class Workspace(Record):
     repairs: dict[str, tuple[str, ...]]
 
 
-def make_workspace(place: Path, submission: Submission, facts: PackageFacts, scripts: Iterable[str], uid: int | None) -> Workspace:
+def make_workspace(
+    place: Path, submission: Submission, facts: PackageFacts, scripts: Iterable[str], uid: int | None
+) -> Workspace:
     """Copy the packages twice below `place`; `scripts` are the paths that get their repairs in the second copy."""
     built, repaired, output = place / "ws", place / "run" / "src", place / "out"
     output.mkdir()
@@ -53,14 +55,13 @@ def needed_packages(submission: Submission) -> list[SourcePackage]:
     needed = [submission.package]
     for package in needed:
         manifest, _ = read_manifest(package.folder)
-        for name in sorted({d.name for d in manifest.dependencies} if manifest else ()):
-            if name in others:
-                needed.append(others.pop(name))
+        names = sorted({d.name for d in manifest.dependencies} & others.keys()) if manifest else ()
+        needed.extend(others.pop(name) for name in names)
     return needed
 
 
 def read_untrusted(path: Path, limit_bytes: int = READ_MAX) -> bytes | None:
-    """A regular file that student code may have written: no link is followed, no pipe waited for. None if it is none."""
+    """A regular file that student code may have written, or None: no link is followed, no pipe waited for."""
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError:

@@ -83,7 +83,9 @@ class Arena:
     def _interrupt(self, command):
         if command["name"] not in self._processes:
             return
-        self._wire.event("/grader/actor", {"action": "interrupt", "actor": "grader", "detail": command["name"]})
+        self._wire.event(
+            "/grader/actor", {"action": "interrupt", "actor": "grader", "detail": command["name"]}
+        )
         self._processes[command["name"]].stop(command["int_s"], command["term_s"])
 
     def _advertise(self, command):

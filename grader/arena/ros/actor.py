@@ -34,7 +34,7 @@ class SlaveApi(XmlRpcHandler):
         self._actor = actor
         self.listening = threading.Event()
 
-    def _ready(self, uri):
+    def _ready(self, uri):  # noqa: ARG002 - rosgraph calls it so
         self.listening.set()
 
     def requestTopic(self, _caller_id, topic, protocols):

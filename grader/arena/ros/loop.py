@@ -1,5 +1,6 @@
 """One thread that waits for everything: sockets, consoles, commands, children, timers."""
 
+import contextlib
 import heapq
 import itertools
 import os
@@ -32,10 +33,8 @@ class Loop:
         self._selector.register(fileobj, selectors.EVENT_READ, callback)
 
     def remove_reader(self, fileobj):
-        try:
+        with contextlib.suppress(KeyError, ValueError):  # already gone
             self._selector.unregister(fileobj)
-        except (KeyError, ValueError):
-            pass  # already gone
 
     def on_child(self, callback):
         """Called whenever a child may have ended."""
@@ -47,10 +46,8 @@ class Loop:
     def call_soon(self, callback):
         self._soon.append(callback)
         if threading.get_ident() != self._thread:
-            try:
+            with contextlib.suppress(BlockingIOError):  # a wake-up is already waiting
                 os.write(self._wake_w, b"w")
-            except BlockingIOError:
-                pass  # a wake-up is already waiting
 
     def stop(self):
         self._running = False

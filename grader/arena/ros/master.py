@@ -67,7 +67,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self._param("delete", key, caller_id, None)
         return answer
 
-    def shutdown(self, caller_id, msg=""):
+    def shutdown(self, caller_id, msg=""):  # noqa: ARG002 - the master API
         """A student's node has no business ending the master: refused, and noted."""
         self._wire.event(
             "/grader/actor",

@@ -1,5 +1,6 @@
 """Runs processes, reads what they print, stops them, and counts what they used."""
 
+import contextlib
 import json
 import os
 import signal
@@ -18,7 +19,7 @@ class Process:
         self.name = spec["name"]
         self.role = spec["role"]
         self.alive = True
-        self._loop = loop
+        self.loop = loop
         self._wire = wire
         self._limits = limits
         self._on_exit = on_exit
@@ -44,8 +45,8 @@ class Process:
         if not self.alive:
             return
         self.interrupt()
-        self._loop.call_later(int_s, lambda: self._escalate("TERM", signal.SIGTERM))
-        self._loop.call_later(int_s + term_s, self.kill)
+        self.loop.call_later(int_s, lambda: self._escalate("TERM", signal.SIGTERM))
+        self.loop.call_later(int_s + term_s, self.kill)
 
     def kill(self):
         if self.alive:
@@ -69,7 +70,7 @@ class Process:
             self._count(usage)
             if self._inner_pid is None:
                 self._signal_group(signal.SIGKILL)
-            self._loop.call_later(WATCH_S, self._finish)
+            self.loop.call_later(WATCH_S, self._finish)
         if self._inner_pid is not None:
             try:
                 pid, _, usage = os.wait4(self._inner_pid, os.WNOHANG)
@@ -121,19 +122,17 @@ class Process:
             text += chunk
             if chunk and b"}" not in text:
                 return
-            self._loop.remove_reader(info_r)
+            self.loop.remove_reader(info_r)
             os.close(info_r)
             if text:
                 self._inner_pid = json.loads(text.decode())["child-pid"]
 
-        self._loop.add_reader(info_r, readable)
+        self.loop.add_reader(info_r, readable)
 
     def _signal_group(self, number):
         """The inner process leads a session of its own; its namespace's init ignores what it has no handler for."""
-        try:
+        with contextlib.suppress(ProcessLookupError, PermissionError):  # already over
             os.killpg(self._inner_pid or self.pid, number)
-        except (ProcessLookupError, PermissionError):
-            pass  # already over
 
     def _escalate(self, name, number):
         if self.alive and self._stopped_by != "KILL":
@@ -161,7 +160,7 @@ class Process:
         elif len(tree) > self._limits["processes"]:
             self._limit("processes", "{} processes".format(len(tree)))
         else:
-            self._loop.call_later(WATCH_S, self._watch)
+            self.loop.call_later(WATCH_S, self._watch)
 
     def _limit(self, what, detail):
         note = "stopped by the grader: limit of {}: {}".format(what, detail)
@@ -173,7 +172,10 @@ class Process:
         self._lines += 1
         self._bytes += len(data)
         if self._lines > self._limits["output_lines"] or self._bytes > self._limits["output_bytes"]:
-            if self._limits["output_lines"] + 1 == self._lines or self._bytes - len(data) <= self._limits["output_bytes"]:
+            if (
+                self._limits["output_lines"] + 1 == self._lines
+                or self._bytes - len(data) <= self._limits["output_bytes"]
+            ):
                 self._console(stream, "… output past the limit is left out", True)
                 self._lines = self._limits["output_lines"] + 1
                 self._bytes = self._limits["output_bytes"] + 1
@@ -220,7 +222,7 @@ class _Stream:
         self._pipe = pipe
         self._rest = b""
         os.set_blocking(pipe.fileno(), False)
-        process._loop.add_reader(pipe, self._readable)
+        process.loop.add_reader(pipe, self._readable)
 
     def _readable(self):
         try:
@@ -230,7 +232,7 @@ class _Stream:
         if not chunk:
             if self._rest:
                 self._process.line(self._name, self._rest, False)
-            self._process._loop.remove_reader(self._pipe)
+            self._process.loop.remove_reader(self._pipe)
             self._pipe.close()
             self._process.stream_closed()
             return
@@ -258,10 +260,8 @@ def _signal_of(code):
 
 
 def _kill(pid, number):
-    try:
+    with contextlib.suppress(ProcessLookupError, PermissionError):  # already over
         os.kill(pid, number)
-    except (ProcessLookupError, PermissionError):
-        pass  # already over
 
 
 def _descendants(pid):

@@ -28,10 +28,10 @@ MESSAGE_BYTES_MAX = 64 << 20
 class Recorder:
     def __init__(self, loop, wire, caller_id, limits):
         self._loop = loop
-        self._wire = wire
+        self.wire = wire
         self._caller_id = caller_id
-        self._messages_max = limits["channel_messages"]
-        self._bytes_max = limits["channel_bytes"]
+        self.messages_max = limits["channel_messages"]
+        self.bytes_max = limits["channel_bytes"]
         self._open = {}
         self._pending = {}
         self._serving = set()
@@ -67,7 +67,7 @@ class Recorder:
                 break
             except ProtocolError as error:
                 if time.monotonic() > deadline:
-                    self._note("refused", topic, caller_id, detail=str(error)[:300])
+                    self.note("refused", topic, caller_id, detail=str(error)[:300])
                     self._answered(caller_id, connected)
                     return
             pause.wait(RETRY_S)
@@ -75,7 +75,7 @@ class Recorder:
         with self._lock:
             self._open[sock] = connection
             self._serving.add((caller_id, caller_api))
-        self._note("connected", topic, caller_id)
+        self.note("connected", topic, caller_id)
         self._loop.call_soon(lambda: self._loop.add_reader(sock, connection.readable))
         self._answered(caller_id, connected)
 
@@ -115,12 +115,12 @@ class Recorder:
             raise ProtocolError(header.get("error", "header without type and md5sum"))
         return sock, header
 
-    def _note(self, event, topic, caller_id, **fields):
+    def note(self, event, topic, caller_id, **fields):
         record = {"event": event, "topic": topic, "callerid": caller_id}
         record.update(fields)
-        self._wire.event("/grader/recorder", record)
+        self.wire.event("/grader/recorder", record)
 
-    def _closed(self, connection):
+    def closed(self, connection):
         with self._lock:
             self._open.pop(connection.sock, None)
         self._loop.remove_reader(connection.sock)
@@ -137,7 +137,7 @@ class _Connection:
         self._bytes = 0
         self._dropped = 0
         self._closed = False
-        self._channel = recorder._wire.channel(
+        self._channel = recorder.wire.channel(
             topic=topic,
             callerid=caller_id,
             type=header["type"],
@@ -171,7 +171,7 @@ class _Connection:
         while len(buffer) - start >= LENGTH.size:
             (length,) = LENGTH.unpack_from(buffer, start)
             if length > MESSAGE_BYTES_MAX:
-                self._recorder._note("invalid", self._topic, self._caller_id, detail="{} bytes".format(length))
+                self._recorder.note("invalid", self._topic, self._caller_id, detail="{} bytes".format(length))
                 self.close()
                 break
             end = start + LENGTH.size + length
@@ -191,26 +191,26 @@ class _Connection:
         if forward is not None:
             for frame in frames:
                 forward(frame)
-        room = recorder._messages_max - self._messages
+        room = recorder.messages_max - self._messages
         kept = frames if len(frames) <= room else frames[: max(0, room)]
         size = sum(map(len, kept))
-        if self._bytes + size > recorder._bytes_max:
+        if self._bytes + size > recorder.bytes_max:
             kept, size = [], 0
         if kept:
-            recorder._wire.messages(self._channel, kept, time_ns)
+            recorder.wire.messages(self._channel, kept, time_ns)
         self._messages += len(kept)
         self._bytes += size
         if len(kept) < len(frames):
             if not self._dropped:
-                recorder._note("limit", self._topic, self._caller_id, messages=self._messages)
+                recorder.note("limit", self._topic, self._caller_id, messages=self._messages)
             self._dropped += len(frames) - len(kept)
 
     def close(self):
         if self._closed:
             return
         self._closed = True
-        self._recorder._closed(self)
+        self._recorder.closed(self)
         self.sock.close()
-        self._recorder._note(
+        self._recorder.note(
             "closed", self._topic, self._caller_id, messages=self._messages, dropped=self._dropped
         )

@@ -35,7 +35,7 @@ def call(method, *args):
     """Call a method of the slave API and return its value; raise ProtocolError for anything but success."""
     try:
         code, message, value = method(*args)
-    except Exception as error:  # noqa: BLE001 - a hostile answer raises from sockets, http.client, expat, xmlrpc
+    except Exception as error:
         raise ProtocolError("{}: {}".format(type(error).__name__, error)) from error
     if code != 1:
         raise ProtocolError(str(message)[:200])
@@ -50,7 +50,7 @@ def read_header(sock):
     body = read_exactly(sock, length)
     try:
         return decode_ros_handshake_header(LENGTH.pack(length) + body)
-    except Exception as error:  # noqa: BLE001 - whatever rosgraph raises for bytes that are no header
+    except Exception as error:
         raise ProtocolError("no connection header: {}".format(error)) from error
 
 

@@ -1,0 +1,258 @@
+"""Records everything that a rubric needs of one submission: the package, its build, and every scenario.
+
+Runs that do not disturb each other go side by side: a run that measures a rate has a lane of its own.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import tempfile
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from typing_extensions import Self
+
+from grader import __version__
+from grader.arena.build import BUILD_EXPECTED_S, BuildOutcome, build
+from grader.arena.place import Place
+from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
+from grader.arena.sandbox import Limits, Mode, Sandbox, choose, prepare
+from grader.arena.scenario import ScenarioCost, expected_s, run_scenario
+from grader.arena.workspace import Workspace, make_workspace, read_untrusted
+from grader.errors import ArenaError
+from grader.evidence.events import ScenarioEvent
+from grader.evidence.writer import EvidenceWriter
+from grader.model.package import PackageFacts
+from grader.model.progress import Progress
+from grader.model.submission import Submission
+from grader.package import python_paths, read_package, read_syntax_report, with_build_facts
+from grader.rubric.model import Rubric, Scenario
+
+PACKAGE = "package"
+ATTACHED_BYTES_MAX = 256 << 10
+ATTACHED_FILES_MAX = 60
+ATTACHED_SUFFIXES = (
+    ".py",
+    ".xml",
+    ".txt",
+    ".launch",
+    ".yaml",
+    ".yml",
+    ".cfg",
+    ".sh",
+    ".cpp",
+    ".h",
+    ".msg",
+    ".srv",
+)
+NO_ROS = "no ROS 1 on this machine"
+STATIC_ONLY = "nothing was run: only the files were asked for"
+
+
+@dataclass(kw_only=True)
+class Recording:
+    """What was recorded, where, by what, and at what cost (CPU seconds)."""
+
+    folder: Path
+    facts: PackageFacts
+    ros: RosInstallation | None
+    sandbox: Sandbox | None
+    cpu_s: float = 0.0
+    student_cpu_s: float = 0.0
+    files: list[Path] = field(default_factory=list)
+
+    def add(self, cost: ScenarioCost | BuildOutcome) -> None:
+        self.cpu_s += cost.cpu_s
+        self.student_cpu_s += cost.student_cpu_s
+
+
+class Recorder:
+    """Records one submission into a folder. Use as a context: its workspaces live as long as it does."""
+
+    def __init__(
+        self,
+        submission: Submission,
+        rubric: Rubric,
+        folder: Path,
+        *,
+        mode: Mode,
+        static_only: bool,
+        progress: Progress,
+    ) -> None:
+        self._submission = submission
+        self._rubric = rubric
+        self._progress = progress
+        self._limits = Limits()
+        ros = None if static_only else find_ros()
+        self._not_run = STATIC_ONLY if static_only else "" if ros else NO_ROS
+        progress.step("package", "running", "reading its files")
+        facts = read_package(submission.package, hints=submission.hints)
+        progress.step("package", "done")
+        self.recording = Recording(folder=folder, facts=facts, ros=ros, sandbox=choose(mode) if ros else None)
+        self._place: Place | None = None
+
+    def __enter__(self) -> Self:
+        # Found by path from inside the sandbox, so passable for others, but not readable.
+        self._temporary = tempfile.TemporaryDirectory(prefix="grader-", ignore_cleanup_errors=True)
+        Path(self._temporary.name).chmod(0o711)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._temporary.cleanup()
+
+    def record_all(self) -> None:
+        """The package with its build, then every scenario in its lane."""
+        asyncio.run(self._record_all())
+
+    def record_again(self, scenarios: Iterable[str]) -> None:
+        """These scenarios once more, one after the other, with nothing beside them."""
+        asyncio.run(self._lane(self._place, tuple(scenarios)))
+
+    async def _record_all(self) -> None:
+        await self._record_package()
+        if self._place is None:
+            for name in self._rubric.scenarios:
+                self._progress.step(name, "skipped", self._not_run)
+            return
+        measuring, others = lanes(self._rubric.scenarios)
+        await asyncio.gather(self._lane(self._place, measuring), self._lane(self._place, others))
+
+    async def _lane(self, place: Place | None, names: tuple[str, ...]) -> None:
+        for name in names:
+            if place is not None:
+                await self._record_scenario(place, name, self._rubric.scenarios[name])
+
+    async def _record_package(self) -> None:
+        recording = self.recording
+        path = recording.folder / f"{PACKAGE}.mcap"
+        metadata = self._metadata() | ({"not_run": self._not_run} if self._not_run else {})
+        with EvidenceWriter(path, scenario=PACKAGE, clock="real", warp=1.0, metadata=metadata) as writer:
+            if recording.ros is not None and recording.sandbox is not None:
+                await self._build(writer, recording.ros, recording.sandbox)
+            now_ns = time.time_ns()
+            writer.package(recording.facts, now_ns)
+            for name, data in _attachments(self._submission.package.folder, recording.facts):
+                writer.attach(name, data, now_ns, "text/plain")
+        recording.files.append(path)
+
+    async def _build(self, writer: EvidenceWriter, ros: RosInstallation, sandbox: Sandbox) -> None:
+        self._progress.step("build", "running", "catkin_make", BUILD_EXPECTED_S)
+        recording = self.recording
+        place = self._make_place(ros, sandbox)
+        faulty = [script for script in self._scripts() if _needs_answer(recording.facts, script)]
+        try:
+            self._place, outcome = await build(place, writer, python_paths(recording.facts), faulty)
+        except ArenaError as error:
+            event = ScenarioEvent(event="end", outcome="host", detail=error.message)
+            writer.event("/grader/scenario", time.time_ns(), event)
+            self._progress.step("build", "failed", error.message)
+            self._not_run = error.message
+            return
+        recording.add(outcome)
+        report = read_syntax_report(outcome.syntax.read_bytes()) if outcome.syntax else None
+        recording.facts = with_build_facts(
+            recording.facts,
+            cmake_trace=outcome.trace,
+            cmake_root=outcome.root,
+            python_faults=report.faults if report else None,
+            python_slips=report.slips if report else None,
+        )
+        self._progress.step(
+            "build", "done" if outcome.ok else "failed", "" if outcome.ok else "catkin_make failed"
+        )
+
+    def _make_place(self, ros: RosInstallation, sandbox: Sandbox) -> Place:
+        folder = Path(self._temporary.name)
+        prepare(folder, ros)
+        scripts = self._scripts()
+        workspace: Workspace = make_workspace(
+            folder, self._submission, self.recording.facts, scripts, sandbox.uid
+        )
+        name = (
+            self.recording.facts.manifest.name
+            if self.recording.facts.manifest
+            else self._submission.package.name
+        )
+        return Place(
+            folder=folder, ros=ros, sandbox=sandbox, limits=self._limits, workspace=workspace, package=name
+        )
+
+    def _scripts(self) -> list[str]:
+        """The paths, in this package, of the scripts that the scenarios start."""
+        paths = [
+            f.path for f in sorted(self.recording.facts.files, key=lambda f: (f.path.count("/"), f.path))
+        ]
+        wanted = {
+            s.script for scenario in self._rubric.scenarios.values() for s in scenario.start if s.script
+        }
+        found = []
+        for script in sorted(wanted):
+            name = Path(script).name
+            match = script if script in paths else next((p for p in paths if Path(p).name == name), None)
+            if match is not None:
+                found.append(match)
+        return found
+
+    async def _record_scenario(self, place: Place, name: str, scenario: Scenario) -> None:
+        shown = ""
+
+        def tell(detail: str) -> None:
+            nonlocal shown
+            if detail != shown:
+                shown = detail
+                self._progress.step(name, "running", detail, expected_s(scenario))
+
+        path = self.recording.folder / f"{name}.mcap"
+        self.recording.add(
+            await run_scenario(name, scenario, place, path=path, metadata=self._metadata(), tell=tell)
+        )
+        if path not in self.recording.files:
+            self.recording.files.append(path)
+        self._progress.step(name, "done")
+
+    def _metadata(self) -> dict[str, str]:
+        submission, recording = self._submission, self.recording
+        return {
+            "submission.id": submission.id,
+            "submission.source": submission.source,
+            "submission.commit": submission.commit or "",
+            "submission.digest": submission.digest,
+            "submission.package": submission.package.name,
+            "grader": __version__,
+            "ros": recording.ros.label if recording.ros else "",
+            "python": recording.ros.python if recording.ros else "",
+            "sandbox": recording.sandbox.label if recording.sandbox else "",
+            "limits": self._limits.model_dump_json(),
+        }
+
+
+def lanes(scenarios: Mapping[str, Scenario]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the runs that measure rates in real time, and of the others."""
+    measuring = tuple(n for n, s in scenarios.items() if s.clock == "real" and (s.until.window_s or 0) >= 3)
+    return measuring, tuple(n for n in scenarios if n not in measuring)
+
+
+def install_hint() -> str:
+    """The command that brings what was missing."""
+    return INSTALL_HINT
+
+
+def _needs_answer(facts: PackageFacts, path: str) -> bool:
+    file = facts.file(path)
+    if file is None:
+        return False
+    shebang = file.shebang
+    return file.executable is False or shebang is None or shebang.crlf or shebang.found is False
+
+
+def _attachments(folder: Path, facts: PackageFacts) -> Iterable[tuple[str, bytes]]:
+    """The package's own text files that were judged, as far as they are of a size to be looked at."""
+    chosen = [
+        f for f in facts.files if not f.binary and f.link is None and f.path.endswith(ATTACHED_SUFFIXES)
+    ]
+    for file in chosen[:ATTACHED_FILES_MAX]:
+        data = read_untrusted(folder / file.path, ATTACHED_BYTES_MAX)
+        if data is not None:
+            yield file.path, data

@@ -1,0 +1,207 @@
+"""The whole data flow: begin reading here.
+
+intake → package facts → arena → evidence → judge → report
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from platform import python_version
+
+from grader import __version__
+from grader.arena.recording import Recorder, Recording
+from grader.arena.sandbox import Mode
+from grader.evidence.reader import load_evidence
+from grader.evidence.run import Run
+from grader.files import unwritable
+from grader.intake import open_submission
+from grader.judge import judge
+from grader.judge.summary import overall_status, total_points
+from grader.model.progress import Progress
+from grader.model.result import (
+    CriterionResult,
+    EnvironmentInfo,
+    GradingResult,
+    RubricInfo,
+    SubmissionInfo,
+    TimingInfo,
+)
+from grader.model.submission import Submission
+from grader.model.verdict import Status
+from grader.report.files import write_reports
+from grader.rubric.load import LoadedRubric
+
+RETRIES = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class GradeOptions:
+    """`static_only` judges files alone; without `keep_hidden`, the reports leave hidden criteria out."""
+
+    sandbox: Mode = "auto"
+    submission_id: str | None = None
+    static_only: bool = False
+    keep_hidden: bool = True
+
+
+def grade(
+    source: str, rubric: LoadedRubric, out: Path, options: GradeOptions, progress: Progress
+) -> GradingResult:
+    """Grade one submission into `out/<its id>/`: evidence, then reports. Raises GraderError where it cannot."""
+    clock = _Clock()
+    with _opened(source, rubric, options, progress) as submission:
+        folder = out / submission.id
+        with _new_evidence(folder) as evidence:
+            recording, criteria = _recorded_and_judged(submission, rubric, evidence, options, progress)
+            console = console_log(load_evidence([evidence]))
+        result = _result(submission, rubric, recording, criteria, clock)
+        write_reports(result, folder, console=console, rubric=rubric.rubric, keep_hidden=options.keep_hidden)
+    return result
+
+
+def record(
+    source: str, rubric: LoadedRubric, out: Path, options: GradeOptions, progress: Progress
+) -> list[Path]:
+    """Record the rubric's scenarios into `out/<its id>/evidence/` and judge nothing."""
+    with _opened(source, rubric, options, progress) as submission:
+        folder = out / submission.id
+        with (
+            _new_evidence(folder) as evidence,
+            _recorder(submission, rubric, evidence, options, progress) as recorder,
+        ):
+            recorder.record_all()
+            names = [path.name for path in recorder.recording.files]
+    return [folder / "evidence" / name for name in names]
+
+
+def console_log(runs: dict[str, Run]) -> str:
+    """What every process printed, by scenario, with seconds since the run began."""
+    lines = []
+    for name, run in runs.items():
+        lines += [f"== {name}"] if run.console else []
+        for time_ns, line in run.console:
+            lines.append(f"{(time_ns - run.start_ns) / 1e9:8.3f} {line.process} {line.stream}: {line.line}")
+    return "".join(f"{line}\n" for line in lines)
+
+
+class _Clock:
+    """Seconds since now: of the wall, and of this process's CPU."""
+
+    def __init__(self) -> None:
+        self._wall, self._cpu = time.monotonic(), time.process_time()
+
+    def timing(self, recording: Recording) -> TimingInfo:
+        return TimingInfo(
+            wall_s=round(time.monotonic() - self._wall, 3),
+            cpu_s=round(time.process_time() - self._cpu + recording.cpu_s, 3),
+            student_cpu_s=round(recording.student_cpu_s, 3),
+        )
+
+
+@contextmanager
+def _opened(
+    source: str, rubric: LoadedRubric, options: GradeOptions, progress: Progress
+) -> Iterator[Submission]:
+    progress.step("intake", "running", source)
+    with tempfile.TemporaryDirectory(prefix="grader-source-", ignore_cleanup_errors=True) as folder:
+        submission = open_submission(
+            source,
+            package=rubric.rubric.package,
+            workdir=Path(folder),
+            submission_id=options.submission_id,
+        )
+        progress.step("intake", "done", submission.id)
+        yield submission
+
+
+@contextmanager
+def _new_evidence(folder: Path) -> Iterator[Path]:
+    """A folder to record into, which takes the place of `folder/evidence` when all went well, and leaves no trace
+    otherwise."""
+    target, beside = folder / "evidence", folder / ".evidence.part"
+    existed = folder.exists()
+    try:
+        shutil.rmtree(beside, ignore_errors=True)
+        beside.mkdir(parents=True)
+    except OSError as error:
+        raise unwritable(folder, error) from error
+    try:
+        yield beside
+        shutil.rmtree(target, ignore_errors=True)
+        beside.rename(target)
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+        if not existed and not any(folder.iterdir()):
+            folder.rmdir()
+
+
+def _recorder(
+    submission: Submission, rubric: LoadedRubric, evidence: Path, options: GradeOptions, progress: Progress
+) -> Recorder:
+    return Recorder(
+        submission,
+        rubric.rubric,
+        evidence,
+        mode=options.sandbox,
+        static_only=options.static_only,
+        progress=progress,
+    )
+
+
+def _recorded_and_judged(
+    submission: Submission, rubric: LoadedRubric, evidence: Path, options: GradeOptions, progress: Progress
+) -> tuple[Recording, tuple[CriterionResult, ...]]:
+    """What the evidence cannot say because the machine was late is recorded again, alone, at most twice."""
+    with _recorder(submission, rubric, evidence, options, progress) as recorder:
+        recorder.record_all()
+        criteria = judge(rubric.rubric, load_evidence([evidence]))
+        for _ in range(RETRIES):
+            again = _inconclusive_scenarios(criteria, recorder.recording)
+            if not again:
+                break
+            recorder.record_again(again)
+            criteria = judge(rubric.rubric, load_evidence([evidence]))
+    return recorder.recording, criteria
+
+
+def _inconclusive_scenarios(criteria: tuple[CriterionResult, ...], recording: Recording) -> list[str]:
+    recorded = {path.stem for path in recording.files}
+    doubtful = {c.scenario for c in criteria if c.status is Status.INCONCLUSIVE and c.scenario is not None}
+    return sorted(doubtful & recorded)
+
+
+def _result(
+    submission: Submission,
+    rubric: LoadedRubric,
+    recording: Recording,
+    criteria: tuple[CriterionResult, ...],
+    clock: _Clock,
+) -> GradingResult:
+    ros, sandbox = recording.ros, recording.sandbox
+    return GradingResult(
+        submission=SubmissionInfo(
+            id=submission.id,
+            source=submission.source,
+            commit=submission.commit,
+            digest=submission.digest,
+            package=submission.package.name,
+        ),
+        rubric=RubricInfo(id=rubric.rubric.id, version=rubric.rubric.version, digest=rubric.digest),
+        status=overall_status(criteria),
+        points=total_points(rubric.rubric, criteria),
+        max_points=rubric.rubric.max_points,
+        criteria=criteria,
+        environment=EnvironmentInfo(
+            grader=__version__,
+            ros=ros.label if ros else "",
+            python=python_version(),
+            sandbox=sandbox.label if sandbox else "nothing was run",
+        ),
+        timing=clock.timing(recording),
+    )

@@ -1,0 +1,107 @@
+"""Runs made-up packages in a real arena."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from grader.arena.place import Place
+from grader.arena.ros_env import require_ros
+from grader.arena.sandbox import Limits, choose, prepare
+from grader.arena.scenario import run_scenario
+from grader.arena.workspace import make_workspace
+from grader.evidence.reader import load_run
+from grader.evidence.run import Run
+from grader.model.submission import SourcePackage, Submission
+from grader.package import read_package
+from grader.rubric.model import Scenario, Start, Until
+
+MANIFEST = """<?xml version="1.0"?>
+<package format="2"><name>lab</name><version>0.0.0</version><description>lab</description>
+<maintainer email="a@b.c">a</maintainer><license>MIT</license>
+<buildtool_depend>catkin</buildtool_depend></package>
+"""
+CMAKE = "cmake_minimum_required(VERSION 3.0.2)\nproject(lab)\nfind_package(catkin REQUIRED)\ncatkin_package()\n"
+SCRIPT = "#!/usr/bin/env python3\n"
+RUN_S = 60.0
+
+
+def make_submission(folder: Path, files: Mapping[str, str]) -> Submission:
+    """A submission that holds the package `lab` with these files; scripts are executable."""
+    for name, text in {"package.xml": MANIFEST, "CMakeLists.txt": CMAKE, **files}.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    executable = {p.relative_to(folder).as_posix(): p.suffix == ".py" for p in folder.rglob("*") if p.is_file()}
+    package = SourcePackage(name="lab", folder=folder, path=".", mode_source="disk", executable=executable)
+    return Submission(
+        id="lab",
+        source=str(folder),
+        root=folder,
+        commit=None,
+        archive_sha256=None,
+        digest="0",
+        package=package,
+        packages=(),
+    )
+
+
+@contextlib.contextmanager
+def make_place(
+    files: Mapping[str, str], *, sandbox: str = "auto", limits: Limits | None = None, folder: Path | None = None
+) -> Iterator[Place]:
+    """A place with the package unbuilt: ROS finds its sources."""
+    with tempfile.TemporaryDirectory(prefix="grader-test-") as name:
+        top = Path(name)
+        top.chmod(0o711)
+        submission = make_submission(folder or top / "submission", files)
+        chosen, ros = choose(sandbox), require_ros()  # type: ignore[arg-type]
+        prepare(top / "place", ros)
+        scripts = [f for f in files if f.endswith(".py")]
+        facts = read_package(submission.package)
+        workspace = make_workspace(top / "place", submission, facts, scripts, chosen.uid)
+        place = Place(
+            folder=top / "place",
+            ros=ros,
+            sandbox=chosen,
+            limits=limits or Limits(),
+            workspace=workspace,
+            package="lab",
+        )
+        yield place.from_source()
+
+
+def run(place: Place, scenario: Scenario, path: Path) -> Run:
+    """Record a scenario and read it back."""
+    asyncio.run(_bounded(place, scenario, path))
+    return load_run(path)
+
+
+def run_script(tmp_path: Path, code: str, *, sandbox: str = "auto", limits: Limits | None = None, **until: object) -> Run:
+    """Run one script as `node.py` until the conditions hold."""
+    scenario = Scenario(
+        title="test",
+        clock=until.pop("clock", "real"),  # type: ignore[arg-type]
+        start=(Start(name="node", script="src/node.py"),),
+        until=Until.model_validate(until),
+    )
+    with make_place({"src/node.py": SCRIPT + code}, sandbox=sandbox, limits=limits) as place:
+        return run(place, scenario, tmp_path / "run.mcap")
+
+
+async def _bounded(place: Place, scenario: Scenario, path: Path) -> None:
+    await asyncio.wait_for(
+        run_scenario("run", scenario, place, path=path, metadata={}, tell=lambda _: None), RUN_S
+    )
+
+
+def exit_of(run: Run, name: str = "node") -> object:
+    """The process's exit event."""
+    return next(e for _, e in run.processes if e.name == name and e.event == "exit")
+
+
+def printed(run: Run, name: str = "node") -> list[str]:
+    return [line.line for _, line in run.lines(name)]

@@ -1,0 +1,80 @@
+"""When a run has seen enough: pure."""
+
+from __future__ import annotations
+
+import pytest
+
+from grader.arena.live import Live, next_look_s, settled, waiting_for
+from grader.rubric.model import Until
+
+
+def _live(**topics: tuple[int, float, float]) -> Live:
+    """Topics as count, first, last; the run started at 0, its process runs."""
+    live = Live(running={"node"})
+    for name, (count, first_s, last_s) in topics.items():
+        seen = live.topics["/" + name]
+        seen.count, seen.first_s, seen.last_s = count, first_s, last_s
+    return live
+
+
+WINDOW = Until(window_s=6, topics=("/a", "/b"), first_message_s=20, silent_s=5)
+COUNT = Until(messages={"/a": 10}, silent_s=5, limit_s=60)
+
+
+@pytest.mark.parametrize(
+    ("until", "live", "now_s", "outcome"),
+    [
+        (WINDOW, _live(), 19.0, None),
+        (WINDOW, _live(), 20.1, "silent"),
+        (WINDOW, _live(a=(5, 1.0, 2.0), b=(5, 3.0, 3.5)), 8.9, None),
+        (WINDOW, _live(a=(5, 1.0, 2.0), b=(5, 3.0, 3.5)), 9.0, "complete"),
+        (WINDOW, _live(a=(5, 1.0, 2.0)), 6.9, None),
+        (WINDOW, _live(a=(5, 1.0, 2.0)), 7.0, "complete"),
+        (COUNT, _live(a=(9, 1.0, 2.0)), 6.9, None),
+        (COUNT, _live(a=(10, 1.0, 2.0)), 2.0, "complete"),
+        (COUNT, _live(a=(9, 1.0, 2.0)), 7.1, "silent"),
+        (COUNT, _live(b=(9, 1.0, 9.0)), 6.1, "silent"),
+        (COUNT, _live(a=(9, 1.0, 60.0)), 60.1, "timeout"),
+        (Until(limit_s=3), _live(), 2.9, None),
+        (Until(limit_s=3), _live(), 3.1, "complete"),
+        (Until(connected=("/a",)), _live(), 1.0, None),
+    ],
+)
+def test_settled(until: Until, live: Live, now_s: float, outcome: str | None) -> None:
+    done = settled(live, until, now_s)
+    assert (done and done[0]) == outcome
+
+
+def test_ended_comes_before_all_else() -> None:
+    live = _live(a=(10, 1.0, 2.0))
+    live.running, live.ended = set(), {"node"}
+    assert settled(live, COUNT, 2.0) == ("ended", "")
+
+
+def test_heard_takes_numbers_as_words_of_their_own() -> None:
+    live = _live()
+    live.sent("12", 1.0)
+    live.sent("-5", 1.0)
+    live.printed("[INFO] [1712.512]: I heard 128, 5 and 3.12", 1.1)
+    assert set(live.unheard) == {"12", "-5"}
+    live.printed("I heard -5: 12", 1.2)
+    assert not live.unheard
+
+
+def test_heard_waits_only_so_long_after_the_last_line() -> None:
+    live, until = _live(), Until(heard=True)
+    live.sent("12", 1.0)
+    live.printed("nothing of it", 1.5)
+    assert settled(live, until, 3.4) is None
+    assert settled(live, until, 3.6) == ("complete", "")
+
+
+def test_waiting_is_said_in_words() -> None:
+    assert waiting_for(_live(), WINDOW) == "waiting for the first message on /a"
+    assert waiting_for(_live(a=(3, 1.0, 2.0)), COUNT) == "3 of 10 messages on /a"
+    assert waiting_for(_live(), Until(connected=("/a",))) == "waiting for a connection over /a"
+
+
+def test_next_look_is_never_in_the_past_and_never_far() -> None:
+    for now_s in (0.0, 3.0, 19.9, 100.0):
+        assert 0 < next_look_s(_live(a=(1, 1.0, 2.0)), WINDOW, now_s) <= 1.001
