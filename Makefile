@@ -33,7 +33,7 @@ test-ros: setup ## the tests that run real nodes
 	@$(BIN)/python -m pytest -m ros
 
 stress: setup ## the reference solution and every fixture, TIMES times each
-	@$(BIN)/python tests/stress.py --times $(TIMES)
+	@$(BIN)/python -m tests.stress --times $(TIMES)
 
 bench: setup ## the figures of benchmarks/README.md, measured here
 	@$(BIN)/python benchmarks/run.py

@@ -1,0 +1,95 @@
+"""The fixtures of the labs, graded: for the tests and for `make stress`."""
+
+from __future__ import annotations
+
+import multiprocessing
+import re
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+import yaml
+from pydantic import Field
+
+from grader.model.progress import Silence
+from grader.model.record import Record
+from grader.model.result import CriterionResult, GradingResult
+from grader.model.verdict import Status
+from grader.pipeline import GradeOptions, grade
+from grader.rubric.load import load_rubric
+from grader.rubric.model import Rubric
+
+ROOT = Path(__file__).resolve().parent.parent
+REFERENCE = "reference"
+SIDE_BY_SIDE = 2
+
+
+class Fixture(Record):
+    """`fixture.yaml`. Criteria that `expect` does not name must pass; `message` holds patterns for what the report
+    says of a criterion (message, measured value, hint, case ignored); `points` only where a score is partial."""
+
+    lab: str
+    summary: str = Field(min_length=10, pattern=r"^\S.*\.$")
+    expect: dict[str, Status]
+    message: dict[str, str] = Field(default_factory=dict)
+    points: float | None = None
+
+
+def fixture_names(lab: str) -> list[str]:
+    return sorted(path.parent.name for path in (ROOT / "fixtures" / lab).glob("*/fixture.yaml"))
+
+
+def source_of(lab: str, name: str) -> Path:
+    """The folder to grade: of a fixture, or of the reference solution."""
+    return ROOT / "reference_solutions" / lab if name == REFERENCE else ROOT / "fixtures" / lab / name
+
+
+def read_fixture(lab: str, name: str) -> Fixture:
+    """What is expected; of the reference solution, that everything passes."""
+    if name == REFERENCE:
+        return Fixture(lab=lab, summary="The reference solution.", expect={})
+    text = (source_of(lab, name) / "fixture.yaml").read_text(encoding="utf-8")
+    return Fixture.model_validate(yaml.safe_load(text))
+
+
+def grade_fixture(lab: str, name: str, out: Path) -> GradingResult:
+    """Grade it for real. Called in a process of its own."""
+    return grade(
+        str(source_of(lab, name)), load_rubric(lab), out, GradeOptions(submission_id=name), Silence()
+    )
+
+
+@contextmanager
+def workers(count: int = SIDE_BY_SIDE) -> Iterator[ProcessPoolExecutor]:
+    """Processes that grade side by side; what has not begun when the block is left is not begun."""
+    pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def expected_points(fixture: Fixture, rubric: Rubric) -> float:
+    if fixture.points is not None:
+        return fixture.points
+    return sum(c.points for c in rubric.criteria if c.id not in fixture.expect)
+
+
+def surprises(result: GradingResult, fixture: Fixture, rubric: Rubric) -> list[str]:
+    """What is not as the fixture expects, a line each; empty where all is well."""
+    found = [line for c in result.criteria for line in _surprises_of(c, fixture)]
+    points = expected_points(fixture, rubric)
+    if result.points != points:
+        found.append(f"points: wanted {points:g}, got {result.points:g}")
+    return found
+
+
+def _surprises_of(criterion: CriterionResult, fixture: Fixture) -> Iterator[str]:
+    said = f"{criterion.message} [measured: {criterion.measured}] [hint: {criterion.hint}]"
+    wanted = fixture.expect.get(criterion.id, Status.PASS)
+    if criterion.status is not wanted:
+        yield f"{criterion.id}: wanted {wanted.value}, got {criterion.status.value}: {said}"
+    pattern = fixture.message.get(criterion.id, "")
+    if not re.search(pattern, said, re.IGNORECASE):
+        yield f"{criterion.id}: says nothing like {pattern!r}: {said}"
