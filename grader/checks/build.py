@@ -108,10 +108,10 @@ def _first_error(lines: Sequence[str]) -> BuildError | None:
 
 
 def _paragraph(lines: Sequence[str]) -> str:
-    """The text of a CMake error: the first paragraph after its heading, which is indented."""
+    """The text of a CMake error: the first paragraph after its heading, and the one that its colon announces."""
     words: list[str] = []
     for line in lines:
-        if words and not line.strip():
+        if words and not line.strip() and not words[-1].endswith(":"):
             break
         words += line.split()
     return " ".join(words)

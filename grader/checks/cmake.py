@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from grader.checks.registry import check
-from grader.model.package import CMakeCall, CMakeFacts, PackageFacts
+from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed
 
 
 class CMakeParams(Record):
-    """`name` is the package's name, for a package whose manifest cannot be read."""
+    """`name` is the handout's name for the package, right also where the manifest has another."""
 
     name: str
 
@@ -38,41 +38,46 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
         `find_package(catkin REQUIRED COMPONENTS rospy std_msgs)` and `catkin_package()`.
     """
     wanted = package.manifest.name if package.manifest else params.name
-    expected = f"project({wanted}), find_package(catkin …), catkin_package(…)"
+    names = (wanted, params.name)
+    expected = f"project({params.name}), find_package(catkin …), catkin_package(…)"
     facts = package.cmake
     if facts is None:
         hint = f"create one with project({wanted}), find_package(catkin REQUIRED) and catkin_package()"
         return failed("there is no CMakeLists.txt", expected=expected, measured="no file", hint=hint)
-    wrong = list(_wrong(facts, wanted))
+    wrong = list(_wrong(facts, names))
     named = [c for c in facts.calls if c.name in {"project", "find_package", "catkin_package"}]
     measured = ", ".join(f"{c.name}({' '.join(c.args[:3])})" for c in named[:6]) or "none of the three calls"
-    if not wrong:
+    fault = facts.fault
+    if not wrong and fault is None:
         places = tuple(FileCitation(file=c.file, line=c.line) for c in named[:3])
         return passed(
             f"{facts.file} has all three calls", expected=expected, measured=measured, citations=places
         )
-    fault = facts.fault
-    stopped = (
-        f"; it cannot be read on from line {fault.line}: {fault.cause or fault.message}" if fault else ""
-    )
     lines = tuple(FileCitation(file=facts.file, line=line) for _, _, line in wrong)
     if fault:
         lines = (*lines, FileCitation(file=fault.file, line=fault.line))
     return failed(
-        f"{facts.file}: {'; '.join(message for message, _, _ in wrong)}{stopped}",
+        f"{facts.file}: {'; '.join([*_fault(fault), *(message for message, _, _ in wrong)])}",
         expected=expected,
         measured=measured,
-        hint="; ".join(hint for _, hint, _ in wrong),
+        hint="; ".join(hint for _, hint, _ in wrong) or "mend that line, then run catkin_make",
         citations=tuple(dict.fromkeys(lines)),
     )
 
 
-def _wrong(facts: CMakeFacts, wanted: str) -> Iterator[tuple[str, str, int | None]]:
+def _fault(fault: Fault | None) -> Iterator[str]:
+    if fault is not None:
+        line = f"line {fault.line}: " if fault.line else ""
+        yield f"{line}CMake cannot read it: {fault.cause or fault.message}"
+
+
+def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[tuple[str, str, int | None]]:
     """What is missing or wrong, how to mend it, and the line."""
+    wanted = names[0]
     project = _first(facts, "project")
     if project is None:
         yield "project(…) is missing", f"add project({wanted})", None
-    elif project.args[:1] != (wanted,):
+    elif not project.args or project.args[0] not in names:
         name = project.args[0] if project.args else ""
         message = f"line {project.line}: project({name}) differs from the package's name {wanted}"
         yield message, f"write project({wanted})", project.line

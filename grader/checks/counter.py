@@ -110,7 +110,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     return verdict.model_copy(
         update={
             "expected": expected,
-            "measured": f"{right} of {plural(len(steps), 'step')} +1, {first_values(count.values)}",
+            "measured": f"{plural(right, 'step')} of +1, {len(wrong)} others; {first_values(count.values)}",
             "citations": cite(run, params.topic, at.from_ns, at.to_ns),
         }
     )

@@ -10,7 +10,7 @@ from grader.checks.build import CATKIN_MAKE
 from grader.checks.registry import check
 from grader.checks.support.text import listed, near_names, shown
 from grader.evidence.run import Run
-from grader.model.package import PackageFacts, Shebang, SourceFile
+from grader.model.package import PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed
 
@@ -58,7 +58,7 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
     found = find_script(package, params.path)
     if found is None:
         return _missing(package, params.path, expected)
-    obstacles = [*_shebang_obstacles(package, found), *_mode_obstacles(found)]
+    obstacles = [*_shebang_obstacles(found), *_mode_obstacles(found)]
     measured = f"{found.path}: {_mode(found)}, {_first_line(found)}"
     line = (FileCitation(file=found.path, line=1),)
     elsewhere = found.path != params.path
@@ -122,56 +122,31 @@ def _missing(package: PackageFacts, path: str, expected: str) -> Verdict:
 
 
 def _mode_obstacles(file: SourceFile) -> Iterator[Obstacle]:
-    if file.executable is False and not file.link:
+    if file.executable is False:
         yield Obstacle(
             "has no executable bit",
             f"chmod +x {file.path}, then git update-index --chmod=+x {file.path}, commit and push",
         )
 
 
-def _shebang_obstacles(package: PackageFacts, file: SourceFile) -> Iterator[Obstacle]:
-    shebang = file.shebang
-    if file.link is not None:
-        if shebang is None and not _link_leads_on(package, file):
-            yield Obstacle(f"is a link to {file.link}, which is not there", "hand in the file itself")
+def _shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
+    """What keeps the system from starting the file, the package facts' own words first."""
+    mend = f"write {RIGHT_SHEBANG} as the very first line, with nothing above it"
+    if file.link_problem:
+        yield Obstacle(f"cannot be run: {file.link_problem}", "hand in the file itself")
+    elif file.shebang is not None and file.shebang.crlf:
+        problem = file.shebang_problem or "its #! line ends with Windows' CRLF"
+        yield Obstacle(f"cannot be run: {problem}", f"dos2unix {file.path}, then commit and push")
+    elif file.shebang_problem:
+        yield Obstacle(f"cannot be run: {file.shebang_problem}", mend)
     elif file.bom:
-        mend = "save it as UTF-8 without BOM"
-        yield Obstacle("begins with an invisible byte order mark, so its #! line does not work", mend)
-    elif shebang is None:
-        mend = f"write {RIGHT_SHEBANG} as the very first line, with nothing above it"
+        yield Obstacle("begins with an invisible byte order mark (BOM)", "save it as UTF-8 without BOM")
+    elif file.shebang is None:
         yield Obstacle("does not begin with a #! line", mend)
-    elif shebang.crlf:
-        yield Obstacle("has a #! line that ends in CR LF (from Windows)", f"dos2unix {file.path}")
-    elif fault := _unusable(shebang, file.path):
-        yield Obstacle(
-            f"has the first line #!{shebang.text}: {fault}", f"write {RIGHT_SHEBANG} as the first line"
-        )
-
-
-def _unusable(shebang: Shebang, path: str) -> str:
-    """Why this `#!` line does not lead to a Python that exists, empty if it does."""
-    words = shebang.text.split()
-    if not words or not words[0].startswith("/"):
-        return "it needs the interpreter's whole path, beginning with /"
-    if PurePosixPath(words[0]).name == "env" and len(words) > 2 and not words[1].startswith("-"):
-        return f"env takes {' '.join(words[1:])!r} as one name"
-    if shebang.found is False:
-        return f"there is no {shebang.interpreter} on a ROS machine"
-    if path.endswith(".py") and "python" not in PurePosixPath(shebang.interpreter).name:
-        return f"{shebang.interpreter} does not run Python"
-    return ""
-
-
-def _link_leads_on(package: PackageFacts, file: SourceFile) -> bool:
-    """A link inside the package, to a file of it that can itself be run."""
-    parts: list[str] = []
-    for part in (PurePosixPath(file.path).parent / (file.link or "")).parts:
-        if part == ".." and parts:
-            parts.pop()
-        elif part != ".":
-            parts.append(part)
-    target = package.file("/".join(parts))
-    return target is not None and target.executable is not False and target.shebang is not None
+    elif file.shebang.found is False:
+        yield Obstacle(f"names {file.shebang.interpreter}, which is not on a ROS machine", mend)
+    elif file.python and "python" not in file.shebang.interpreter:
+        yield Obstacle(f"is Python, and its first line names {file.shebang.interpreter}", mend)
 
 
 def _rosrun_answer(build: Run, path: str) -> str:

@@ -131,7 +131,7 @@ def _unconnected(
     """Why no two nodes are connected: a wrong attribute, an error of roslaunch's, or what the graph shows."""
     said = _roslaunch_error(run)
     quoted = f"; roslaunch says: {said}" if said else ""
-    wrong = next(_wrong_attributes(package, file), None) if file else None
+    wrong = next(_wrong_attributes(package, file, said), None) if file else None
     if wrong is not None and file is not None:
         node, message, hint = wrong
         cited = (FileCitation(file=file.path, line=node.line),)
@@ -139,13 +139,9 @@ def _unconnected(
     nodes = run.student_nodes()
     if len(nodes) < 2:
         up = f"only {nodes[0]} comes up" if nodes else "no node comes up"
-        count = len(file.nodes) if file else 0
-        declared = (
-            f"; the file has {plural(count, '<node>').replace('s', '') if count == 1 else f'{count} <node>s'}"
-        )
-        return failed(
-            f"{up}{declared}{quoted}", hint="give each script a <node>, and run each alone with rosrun"
-        )
+        message = f"{up}; the file declares {plural(len(file.nodes) if file else 0, 'node')}{quoted}"
+        hint = "give the talker and the listener a <node> each, and try each script alone with rosrun"
+        return failed(message, hint=hint)
     return _over_another_topic(run, params, quoted)
 
 
@@ -168,7 +164,7 @@ def _over_another_topic(run: Run, params: LaunchConnectsParams, quoted: str) -> 
         )
         return failed(message + quoted, hint="do both use the same message type?")
     lacking = "publishes on" if not publishers else "subscribes to"
-    message = f"{listed(run.student_nodes())} came up, but none {lacking} {params.topic}"
+    message = f"{listed(run.student_nodes())} are not connected: none {lacking} {params.topic}"
     return failed(message + quoted, hint="launch a talker and a listener")
 
 
@@ -180,21 +176,31 @@ def _nodes_on(run: Run, topic: str, end: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def _wrong_attributes(package: PackageFacts, file: LaunchFile) -> Iterator[tuple[LaunchNode, str, str]]:
+def _wrong_attributes(
+    package: PackageFacts, file: LaunchFile, said: str
+) -> Iterator[tuple[LaunchNode, str, str]]:
     """Nodes that cannot start by what the file says of them. Names with `$(…)` are roslaunch's to resolve."""
     for node in file.nodes:
+        name = str(node.type)
         missing = [a for a in ("pkg", "type", "name") if not getattr(node, a)]
         if missing:
             yield node, f"<node> has no {listed(missing)}", "a <node> needs pkg, type and name"
-        elif "$(" in f"{node.pkg}{node.type}":
+        elif "$(" in f"{node.pkg}{name}":
             continue
-        elif near_names(package.name, [str(node.pkg)]):
-            yield node, f"there is no package {node.pkg}", f'write pkg="{package.name}"'
-        elif node.pkg == package.name and find_script(package, str(node.type)) is None:
-            hint = "type is the script's file name, with .py"
-            if find_script(package, f"{node.type}.py"):
-                hint = f'write type="{node.type}.py"'
-            yield node, f"there is no {node.type} in the package", hint
+        elif node.pkg == package.name:
+            if not _has_program(package, name):
+                python = find_script(package, f"{name}.py")
+                hint = f'write type="{name}.py"' if python else "type is the script's file name, with .py"
+                yield node, f"there is no {name} in the package", hint
+        elif near_names(package.name, [str(node.pkg)]) or f"[{node.pkg}/{name}]" in said:
+            yield node, f"there is no {name} in a package {node.pkg}", f'write pkg="{package.name}"'
+
+
+def _has_program(package: PackageFacts, name: str) -> bool:
+    """A file of that name, or a program that CMake builds under it."""
+    calls = package.cmake.calls if package.cmake else ()
+    built = any(c.name == "add_executable" and c.args[:1] == (name,) for c in calls)
+    return built or find_script(package, name) is not None
 
 
 def _roslaunch_error(run: Run) -> str:

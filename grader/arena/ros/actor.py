@@ -160,9 +160,9 @@ class Actor:
             return "no such topic"
         for field in ("type", "md5sum"):
             if header.get(field) not in ("*", topic.header[field]):
-                self._wire.status(
-                    "mismatch", topic=topic.name, subscriber=header.get("callerid"), type=header.get("type")
-                )
+                asked = {"topic": topic.name, "type": header.get("type")}
+                note = {"action": "note", "actor": str(header.get("callerid")), "detail": "asks for another type"}
+                self._wire.event("/grader/actor", dict(asked, **note))
                 return "{} differs: this topic carries {}".format(field, topic.type)
         return ""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Sequence
 from functools import cached_property
@@ -132,11 +131,9 @@ def _count(channel: Channel) -> Count | None:
 
 
 def _number(value: object) -> float | None:
-    """A number, also one that was published as text."""
+    """A number; text is none, even if it is written in digits."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return value
-    if isinstance(value, str) and re.fullmatch(r"\s*[-+]?\d{1,18}\s*", value, re.ASCII):
-        return int(value)
     return None
 
 

@@ -27,6 +27,8 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     subscribed = student_subscriptions(run)
     cite = (EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),)
     measured = f"subscribed to {listed(subscribed)}" if subscribed else "no subscription"
+    if differs := _types_differ(run, topic):
+        return differs.model_copy(update={"measured": measured, "citations": cite})
     if topic in subscribed:
         message = f"the node subscribed to {topic}, but the grader sent nothing"
         return inconclusive(message, hint="grade again", measured=measured, citations=cite)
@@ -54,10 +56,7 @@ def not_printed(
 ) -> Verdict:
     """Some or all of what was sent was not printed: the likeliest reason that shows."""
     return (
-        _broken(package, run)
-        or _types_differ(run, probes, missing)
-        or _some_numbers(probes, missing, lines)
-        or _by_number(probes, missing, lines)
+        _broken(package, run) or _some_numbers(probes, missing, lines) or _by_number(probes, missing, lines)
     )
 
 
@@ -76,15 +75,13 @@ def _broken(package: PackageFacts, run: Run) -> Verdict | None:
     return failed(message, hint=end.hint or "mend the line that is named", citations=end.citations)
 
 
-def _types_differ(run: Run, probes: Sequence[Probe], missing: Sequence[Probe]) -> Verdict | None:
-    said = next((c.line for _, c in run.console if "do not match" in c.line or "md5sum" in c.line), "")
-    if not said or len(missing) < len(probes):
+def _types_differ(run: Run, topic: str) -> Verdict | None:
+    """The grader's publisher had to refuse the node, which asked for another type."""
+    asked = next((e for _, e in run.actors if e.action == "note" and e.topic == topic and e.type), None)
+    if asked is None:
         return None
-    sent = next((e for t, e in run.actors if t == probes[0].at_ns and e.action == "publish"), None)
-    message = f"no message arrives, because the types differ: {shown(said)}"
-    return failed(
-        message, hint=f"subscribe with {sent.type}" if sent and sent.type else "subscribe with its type"
-    )
+    message = f"{asked.actor} subscribes to {topic} with {asked.type}, so that nothing arrives"
+    return failed(message, hint=f"give rospy.Subscriber('{topic}', …) the type that the publisher uses")
 
 
 def _some_numbers(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]) -> Verdict | None:
