@@ -6,8 +6,8 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from io import TextIOWrapper
 from types import FrameType
@@ -29,8 +29,19 @@ def _dispatch(argv: Sequence[str]) -> int:
     except SystemExit as done:  # --help and --version end this way
         return int(done.code or 0)
     options.pop("debug", None)
-    module = import_module(f"grader.cli.commands.{options.pop('module')}")
+    with _uninterrupted():
+        module = import_module(f"grader.cli.commands.{options.pop('module')}")
     return int(module.run(**options))
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Hold Ctrl-C back for a moment: a compiled module that is interrupted while it loads panics."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _prepare_streams() -> None:

@@ -32,9 +32,7 @@ def show(
     if as_json:
         sys.stdout.write(result_bytes(result).decode())
     else:
-        print_report(result, rubric, open_console(sys.stdout), hidden=hidden)
-        if static:
-            print("\nNothing was run (--static): what needs a run is still open.")
+        print_report(result, rubric, open_console(sys.stdout), hidden=hidden, static=static)
         _paths(folder)
     if result.error is not None:
         report(GraderError(result.error.message, hint=result.error.hint))

@@ -68,6 +68,8 @@ def _details(criterion: CriterionResult) -> Iterator[str]:
 
 
 def _blocked(loss: Loss) -> Iterator[str]:
+    if loss.alike:
+        yield f"- The same holds for: {', '.join(f'{_code(c.id)} ({points_of(c)})' for c in loss.alike)}"
     if loss.blocked:
         names = ", ".join(f"{_code(c.id)} ({points_of(c)})" for c in loss.blocked)
         yield f"- Could not be judged because of this: {names}"

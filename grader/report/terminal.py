@@ -59,9 +59,11 @@ def emit(console: Console, parts: Iterable[RenderableType]) -> None:
     console.file.write("".join(f"{line.rstrip()}\n" for line in capture.get().splitlines()))
 
 
-def print_report(result: GradingResult, rubric: Rubric, console: Console, *, hidden: int = 0) -> None:
-    """Print the whole report. `hidden` is how many criteria are left out of it."""
-    Terminal(console).report(result, rubric, hidden)
+def print_report(
+    result: GradingResult, rubric: Rubric, console: Console, *, hidden: int = 0, static: bool = False
+) -> None:
+    """Print the whole report. `hidden` is how many criteria are left out; with `static`, open ones are only counted."""
+    Terminal(console).report(result, rubric, hidden, static)
 
 
 class Terminal:
@@ -71,11 +73,14 @@ class Terminal:
         self.console = console
         self.plain = not _has_marks(console.encoding)
 
-    def report(self, result: GradingResult, rubric: Rubric, hidden: int) -> None:
+    def report(self, result: GradingResult, rubric: Rubric, hidden: int, static: bool) -> None:
         view = arrange(result, rubric)
         parts: list[RenderableType] = [self._head(result, rubric)]
         parts += self._losses("Lost", view.lost)
-        parts += self._losses("Still open: no points are lost for good", view.open)
+        if static:
+            parts += self._unrun(view.open)
+        else:
+            parts += self._losses("Still open: no points are lost for good", view.open)
         parts += self._section("Advice, costs nothing", [self._advice(c) for c in view.advice])
         parts += self._section("All criteria", [self._table(result.criteria)])
         if hidden:
@@ -97,11 +102,17 @@ class Terminal:
         parts = [self._loss(loss, min(width, 20)) for loss in losses]
         return self._section(title, [x for part in parts for x in (part, Text())][:-1])
 
+    def _unrun(self, losses: tuple[Loss, ...]) -> list[RenderableType]:
+        points = number(sum(loss.points for loss in losses))
+        still = f"criteria worth {points} points are still open" if losses else "nothing is open"
+        return [Text(f"\nNothing was run (--static): {still}.")]
+
     def _loss(self, loss: Loss, width: int) -> RenderableType:
         c = loss.criterion
         head = self._line(c, c.message or c.title, width)
         rows = [("measured", c.measured), ("expected", c.expected), ("hint", c.hint), ("see", c.reproduce)]
         rows.append(("where", ", ".join(places(c))))
+        rows.append(("also", ", ".join(f"{a.id} {points_of(a)}" for a in loss.alike)))
         rows.append(("blocks", ", ".join(f"{b.id} {points_of(b)}" for b in loss.blocked)))
         return Group(head, Padding(self._rows(rows), (0, 0, 0, 4)))
 

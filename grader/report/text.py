@@ -9,12 +9,12 @@ HIDDEN_CATEGORIES = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
 NAMED = {"\n": "\\n", "\r": "\\r", "\t": "\\t"}
 
 LINKED = re.compile(
-    r"""
-    [A-Za-z][A-Za-z0-9+.-]{0,32}://[^\s`]+  # an address with its scheme
+    r"""(?:
+      [A-Za-z][A-Za-z0-9+.-]{0,32}://[^\s`]+  # an address with its scheme
     | (?:www\.|mailto:|xmpp:)[^\s`]+        # what GitHub links without one
     | [\w.+-]{0,64}@[\w-][\w./+-]*          # a mention, or an e-mail address
     | (?<!\w)[A-Za-z]{0,40}[\#!]\d+         # a reference to an issue or a merge request
-    """,
+    )+""",
     re.VERBOSE,
 )
 MARKUP = re.compile(r"[\\`*\[\]|~$]|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
@@ -12,15 +12,19 @@ from grader.rubric.model import Rubric
 
 @dataclass(frozen=True, kw_only=True)
 class Loss:
-    """A criterion that was not reached, and those that it blocks (directly or through another)."""
+    """A criterion that was not reached, and those that it blocks (directly or through another).
+
+    `alike` are others that are open with the same advice: no ROS on a machine leaves a dozen of them.
+    """
 
     criterion: CriterionResult
     blocked: tuple[CriterionResult, ...] = ()
+    alike: tuple[CriterionResult, ...] = ()
 
     @property
     def points(self) -> float:
         """What it cost, the blocked ones included."""
-        return sum(c.max_points - c.points for c in (self.criterion, *self.blocked))
+        return sum(c.max_points - c.points for c in (self.criterion, *self.blocked, *self.alike))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,8 +54,23 @@ def arrange(result: GradingResult, rubric: Rubric) -> ReportView:
     told = {c.id for loss in losses for c in (loss.criterion, *loss.blocked)}
     return ReportView(
         lost=tuple(loss for loss in losses if loss.criterion.status not in OPEN),
-        open=tuple(loss for loss in losses if loss.criterion.status in OPEN),
+        open=_folded([loss for loss in losses if loss.criterion.status in OPEN]),
         advice=tuple(c for c in unreached if c.id not in told),
+    )
+
+
+def _folded(losses: list[Loss]) -> tuple[Loss, ...]:
+    """One entry for all that are open in the same way."""
+    groups: dict[tuple[Status, str], list[Loss]] = {}
+    for loss in losses:
+        groups.setdefault((loss.criterion.status, loss.criterion.hint), []).append(loss)
+    return tuple(
+        replace(
+            first,
+            blocked=tuple(c for loss in (first, *others) for c in loss.blocked),
+            alike=tuple(loss.criterion for loss in others),
+        )
+        for first, *others in groups.values()
     )
 
 

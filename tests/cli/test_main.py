@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
+from contextlib import suppress
 
 import pytest
 
@@ -185,3 +187,18 @@ def test_diagnosis_without_ros_names_the_command_that_mends_it(monkeypatch):
     assert rows["ROS 1"].state == "missing"
     assert "apt-get install" in rows["ROS 1"].mend
     assert {"Python", "git", "sandbox", "memory", "disk", "host name", "encoding"} <= set(rows)
+
+
+@pytest.mark.parametrize("delay_s", [0.05, 0.1, 0.15, 0.2, 0.3])
+def test_an_interrupt_while_the_program_loads_is_quiet(delay_s, tmp_path):
+    """Started is what has its handlers in place: the Python that runs before them is not ours."""
+    code = "import sys; from grader.cli.main import run; print(1, flush=True); sys.exit(run(sys.argv[1:]))"
+    command = [sys.executable, "-c", code, "grade", "/nonexistent/x", "--rubric", str(spoiled(tmp_path))]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path) as child:
+        assert child.stdout.readline() == b"1\n"
+        with suppress(subprocess.TimeoutExpired):
+            child.wait(delay_s)
+        child.send_signal(signal.SIGINT)
+        _, stderr = child.communicate(timeout=30)
+    assert child.returncode in {130, 2}
+    assert b"Traceback" not in stderr

@@ -97,6 +97,16 @@ def test_blocked_ones_are_folded_under_their_root():
     assert [c.id for c in view.advice] == ["talker-name"]
 
 
+def test_what_is_open_for_one_reason_is_one_entry():
+    no_ros = [
+        criterion(n, Status.INCONCLUSIVE, 0, 5, hint="install ROS")
+        for n in ("build", "launch", "talker-node")
+    ]
+    (entry,) = arrange(result(criteria=tuple(no_ros)), rubric()).open
+    assert [entry.criterion.id, *(c.id for c in entry.alike)] == ["build", "launch", "talker-node"]
+    assert entry.points == 15
+
+
 def test_a_blocked_criterion_whose_cause_is_not_there_is_told_by_itself():
     alone = result(criteria=(criterion("counter-step", Status.BLOCKED, 0, 5),))
     assert [loss.criterion.id for loss in arrange(alone, rubric()).lost] == ["counter-step"]

@@ -69,6 +69,10 @@ def test_what_a_forge_would_link_is_code(text):
     assert "`" in markdown(f"see {text} now")
 
 
+def test_neighbours_that_a_forge_would_link_share_one_span():
+    assert markdown("@0@0 and #1#2") == "`@0@0` and `#1`#2"
+
+
 @given(st.text(st.sampled_from("`| ax\\"), min_size=1))
 def test_code_spans_hold_in_a_cell(text):
     html = _rendered(f"| a | b |\n|---|---|\n| {markdown_code(text, cell=True)} | end |")

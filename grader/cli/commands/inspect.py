@@ -53,13 +53,13 @@ def _end(process: ProcessSummary) -> str:
 
 def _channels(inspection: Inspection) -> Table:
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="dim")
-    for heading in ("topic", "publisher", "type"):
-        table.add_column(heading, overflow="fold")
     for heading in ("count", "Hz", "gaps in ms"):
-        table.add_column(heading, justify="right", overflow="fold")
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("topic, type, publisher", overflow="fold", ratio=1)
     for channel in inspection.channels:
-        cells = (channel.topic, channel.publisher, channel.type, str(channel.rate.count), *_rate(channel))
-        table.add_row(*(Text(visible(clip(cell, 200))) for cell in cells))
+        names = f"{visible(clip(channel.topic, 200))}\n{visible(clip(channel.type, 200))} by "
+        names += visible(clip(channel.publisher, 200))
+        table.add_row(*map(Text, (str(channel.rate.count), *_rate(channel), names)))
     return table
 
 
