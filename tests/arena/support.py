@@ -21,7 +21,7 @@ from grader.rubric.model import Scenario, Start, Until
 
 MANIFEST = """<?xml version="1.0"?>
 <package format="2"><name>lab</name><version>0.0.0</version><description>lab</description>
-<maintainer email="a@b.c">a</maintainer><license>MIT</license>
+<maintainer email="student@example.org">a</maintainer><license>MIT</license>
 <buildtool_depend>catkin</buildtool_depend></package>
 """
 CMAKE = "cmake_minimum_required(VERSION 3.0.2)\nproject(lab)\nfind_package(catkin REQUIRED)\ncatkin_package()\n"
