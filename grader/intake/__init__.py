@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from grader.errors import OutputError, SubmissionError
+from grader.errors import GraderError, OutputError, SubmissionError
 from grader.intake.find import enclosing_package, find_packages
 from grader.intake.git import Git
 from grader.intake.limits import Limits
@@ -59,7 +60,9 @@ def _parsed(source: str) -> Source:
         raise _unreadable(printable(source), error) from error
 
 
-def _unreadable(given: str, error: OSError) -> SubmissionError:
+def _unreadable(given: str, error: OSError) -> GraderError:
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return OutputError(f"{given}: the disk is full", hint="Free some room (`df -h`) and try again.")
     where = f" at {printable(str(error.filename))}" if error.filename else ""
     return SubmissionError(
         f"{given} cannot be read: {error.strerror or error}{where}", hint="Check its permissions (`ls -l`)."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import lzma
 import struct
@@ -71,6 +72,8 @@ def unpack(path: Path, into: Path, limits: Limits) -> Unpacked:
     except _DAMAGED as error:
         raise _damaged(name, error) from None
     except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            raise SubmissionError(f"{name} holds a file whose name is too long", hint="Shorten it.") from None
         # gzip and bz2 report what is damaged in this way too, but without a number.
         if error.errno is not None:
             raise

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
@@ -79,7 +79,7 @@ class Git:
                 raise GitFailed(err.read().decode("utf-8", "replace"))
             return out.read()
 
-    def records(self, *args: str, cwd: Path) -> Iterator[bytes]:
+    def records(self, *args: str, cwd: Path) -> Generator[bytes]:
         """The NUL-ended records that git prints, one by one, so that a caller can stop an endless listing."""
         with self._started(
             args, cwd, remote=False, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
@@ -138,7 +138,7 @@ class Git:
         }
 
     def _remote_environment(self, cwd: Path) -> dict[str, str]:
-        """For servers: the user's settings hold the credentials, the proxy, and perhaps a mirror on this disk."""
+        """For servers: the user's settings hold the credentials, the proxy, perhaps a mirror on this disk."""
         kept = {
             key: value
             for key, value in os.environ.items()

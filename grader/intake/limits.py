@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from grader.errors import SubmissionError
+from grader.intake.tree import MAX_DEPTH, too_deep
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,17 +19,21 @@ class Limits:
 
 
 class Meter:
-    """Counts what is taken from a source and refuses more than the limits allow."""
+    """Counts what is taken from a source and refuses more than the limits, and `allowance_bytes`, allow."""
 
-    def __init__(self, limits: Limits, *, name: str, packed_bytes: int | None = None) -> None:
+    def __init__(
+        self, limits: Limits, *, name: str, packed_bytes: int | None = None, allowance_bytes: int = 0
+    ) -> None:
         self._limits = limits
         self._name = name
         self._packed_bytes = packed_bytes
         self._entries = 0
-        self._bytes = 0
+        self._bytes = -allowance_bytes
 
-    def entry(self) -> None:
+    def entry(self, path: str) -> None:
         self._entries += 1
+        if path.count("/") > MAX_DEPTH:
+            raise too_deep(self._name)
         if self._entries > self._limits.entries:
             self._refuse(f"holds more than {self._limits.entries} files")
 

@@ -65,7 +65,7 @@ def _index(folder: Path, git: Git) -> tuple[dict[str, bool], tuple[str, ...]]:
 
 
 def _is_script(folder: Path, path: str) -> bool:
-    """Hints are for scripts of the student's own: on some disks (Windows under WSL) every file is executable."""
+    """Hints are for scripts of the student's own: on a disk of Windows every file is executable."""
     if any(part in BUILD_SPACES or part.startswith((".", "__")) for part in path.split("/")[:-1]):
         return False
     if path.endswith(_SCRIPTS):
@@ -89,7 +89,7 @@ def _differences(folder: Path, on_disk: Mapping[str, bool], tracked: Mapping[str
         else:
             hints.append(
                 f"{shown} is executable on this disk but not in git: "
-                f"git update-index --chmod=+x {shlex.quote(shown)}; git commit -m 'Make it executable'; git push"
+                f"git update-index --chmod=+x {shlex.quote(shown)}; git commit -m 'Executable'; git push"
             )
     return hints
 

@@ -109,7 +109,7 @@ def _measured(source: Source, git: Git, into: Path, commit: str, limits: Limits)
         for record in records:
             meta, _, path = record.partition(b"\t")
             mode, _, _, size = meta.split()
-            meter.entry()
+            meter.entry(os.fsdecode(path))
             if mode == b"160000":
                 git_links.append(os.fsdecode(path))
             else:

@@ -68,16 +68,9 @@ def _plain(path: Path, name: str, limits: Limits) -> Iterator[IO[bytes]]:
         if opener is None:
             yield packed
             return
-        # Headers and padding come on top of the files: twice the limit is far beyond what those need.
-        meter = Meter(
-            Limits(
-                total_bytes=2 * limits.total_bytes,
-                ratio=limits.ratio,
-                ratio_floor_bytes=limits.ratio_floor_bytes,
-            ),
-            name=name,
-            packed_bytes=path.stat().st_size,
-        )
+        # Headers and padding come on top of the files; as much again is far beyond what those need.
+        packed_bytes = path.stat().st_size
+        meter = Meter(limits, name=name, packed_bytes=packed_bytes, allowance_bytes=limits.total_bytes)
         with tempfile.TemporaryFile() as plain, opener(packed) as stream:
             while block := stream.read(1 << 20):
                 meter.data(len(block))

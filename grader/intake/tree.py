@@ -10,6 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from grader.errors import SubmissionError
+from grader.intake.names import printable
+
+# Far more than any workspace; much deeper, and Python's own functions for trees fail.
+MAX_DEPTH = 200
 # Part of no submission: git's own files and what macOS adds.
 NO_CONTENT = frozenset({".git", ".DS_Store", "__MACOSX"})
 
@@ -42,7 +47,8 @@ class Entry:
 def walk(root: Path, *, tolerant: bool = False) -> Iterator[Folder]:
     """Every folder from `root` on, nearest first, in order of names; links are entries, never ways.
 
-    Raises OSError for a folder that cannot be read; `tolerant` passes over those below the root.
+    Raises OSError for a folder that cannot be read and SubmissionError for more than MAX_DEPTH folders in each
+    other; `tolerant` passes over those below the root.
     """
     waiting = deque(["."])
     while waiting:
@@ -58,7 +64,20 @@ def walk(root: Path, *, tolerant: bool = False) -> Iterator[Folder]:
         others = [entry for entry in entries if not entry.is_dir(follow_symlinks=False)]
         folder = Folder(path=path, folders=names, others=others)
         yield folder
-        waiting.extend(folder.inside(name) for name in folder.folders)
+        below = [folder.inside(name) for name in folder.folders]
+        if below and below[0].count("/") >= MAX_DEPTH:
+            if tolerant:
+                continue
+            raise too_deep(root.name)
+        waiting.extend(below)
+
+
+def too_deep(name: str) -> SubmissionError:
+    """The error for a tree that no student's work looks like."""
+    return SubmissionError(
+        f"{printable(name)} holds more than {MAX_DEPTH} folders in each other",
+        hint="Hand in the package alone.",
+    )
 
 
 def list_entries(root: Path, *, leave_out: Path | None = None, tolerant: bool = False) -> list[Entry]:

@@ -34,7 +34,7 @@ class Unpacker:
 
         Raises SubmissionError for a name that leads outside and for more than the limits allow.
         """
-        self._meter.entry()
+        self._meter.entry(name)
         parts = [part for part in name.split("/") if part not in ("", ".")]
         if name.startswith("/") or ".." in parts or re.match(r"[A-Za-z]:/", name):
             self.refuse(f"the entry {printable(name)!r} leads outside of it")

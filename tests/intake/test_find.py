@@ -1,0 +1,262 @@
+"""Which folder is the lab's package."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+
+import pytest
+
+from grader.errors import PackageNotFound, SubmissionError
+from grader.intake import enclosing_package, find_packages
+from tests.intake.samples import lab, manifest, opened, repository, write
+
+BROKEN = "<package><name>lab1</name><oops></package>"
+NAMELESS = "this is no xml at all"
+
+
+def tree(*packages: str, **files: str) -> dict[str, str | bytes]:
+    """A package in each folder, named as after the colon (`src/a:lab1`) or as the folder."""
+    found: dict[str, str | bytes] = dict(files)
+    for text in packages:
+        folder, _, name = text.partition(":")
+        found |= lab(folder, name or folder.rpartition("/")[2])
+    return found
+
+
+@pytest.mark.parametrize(
+    ("files", "path", "hints"),
+    [
+        (tree("lab1"), "lab1", ()),
+        (tree(".:lab1"), ".", ()),
+        (tree("a/b c/ü/d/e/lab1"), "a/b c/ü/d/e/lab1", ()),
+        (tree("other:lab1", "lab1:lab2"), "other", ()),
+        (tree("lab2", "lab1", "project"), "lab1", ()),
+        (tree("src/lab1", "build/lab1", "devel/share/lab1", "install/share/lab1"), "src/lab1", ()),
+        (tree("z/src/lab1", ".hidden/lab1", ".catkin_tools/lab1"), "z/src/lab1", ()),
+        (tree("meta", "meta/lab1", "deep/er/lab1"), "deep/er/lab1", ()),
+        (tree("lab1", "lab1/src/lab1"), "lab1", ()),
+        (tree("x:Lab1"), "x", ("exactly lab1",)),
+        (tree("x:Lab1", "y/z:lab1"), "y/z", ()),
+        (tree("lab1:lab_one"), "lab1", ("names the package lab_one",)),
+        (tree("LAB1:lab_one"), "LAB1", ("names the package lab_one",)),
+        (tree("lab1-main:foo"), "lab1-main", ("names the package foo",)),
+        (tree("lab1") | {"lab1/package.xml": BROKEN}, "lab1", ()),
+        (tree("x:lab1") | {"x/package.xml": BROKEN}, "x", ()),
+        (tree("lab1") | {"lab1/package.xml": NAMELESS}, "lab1", ("no name can be read",)),
+        (tree("lab1") | {"lab1/package.xml": ""}, "lab1", ("no name can be read",)),
+        (tree("lab1", "lab2") | {"lab2/package.xml": NAMELESS}, "lab1", ()),
+        (tree("b/lab1", "a/lab1"), "a/lab1", ("a/lab1 is graded, b/lab1 is not",)),
+        (tree("b/lab1", "a/c/lab1"), "b/lab1", ("b/lab1 is graded, a/c/lab1 is not",)),
+        (tree("backup:lab1", "lab1"), "lab1", ("lab1 is graded, backup is not",)),
+        (tree("lab1") | {"lab1/CATKIN_IGNORE": ""}, "lab1", ("lab1/CATKIN_IGNORE: delete",)),
+        (tree("old/lab1", "x/lab1") | {"old/CATKIN_IGNORE": ""}, "x/lab1", ()),
+        (tree("old/lab1") | {"old/COLCON_IGNORE": ""}, "old/lab1", ("old/COLCON_IGNORE",)),
+        ({"lab1/src/a.py": "", "lab2/package.xml": manifest("lab2")}, "lab1", ("has no package.xml",)),
+        ({"ws/Lab1/CMakeLists.txt": ""}, "ws/Lab1", ("has no package.xml",)),
+        ({"lab1/src/lab1/CMakeLists.txt": ""}, "lab1/src/lab1", ("has no package.xml",)),
+    ],
+)
+def test_the_package_is_found(files, path, hints, tmp_path):
+    submission = opened(write(tmp_path / "repo", files), tmp_path)
+    assert submission.package.path == path
+    assert submission.package.folder == tmp_path / "repo" / path
+    assert len(submission.hints) == len(hints)
+    for hint, part in zip(submission.hints, hints, strict=True):
+        assert part in hint
+
+
+@pytest.mark.parametrize(
+    ("files", "message", "hint"),
+    [
+        (tree("lab2", "project"), "packages here: lab2, project", "<name>lab1</name>"),
+        ({"readme": "x"}, "no package.xml", "<name>lab1</name>"),
+        (tree("build/lab1"), "no package.xml", "only a copy in build/"),
+        (tree("devel/share/lab1"), "no package.xml", "only a copy in devel/"),
+        (tree("ws", "ws/lab1"), "packages here: ws", "below another package.xml"),
+        ({"lab1.zip": "", "x": ""}, "no package.xml", "lab1.zip lies here"),
+        # A workspace that is called like the lab is not the lab's package.
+        (tree("lab1/src/other"), "packages here: other", "<name>lab1</name>"),
+    ],
+)
+def test_what_is_there_instead_is_named(files, message, hint, tmp_path):
+    with pytest.raises(PackageNotFound) as caught:
+        opened(write(tmp_path / "repo", files), tmp_path)
+    assert message in caught.value.message
+    assert hint in caught.value.hint
+    assert "\n" not in caught.value.message + caught.value.hint
+    assert list((tmp_path / "work").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        manifest("lab1"),
+        "\ufeff" + manifest("lab1"),
+        "\n\n  " + manifest("lab1"),
+        '<package xmlns="http://x/y"><name>lab1</name></package>',
+        '<p:package xmlns:p="http://x/y"><p:name>lab1</p:name></p:package>',
+        "<package><name>\n  lab1 <!-- mine -->\n</name></package>",
+        "<package><!-- <name>no</name> --><name>lab1</name><name>lab2</name></package>",
+        '<?xml version="1.0" encoding="utf-16"?><package><name>lab1</name></package>'.encode("utf-16"),
+        "<package><description>a & b</description><name>lab1</name></package>",
+    ],
+)
+def test_the_name_is_read_from_any_manifest(text, tmp_path):
+    write(tmp_path / "repo", {"x/package.xml": text})
+    assert opened(tmp_path / "repo", tmp_path).package.name == "lab1"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<!DOCTYPE p [<!ENTITY n "lab1">]><package><name>&n;</name></package>',
+        '<!DOCTYPE p [<!ENTITY n SYSTEM "secret">]><package><name>&n;</name></package>',
+        "<package><name>lab1</name></package>" + " " * (1 << 20),
+        "<package><name/></package>",
+        "<package/>",
+        b"\xff\xfe\x00",
+    ],
+)
+def test_nothing_is_read_from_a_manifest_that_plays_tricks(text, tmp_path):
+    write(tmp_path / "repo", {"x/package.xml": text, "x/secret": "lab1"})
+    with pytest.raises(PackageNotFound, match="packages here: x"):
+        opened(tmp_path / "repo", tmp_path)
+
+
+def test_a_manifest_is_not_read_through_a_link_that_leads_out(tmp_path):
+    write(tmp_path, {"outside.xml": manifest("lab1"), "repo/inside.xml": manifest("lab1"), "repo/x/a": ""})
+    link = tmp_path / "repo/x/package.xml"
+    link.symlink_to(tmp_path / "outside.xml")
+    with pytest.raises(PackageNotFound):
+        opened(tmp_path / "repo", tmp_path)
+    link.unlink()
+    link.symlink_to("../inside.xml")
+    assert opened(tmp_path / "repo", tmp_path).package.path == "x"
+
+
+def test_links_are_not_followed(tmp_path):
+    root = write(tmp_path / "repo", tree("a/lab1"))
+    (root / "a/loop").symlink_to(root)
+    (root / "b").symlink_to("a")
+    (root / "CMakeLists.txt").symlink_to("/opt/ros/nowhere/toplevel.cmake")
+    (root / "outside").symlink_to(tmp_path)
+    submission = opened(root, tmp_path)
+    assert (submission.package.path, submission.hints) == ("a/lab1", ())
+
+
+def test_a_link_in_the_package_s_place_is_named(tmp_path):
+    write(tmp_path, {"real/package.xml": manifest("lab1"), "repo/readme": ""})
+    (tmp_path / "repo/lab1").symlink_to(tmp_path / "real")
+    with pytest.raises(PackageNotFound) as caught:
+        opened(tmp_path / "repo", tmp_path)
+    assert "lab1 is a link" in caught.value.hint
+
+
+def test_a_folder_inside_the_package_stands_for_the_package(tmp_path):
+    root = write(tmp_path / "ws", tree("lab1", "lab2") | {"lab1/src/deep/x": ""})
+    submission = opened(root / "lab1/src/deep", tmp_path)
+    assert (submission.package.path, submission.root, submission.id) == (".", root / "lab1", "lab1")
+    with pytest.raises(PackageNotFound):
+        opened(root / "lab2/src", tmp_path)
+
+
+def test_enclosing_package(tmp_path):
+    root = repository(tmp_path / "ws", tree("a/lab1", "a/lab1/src/copy"))
+    inner = root / "a/lab1/src/copy"
+    assert enclosing_package(inner / "src") == root / "a/lab1"
+    assert enclosing_package(root / "a/lab1/package.xml") == root / "a/lab1"
+    assert enclosing_package(root / "a/lab1") == root / "a/lab1"
+    assert enclosing_package(root / "a") is None
+    (root / ".git").rename(tmp_path / "gone")
+    assert enclosing_package(inner / "src") == inner
+
+
+def test_find_packages(tmp_path):
+    root = write(tmp_path / "ws", tree("src/lab1", "lab2:two", "build/x") | {"bare/CMakeLists.txt": ""})
+    assert find_packages(root) == [("two", root / "lab2"), ("lab1", root / "src/lab1")]
+    assert find_packages(root / "src/lab1/src") == [("lab1", root / "src/lab1")]
+    assert find_packages(root / "bare") == []
+
+
+def test_other_packages_are_listed(tmp_path):
+    files = tree("lab1", "b/lab1", "msgs:my_msgs", "broken", "hidden/x") | {
+        "broken/package.xml": NAMELESS,
+        "hidden/CATKIN_IGNORE": "",
+    }
+    submission = opened(write(tmp_path / "repo", files), tmp_path)
+    assert [(p.name, p.path) for p in submission.packages] == [("broken", "broken"), ("my_msgs", "msgs")]
+    assert submission.packages[1].executable == {
+        "CMakeLists.txt": False,
+        "package.xml": False,
+        "src/node.py": False,
+    }
+
+
+def test_the_package_keeps_a_second_manifest_below_it(tmp_path):
+    root = write(tmp_path / "repo", tree("lab1", "lab1/src/copy:other"))
+    submission = opened(root, tmp_path)
+    assert "src/copy/package.xml" in submission.package.executable
+    assert submission.packages == ()
+
+
+def test_what_a_build_left_is_not_even_looked_at(tmp_path, monkeypatch):
+    files = tree("src/lab1") | {
+        f"{space}/d{n}/x": "" for space in ("build", "devel", ".git") for n in range(9)
+    }
+    root = write(tmp_path / "repo", files)
+    seen = []
+    scandir = os.scandir
+    monkeypatch.setattr(os, "scandir", lambda path: seen.append(str(path)) or scandir(path))
+    assert opened(root, tmp_path).package.path == "src/lab1"
+    assert not [path for path in seen if "/d" in path.removeprefix(str(root))]
+
+
+@pytest.fixture
+def deep(tmp_path):
+    """Folders in each other, more than Python's own functions can walk through or delete."""
+    root = tmp_path / "deep"
+    root.mkdir()
+    here = os.open(root, os.O_RDONLY)
+    for _ in range(1500):
+        os.mkdir("d", dir_fd=here)
+        below = os.open("d", os.O_RDONLY, dir_fd=here)
+        os.close(here)
+        here = below
+    os.close(here)
+    yield root
+    subprocess.run(["rm", "-rf", str(root)], check=True)  # noqa: S607 - rm knows no limit
+
+
+def test_a_very_deep_tree(deep, tmp_path):
+    write(deep, tree("lab1"))
+    assert opened(deep, tmp_path).package.path == "lab1"
+    write(deep, {"package.xml": manifest("lab1")})
+    with pytest.raises(SubmissionError, match="folders in each other"):
+        opened(deep, tmp_path)
+
+
+def test_an_empty_folder_and_one_that_cannot_be_read(tmp_path, monkeypatch):
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(SubmissionError, match="is empty"):
+        opened(tmp_path / "empty", tmp_path)
+    root = write(tmp_path / "repo", tree("lab1", "closed"))
+    scandir = os.scandir
+
+    def refusing(path):
+        if str(path).endswith("closed"):
+            raise PermissionError(13, "Permission denied", os.fspath(path))
+        return scandir(path)
+
+    monkeypatch.setattr(os, "scandir", refusing)
+    assert opened(root, tmp_path).package.path == "lab1"
+    with pytest.raises(SubmissionError, match="Permission denied"):
+        opened(root / "closed", tmp_path)
+
+
+def test_the_work_folder_may_lie_in_the_submission(tmp_path):
+    root = write(tmp_path / "repo", tree(".:lab1"))
+    plain = opened(root, tmp_path)
+    within = opened(root, root)
+    assert within.digest == plain.digest
+    assert set(within.package.executable) == set(plain.package.executable)
