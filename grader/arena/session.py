@@ -19,7 +19,7 @@ from grader.arena.frames import Frame, FrameReader
 from grader.arena.live import Live
 from grader.arena.place import Place
 from grader.errors import ArenaError
-from grader.evidence.events import TOPICS, ScenarioEvent
+from grader.evidence.events import TOPICS, ProcessEvent, ScenarioEvent
 from grader.evidence.run import is_grader_node
 from grader.evidence.writer import EvidenceWriter
 
@@ -208,8 +208,20 @@ class ArenaSession:
         elif status == "spawn-failed":
             self._failure = f"{fields['name']} could not be started: {fields['detail']}"
         elif status == "done":
-            self.cpu_s += fields["cpu_s"]
+            self._note_cost(fields)
             self._done = True
+
+    def _note_cost(self, fields: dict[str, Any]) -> None:
+        """What the arena itself took: CPU seconds, and bytes of memory at its peak."""
+        self.cpu_s += fields["cpu_s"]
+        event = ProcessEvent(
+            event="exit",
+            name="arena",
+            role="grader",
+            cpu_s=round(fields["cpu_s"], 4),
+            max_rss_bytes=fields["max_rss_bytes"],
+        )
+        self._writer.event("/grader/process", time.time_ns(), event)
 
     def _why(self) -> str:
         return (

@@ -24,7 +24,9 @@ MANIFEST = """<?xml version="1.0"?>
 <maintainer email="student@example.org">a</maintainer><license>MIT</license>
 <buildtool_depend>catkin</buildtool_depend></package>
 """
-CMAKE = "cmake_minimum_required(VERSION 3.0.2)\nproject(lab)\nfind_package(catkin REQUIRED)\ncatkin_package()\n"
+CMAKE = (
+    "cmake_minimum_required(VERSION 3.0.2)\nproject(lab)\nfind_package(catkin REQUIRED)\ncatkin_package()\n"
+)
 SCRIPT = "#!/usr/bin/env python3\n"
 RUN_S = 60.0
 
@@ -35,7 +37,9 @@ def make_submission(folder: Path, files: Mapping[str, str]) -> Submission:
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-    executable = {p.relative_to(folder).as_posix(): p.suffix == ".py" for p in folder.rglob("*") if p.is_file()}
+    executable = {
+        p.relative_to(folder).as_posix(): p.suffix == ".py" for p in folder.rglob("*") if p.is_file()
+    }
     package = SourcePackage(name="lab", folder=folder, path=".", mode_source="disk", executable=executable)
     return Submission(
         id="lab",
@@ -51,7 +55,11 @@ def make_submission(folder: Path, files: Mapping[str, str]) -> Submission:
 
 @contextlib.contextmanager
 def make_place(
-    files: Mapping[str, str], *, sandbox: str = "auto", limits: Limits | None = None, folder: Path | None = None
+    files: Mapping[str, str],
+    *,
+    sandbox: str = "auto",
+    limits: Limits | None = None,
+    folder: Path | None = None,
 ) -> Iterator[Place]:
     """A place with the package unbuilt: ROS finds its sources."""
     with tempfile.TemporaryDirectory(prefix="grader-test-") as name:
@@ -80,7 +88,9 @@ def run(place: Place, scenario: Scenario, path: Path) -> Run:
     return load_run(path)
 
 
-def run_script(tmp_path: Path, code: str, *, sandbox: str = "auto", limits: Limits | None = None, **until: object) -> Run:
+def run_script(
+    tmp_path: Path, code: str, *, sandbox: str = "auto", limits: Limits | None = None, **until: object
+) -> Run:
     """Run one script as `node.py` until the conditions hold."""
     scenario = Scenario(
         title="test",

@@ -94,7 +94,9 @@ def test_build_that_fails_leaves_the_sources_to_run(tmp_path: Path) -> None:
         built, outcome, evidence = _built(place, tmp_path)
         assert not outcome.ok
         assert any("CMake Error" in line.line for _, line in evidence.lines("catkin_make"))
-        scenario = Scenario(title="t", start=(Start(name="node", script="src/node.py"),), until=Until(limit_s=5))
+        scenario = Scenario(
+            title="t", start=(Start(name="node", script="src/node.py"),), until=Until(limit_s=5)
+        )
         seen = run(built, scenario, tmp_path / "run.mcap")
     assert [line.line for _, line in seen.lines("node")] == ["run from source"]
 

@@ -18,7 +18,10 @@ needs_sandbox = pytest.mark.skipif(bool(why_not()), reason=f"no sandbox here: {w
 
 @pytest.mark.parametrize("sandbox", SANDBOXES)
 def test_print_without_flush_is_seen_by_line_and_time(tmp_path: Path, sandbox: str) -> None:
-    code = NODE + "print('one')\ntime.sleep(0.5)\nsys.stdout.write('two')\nsys.stderr.write('three\\n')\nrospy.spin()\n"
+    code = (
+        NODE
+        + "print('one')\ntime.sleep(0.5)\nsys.stdout.write('two')\nsys.stderr.write('three\\n')\nrospy.spin()\n"
+    )
     run = run_script(tmp_path, code, limit_s=1.5, sandbox=sandbox)
     lines = {line.line: (time_ns, line.stream) for time_ns, line in run.lines("node")}
     assert lines["three"][1] == "stderr"
@@ -38,7 +41,9 @@ def test_ctrl_c_ends_a_node(tmp_path: Path, sandbox: str) -> None:
 
 @pytest.mark.parametrize("sandbox", SANDBOXES)
 def test_node_that_ignores_ctrl_c_is_killed(tmp_path: Path, sandbox: str) -> None:
-    code = "import signal, time\nfor n in (2, 15): signal.signal(n, signal.SIG_IGN)\nwhile True: time.sleep(1)\n"
+    code = (
+        "import signal, time\nfor n in (2, 15): signal.signal(n, signal.SIG_IGN)\nwhile True: time.sleep(1)\n"
+    )
     assert exit_of(run_script(tmp_path, code, limit_s=0.5, sandbox=sandbox)).stopped_by == "KILL"
 
 
@@ -130,10 +135,11 @@ def test_a_long_line_is_cut(tmp_path: Path) -> None:
 
 
 def _command_lines() -> str:
-    found = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            found.append(path.read_bytes().decode(errors="replace"))
-        except OSError:
-            continue
-    return "\n".join(found)
+    return "\n".join(_read(path) for path in Path("/proc").glob("[0-9]*/cmdline"))
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_bytes().decode(errors="replace")
+    except OSError:  # it has ended since
+        return ""

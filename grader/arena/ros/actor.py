@@ -161,7 +161,11 @@ class Actor:
         for field in ("type", "md5sum"):
             if header.get(field) not in ("*", topic.header[field]):
                 asked = {"topic": topic.name, "type": header.get("type")}
-                note = {"action": "note", "actor": str(header.get("callerid")), "detail": "asks for another type"}
+                note = {
+                    "action": "note",
+                    "actor": str(header.get("callerid")),
+                    "detail": "asks for another type",
+                }
                 self._wire.event("/grader/actor", dict(asked, **note))
                 return "{} differs: this topic carries {}".format(field, topic.type)
         return ""

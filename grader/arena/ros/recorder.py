@@ -14,20 +14,19 @@ import threading
 import time
 from urllib.parse import urlparse
 
-from tcpros import LENGTH, ProtocolError, call, connect, read_header, slave_api, write_header
-from wire import now_ns
+from connection import Connection
+from tcpros import ProtocolError, call, connect, read_header, slave_api, write_header
 
 HOLD_S = 1.0
 CONNECT_S = 10.0
 RETRY_S = 0.05
 KNOCK = "_knock"
-READ_BYTES = 1 << 18
-MESSAGE_BYTES_MAX = 64 << 20
+LATCHING_S = 1.0
 
 
 class Recorder:
     def __init__(self, loop, wire, caller_id, limits):
-        self._loop = loop
+        self.loop = loop
         self.wire = wire
         self._caller_id = caller_id
         self.messages_max = limits["channel_messages"]
@@ -36,7 +35,6 @@ class Recorder:
         self._pending = {}
         self._serving = set()
         self._lock = threading.Lock()
-        self.forward = {}
 
     def connect(self, topic, caller_id, caller_api):
         """Connect to a publisher, beside the caller; hold the caller if the publisher is able to answer."""
@@ -71,12 +69,12 @@ class Recorder:
                     self._answered(caller_id, connected)
                     return
             pause.wait(RETRY_S)
-        connection = _Connection(self, sock, topic, caller_id, header)
+        connection = Connection(self, sock, topic, caller_id, header)
         with self._lock:
             self._open[sock] = connection
             self._serving.add((caller_id, caller_api))
         self.note("connected", topic, caller_id)
-        self._loop.call_soon(lambda: self._loop.add_reader(sock, connection.readable))
+        self.loop.call_soon(lambda: self.loop.add_reader(sock, connection.readable))
         self._answered(caller_id, connected)
 
     def _answered(self, caller_id, connected):
@@ -115,6 +113,17 @@ class Recorder:
             raise ProtocolError(header.get("error", "header without type and md5sum"))
         return sock, header
 
+    def ask_latching(self, topic, address):
+        """Whether the publisher latches: rospy knows it only once its constructor is through."""
+        try:
+            sock, header = self._subscribe(
+                self._caller_id + KNOCK, topic, address, time.monotonic() + LATCHING_S
+            )
+        except (OSError, ProtocolError):
+            return False
+        sock.close()
+        return header.get("latching") == "1"
+
     def note(self, event, topic, caller_id, **fields):
         record = {"event": event, "topic": topic, "callerid": caller_id}
         record.update(fields)
@@ -123,94 +132,4 @@ class Recorder:
     def closed(self, connection):
         with self._lock:
             self._open.pop(connection.sock, None)
-        self._loop.remove_reader(connection.sock)
-
-
-class _Connection:
-    def __init__(self, recorder, sock, topic, caller_id, header):
-        self.sock = sock
-        self._recorder = recorder
-        self._topic = topic
-        self._caller_id = caller_id
-        self._buffer = bytearray()
-        self._messages = 0
-        self._bytes = 0
-        self._dropped = 0
-        self._closed = False
-        self._channel = recorder.wire.channel(
-            topic=topic,
-            callerid=caller_id,
-            type=header["type"],
-            md5sum=header["md5sum"],
-            definition=header.get("message_definition", ""),
-            latching=header.get("latching", "0") == "1",
-        )
-
-    def readable(self):
-        """Take all that the socket holds now."""
-        while not self._closed:
-            try:
-                chunk = self.sock.recv(READ_BYTES)
-            except BlockingIOError:
-                return
-            except OSError:
-                chunk = b""
-            if not chunk:
-                self.close()
-                return
-            self._buffer += chunk
-            self._record(self._frames())
-            if len(chunk) < READ_BYTES:
-                return
-
-    def _frames(self):
-        """Cut whole messages off the buffer."""
-        frames = []
-        start = 0
-        buffer = self._buffer
-        while len(buffer) - start >= LENGTH.size:
-            (length,) = LENGTH.unpack_from(buffer, start)
-            if length > MESSAGE_BYTES_MAX:
-                self._recorder.note("invalid", self._topic, self._caller_id, detail="{} bytes".format(length))
-                self.close()
-                break
-            end = start + LENGTH.size + length
-            if end > len(buffer):
-                break
-            frames.append(bytes(buffer[start + LENGTH.size : end]))
-            start = end
-        del buffer[:start]
-        return frames
-
-    def _record(self, frames):
-        if not frames:
-            return
-        recorder = self._recorder
-        time_ns = now_ns()
-        forward = recorder.forward.get(self._topic)
-        if forward is not None:
-            for frame in frames:
-                forward(frame)
-        room = recorder.messages_max - self._messages
-        kept = frames if len(frames) <= room else frames[: max(0, room)]
-        size = sum(map(len, kept))
-        if self._bytes + size > recorder.bytes_max:
-            kept, size = [], 0
-        if kept:
-            recorder.wire.messages(self._channel, kept, time_ns)
-        self._messages += len(kept)
-        self._bytes += size
-        if len(kept) < len(frames):
-            if not self._dropped:
-                recorder.note("limit", self._topic, self._caller_id, messages=self._messages)
-            self._dropped += len(frames) - len(kept)
-
-    def close(self):
-        if self._closed:
-            return
-        self._closed = True
-        self._recorder.closed(self)
-        self.sock.close()
-        self._recorder.note(
-            "closed", self._topic, self._caller_id, messages=self._messages, dropped=self._dropped
-        )
+        self.loop.remove_reader(connection.sock)
