@@ -14,8 +14,13 @@ from grader.errors import OutputError
 def atomic_write(path: Path, data: bytes) -> None:
     """Write `data` beside `path`, flush it to the disk, and rename it into place.
 
+    A link stays a link, and what is no file (`/dev/null`, a pipe) is written to and stays what it is.
     Raises OutputError; then `path` is as it was before, and nothing is left beside it.
     """
+    path = path.resolve() if path.is_symlink() else path
+    if path.exists() and not path.is_file():
+        _write_into(path, data)
+        return
     beside = path.with_name(f".{path.name[:80]}.{secrets.token_hex(6)}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -30,6 +35,14 @@ def atomic_write(path: Path, data: bytes) -> None:
         if isinstance(error, OSError):
             raise unwritable(path, error) from error
         raise
+
+
+def _write_into(path: Path, data: bytes) -> None:
+    try:
+        with path.open("wb") as file:
+            file.write(data)
+    except OSError as error:
+        raise unwritable(path, error) from error
 
 
 def check_writable(folder: Path) -> None:
