@@ -27,7 +27,7 @@ _CMAKE_ERROR = re.compile(
 )
 _COMPILER_ERROR = re.compile(r"^(?P<file>[^:\s][^:]*):(?P<line>\d+):(?:\d+:)? (?:fatal )?error: (?P<text>.*)")
 _OTHER_ERROR = re.compile(
-    r"(?P<text>.*(?:\berror:|undefined reference|No rule to make target|[A-Za-z]+Error:|\*\*\*).*)"
+    r"(?P<text>.*(?:\b[Ee]rror:|Error\(s\)|undefined reference|No rule to make|[A-Za-z]+Error:|\*\*\*).*)"
 )
 
 

@@ -87,8 +87,8 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
 
     How it is measured
         Value by value. Values that are missing where there is also a gap in time were lost by the machine,
-        not by the program: nothing is taken for those. In a flood of messages the publisher itself throws
-        some away; skips are not judged then.
+        not by the program: nothing is taken for those. In a flood of messages
+        the publisher itself throws some away; those skips are left out.
 
     How to fix
         Add one to the counter in one place only, once in each turn of the loop. `rostopic echo <topic>`
@@ -104,7 +104,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     verdict = (
         _wrong_steps(count, wrong, run, params)
         or _too_few(len(steps), run, package, params)
-        or (passed if right else failed)(f"all {plural(right, 'step')} are +1")
+        or passed(f"the counter goes up by one, {plural(right, 'time')}")
     )
     at = wrong[0] if wrong else Step(0, 0, 0, count.times_ns[0], count.times_ns[-1], 0)
     return verdict.model_copy(
@@ -154,10 +154,12 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
 def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
     """There is no counter on the topic."""
     if any(c.messages for c in run.student_channels(topic)):
-        return unjudged(f"{topic} carries no numbers", measured="no number")
+        hint = "publish the counter itself, as an Int8"
+        return unjudged(f"{topic} carries no numbers", measured="no number", hint=hint)
     ended = early_end(run)
     cause = f": the node ended ({explain_end(ended, run, package).cause})" if ended else ""
-    return unjudged(f"no message came on {topic}{cause}", measured="no message")
+    hint = f"look at rostopic echo {topic}"
+    return unjudged(f"no message came on {topic}{cause}", measured="no message", hint=hint)
 
 
 def _recorder_was_late(run: Run, topic: str, callerid: str) -> bool:
@@ -180,12 +182,11 @@ def _wrong_steps(count: Count, wrong: list[Step], run: Run, params: StepParams) 
     if not wrong:
         return None
     skips = [s for s in wrong if s.change > 1]
+    usual = count.usual_step()
+    if len(skips) == len(wrong) and usual in {None, 1} and count.is_flood(run, params.rate_hz):
+        return None if usual == 1 else _flooded(len(skips), params)
     lost = [s for s in skips if count.lost_on_the_way(s, s.change)]
     own = [s for s in wrong if s not in lost]
-    flood = count.is_flood(run, params.rate_hz)
-    if flood and len(skips) == len(wrong):
-        message = f"{params.topic} is flooded, so its publisher drops values: {plural(len(skips), 'skip')}"
-        return unjudged(message, hint="first make the loop sleep, then look at the counter again")
     if not own:
         missing = sum(int(s.change) - 1 for s in lost)
         message = f"{plural(missing, 'value')} of {params.topic} got lost on the way, with a gap in time"
@@ -194,7 +195,6 @@ def _wrong_steps(count: Count, wrong: list[Step], run: Run, params: StepParams) 
     after = seconds(first.to_ns - count.times_ns[0])
     comes = f"after {number(first.before)} comes {number(first.after)}"
     place = f"{comes} (value {first.number + 1}, {after} after the first)"
-    usual = count.usual_step()
     if usual not in {None, 1}:
         message = _usual_fault(usual or 0.0)
     else:
@@ -202,6 +202,11 @@ def _wrong_steps(count: Count, wrong: list[Step], run: Run, params: StepParams) 
         message = listed(dict.fromkeys(kinds.get(int(s.change), "skips values") for s in own))
     hint = "add one to the counter in one place only, once in each turn of the loop"
     return failed(f"the counter {message}: {place}", hint=hint)
+
+
+def _flooded(skips: int, params: StepParams) -> Verdict:
+    message = f"{params.topic} is flooded, so its publisher drops most values: {plural(skips, 'skip')}"
+    return unjudged(message, hint="first make the loop sleep, then look at the counter again")
 
 
 def _usual_fault(usual: float) -> str:
@@ -215,4 +220,5 @@ def _too_few(steps: int, run: Run, package: PackageFacts, params: StepParams) ->
         return None
     ended = early_end(run)
     cause = f": the node ended ({explain_end(ended, run, package).cause})" if ended else ""
-    return unjudged(f"only {plural(steps + 1, 'value')} came on {params.topic}{cause}")
+    message = f"only {plural(steps + 1, 'value')} came on {params.topic}{cause}"
+    return unjudged(message, hint="publish in a loop `while not rospy.is_shutdown():`")

@@ -151,7 +151,8 @@ def _shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
 
 def _rosrun_answer(build: Run, path: str) -> str:
     """The last line of what `rosrun` said to the file as handed in, where the build's recording has it."""
-    lines = [c.line for _, c in build.lines(f"rosrun {PurePosixPath(path).name}") if c.line.strip()]
+    names = {f"rosrun {path}", f"rosrun {PurePosixPath(path).name}"}
+    lines = [c.line for _, c in build.console if c.process in names and c.line.strip()]
     return f"; rosrun answers: {shown(lines[-1])}" if lines else ""
 
 

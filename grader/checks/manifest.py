@@ -95,7 +95,8 @@ def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
     found = package.manifest
     expected = f"{listed(params.names)} at run time"
     if found is None:
-        return unjudged("package.xml cannot be read, so its dependencies are not known", expected=expected)
+        message = "package.xml cannot be read, so its dependencies are not known"
+        return unjudged(message, expected=expected, hint="first mend package.xml")
     declared = [d for d in found.dependencies if d.kind in RUNTIME_KINDS]
     missing = [n for n in params.names if n not in {d.name for d in declared}]
     measured = listed(dict.fromkeys(d.name for d in declared)) or "none"

@@ -14,7 +14,7 @@ from grader.checks.support.ending import (
     process_tracebacks,
 )
 from grader.checks.support.process import Life, life, lives
-from grader.checks.support.text import listed, near_names, plural, seconds
+from grader.checks.support.text import listed, plural, seconds
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -68,7 +68,8 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
     expected = f"one node, alive {params.min_s:g} s and more after its first message, ending on Ctrl-C"
     one = life(run, params.process)
     if one is None:
-        return unjudged(f"{params.process} was not started: there is no script to run", expected=expected)
+        message = f"{params.process} was not started: there is no script to run"
+        return unjudged(message, expected=expected, hint="add the script to the package, and push it")
     nodes = run.student_nodes()
     up_ns = _up_ns(one, run)
     message = f"{_script(one)} is the node {listed(nodes)}, stayed alive and ended on Ctrl-C"
@@ -107,16 +108,15 @@ def node_name(run: Run, params: NodeNameParams) -> Verdict:
     kind = {"allowed": "plain or anonymous", "required": "anonymous", "forbidden": "plain"}[params.anonymous]
     expected = f"{listed((f'/{n}' for n in params.names), 'or')}, {kind}"
     if not nodes:
-        return unjudged("no node was registered, so there is no name", expected=expected, measured="no node")
+        message, hint = "no node was registered, so there is no name", "call rospy.init_node(…)"
+        return unjudged(message, expected=expected, measured="no node", hint=hint)
     cite = (EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),)
     measured = listed(nodes)
     if fitting := [n for n in nodes if _fits(n, params)]:
         return passed(f"the node is {fitting[0]}", expected=expected, measured=measured, citations=cite)
-    near = [n for wanted in params.names for n in near_names(f"/{wanted}", nodes)]
-    other = f" ({near[0]} nearly fits)" if near else ""
     flag = {"required": ", anonymous=True", "forbidden": ""}.get(params.anonymous, "")
     return failed(
-        f"the node is named {measured}, not {expected}{other}",
+        f"the node is named {measured}, not {expected}",
         expected=expected,
         measured=measured,
         hint=f"write rospy.init_node('{params.names[0]}'{flag})",

@@ -85,12 +85,14 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     """
     expected = f"{params.low_hz:g} to {params.high_hz:g} Hz on {params.topic}, evenly"
     if run.clock != "real":
-        return inconclusive("rates are judged in real time only, and this run was warped", expected=expected)
+        message = "rates are judged in real time only, and this run was warped"
+        return inconclusive(message, expected=expected, hint="give the criterion a scenario with clock: real")
     full = limit_reached(run, params.topic)
     until_ns = None if full else observed_until_ns(run)
     found = rhythm(run.student_channels(params.topic), until_ns, params.period_ns)
     if found is None:
-        return unjudged(f"no message came on {params.topic}", expected=expected, measured="no message")
+        message, hint = f"no message came on {params.topic}", f"look at rostopic hz {params.topic}"
+        return unjudged(message, expected=expected, measured="no message", hint=hint)
     verdict = (
         _flood(found, package, params)
         or _short(found, run, package, params)
@@ -153,10 +155,9 @@ def _uneven(found: Rhythm, params: RateParams) -> Verdict | None:
         return failed(
             message, hint="publish one message in each turn of the loop, and sleep once in each turn"
         )
-    bursts = "" if even else ", and unevenly"
     direction = "slow" if mean_hz < params.rate_hz else "fast"
     return failed(
-        f"{topic} is too {direction}: {hertz(mean_hz)} instead of {nominal} Hz{bursts}",
+        f"{topic} is too {direction}: {hertz(mean_hz)} instead of {nominal} Hz",
         hint=_rate_hint(mean_hz / params.rate_hz, nominal),
     )
 

@@ -102,7 +102,8 @@ def _silent(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verdict
         message = f"{params.topic} is advertised, but no message ever came"
         return failed(message, hint="call publish(…) inside the loop `while not rospy.is_shutdown():`")
     if not run.student_nodes():
-        return unjudged(f"nothing came on {params.topic}: no node was there to publish")
+        hint = f"run the node, and look at rostopic info {params.topic}"
+        return unjudged(f"nothing came on {params.topic}: no node was there to publish", hint=hint)
     message = f"no node publishes on {params.topic}"
     only = f"it publishes on {listed(others)}; " if others else ""
     return failed(message, hint=f"{only}add rospy.Publisher('{params.topic}', …) and publish in the loop")

@@ -175,7 +175,7 @@ class TimelineRun(Record):
     recorder: tuple[RecorderLine, ...] | None = None
     actors: tuple[Acted, ...] = ()
     params: tuple[ParamLine, ...] = ()
-    outcome: Literal["complete", "ended", "timeout", "host"] | None = "complete"
+    outcome: Literal["complete", "ended", "silent", "timeout", "host"] | None = "complete"
     outcome_detail: str = ""
     end_s: At | None = None
     attachments: dict[str, str] = Field(default_factory=dict)

@@ -13,6 +13,7 @@ from grader.model.package import PackageFacts
 from grader.model.verdict import FileCitation
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
+RUN_IT = "run it by itself with rosrun, and read what it prints last"
 RACE = "publish() to a closed topic"
 CAUSES = {
     "EOFError": (
@@ -42,6 +43,8 @@ CAUSES = {
     "NameError": ("", "check the spelling, and that it is imported or assigned before it is used"),
     "ROSSerializationException": ("", "publish a value that fits the message's type"),
     "SerializationError": ("", "publish a value that fits the message's type"),
+    "SyntaxError": ("", "mend that line, or the one above it"),
+    "IndentationError": ("", "indent every line with four spaces"),
     "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
 }
 
@@ -64,19 +67,19 @@ def explain_end(life: Life, run: Run, package: PackageFacts) -> Ending:
     if limit:
         return Ending(limit, "a node of this lab needs little memory and one process", ())
     if life.end is not None and life.end.signal is not None and life.end.stopped_by is None:
-        return Ending(f"{_signal_name(life.end.signal)} ended it", "", ())
+        return Ending(f"{_signal_name(life.end.signal)} ended it", RUN_IT, ())
     if code == 0:
         hint = "a node has to stay alive: `rospy.spin()`, or a loop `while not rospy.is_shutdown():`"
         return Ending("its script came to its end", hint, ())
     last = next((line.line for _, line in reversed(list(run.lines(life.name))) if line.line.strip()), "")
     words = f"; its last words: {shown(last)}" if last else ""
-    return Ending(f"it exited with code {code}{words}", "", ())
+    return Ending(f"it exited with code {code}{words}", RUN_IT, ())
 
 
 def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     """One traceback, with the line of the student's own file where it names one."""
     place = _place(found, package)
-    cause, hint = CAUSES.get(found.kind, ("", ""))
+    cause, hint = CAUSES.get(found.kind, ("", "mend the line that is named"))
     fault = (package.file(place.file) or _NO_FILE).python_fault if place else None
     if found.kind in SYNTAX and fault is not None:
         cause = fault.cause or cause

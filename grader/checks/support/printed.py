@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+from grader.checks.support.text import bare
 from grader.checks.support.traceback import HEADING, tracebacks
 from grader.evidence.run import Run
 
@@ -13,7 +14,6 @@ NUMBERS_PER_LINE = 6
 LINES_PER_PROBE = 8
 LINES_SPARE = 20
 CLOCK_SLACK_NS = 50_000_000
-_ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 _LOG_PREFIX = re.compile(r"^\s*\[\s*(?:DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*(?:\[[^\]]*\]\s*)*:?\s?")
 _ANONYMOUS = re.compile(r"/?[A-Za-z][\w/]*_\d+_\d{9,}")
 _NUMBER = re.compile(r"(?<![\d.])([-+]?)(\d+)(\.\d+)?(?![\d])")
@@ -71,7 +71,7 @@ def _without_tracebacks(lines: Sequence[tuple[int, str]]) -> list[tuple[int, str
 
 
 def _bare(text: str, names: Iterable[str]) -> str:
-    text = _LOG_PREFIX.sub("", _ANSI.sub("", text))
+    text = _LOG_PREFIX.sub("", bare(text))
     for name in names:
         text = text.replace(name, " ")
     return _ANONYMOUS.sub(" ", text)

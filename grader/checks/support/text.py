@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 SIMILARITY = 0.8
 SHOWN_CHARS = 160
+_ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
 
 def near_names(wanted: str, names: Iterable[str]) -> tuple[str, ...]:
@@ -46,9 +47,14 @@ def listed(names: Iterable[str], last: str = "and") -> str:
     return " ".join([", ".join(items[:-1]), last, items[-1]]) if len(items) > 1 else "".join(items)
 
 
+def bare(text: str) -> str:
+    """Without the terminal's colours."""
+    return _ANSI.sub("", text)
+
+
 def shown(text: str) -> str:
-    """One line of somebody's output, cut to a length that fits a report."""
-    line = " ".join(text.split())
+    """One line of somebody's output, without colours and control characters, cut to fit a report."""
+    line = " ".join("".join(c for c in bare(text) if c.isprintable() or c.isspace()).split())
     return line if len(line) <= SHOWN_CHARS else line[: SHOWN_CHARS - 1] + "…"
 
 

@@ -12,13 +12,16 @@ from grader.evidence.run import Run, is_grader_node
 from grader.model.package import PackageFacts
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, unjudged
 
+HAND_IN = "add the script to the package, and push it"
 CALLBACK_HINT = "print data.data in the callback, without a condition, and end the script with rospy.spin()"
 
 
 def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     """The grader sends when the node has subscribed; it never did, or it was not there."""
     if not lives(run):
-        return unjudged("the listener was not started: there is no script to run", measured="not started")
+        return unjudged(
+            "the listener was not started: there is no script to run", measured="not started", hint=HAND_IN
+        )
     ended = early_end(run)
     if ended is not None:
         end = explain_end(ended, run, package)
@@ -72,7 +75,7 @@ def _broken(package: PackageFacts, run: Run) -> Verdict | None:
         message = f"an error stops the node from printing: {end.cause}"
     else:
         return None
-    return failed(message, hint=end.hint or "mend the line that is named", citations=end.citations)
+    return failed(message, hint=end.hint, citations=end.citations)
 
 
 def _types_differ(run: Run, topic: str) -> Verdict | None:

@@ -1,0 +1,85 @@
+"""Runs a check on a timeline file: evidence as text, the check's parameters, and the verdict that it must give."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from grader.checks import CHECKS
+from grader.evidence.run import Run
+from grader.evidence.timeline import build_runs
+from grader.model.package import PackageFacts
+from grader.model.verdict import Status, Verdict
+
+TIMELINES = Path(__file__).parent / "timelines"
+KEYS = {"expect", "with", "run", "build", "package"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Example:
+    """One file. `expect`: `status`, `unjudged`, and regular expressions for fields of the verdict."""
+
+    check: str
+    path: Path
+    data: dict[str, Any]
+
+    @property
+    def expect(self) -> dict[str, Any]:
+        return self.data["expect"]
+
+    def verdict(self) -> Verdict:
+        return judge_example(self.check, self.data)
+
+
+def examples() -> list[Example]:
+    return [
+        Example(check=path.parent.name, path=path, data=yaml.safe_load(path.read_text(encoding="utf-8")))
+        for path in sorted(TIMELINES.glob("*/*.yaml"))
+    ]
+
+
+def judge_example(check: str, data: dict[str, Any]) -> Verdict:
+    """The verdict of one check on `run`, `build` and `package` (all optional), with the parameters `with`."""
+    if unknown := data.keys() - KEYS:
+        raise ValueError(f"unknown keys: {sorted(unknown)}")
+    return judge_runs(check, data.get("with", {}), runs_of(data))
+
+
+def runs_of(data: dict[str, Any]) -> dict[str, Run]:
+    recorded = {**data.get("build", {}), "package": data.get("package", {})}
+    return build_runs({"runs": {"run": data.get("run", {}), "package": recorded}})
+
+
+def judge_runs(name: str, params: dict[str, Any], runs: dict[str, Run]) -> Verdict:
+    check = CHECKS[name]
+    facts = {
+        "run": runs["run"],
+        "build": runs["package"],
+        "package": PackageFacts.model_validate_json(runs["package"].package_json or b""),
+        "params": check.params.model_validate(params),
+    }
+    return check.function(**{fact: facts[fact] for fact in check.facts})
+
+
+def differences(verdict: Verdict, expect: dict[str, Any]) -> list[str]:
+    """What the verdict lacks of what was expected, in words."""
+    found = []
+    if verdict.status is not Status(expect["status"]):
+        found.append(f"status {verdict.status.value}, expected {expect['status']}")
+    if verdict.unjudged != expect.get("unjudged", False):
+        found.append(f"unjudged {verdict.unjudged}")
+    for field in expect.keys() - {"status", "unjudged", "cites"}:
+        text = str(getattr(verdict, field))
+        if not re.search(str(expect[field]), text):
+            found.append(f"{field} {text!r} does not match {expect[field]!r}")
+    cited = [c.model_dump(exclude_none=True) for c in verdict.citations]
+    found += [f"no citation {c} in {cited}" for c in expect.get("cites", []) if not _is_cited(c, cited)]
+    return found
+
+
+def _is_cited(wanted: dict[str, Any], cited: list[dict[str, Any]]) -> bool:
+    return any(wanted.items() <= citation.items() for citation in cited)

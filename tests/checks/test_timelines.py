@@ -1,0 +1,79 @@
+"""Every timeline file gets the verdict that it says, and every check has what it needs to be trusted."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import textwrap
+from pathlib import Path
+
+import pytest
+import yaml
+
+from grader.checks import CHECKS, HEADINGS, Check
+from grader.checks.docs import checks_page
+from grader.model.verdict import Status
+from tests.checks.examples import TIMELINES, Example, differences, examples
+
+REPOSITORY = Path(__file__).parents[2]
+EXAMPLES = examples()
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=[str(e.path.relative_to(TIMELINES)) for e in EXAMPLES])
+def test_verdict(example: Example) -> None:
+    verdict = example.verdict()
+    assert differences(verdict, example.expect) == [], verdict
+    assert verdict.expected, "every verdict says what was expected"
+    assert verdict.message == verdict.message.strip()
+    assert "\n" not in verdict.message + verdict.hint + verdict.measured
+    if verdict.status is not Status.PASS:
+        assert verdict.hint, "where points are lost, the student is told what to do"
+
+
+@pytest.mark.parametrize("check", CHECKS.values(), ids=CHECKS)
+def test_check_is_documented(check: Check) -> None:
+    assert check.title.endswith(".")
+    assert list(check.sections) == list(HEADINGS)
+    assert all(len(text) > 20 for text in check.sections.values())
+
+
+@pytest.mark.parametrize("check", CHECKS.values(), ids=CHECKS)
+def test_check_is_short(check: Check) -> None:
+    tree = ast.parse(textwrap.dedent(inspect.getsource(check.function)))
+    function = tree.body[0]
+    assert isinstance(function, ast.FunctionDef)
+    first = function.body[1]  # behind the docstring
+    assert (function.end_lineno or 0) - first.lineno < 40
+
+
+@pytest.mark.parametrize("name", CHECKS)
+def test_check_has_a_passing_and_a_failing_timeline(name: str) -> None:
+    statuses = {e.expect["status"] for e in EXAMPLES if e.check == name}
+    assert {"pass", "fail"} <= statuses
+
+
+@pytest.mark.parametrize("name", CHECKS)
+def test_check_has_a_place_in_a_rubric(name: str) -> None:
+    rubrics = [yaml.safe_load(p.read_text()) for p in (REPOSITORY / "rubrics").glob("*.yaml")]
+    assert any(c["check"] == name for r in rubrics for c in r["criteria"])
+
+
+def test_timelines_are_for_checks() -> None:
+    assert {e.check for e in EXAMPLES} <= CHECKS.keys()
+
+
+def test_docs_are_what_the_docstrings_say() -> None:
+    page = (REPOSITORY / "docs" / "checks.md").read_text(encoding="utf-8")
+    assert page == checks_page(), "run: python -m grader.checks.docs > docs/checks.md"
+
+
+def test_checks_touch_nothing_outside() -> None:
+    """No file, clock, process, network or randomness in a check."""
+    forbidden = {"os", "io", "time", "datetime", "random", "socket", "subprocess", "pathlib.Path", "logging"}
+    for path in (REPOSITORY / "grader" / "checks").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom):
+                names = [node.module or "", *(f"{node.module}.{a.name}" for a in node.names)]
+            assert not forbidden & set(names), f"{path.name} imports {names}"
+            assert not (isinstance(node, ast.Name) and node.id in {"open", "print"}), path.name
