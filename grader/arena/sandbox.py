@@ -31,6 +31,11 @@ ETC = (
     "ssl/openssl.cnf",
 )  # fmt: skip
 SYNTAX = Path(__file__).parent / "ros" / "syntax.py"
+TERMINAL = Path(__file__).parent / "ros" / "terminal.sh"
+TERMINALS = (
+    "gnome-terminal", "konsole", "lxterminal", "mate-terminal", "rxvt", "terminator", "tilix", "urxvt",
+    "x-terminal-emulator", "xfce4-terminal", "xterm",
+)  # fmt: skip
 TMP_BYTES = 256 << 20
 FILE_BYTES = 64 << 20
 OPEN_FILES = 1024
@@ -117,7 +122,8 @@ def _system(ros: RosInstallation) -> list[str]:
 
 
 def prepare(place: Path, ros: RosInstallation) -> None:
-    """Write what every inner layer binds: `etc/` with one user in it, `bin/` with `python` as ROS means it."""
+    """Write what every inner layer binds: `etc/` with one user in it, `bin/` with `python` as ROS means it and
+    stand-ins for terminals, which launch files name as their `launch-prefix`."""
     etc, shims = place / "etc", place / "bin"
     for folder in (etc, shims, place / "home"):
         folder.mkdir(parents=True)
@@ -127,6 +133,11 @@ def prepare(place: Path, ros: RosInstallation) -> None:
     for name in ("python", "python3"):
         (shims / name).symlink_to(ros.python)
     shutil.copyfile(SYNTAX, shims / "grader-syntax.py")
+    terminal = shims / "grader-terminal"
+    shutil.copyfile(TERMINAL, terminal)
+    terminal.chmod(0o755)
+    for name in TERMINALS:
+        (shims / name).symlink_to(terminal.name)
 
 
 def choose(mode: Mode) -> Sandbox:

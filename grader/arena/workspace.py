@@ -20,6 +20,10 @@ from grader.package.manifest import read_manifest
 IGNORED = {".git", "build", "devel", "install", "__pycache__"}
 SHEBANG = b"#!/usr/bin/env python3\n"
 READ_MAX = 8 << 20
+MANIFEST = """<package format="2"><name>{}</name><version>0.0.0</version><description>A repair</description>
+<maintainer email="student@example.org">student</maintainer><license>TODO</license>
+<buildtool_depend>catkin</buildtool_depend></package>
+"""
 
 
 class Workspace(Record):
@@ -44,6 +48,8 @@ def make_workspace(
             _copy(package, source_tree / _folder_name(package))
     folder = _folder_name(submission.package)
     repairs = {path: tuple(_repair(repaired / folder / path, facts.file(path))) for path in scripts}
+    if facts.manifest is None:
+        _replace_manifest(repaired / folder / "package.xml", folder)
     for path in (built, output):
         _give_to(path, uid)
     return Workspace(built=built, repaired=repaired, output=output, folder=folder, repairs=repairs)
@@ -123,6 +129,13 @@ def _repair(path: Path, facts: SourceFile | None) -> Iterator[str]:
         yield "shebang (none)"
         text = text if text.split(b"\n", 1)[0].strip() else text.partition(b"\n")[2]
     path.write_bytes(SHEBANG + text.replace(b"\r\n", b"\n"))
+
+
+def _replace_manifest(path: Path, name: str) -> None:
+    """rospy reads the manifest above a script as the node starts: one that cannot be read would end every node."""
+    if not path.is_dir():
+        path.unlink(missing_ok=True)
+        path.write_text(MANIFEST.format(name))
 
 
 def _give_to(path: Path, uid: int | None) -> None:

@@ -21,6 +21,7 @@ from grader.model.verdict import (
     failed,
     inconclusive,
     passed,
+    unjudged,
 )
 
 _ERRORS = ("ERROR: cannot launch", "RLException", "Invalid ", "ERROR:", "process has died", "roslaunch:")
@@ -135,7 +136,10 @@ def _unconnected(
     if wrong is not None and file is not None:
         node, message, hint = wrong
         cited = (FileCitation(file=file.path, line=node.line),)
-        return failed(f"{file.path}, line {node.line}: {message}{quoted}", hint=hint, citations=cited)
+        # Where the launch file has the folder's name and the manifest another one, the manifest is at fault.
+        of_folder = node.pkg != package.name and node.pkg == PurePosixPath(package.path).name
+        verdict = unjudged if of_folder else failed
+        return verdict(f"{file.path}, line {node.line}: {message}{quoted}", hint=hint, citations=cited)
     nodes = run.student_nodes()
     if len(nodes) < 2:
         up = f"only {nodes[0]} comes up" if nodes else "no node comes up"
