@@ -31,9 +31,9 @@ def main() -> int:
     options = _parse()
     names = options.only or [REFERENCE, *fixture_names(LAB)]
     began_s, wrong = time.monotonic(), 0
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as temporary:
         for turn in range(1, options.times + 1):
-            found = _one_round(names, Path(folder), options.jobs)
+            found = _one_round(names, (options.out or Path(temporary)) / str(turn), options.jobs)
             wrong += len(found)
             print(f"round {turn} of {options.times}: {len(names) - len(found)} of {len(names)} as declared")
             for name, lines in sorted(found.items()):
@@ -50,6 +50,7 @@ def _parse() -> argparse.Namespace:
     parser.add_argument(
         "--only", nargs="+", metavar="NAME", help=f"these fixtures ({REFERENCE}: the reference)"
     )
+    parser.add_argument("--out", type=Path, help="keep the results here, by round and fixture")
     return parser.parse_args()
 
 
