@@ -56,21 +56,21 @@ class Verdict(Record):
 
 
 def passed(message: str, **fields: object) -> Verdict:
-    return Verdict(status=Status.PASS, score=1.0, message=message, **fields)  # type: ignore[arg-type]
+    return Verdict(status=Status.PASS, score=1.0, message=message, **fields)
 
 
 def partial(score: float, message: str, **fields: object) -> Verdict:
-    return Verdict(status=Status.PARTIAL, score=score, message=message, **fields)  # type: ignore[arg-type]
+    return Verdict(status=Status.PARTIAL, score=score, message=message, **fields)
 
 
 def failed(message: str, **fields: object) -> Verdict:
-    return Verdict(status=Status.FAIL, score=0.0, message=message, **fields)  # type: ignore[arg-type]
+    return Verdict(status=Status.FAIL, score=0.0, message=message, **fields)
 
 
 def unjudged(message: str, **fields: object) -> Verdict:
     """There is nothing to judge: a fail of its own, or `blocked` where a required criterion explains it."""
-    return Verdict(status=Status.FAIL, score=0.0, message=message, unjudged=True, **fields)  # type: ignore[arg-type]
+    return Verdict(status=Status.FAIL, score=0.0, message=message, unjudged=True, **fields)
 
 
 def inconclusive(message: str, **fields: object) -> Verdict:
-    return Verdict(status=Status.INCONCLUSIVE, score=0.0, message=message, **fields)  # type: ignore[arg-type]
+    return Verdict(status=Status.INCONCLUSIVE, score=0.0, message=message, **fields)

@@ -16,7 +16,7 @@ LINES_SPARE = 20
 CLOCK_SLACK_NS = 50_000_000
 _LOG_PREFIX = re.compile(r"^\s*\[\s*(?:DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*(?:\[[^\]]*\]\s*)*:?\s?")
 _ANONYMOUS = re.compile(r"/?[A-Za-z][\w/]*_\d+_\d{9,}")
-_NUMBER = re.compile(r"(?<![\d.])([-+]?)(\d+)(\.\d+)?(?![\d])")
+_NUMBER = re.compile(r"(?<![\d.])([-+]?)(\d+)(\.\d+)?(?!\d)", re.ASCII)
 
 
 class Probe(NamedTuple):

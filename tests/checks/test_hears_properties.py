@@ -1,0 +1,94 @@
+"""Whatever a listener writes around a number, it is found, and no other is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from grader.checks.support.printed import in_order, numbers_in
+from grader.evidence.timeline import build_runs
+from grader.model.verdict import Status
+from tests.checks.examples import judge_runs
+
+INT8 = st.integers(-128, 127)
+FORMS = [
+    "{}", "data: {}", "I heard {}", "I heard{}", "heard: {}.", "({})", "[{}]", "{},", "number={}", "'{}'", "{}!",
+    "{} (Int8)", "Int8 {}", "{}.0", "+{}", "\x1b[32m{}\x1b[0m", "got {} at 12:30:05.25", "received {}\n",
+]  # fmt: skip
+
+
+def status(topic: str, sent: list[Any], lines: list[str]) -> Status:
+    kind = "std_msgs/Int8" if isinstance(sent[0], int) else "std_msgs/String"
+    run = {
+        "processes": [{"name": "listener", "stopped_by": "INT", "exit_s": 9}],
+        "actors": [
+            {"action": "publish", "topic": topic, "type": kind, "values": sent, "at_s": 1, "every_s": 0.05}
+        ],
+        "console": [{"process": "listener", "lines": lines, "at_s": 1.01, "every_s": 0.05}] if lines else [],
+    }
+    return judge_runs("hears", {"topic": topic}, build_runs({"runs": {"run": run}, "package": {}})).status
+
+
+@pytest.mark.parametrize("form", [f for f in FORMS if f != "+{}"])
+@pytest.mark.parametrize("value", [-128, -1, 0, 7, 127])
+def test_forms(form: str, value: int) -> None:
+    from grader.checks.support.text import bare  # noqa: PLC0415 - only this test looks below the check
+
+    assert value in numbers_in(bare(form.format(value)))
+
+
+@pytest.mark.parametrize(
+    ("text", "missing"),
+    [
+        ("127", 12), ("127", 27), ("3.12", 12), ("12.5", 12), ("-12", 12), ("12", -12), ("1.2.3", 2),
+        ("0x0c", 12), ("1e3", 1000), ("", 0), ("zero", 0), ("٣", 3),
+    ],
+)  # fmt: skip
+def test_no_number_where_there_is_none(text: str, missing: int) -> None:
+    assert missing not in numbers_in(text)
+
+
+@settings(max_examples=40, deadline=None)
+@given(sent=st.lists(INT8, min_size=3, max_size=12), form=st.sampled_from(FORMS))
+def test_who_prints_all_passes(sent: list[int], form: str) -> None:
+    if form == "+{}" and min(sent) < 0:
+        return
+    assert status("/numeric_chatter", sent, [form.format(v).strip() for v in sent]) is Status.PASS
+
+
+@settings(max_examples=40, deadline=None)
+@given(sent=st.lists(INT8, min_size=3, max_size=12, unique=True), data=st.data())
+def test_who_leaves_one_out_fails(sent: list[int], data: st.DataObject) -> None:
+    left_out = data.draw(st.sampled_from(sent))
+    assert status("/numeric_chatter", sent, [str(v) for v in sent if v != left_out]) is Status.FAIL
+
+
+@settings(max_examples=40, deadline=None)
+@given(sent=st.lists(INT8, min_size=4, max_size=12, unique=True), shift=st.integers(1, 255))
+def test_who_prints_other_numbers_fails(sent: list[int], shift: int) -> None:
+    assert status("/numeric_chatter", sent, [str(v + shift) for v in sent]) is Status.FAIL
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    sent=st.lists(st.text("abcdefghij ", min_size=6, max_size=16).filter(str.strip), min_size=2, max_size=6)
+)
+def test_texts(sent: list[str]) -> None:
+    assert status("/chatter", sent, [f"I heard {text}" for text in sent]) is Status.PASS
+
+
+def test_nothing_printed_fails() -> None:
+    assert status("/chatter", ["abcdef"], []) is Status.FAIL
+
+
+@given(st.lists(st.lists(st.integers(0, 20), max_size=5).map(lambda p: tuple(sorted(p))), max_size=6))
+def test_in_order_is_exact(places: list[tuple[int, ...]]) -> None:
+    """Against trying every choice."""
+
+    def possible(rest: list[tuple[int, ...]], behind: int) -> bool:
+        return not rest or any(possible(rest[1:], place) for place in rest[0] if place > behind)
+
+    assert in_order(places) is possible(places, -1)

@@ -1,0 +1,174 @@
+"""What blocks what, whose fault nothing is, and how points are given."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from grader.checks import CHECKS
+from grader.evidence.timeline import build_runs
+from grader.judge import judge
+from grader.model.result import CriterionResult
+from grader.model.verdict import Status, Verdict, partial
+from tests.judge.rubrics import ALL, CHATTER, EXECUTABLE, GOOD_RUN, NODE, PACKAGE, RATE, rubric
+
+DIED = {"processes": [{"name": "talker", "exit_s": 0.3, "exit_code": 1}], "outcome": "ended"}
+
+
+def results(timeline: dict[str, Any], *criteria: dict[str, Any], **keys: Any) -> dict[str, CriterionResult]:
+    found = judge(rubric(*(criteria or ALL), **keys), build_runs(timeline))
+    return {r.id: r for r in found}
+
+
+def statuses(found: dict[str, CriterionResult]) -> dict[str, str]:
+    return {name: r.status.value for name, r in found.items()}
+
+
+def test_all_pass_in_the_rubrics_order() -> None:
+    found = results({"runs": {"talker": GOOD_RUN}, "package": PACKAGE})
+    assert statuses(found) == dict.fromkeys(["rate", "chatter", "node", "executable"], "pass")
+    assert list(found) == ["rate", "chatter", "node", "executable"]
+    assert all(r.points == r.max_points == 10 for r in found.values())
+
+
+def test_blocked_names_the_root() -> None:
+    found = results({"runs": {"talker": DIED}, "package": PACKAGE})
+    assert statuses(found) == {"rate": "blocked", "chatter": "blocked", "node": "fail", "executable": "pass"}
+    for name in ("rate", "chatter"):
+        assert found[name].message.startswith("blocked by node: talker ended by itself")
+        assert found[name].hint == "mend node first"
+        assert found[name].points == 0
+
+
+@pytest.mark.parametrize("recorded", [True, False])
+def test_a_missing_script_blocks_everything_that_needs_it(recorded: bool) -> None:
+    """Also where the arena had nothing to run, and where there is no arena."""
+    runs = {"talker": {"outcome": "ended", "graph": []}} if recorded else {}
+    found = results({"runs": runs, "package": {"files": []}})
+    assert statuses(found) == {
+        "rate": "blocked",
+        "chatter": "blocked",
+        "node": "blocked",
+        "executable": "fail",
+    }
+    assert found["rate"].message.startswith(
+        "blocked by executable: src/numeric_talker.py is not in the package"
+    )
+
+
+def test_what_can_be_judged_is_judged_though_a_requirement_failed() -> None:
+    package = {
+        "files": [{"path": "src/numeric_talker.py", "executable": False, "shebang": "#!/usr/bin/python3"}]
+    }
+    found = results({"runs": {"talker": GOOD_RUN}, "package": package})
+    assert statuses(found) == {"rate": "pass", "chatter": "pass", "node": "pass", "executable": "fail"}
+
+
+def test_nothing_to_judge_and_nothing_that_explains_it_is_a_fail() -> None:
+    free = {**RATE, "requires": []}
+    found = results({"runs": {"talker": DIED}, "package": PACKAGE}, free)
+    assert found["rate"].status is Status.FAIL
+    assert found["rate"].hint
+
+
+def test_nothing_to_judge_because_of_something_open_is_open() -> None:
+    package = {
+        "files": [{"path": "src/numeric_talker.py", "executable": None, "shebang": "#!/usr/bin/python3"}]
+    }
+    found = results({"runs": {"talker": {"outcome": "ended"}}, "package": package})
+    assert statuses(found) == dict.fromkeys(["rate", "chatter", "node", "executable"], "inconclusive")
+    assert "executable could not be judged" in found["node"].message
+
+
+def test_no_ros_leaves_the_static_criteria_judged() -> None:
+    reason = "no ROS 1 on this machine"
+    timeline = {"runs": {"package": {"package": PACKAGE, "metadata": {"not_run": reason}}}}
+    found = results(timeline)
+    assert statuses(found) == {
+        "rate": "inconclusive",
+        "chatter": "inconclusive",
+        "node": "inconclusive",
+        "executable": "pass",
+    }
+    assert reason in found["rate"].message
+    assert "apt-get install" in found["rate"].hint
+
+
+@pytest.mark.parametrize("outcome", ["host", None])
+def test_a_run_that_the_machine_lost_is_held_against_nobody(outcome: str | None) -> None:
+    run = {**GOOD_RUN, "topics": [], "outcome": outcome, "outcome_detail": "the roscore ended"}
+    found = results({"runs": {"talker": run}, "package": PACKAGE})
+    assert found["chatter"].status is Status.INCONCLUSIVE
+    if outcome:
+        assert "the roscore ended" in found["chatter"].message
+
+
+def test_no_evidence_at_all_is_inconclusive() -> None:
+    found = {r.id: r for r in judge(rubric(*ALL), {})}
+    assert statuses(found) == dict.fromkeys(["rate", "chatter", "node", "executable"], "inconclusive")
+
+
+def test_a_check_that_breaks_is_an_error_and_no_lost_mark(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(**_: object) -> Verdict:
+        raise ZeroDivisionError("secret detail")
+
+    monkeypatch.setitem(CHECKS, "rate", _with_function("rate", broken))
+    found = results({"runs": {"talker": GOOD_RUN}, "package": PACKAGE})
+    assert found["rate"].status is Status.ERROR
+    assert "ZeroDivisionError" in found["rate"].message
+    assert "secret" not in found["rate"].message
+    assert found["chatter"].status is Status.PASS
+
+
+def test_unknown_check_and_bad_parameters_are_errors() -> None:
+    unknown = {"id": "a", "check": "no-such-check"}
+    bad = {"id": "b", "check": "rate", "with": {"rate": 10}, "scenario": "talker"}
+    found = results({"runs": {"talker": GOOD_RUN}, "package": PACKAGE}, unknown, bad)
+    assert statuses(found) == {"a": "error", "b": "error"}
+
+
+def test_manual_is_left_to_a_person() -> None:
+    found = results({"package": PACKAGE}, {"id": "a", "check": "manual"})
+    assert (found["a"].status, found["a"].points) == (Status.MANUAL, 0)
+
+
+@pytest.mark.parametrize(
+    ("score", "points", "digits", "expected"),
+    [
+        (1 / 3, 15, 1, 5.0),
+        (1 / 3, 10, 1, 3.3),
+        (0.45, 5, 1, 2.3),
+        (0.5, 2.5, 1, 1.3),
+        (0.5, 5, 0, 3.0),
+        (0.125, 1, 2, 0.13),
+    ],
+)
+def test_points_are_rounded_half_up(
+    score: float, points: float, digits: int, expected: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(CHECKS, "rate", _with_function("rate", lambda **_: partial(score, "some")))
+    found = results(
+        {"runs": {"talker": GOOD_RUN}, "package": PACKAGE},
+        {**RATE, "requires": [], "points": points},
+        digits=digits,
+    )
+    assert found["rate"].points == expected
+
+
+def test_the_rubrics_hint_stands_in_where_the_check_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(CHECKS, "rate", _with_function("rate", lambda **_: partial(0.5, "some")))
+    timeline = {"runs": {"talker": GOOD_RUN}, "package": PACKAGE}
+    found = results(
+        timeline, {**RATE, "requires": [], "hint": "look here", "reproduce": "rostopic hz /chatter"}
+    )
+    assert found["rate"].hint == "look here"
+    assert found["rate"].reproduce == "rostopic hz /chatter"
+    passed = results(timeline, EXECUTABLE, NODE, {**CHATTER, "hint": "look here"})
+    assert passed["chatter"].hint == ""
+
+
+def _with_function(name: str, function: Any) -> Any:
+    from dataclasses import replace  # noqa: PLC0415 - beside its only use
+
+    return replace(CHECKS[name], function=function)

@@ -1,0 +1,96 @@
+"""Status, points and pass mark of the whole, and the bytes that two commands must agree on."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from grader.evidence.timeline import build_runs
+from grader.judge import criteria_bytes, judge, overall_status, reached_pass_mark, total_points
+from grader.judge.points import round_half_up
+from grader.model.result import CriterionResult
+from grader.model.verdict import FileCitation, Status
+from tests.judge.rubrics import ALL, GOOD_RUN, PACKAGE, rubric
+
+
+def result(
+    name: str = "a", status: str = "pass", points: float = 10.0, max_points: float = 10.0
+) -> CriterionResult:
+    return CriterionResult(
+        id=name,
+        title="größer",
+        check="rate",
+        scenario=None,
+        status=Status(status),
+        points=points,
+        max_points=max_points,
+        message="m",
+        expected="",
+        measured="",
+        hint="",
+        reproduce="",
+        citations=(FileCitation(file="a.py", line=1),),
+    )
+
+
+@pytest.mark.parametrize(
+    ("statuses", "expected"),
+    [
+        (["pass", "fail", "blocked", "partial"], "graded"),
+        (["pass", "inconclusive"], "inconclusive"),
+        (["pass", "manual"], "inconclusive"),
+        (["error", "inconclusive"], "error"),
+        ([], "error"),
+    ],
+)
+def test_overall_status(statuses: list[str], expected: str) -> None:
+    assert overall_status([result(str(i), s) for i, s in enumerate(statuses)]) == expected
+
+
+def test_advice_holds_up_nothing() -> None:
+    advice = result("b", "inconclusive", 0, 0)
+    assert overall_status([result(), advice]) == "graded"
+    assert overall_status([advice]) == "error"
+
+
+def test_total_is_exact() -> None:
+    results = [result(str(i), points=0.1, max_points=0.1) for i in range(3)]
+    assert total_points(rubric({"id": "a", "check": "rate"}), results) == 0.3
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "expected"),
+    [(2.25, 1, 2.3), (2.35, 1, 2.4), (0.5, 0, 1), (2.675, 2, 2.68), (7, 1, 7)],
+)
+def test_round_half_up(value: float, digits: int, expected: float) -> None:
+    assert round_half_up(value, digits) == expected
+
+
+def test_pass_mark_in_points() -> None:
+    one = rubric({"id": "a", "check": "rate"}, pass_mark=5)
+    assert reached_pass_mark(one, [result("a", "partial", 5)])
+    assert not reached_pass_mark(one, [result("a", "partial", 4.9)])
+
+
+def test_without_a_pass_mark_every_visible_criterion_has_to_pass() -> None:
+    criteria = rubric(
+        {"id": "a", "check": "rate"},
+        {"id": "hidden", "check": "rate", "visibility": "hidden"},
+        {"id": "advice", "check": "rate", "points": 0},
+    )
+    others = [result("hidden", "fail", 0), result("advice", "fail", 0, 0)]
+    assert reached_pass_mark(criteria, [result("a"), *others])
+    assert not reached_pass_mark(criteria, [result("a", "partial", 9), *others])
+    assert not reached_pass_mark(criteria, others)
+    assert not reached_pass_mark(criteria, [])
+
+
+def test_bytes_are_canonical() -> None:
+    timeline = {"runs": {"talker": GOOD_RUN}, "package": PACKAGE}
+    first, second = (criteria_bytes(judge(rubric(*ALL), build_runs(timeline))) for _ in range(2))
+    assert first == second
+    assert first.endswith(b"]\n")
+    assert [c["id"] for c in json.loads(first)] == ["rate", "chatter", "node", "executable"]
+    assert "größer".encode() in criteria_bytes([result()])
+    assert json.loads(criteria_bytes([result()]))[0]["citations"] == [{"file": "a.py", "line": 1}]
