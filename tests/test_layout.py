@@ -1,0 +1,125 @@
+"""Imports go one way, as docs/design.md says, and what must stay pure imports no I/O."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Iterator
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+GRADER = Path(__file__).resolve().parent.parent / "grader"
+ROS_SIDE = GRADER / "arena" / "ros"
+
+# Who may import whom, beside itself. `rubric.model` holds records only: whoever may see records may see it.
+BASE = {"model", "errors"}
+ALLOWED = {
+    "__init__": set[str](),
+    "model": set[str](),
+    "errors": set[str](),
+    "files": {"errors"},
+    "evidence": BASE,
+    "package": BASE,
+    "intake": BASE | {"files"},
+    "checks": BASE | {"evidence"},
+    "rubric": BASE | {"checks"},
+    "judge": BASE | {"checks", "evidence", "rubric"},
+    "report": BASE | {"files", "rubric.model"},
+    "arena": BASE | {"evidence", "files", "package", "rubric.model"},
+    "pipeline": BASE | {"arena", "evidence", "files", "intake", "judge", "package", "report", "rubric"},
+    "cli": {
+        *BASE, "arena", "checks", "evidence", "files", "intake", "judge", "package", "pipeline", "report", "rubric"
+    },
+    "__main__": {"cli"},
+}  # fmt: skip
+IO_MODULES = {
+    "asyncio", "fileinput", "glob", "http", "io", "logging", "multiprocessing", "os", "random", "select", "shutil",
+    "socket", "sqlite3", "subprocess", "tempfile", "threading", "time", "urllib",
+}  # fmt: skip
+IO_CALLS = {"open", "print", "input", "exec", "eval"}
+ROS_MODULES = {"rosgraph", "rosmaster", "genpy", "rospy"}
+
+
+def test_the_rule_itself_goes_one_way() -> None:
+    graph = {
+        station: {name.split(".")[0] for name in names} - {station} for station, names in ALLOWED.items()
+    }
+    order = list(TopologicalSorter(graph).static_order())
+    assert order.index("model") < order.index("judge") < order.index("pipeline") < order.index("cli")
+
+
+def test_every_station_is_in_the_rule() -> None:
+    assert {_station(path) for path in _sources(GRADER)} <= ALLOWED.keys()
+
+
+def test_imports_go_one_way() -> None:
+    wrong = [
+        f"{path.relative_to(GRADER)}: {module}"
+        for path in _sources(GRADER)
+        for module in _imports(path)
+        if module.startswith("grader.") and not _may(_station(path), module.removeprefix("grader."))
+    ]
+    assert wrong == []
+
+
+def test_checks_and_records_do_no_io() -> None:
+    wrong = [
+        f"{path.relative_to(GRADER)}: {name}"
+        for folder in ("checks", "model")
+        for path in _sources(GRADER / folder)
+        for name in [*_imports(path), *_calls(path)]
+        if name.split(".")[0] in IO_MODULES or name in IO_CALLS
+    ]
+    assert wrong == []
+
+
+def test_checks_see_evidence_as_records_only() -> None:
+    seen = {
+        m for path in _sources(GRADER / "checks") for m in _imports(path) if m.startswith("grader.evidence")
+    }
+    assert {module.split(".")[2] for module in seen} <= {"run", "events"}
+
+
+def test_the_ros_side_needs_ros_and_the_standard_library_only() -> None:
+    own = {path.stem for path in ROS_SIDE.glob("*.py")}
+    known = own | ROS_MODULES | sys.stdlib_module_names
+    found = {module.split(".")[0] for path in _sources(ROS_SIDE) for module in _imports(path)}
+    assert found - known == set()
+
+
+@pytest.mark.parametrize("path", sorted(ROS_SIDE.glob("*.py")), ids=lambda path: path.name)
+def test_the_ros_side_is_python_3_8(path) -> None:
+    tree = ast.parse(path.read_text(encoding="utf-8"), feature_version=(3, 8))
+    assert tree.body
+
+
+def _sources(folder: Path) -> Iterator[Path]:
+    return (path for path in sorted(folder.rglob("*.py")) if "_data" not in path.parts)
+
+
+def _station(path: Path) -> str:
+    return path.relative_to(GRADER).parts[0].removesuffix(".py")
+
+
+def _may(station: str, module: str) -> bool:
+    parts = module.split(".")
+    return parts[0] == station or bool({parts[0], ".".join(parts[:2])} & ALLOWED[station])
+
+
+def _imports(path: Path) -> Iterator[str]:
+    """The modules that a file imports, in functions too; `from grader import pipeline` as `grader.pipeline`."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module == "grader":
+            yield from (f"grader.{alias.name}" for alias in node.names if alias.name != "__version__")
+        elif isinstance(node, ast.ImportFrom):
+            yield f"{'.' * node.level}{node.module or ''}"
+
+
+def _calls(path: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            yield node.func.id
