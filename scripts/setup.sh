@@ -27,15 +27,16 @@ die() {
 # Where ROS 1 is, if not in Debian's packages: the same order as the grader's own search.
 ros_elsewhere() {
   local root
+  if [ "${GRADER_ROS_SETUP:-}" = none ]; then return 0; fi # asked to do without
   if [ -n "${GRADER_ROS_SETUP:-}" ]; then
     [ -f "$GRADER_ROS_SETUP" ] || die "GRADER_ROS_SETUP names $GRADER_ROS_SETUP, which is not there"
     return 0
   fi
-  for root in /opt/ros/*/; do # ROS 2 lies here too, and has no rospy
-    if [ -f "$root/setup.bash" ] && [ -d "$root/share/rospy" ]; then return 0; fi
+  for root in /opt/ros/*/; do # ROS 2 lies here too, and has no master
+    if [ -f "$root/setup.bash" ] && [ -x "$root/bin/rosmaster" ]; then return 0; fi
   done
   if [ -d /usr/share/rospy ]; then return 1; fi
-  [ -n "${CONDA_PREFIX:-}" ] && [ -d "$CONDA_PREFIX/share/rospy" ]
+  [ -n "${CONDA_PREFIX:-}" ] && [ -x "$CONDA_PREFIX/bin/rosmaster" ]
 }
 
 # Those of the named packages that are not installed, one a line.
