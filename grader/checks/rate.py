@@ -142,24 +142,34 @@ def _uneven(found: Rhythm, params: RateParams) -> Verdict | None:
     in_bounds = params.low_hz * (1 - ROUNDING) <= mean_hz <= params.high_hz * (1 + ROUNDING)
     if in_bounds and even:
         return None
-    topic, nominal = params.topic, number(params.rate_hz)
-    if found.tail_ns > max(5 * period_ns, 0.5e9):
-        lasted = seconds(found.times_ns[-1] - found.times_ns[0])
-        message = f"{topic} falls silent {lasted} after its first message, while its node lives on"
-        return failed(
-            message, hint="publish in a loop `while not rospy.is_shutdown():`, not a fixed number of times"
-        )
-    if in_bounds:
-        share = f"{len(outside)} of {len(found.gaps_ns)} gaps are far from {1 / params.rate_hz:g} s"
-        message = f"{topic} has {hertz(mean_hz)} in the mean, but in bursts or unevenly: {share}"
-        return failed(
-            message, hint="publish one message in each turn of the loop, and sleep once in each turn"
-        )
-    direction = "slow" if mean_hz < params.rate_hz else "fast"
-    return failed(
-        f"{topic} is too {direction}: {hertz(mean_hz)} instead of {nominal} Hz",
-        hint=_rate_hint(mean_hz / params.rate_hz, nominal),
-    )
+    return _fell_silent(found, params) or _bursts(found, outside, even, params) or _wrong_mean(found, params)
+
+
+def _fell_silent(found: Rhythm, params: RateParams) -> Verdict | None:
+    """The silence at the end is longer than anything that came before it."""
+    before_ns = max(found.gaps_ns[:-1], default=0)
+    if found.tail_ns <= max(5 * params.period_ns, 2 * before_ns, 0.5e9):
+        return None
+    lasted = seconds(found.times_ns[-1] - found.times_ns[0])
+    message = f"{params.topic} falls silent {lasted} after its first message, while its node lives on"
+    return failed(message, hint="publish in a loop `while not rospy.is_shutdown():`, not a number of times")
+
+
+def _bursts(found: Rhythm, outside: list[int], even: bool, params: RateParams) -> Verdict | None:
+    """The gaps are uneven, by the nominal period where the mean is right, or else by the topic's own."""
+    low_hz, high_hz = params.low_hz * (1 - ROUNDING), params.high_hz * (1 + ROUNDING)
+    if even or not (low_hz <= found.mean_hz <= high_hz or found.comes_in_bursts):
+        return None
+    share = f"{len(outside)} of {len(found.gaps_ns)} gaps are far from {1 / params.rate_hz:g} s"
+    kind = "in bursts" if found.comes_in_bursts else "unevenly"
+    message = f"{params.topic} comes {kind}: {hertz(found.mean_hz)} in the mean, but {share}"
+    return failed(message, hint="publish one message in each turn of the loop, and sleep once in each turn")
+
+
+def _wrong_mean(found: Rhythm, params: RateParams) -> Verdict:
+    direction, nominal = "slow" if found.mean_hz < params.rate_hz else "fast", number(params.rate_hz)
+    message = f"{params.topic} is too {direction}: {hertz(found.mean_hz)} instead of {nominal} Hz"
+    return failed(message, hint=_rate_hint(found.mean_hz / params.rate_hz, nominal))
 
 
 def _rate_hint(ratio: float, nominal: str) -> str:

@@ -51,6 +51,13 @@ class Rhythm(Record):
         slack = high_ns * ROUNDING
         return [i for i, gap in enumerate(self.gaps_ns) if not low_ns - slack <= gap <= high_ns + slack]
 
+    @property
+    def comes_in_bursts(self) -> bool:
+        """Many gaps are far shorter than the mean one, and some far longer."""
+        mean_ns = self.span_ns / len(self.gaps_ns)
+        short = sum(gap < 0.3 * mean_ns for gap in self.gaps_ns)
+        return short >= 0.25 * len(self.gaps_ns) and max(self.gaps_ns) > 1.5 * mean_ns
+
     def is_single_stall(self, outside: Sequence[int], period_ns: float) -> bool:
         """One message came late and the next on its schedule again: one long gap, then one short one."""
         match outside:
