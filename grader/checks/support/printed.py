@@ -16,6 +16,7 @@ LINES_SPARE = 20
 CLOCK_SLACK_NS = 50_000_000
 _LOG_PREFIX = re.compile(r"^\s*\[\s*(?:DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*(?:\[[^\]]*\]\s*)*:?\s?")
 _ANONYMOUS = re.compile(r"/?[A-Za-z][\w/]*_\d+_\d{9,}")
+_HEX = re.compile(r"0[xX][0-9a-fA-F]+")
 _NUMBER = re.compile(r"(?<![\d.])([-+]?)(\d+)(\.\d+)?(?!\d)", re.ASCII)
 
 
@@ -80,12 +81,12 @@ def _bare(text: str, names: Iterable[str]) -> str:
 def numbers_in(text: str) -> frozenset[int]:
     """A line's whole numbers: `12` is not in `127` and not in `3.12`. A `-` after a letter may be a dash."""
     found: set[int] = set()
-    for match in _NUMBER.finditer(text):
+    for match in _NUMBER.finditer(_HEX.sub(" ", text)):
         sign, whole, fraction = match.groups()
         if len(whole) > 18 or (fraction and fraction.strip(".0")):
             continue
         found.add(int(sign + whole))
-        if sign and text[: match.start()][-1:].isalpha():
+        if sign and match.string[: match.start()][-1:].isalpha():
             found.add(int(whole))
     return frozenset(found)
 
