@@ -44,7 +44,8 @@ def test_forms(form: str, value: int) -> None:
     ("text", "missing"),
     [
         ("127", 12), ("127", 27), ("3.12", 12), ("12.5", 12), ("-12", 12), ("12", -12), ("1.2.3", 2),
-        ("0x0c", 12), ("<function f at 0x7f14>", 14), ("<function f at 0x7f14>", 0), ("1e3", 1000), ("", 0), ("zero", 0), ("٣", 3),
+        ("0x0c", 12), ("<function f at 0x7f14>", 14),
+        ("<function f at 0x7f14>", 0), ("1e3", 1000), ("", 0), ("zero", 0), ("٣", 3),
     ],
 )  # fmt: skip
 def test_no_number_where_there_is_none(text: str, missing: int) -> None:
