@@ -9,7 +9,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from platform import python_version
@@ -122,10 +122,12 @@ def _opened(
 
 @contextmanager
 def _new_evidence(folder: Path) -> Iterator[Path]:
-    """A folder to record into, which takes the place of `folder/evidence` when all went well, and leaves no trace
-    otherwise."""
+    """A folder to record into, which takes the place of `folder/evidence` when all went well.
+
+    Otherwise it leaves no trace: an older grading stays whole, and folders that it made are gone.
+    """
     target, beside = folder / "evidence", folder / ".evidence.part"
-    existed = folder.exists()
+    made = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
         shutil.rmtree(beside, ignore_errors=True)
         beside.mkdir(parents=True)
@@ -137,8 +139,9 @@ def _new_evidence(folder: Path) -> Iterator[Path]:
         beside.rename(target)
     finally:
         shutil.rmtree(beside, ignore_errors=True)
-        if not existed and not any(folder.iterdir()):
-            folder.rmdir()
+        for path in made:
+            with suppress(OSError):  # not empty: it is in use
+                path.rmdir()
 
 
 def _recorder(

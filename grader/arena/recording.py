@@ -5,7 +5,6 @@ Runs that do not disturb each other go side by side: a run that measures a rate 
 
 from __future__ import annotations
 
-import asyncio
 import tempfile
 import time
 from collections.abc import Iterable, Mapping
@@ -15,6 +14,7 @@ from pathlib import Path
 from typing_extensions import Self
 
 from grader import __version__
+from grader.arena.asynchronous import run_until_signal, side_by_side
 from grader.arena.build import BUILD_EXPECTED_S, BuildOutcome, build
 from grader.arena.place import Place
 from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
@@ -104,11 +104,11 @@ class Recorder:
 
     def record_all(self) -> None:
         """The package with its build, then every scenario in its lane."""
-        asyncio.run(self._record_all())
+        run_until_signal(self._record_all())
 
     def record_again(self, scenarios: Iterable[str]) -> None:
         """These scenarios once more, one after the other, with nothing beside them."""
-        asyncio.run(self._lane(self._place, tuple(scenarios)))
+        run_until_signal(self._lane(self._place, tuple(scenarios)))
 
     async def _record_all(self) -> None:
         await self._record_package()
@@ -117,7 +117,7 @@ class Recorder:
                 self._progress.step(name, "skipped", self._not_run)
             return
         measuring, others = lanes(self._rubric.scenarios)
-        await asyncio.gather(self._lane(self._place, measuring), self._lane(self._place, others))
+        await side_by_side(self._lane(self._place, measuring), self._lane(self._place, others))
 
     async def _lane(self, place: Place | None, names: tuple[str, ...]) -> None:
         for name in names:

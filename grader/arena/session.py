@@ -7,6 +7,7 @@ import contextlib
 import json
 import os
 import secrets
+import signal
 import time
 from collections import deque
 from collections.abc import Callable
@@ -27,6 +28,7 @@ ARENA = Path(__file__).parent / "ros"
 ROSOUT = ("/usr/lib/rosout/rosout", "lib/rosout/rosout")
 READY_S = 15.0
 END_S = 5.0
+CLOSE_S = 1.5
 READ_BYTES = 1 << 18
 PORT = 11311
 JSON_TOPICS = {topic for topic in TOPICS if topic != "/grader/scenario"}
@@ -109,8 +111,11 @@ class ArenaSession:
             if left <= 0:
                 return False
             self._changed.clear()
-            with contextlib.suppress(asyncio.TimeoutError):
-                await asyncio.wait_for(self._changed.wait(), left)
+            timer = asyncio.get_running_loop().call_later(left, self._changed.set)
+            try:
+                await self._changed.wait()
+            finally:
+                timer.cancel()
         return True
 
     async def finish(self) -> None:
@@ -230,15 +235,29 @@ class ArenaSession:
         )
 
     async def _end(self) -> None:
-        """End the arena at once: closed commands first, so that it ends what it started, then by force."""
+        """End the arena at once, even when Ctrl-C comes again meanwhile."""
+        closing = asyncio.ensure_future(self._close())
+        try:
+            await asyncio.shield(closing)
+        except asyncio.CancelledError:
+            self._kill()
+            await closing
+            raise
+
+    async def _close(self) -> None:
+        """Closed commands first, so that it ends what it started; then by force."""
         if self._process.stdin is not None:
             self._process.stdin.close()
-        try:
-            await asyncio.wait_for(self._process.wait(), 1.5)
-        except (asyncio.TimeoutError, asyncio.CancelledError):
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(self._process.pid, 9)
-            await self._process.wait()
+        ended = asyncio.ensure_future(self._process.wait())
+        await asyncio.wait({ended}, timeout=CLOSE_S)
+        self._kill()
+        await ended
+        await asyncio.wait(self._tasks, timeout=CLOSE_S)
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    def _kill(self) -> None:
+        if self._process.returncode is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)

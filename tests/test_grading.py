@@ -1,0 +1,211 @@
+"""`grader grade` as a user runs it: what it writes, and what is left when it is stopped."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.arena.support import SCRIPT
+
+pytestmark = pytest.mark.ros
+
+ROOT = Path(__file__).resolve().parent.parent
+LAB = "leeds-comp3631-lab1"
+SOLUTION = ROOT / "reference_solutions" / LAB
+KEYS = [
+    "schema", "submission", "rubric", "status", "points", "max_points", "criteria", "environment", "timing"
+]  # fmt: skip
+CRITERION_KEYS = [
+    "id", "title", "check", "scenario", "status", "points", "max_points", "message", "expected", "measured",
+    "hint", "reproduce", "citations",
+]  # fmt: skip
+
+
+class Grader:
+    """Runs `grader` in processes that can be told from all others by their temporary folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.temporary = folder / "tmp"
+        self.temporary.mkdir()
+        self.temporary.chmod(0o711)
+        for parent in (folder, *folder.parents[:2]):
+            parent.chmod(0o711)
+        self.env = {**os.environ, "TMPDIR": str(self.temporary)}
+
+    def start(self, *argv: str | Path, **env: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-m", "grader", *map(str, argv)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**self.env, **env},
+            cwd=ROOT,
+            start_new_session=True,
+        )
+
+    def run(self, *argv: str | Path, **env: str) -> tuple[int, str, str]:
+        process = self.start(*argv, **env)
+        out, err = process.communicate(timeout=120)
+        return process.returncode, out, err
+
+    def processes(self) -> list[str]:
+        """Command lines of what still runs of ours: sandboxes name the temporary folder, arenas have it from us."""
+        marker = str(self.temporary).encode()
+        return [
+            command.decode(errors="replace").replace("\0", " ")[:200]
+            for pid in (path.name for path in Path("/proc").iterdir() if path.name.isdigit())
+            if marker in (command := _read(pid, "cmdline")) or marker in _read(pid, "environ")
+        ]
+
+    def await_none(self, within_s: float) -> list[str]:
+        """What is left when nothing is, or when the time is over."""
+        deadline = time.monotonic() + within_s
+        while (left := self.processes()) and time.monotonic() < deadline:
+            os.sched_yield()
+        return left
+
+
+def _read(pid: str, name: str) -> bytes:
+    try:
+        return Path("/proc", pid, name).read_bytes()
+    except OSError:  # it has ended since
+        return b""
+
+
+@pytest.fixture
+def grader(tmp_path: Path) -> Grader:
+    return Grader(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Grader]:
+    folder = tmp_path_factory.mktemp("graded")
+    grader = Grader(folder)
+    code, out, err = grader.run("grade", SOLUTION, "--rubric", LAB, "--out", folder / "out", "--id", "sc20ab")
+    assert code == 0, out + err
+    return folder / "out" / "sc20ab", grader
+
+
+def test_result_has_the_keys_that_others_read(graded: tuple[Path, Grader]) -> None:
+    result = json.loads((graded[0] / "result.json").read_text())
+    assert list(result) == KEYS
+    assert (result["schema"], result["status"], result["points"]) == ("grader.result/1", "graded", 100)
+    assert list(result["submission"]) == ["id", "source", "commit", "digest", "package"]
+    assert result["submission"]["id"] == "sc20ab"
+    assert list(result["rubric"]) == ["id", "version", "digest"]
+    assert list(result["environment"]) == ["grader", "ros", "python", "sandbox"]
+    assert list(result["timing"]) == ["wall_s", "cpu_s", "student_cpu_s"]
+    for criterion in result["criteria"]:
+        assert list(criterion) == CRITERION_KEYS
+
+
+def test_judging_again_gives_the_same_bytes(graded: tuple[Path, Grader], tmp_path: Path) -> None:
+    folder, grader = graded
+    code, out, _ = grader.run("judge", folder / "evidence", "--rubric", LAB, GRADER_ROS_SETUP="none")
+    assert code == 0
+    again = json.loads(out)
+    result = json.loads((folder / "result.json").read_text())
+    as_text = {"ensure_ascii": False, "indent": 2}
+    assert json.dumps(again, **as_text) == json.dumps(result["criteria"], **as_text)
+    single = grader.run("judge", *sorted((folder / "evidence").iterdir()), "--rubric", LAB)[1]
+    assert single == out
+
+
+def test_all_reports_and_evidence_are_there(graded: tuple[Path, Grader]) -> None:
+    folder, grader = graded
+    assert {p.name for p in folder.iterdir()} == {
+        "result.json", "report.md", "junit.xml", "console.log", "evidence"
+    }  # fmt: skip
+    names = {p.name for p in (folder / "evidence").iterdir()}
+    assert names == {"package.mcap", "talker.mcap", "wraps.mcap", "listener.mcap", "launch.mcap"}
+    assert "I heard" in (folder / "console.log").read_text()
+    assert grader.await_none(2) == []
+    assert list(grader.temporary.iterdir()) == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("seen", ["catkin_make", "talker", "wraps  done", "launch"])
+def test_stopping_leaves_nothing(grader: Grader, tmp_path: Path, seen: str, number: int) -> None:
+    out = tmp_path / "out"
+    process = grader.start("grade", SOLUTION, "--rubric", LAB, "--out", out)
+    assert process.stderr is not None
+    for line in process.stderr:
+        if seen in line:
+            break
+    began = time.monotonic()
+    process.send_signal(number)
+    _, err = process.communicate(timeout=30)
+    assert time.monotonic() - began < 3
+    assert process.returncode == 130
+    assert err.splitlines()[-1] == "grader: interrupted"
+    assert grader.await_none(1) == []
+    assert not out.exists()
+    assert list(grader.temporary.iterdir()) == []
+
+
+def test_killing_leaves_no_process_and_no_half_result(grader: Grader, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    process = grader.start("grade", SOLUTION, "--rubric", LAB, "--out", out)
+    assert process.stderr is not None
+    for line in process.stderr:
+        if "observing" in line or "wraps  done" in line:
+            break
+    assert grader.processes()
+    process.kill()
+    process.communicate(timeout=30)
+    assert grader.await_none(2) == []
+    assert not list(out.rglob("result.json"))
+    code, _, err = grader.run("grade", SOLUTION, "--rubric", LAB, "--out", out)
+    assert code == 0, err
+
+
+def test_interrupted_grading_keeps_the_older_result(grader: Grader, tmp_path: Path) -> None:
+    source = tmp_path / "empty-lab"
+    (source / "src").mkdir(parents=True)
+    (source / "package.xml").write_text("<package>broken")
+    (source / "src" / "numeric_talker.py").write_text(SCRIPT)
+    argv = ("grade", source, "--rubric", LAB, "--out", tmp_path / "out", "--id", "one")
+    source.rename(tmp_path / "lab1")
+    argv = (argv[0], tmp_path / "lab1", *argv[2:])
+    assert grader.run(*argv)[0] == 1
+    before = {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()}
+    process = grader.start(*argv)
+    assert process.stderr is not None
+    for line in process.stderr:
+        if "catkin_make" in line:
+            break
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=30)
+    assert {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()} == before
+
+
+def test_without_ros_the_static_criteria_are_still_judged(grader: Grader, tmp_path: Path) -> None:
+    code, out, _ = grader.run(
+        "grade", SOLUTION, "--rubric", LAB, "--out", tmp_path / "out", GRADER_ROS_SETUP="none"
+    )
+    assert code == 4
+    result = json.loads(next((tmp_path / "out").rglob("result.json")).read_text())
+    statuses = {c["id"]: c["status"] for c in result["criteria"]}
+    assert {i for i, s in statuses.items() if s == "pass"} == {
+        "manifest", "cmake", "talker-executable", "listener-executable", "dependencies"
+    }  # fmt: skip
+    assert set(statuses.values()) == {"pass", "inconclusive"}
+    assert "apt-get install python3-rospy" in out.replace("\n", " ").replace("          ", "")
+
+
+def test_without_a_sandbox_the_lab_is_graded_all_the_same(grader: Grader, tmp_path: Path) -> None:
+    code, out, err = grader.run(
+        "grade", SOLUTION, "--rubric", LAB, "--out", tmp_path / "out", "--sandbox", "none"
+    )
+    assert code == 0, out + err
+    result = json.loads(next((tmp_path / "out").rglob("result.json")).read_text())
+    assert result["environment"]["sandbox"] == "none (--sandbox none)"
+    assert grader.await_none(2) == []
