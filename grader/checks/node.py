@@ -13,6 +13,7 @@ from grader.checks.support.ending import (
     is_rospys_own,
     process_tracebacks,
 )
+from grader.checks.support.lockup import fell_silent, is_flood, was_talking
 from grader.checks.support.process import Life, life, lives
 from grader.checks.support.text import listed, plural, seconds
 from grader.evidence.run import Run
@@ -59,7 +60,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
     How it is measured
         By what the master lists, by the process's life until 5 s and more after its first message, and by
         its exit after SIGINT. Any exit code is fine. A traceback `publish() to a closed topic` at the end
-        is a race of rospy's own and costs nothing.
+        is a race of rospy's own and costs nothing, nor does a lock-up of rospy's in a flood of messages.
 
     How to fix
         Call `rospy.init_node(…)` once. Loop with `while not rospy.is_shutdown():`, sleep with `rospy.Rate`,
@@ -168,6 +169,9 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     """How its end after Ctrl-C was wrong, None where it was not."""
     stopped_by = one.end.stopped_by if one.end else None
     if stopped_by in {"TERM", "KILL"}:
+        excuse = _locked_up(one, run)
+        if excuse is not None:
+            return excuse
         message = f"{_script(one)} did not end on Ctrl-C and had to be stopped with SIG{stopped_by}"
         return failed(message, hint=f"{LOOP}; a bare `except:` in the loop swallows the Ctrl-C")
     found = process_tracebacks(run, one.name, after_ns=one.interrupt_ns)
@@ -177,6 +181,20 @@ def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     end = explain_traceback(own[-1], package)
     message = f"{_script(one)} ends on Ctrl-C with a traceback: {end.cause}"
     return failed(message, hint=end.hint or LOOP, citations=end.citations)
+
+
+def _locked_up(one: Life, run: Run) -> Verdict | None:
+    if not fell_silent(one, run):
+        return None
+    if is_flood(run):
+        flood = "it floods its topics, which can lock up rospy itself on Ctrl-C"
+        return passed(f"{_script(one)} is one node and stayed alive; {flood}, so its end is not counted")
+    if was_talking(one, run):
+        message = (
+            f"{_script(one)} stopped short on Ctrl-C but did not end: rospy may have locked up by itself"
+        )
+        return inconclusive(message, hint="grade again")
+    return None
 
 
 def _process_citation(one: Life, run: Run) -> EvidenceCitation:
