@@ -59,7 +59,7 @@ def _one_round(names: list[str], folder: Path, jobs: int) -> dict[str, list[str]
     rubric = load_rubric(LAB).rubric
     found: dict[str, list[str]] = {}
     with workers(jobs) as pool:
-        futures = {pool.submit(grade_fixture, LAB, name, folder / name): name for name in names}
+        futures = {pool.submit(grade_fixture, LAB, name, folder): name for name in names}
         for future in as_completed(futures):
             name = futures[future]
             try:

@@ -43,7 +43,7 @@ def graded(request, tmp_path_factory) -> Iterator[dict[str, Future[GradingResult
     chosen = [i.callspec.params["graded_name"] for i in request.session.items if _is_graded(i)]
     out = tmp_path_factory.mktemp("graded")
     with workers() as pool:
-        yield {name: pool.submit(grade_fixture, LAB, name, out / name) for name in dict.fromkeys(chosen)}
+        yield {name: pool.submit(grade_fixture, LAB, name, out) for name in dict.fromkeys(chosen)}
 
 
 def _is_graded(item: pytest.Item) -> bool:
