@@ -13,6 +13,8 @@ from grader.arena.sandbox import BUILT_WORKSPACE, HOME, INSIDE_WORKSPACE, OUTPUT
 from grader.arena.workspace import Workspace
 
 LIBSTDBUF = Path("/usr/libexec/coreutils/libstdbuf.so")
+LIFELINE = "echo >&{lifeline} && read -r _ <&{lifeline} && exec {lifeline}>&- || exit 125; "
+"""The first thing that runs says that it is there and waits for leave: an arena that has died gives none."""
 BUILD_STEP = 'cd "$HOME" && exec "$@"'
 RUN_STEP = (
     f"mkdir {INSIDE_WORKSPACE} && cp -R --preserve=mode,links {BUILT_WORKSPACE}/* {INSIDE_WORKSPACE}/"
@@ -96,12 +98,8 @@ class Place:
     ) -> dict[str, Any]:
         """What the arena needs to start a process. `build` gives it the workspace as handed in, writable; otherwise,
         with `copy`, it gets a copy of its own with the repairs."""
-        shell = [
-            "/bin/sh",
-            "-c",
-            RUN_STEP if copy and not build and self.sandbox.bubblewrap else BUILD_STEP,
-            "sh",
-        ]
+        step = RUN_STEP if copy and not build and self.sandbox.bubblewrap else BUILD_STEP
+        shell = ["/bin/bash", "-c", LIFELINE + step, "bash"]
         inner = self.sandbox.inner(
             [*shell, *argv],
             ros=self.ros,

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import json
-import os
 import secrets
-import signal
 import time
-from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from typing_extensions import Self
 
+from grader.arena.child import ArenaProcess
 from grader.arena.frames import Frame, FrameReader
 from grader.arena.live import Live
 from grader.arena.place import Place
-from grader.errors import ArenaError
+from grader.errors import ArenaError, GraderError
 from grader.evidence.events import TOPICS, ProcessEvent, ScenarioEvent
 from grader.evidence.run import is_grader_node
 from grader.evidence.writer import EvidenceWriter
@@ -28,10 +24,7 @@ ARENA = Path(__file__).parent / "ros"
 ROSOUT = ("/usr/lib/rosout/rosout", "lib/rosout/rosout")
 READY_S = 15.0
 END_S = 5.0
-CLOSE_S = 1.5
-READ_BYTES = 1 << 18
 PORT = 11311
-JSON_TOPICS = {topic for topic in TOPICS if topic != "/grader/scenario"}
 
 
 class ArenaSession:
@@ -55,30 +48,22 @@ class ArenaSession:
         self._done = False
         self.rosout_up = False
         self._failure = ""
-        self._stderr: deque[str] = deque(maxlen=20)
+        self._error: GraderError | None = None
+        self._frames = FrameReader()
 
     async def __aenter__(self) -> Self:
         argv = self._place.sandbox.outer([self._place.ros.python, "-s", "-B", str(ARENA)])
-        self._process = await asyncio.create_subprocess_exec(
-            *argv,
-            stdin=asyncio.subprocess.PIPE,
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
-            env=self._place.arena_env(),
-            cwd="/",
-            start_new_session=True,
-        )
-        self._tasks = [asyncio.create_task(self._read_frames()), asyncio.create_task(self._read_errors())]
+        self._process = ArenaProcess(argv, self._place.arena_env(), self._read)
         try:
             self.send(**self._config())
             await self._await_ready()
         except BaseException:
-            await self._end()
+            await self._process.end()
             raise
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        await self._end()
+        await self._process.end()
 
     async def _await_ready(self) -> None:
         if not await self.wait(lambda: self._ready, READY_S):
@@ -86,8 +71,7 @@ class ArenaSession:
 
     def send(self, **command: Any) -> None:  # noqa: ANN401 - JSON
         """Hand the arena one command (grader/arena/ros/__main__.py has a method for each)."""
-        if self._process.stdin is not None and not self._process.stdin.is_closing():
-            self._process.stdin.write(json.dumps(command).encode() + b"\n")
+        self._process.send(command)
 
     def start(self, spec: dict[str, Any]) -> None:
         self.live.running.add(spec["name"])
@@ -105,6 +89,8 @@ class ArenaSession:
         """Wait until the condition holds; False when it does not in time. Raises ArenaError if the arena dies."""
         deadline = time.monotonic() + timeout_s
         while not condition():
+            if self._error is not None:
+                raise self._error
             if self._failure:
                 raise ArenaError(f"the managed roscore ended: {self._why()}", hint="grade again")
             left = deadline - time.monotonic()
@@ -140,23 +126,17 @@ class ArenaSession:
                     return self._place.spec("rosout", [str(program)], role="grader", copy=False)
         return None
 
-    async def _read_frames(self) -> None:
-        assert self._process.stdout is not None  # noqa: S101 - a pipe was asked for
-        frames = FrameReader()
+    def _read(self, chunk: bytes) -> None:
         try:
-            while chunk := await self._process.stdout.read(READ_BYTES):
-                for frame in frames.feed(chunk):
-                    self._take(frame)
-                self._changed.set()
-        finally:
-            if not self._done:
-                self._failure = self._failure or "its output ended"
-            self._changed.set()
-
-    async def _read_errors(self) -> None:
-        assert self._process.stderr is not None  # noqa: S101 - a pipe was asked for
-        async for line in self._process.stderr:
-            self._stderr.append(line.decode(errors="replace").rstrip())
+            for frame in self._frames.feed(chunk):
+                self._take(frame)
+        except GraderError as error:
+            self._error = error
+        except (ValueError, KeyError) as error:
+            self._failure = f"it sent what is no frame: {type(error).__name__}"
+        if not chunk and not self._done:
+            self._failure = self._failure or "its output ended"
+        self._changed.set()
 
     def _take(self, frame: Frame) -> None:
         if frame.kind == "M":
@@ -229,35 +209,4 @@ class ArenaSession:
         self._writer.event("/grader/process", time.time_ns(), event)
 
     def _why(self) -> str:
-        return (
-            " ".join([self._failure, *list(self._stderr)[-1:]]).strip()
-            or f"exit code {self._process.returncode}"
-        )
-
-    async def _end(self) -> None:
-        """End the arena at once, even when Ctrl-C comes again meanwhile."""
-        closing = asyncio.ensure_future(self._close())
-        try:
-            await asyncio.shield(closing)
-        except asyncio.CancelledError:
-            self._kill()
-            await closing
-            raise
-
-    async def _close(self) -> None:
-        """Closed commands first, so that it ends what it started; then by force."""
-        if self._process.stdin is not None:
-            self._process.stdin.close()
-        ended = asyncio.ensure_future(self._process.wait())
-        await asyncio.wait({ended}, timeout=CLOSE_S)
-        self._kill()
-        await ended
-        await asyncio.wait(self._tasks, timeout=CLOSE_S)
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-
-    def _kill(self) -> None:
-        if self._process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(self._process.pid, signal.SIGKILL)
+        return f"{self._failure} {self._process.last_words()}".strip() or "it did not answer"

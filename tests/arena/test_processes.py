@@ -109,6 +109,12 @@ for path in ("/usr/x", "/etc/x", "/run/grader/ws/src/x"):
         assert word not in text, text
 
 
+@pytest.mark.parametrize("sandbox", SANDBOXES)
+def test_nothing_of_the_arena_is_inherited(tmp_path: Path, sandbox: str) -> None:
+    code = "import os\nprint(sorted(int(n) for n in os.listdir('/proc/self/fd')))\n"
+    assert printed(run_script(tmp_path, code, limit_s=5, sandbox=sandbox)) == ["[0, 1, 2, 3]"]
+
+
 @needs_sandbox
 def test_memory_is_limited(tmp_path: Path) -> None:
     code = "import time\nblocks = []\nwhile True:\n    blocks.append(bytearray(20 << 20))\n    time.sleep(0.02)\n"

@@ -4,6 +4,7 @@ import contextlib
 import json
 import os
 import signal
+import socket
 import subprocess
 
 LINE_BYTES_MAX = 4096
@@ -87,30 +88,40 @@ class Process:
         self._peak_bytes = max(self._peak_bytes, usage.ru_maxrss * 1024)
 
     def _spawn(self, spec):
-        argv = list(spec["argv"])
-        info_r = None
-        pass_fds = ()
-        if spec["sandboxed"]:
-            info_r, info_w = os.pipe()
-            argv = [str(info_w) if a == "{info_fd}" else a for a in argv]
-            pass_fds = (info_w,)
+        lifeline, theirs = socket.socketpair()
+        info_r, info_w = os.pipe() if spec["sandboxed"] else (None, None)
+        numbers = {"{lifeline}": str(theirs.fileno()), "{info_fd}": str(info_w)}
         self._popen = subprocess.Popen(
-            argv,
+            [_filled_in(argument, numbers) for argument in spec["argv"]],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             env=spec["env"],
             cwd=spec["cwd"],
-            pass_fds=pass_fds,
+            pass_fds=[theirs.fileno()] + ([info_w] if info_w is not None else []),
             start_new_session=True,
         )
         self.pid = self._popen.pid
-        if info_r is not None:
+        theirs.close()
+        if info_w is not None:
             os.close(info_w)
             self._read_info(info_r)
+        self._give_leave(lifeline)
         for name, pipe in (("stdout", self._popen.stdout), ("stderr", self._popen.stderr)):
             self._open_streams += 1
             _Stream(self, name, pipe)
+
+    def _give_leave(self, lifeline):
+        """The process is in its sandbox, which ends with the arena, and only now runs what it is to run."""
+
+        def readable():
+            self.loop.remove_reader(lifeline)
+            with contextlib.suppress(OSError):  # it has ended already
+                if lifeline.recv(1):
+                    lifeline.sendall(b"\n")
+            lifeline.close()
+
+        self.loop.add_reader(lifeline, readable)
 
     def _read_info(self, info_r):
         """bubblewrap says which process is the first one of the new PID namespace."""
@@ -246,6 +257,12 @@ class _Stream:
     def _line(self, line):
         cut = len(line) > LINE_BYTES_MAX
         self._process.line(self._name, line[:LINE_BYTES_MAX].rstrip(b"\r"), cut)
+
+
+def _filled_in(argument, numbers):
+    for name, number in numbers.items():
+        argument = argument.replace(name, number)
+    return argument
 
 
 def kill_orphans():
