@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -38,9 +39,10 @@ class Grader:
         for parent in (folder, *folder.parents[:2]):
             parent.chmod(0o711)
         self.env = {**os.environ, "TMPDIR": str(self.temporary)}
+        self.started: list[subprocess.Popen[str]] = []
 
     def start(self, *argv: str | Path, **env: str) -> subprocess.Popen[str]:
-        return subprocess.Popen(
+        process = subprocess.Popen(
             [sys.executable, "-m", "grader", *map(str, argv)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
@@ -50,6 +52,14 @@ class Grader:
             cwd=ROOT,
             start_new_session=True,
         )
+        self.started.append(process)
+        return process
+
+    def end(self) -> None:
+        """What a failed test left running must not disturb the next."""
+        for process in self.started:
+            process.kill()
+            process.communicate()
 
     def run(self, *argv: str | Path, **env: str) -> tuple[int, str, str]:
         process = self.start(*argv, **env)
@@ -81,8 +91,10 @@ def _read(pid: str, name: str) -> bytes:
 
 
 @pytest.fixture
-def grader(tmp_path: Path) -> Grader:
-    return Grader(tmp_path)
+def grader(tmp_path: Path) -> Iterator[Grader]:
+    grader = Grader(tmp_path)
+    yield grader
+    grader.end()
 
 
 @pytest.fixture(scope="module")
