@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -32,12 +34,9 @@ CRITERION_KEYS = [
 class Grader:
     """Runs `grader` in processes that can be told from all others by their temporary folder."""
 
-    def __init__(self, folder: Path) -> None:
-        self.temporary = folder / "tmp"
-        self.temporary.mkdir()
+    def __init__(self) -> None:
+        self.temporary = Path(tempfile.mkdtemp(prefix="grader-test-"))
         self.temporary.chmod(0o711)
-        for parent in (folder, *folder.parents[:2]):
-            parent.chmod(0o711)
         self.env = {**os.environ, "TMPDIR": str(self.temporary)}
         self.started: list[subprocess.Popen[str]] = []
 
@@ -60,6 +59,7 @@ class Grader:
         for process in self.started:
             process.kill()
             process.communicate()
+        shutil.rmtree(self.temporary)
 
     def run(self, *argv: str | Path, **env: str) -> tuple[int, str, str]:
         process = self.start(*argv, **env)
@@ -91,19 +91,20 @@ def _read(pid: str, name: str) -> bytes:
 
 
 @pytest.fixture
-def grader(tmp_path: Path) -> Iterator[Grader]:
-    grader = Grader(tmp_path)
+def grader() -> Iterator[Grader]:
+    grader = Grader()
     yield grader
     grader.end()
 
 
 @pytest.fixture(scope="module")
-def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Grader]:
+def graded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Grader]]:
     folder = tmp_path_factory.mktemp("graded")
-    grader = Grader(folder)
+    grader = Grader()
     code, out, err = grader.run("grade", SOLUTION, "--rubric", LAB, "--out", folder / "out", "--id", "sc20ab")
     assert code == 0, out + err
-    return folder / "out" / "sc20ab", grader
+    yield folder / "out" / "sc20ab", grader
+    grader.end()
 
 
 def test_result_has_the_keys_that_others_read(graded: tuple[Path, Grader]) -> None:
@@ -221,3 +222,11 @@ def test_without_a_sandbox_the_lab_is_graded_all_the_same(grader: Grader, tmp_pa
     result = json.loads(next((tmp_path / "out").rglob("result.json")).read_text())
     assert result["environment"]["sandbox"] == "none (--sandbox none)"
     assert grader.await_none(2) == []
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root becomes another user")
+def test_root_with_a_closed_temporary_folder(grader: Grader, tmp_path: Path) -> None:
+    closed = tmp_path / "closed"
+    closed.mkdir(mode=0o700)
+    argv = ("grade", SOLUTION, "--rubric", LAB, "--out", tmp_path / "out")
+    assert grader.run(*argv, TMPDIR=str(closed))[0] == 0

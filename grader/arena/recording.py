@@ -18,7 +18,7 @@ from grader.arena.asynchronous import run_until_signal, side_by_side
 from grader.arena.build import BUILD_EXPECTED_S, BuildOutcome, build
 from grader.arena.place import Place
 from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
-from grader.arena.sandbox import Limits, Mode, Sandbox, choose, prepare
+from grader.arena.sandbox import Limits, Mode, Sandbox, choose, prepare, temporary_base
 from grader.arena.scenario import ScenarioCost, expected_s, run_scenario
 from grader.arena.workspace import Workspace, make_workspace, read_untrusted
 from grader.errors import ArenaError
@@ -94,8 +94,8 @@ class Recorder:
         self._place: Place | None = None
 
     def __enter__(self) -> Self:
-        # Found by path from inside the sandbox, so passable for others, but not readable.
-        self._temporary = tempfile.TemporaryDirectory(prefix="grader-", ignore_cleanup_errors=True)
+        base = temporary_base(self.recording.sandbox)
+        self._temporary = tempfile.TemporaryDirectory(prefix="grader-", dir=base, ignore_cleanup_errors=True)
         Path(self._temporary.name).chmod(0o711)
         return self
 

@@ -8,14 +8,16 @@ from __future__ import annotations
 import os
 import random
 import shutil
+import stat
 import subprocess
+import tempfile
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
 from grader.arena.ros_env import RosInstallation
-from grader.errors import SandboxMissing
+from grader.errors import HostError, SandboxMissing
 from grader.model.record import Record
 
 Mode = Literal["auto", "require", "none"]
@@ -138,6 +140,22 @@ def prepare(place: Path, ros: RosInstallation) -> None:
     terminal.chmod(0o755)
     for name in TERMINALS:
         (shims / name).symlink_to(terminal.name)
+
+
+def temporary_base(sandbox: Sandbox | None) -> Path:
+    """Where run folders go: `$TMPDIR`, or where root's is closed to others, a place that the student's user can pass.
+
+    Raises HostError where there is none.
+    """
+    first = Path(tempfile.gettempdir())
+    if sandbox is None or sandbox.uid is None:
+        return first
+    for base in (first, Path("/var/tmp"), Path("/dev/shm")):  # noqa: S108 - the run's folder in it has a name of its own
+        if base.is_dir() and all(p.stat().st_mode & stat.S_IXOTH for p in (base, *base.resolve().parents)):
+            return base
+    raise HostError(
+        f"{first} is closed to other users, and so is /var/tmp", hint=f"chmod o+x {first}, or set TMPDIR"
+    )
 
 
 def choose(mode: Mode) -> Sandbox:

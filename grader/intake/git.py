@@ -34,7 +34,7 @@ _NETWORK_KEPT = re.compile(
 )
 
 
-class GitFailed(Exception):  # noqa: N818 - an outcome, translated before a user meets it
+class GitFailed(Exception):
     """git ended with an error; `stderr` is what it said, in English."""
 
     def __init__(self, stderr: str) -> None:

@@ -16,7 +16,7 @@ LEFT_OUT = frozenset(
 )
 
 
-class Unreadable(Exception):  # noqa: N818 - says what the file is, and never leaves this package
+class Unreadable(Exception):
     """Why a path gives no file. `kind` goes into a Fault, the text into its message."""
 
     def __init__(self, kind: str, message: str) -> None:
