@@ -9,6 +9,7 @@ import tempfile
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 from typing_extensions import Self
@@ -111,12 +112,21 @@ class Recorder:
         run_until_signal(self._lane(self._place, tuple(scenarios)))
 
     async def _record_all(self) -> None:
+        if not self._not_run:
+            self._progress.step("build", "waiting", "", BUILD_EXPECTED_S)
+            for name, scenario in self._rubric.scenarios.items():
+                self._progress.step(name, "waiting", "for the build", expected_s(scenario))
         await self._record_package()
         if self._place is None:
             for name in self._rubric.scenarios:
                 self._progress.step(name, "skipped", self._not_run)
             return
         measuring, others = lanes(self._rubric.scenarios)
+        for names in (measuring, others):
+            for before, name in pairwise(names):
+                self._progress.step(
+                    name, "waiting", f"for {before}", expected_s(self._rubric.scenarios[name])
+                )
         await side_by_side(self._lane(self._place, measuring), self._lane(self._place, others))
 
     async def _lane(self, place: Place | None, names: tuple[str, ...]) -> None:
