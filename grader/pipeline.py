@@ -81,11 +81,14 @@ def record(
 
 
 def console_log(runs: dict[str, Run]) -> str:
-    """What every process printed, by scenario, with seconds since the run began."""
+    """What the build and the student's processes printed, by scenario, with seconds since the run began."""
     lines = []
     for name, run in runs.items():
         lines += [f"== {name}"] if run.console else []
+        own = {event.name for _, event in run.processes if event.role == "grader"}
         for time_ns, line in run.console:
+            if line.process in own:
+                continue
             lines.append(f"{(time_ns - run.start_ns) / 1e9:8.3f} {line.process} {line.stream}: {line.line}")
     return "".join(f"{line}\n" for line in lines)
 

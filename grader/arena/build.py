@@ -100,8 +100,9 @@ async def _with_setup(place: Place, arena: ArenaSession) -> Place:
 
 async def _answer(place: Place, arena: ArenaSession, script: str) -> None:
     """What `rosrun` says to a script that is not as it should be, on the package as handed in."""
-    name = f"rosrun {script}"
-    arena.start(place.spec(name, ["rosrun", place.package, script], role="student", build=True))
+    file = Path(script).name
+    name = f"rosrun {file}"
+    arena.start(place.spec(name, ["rosrun", place.package, file], role="student", build=True))
     if not await arena.wait(lambda: name in arena.live.ended, ROSRUN_S):
         await arena.interrupt(name, int_s=1.0, term_s=1.0)
 

@@ -9,7 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from grader.arena.ros_env import SYSTEM_PATH, RosInstallation
-from grader.arena.sandbox import BUILT_WORKSPACE, HOME, INSIDE_WORKSPACE, OUTPUT, SHIMS, Limits, Sandbox
+from grader.arena.sandbox import (
+    BUILT_WORKSPACE,
+    HOME,
+    INSIDE_WORKSPACE,
+    LARGE,
+    OUTPUT,
+    SHIMS,
+    Limits,
+    Sandbox,
+)
 from grader.arena.workspace import Workspace
 
 LIBSTDBUF = Path("/usr/libexec/coreutils/libstdbuf.so")
@@ -123,11 +132,20 @@ class Place:
 
     def _binds(self, *, build: bool, copy: bool) -> list[str]:
         workspace = self.workspace
+        large = ["--ro-bind", str(workspace.large), LARGE]
         if build:
-            return ["--bind", str(workspace.built), INSIDE_WORKSPACE, "--bind", str(workspace.output), OUTPUT]
+            written = [
+                "--bind",
+                str(workspace.built),
+                INSIDE_WORKSPACE,
+                "--bind",
+                str(workspace.output),
+                OUTPUT,
+            ]
+            return [*large, *written]
         if not copy:
             return []
-        binds = ["--ro-bind", str(workspace.repaired), f"{BUILT_WORKSPACE}/src"]
+        binds = [*large, "--ro-bind", str(workspace.repaired), f"{BUILT_WORKSPACE}/src"]
         devel = workspace.built / "devel"
         if devel.is_dir() and not devel.is_symlink():
             binds += ["--ro-bind", str(devel), f"{BUILT_WORKSPACE}/devel"]

@@ -178,7 +178,7 @@ class Recorder:
         prepare(folder, ros)
         scripts = self._scripts()
         workspace: Workspace = make_workspace(
-            folder, self._submission, self.recording.facts, scripts, sandbox.uid
+            folder, self._submission, self.recording.facts, scripts, sandbox
         )
         name = (
             self.recording.facts.manifest.name

@@ -26,6 +26,7 @@ HOME = "/home/student"
 INSIDE_WORKSPACE = f"{HOME}/catkin_ws"
 OUTPUT = "/run/grader/out"
 BUILT_WORKSPACE = "/run/grader/ws"
+LARGE = "/run/grader/large"
 SHIMS = "/run/grader/bin"
 ETC = (
     "alternatives", "ld.so.cache", "ld.so.conf", "ld.so.conf.d", "localtime", "timezone", "nsswitch.conf",

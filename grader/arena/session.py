@@ -22,6 +22,7 @@ from grader.evidence.writer import EvidenceWriter
 
 ARENA = Path(__file__).parent / "ros"
 ROSOUT = ("/usr/lib/rosout/rosout", "lib/rosout/rosout")
+LOG_FOLDER = ("/bin/sh", "-c", 'mkdir -p "$ROS_HOME/log" && exec "$0"')
 READY_S = 15.0
 END_S = 5.0
 PORT = 11311
@@ -123,7 +124,7 @@ class ArenaSession:
             for prefix in ("/", *self._place.ros.prefixes):
                 program = Path(prefix) / name
                 if program.exists():
-                    return self._place.spec("rosout", [str(program)], role="grader", copy=False)
+                    return self._place.spec("rosout", [*LOG_FOLDER, str(program)], role="grader", copy=False)
         return None
 
     def _read(self, chunk: bytes) -> None:

@@ -6,12 +6,15 @@ and those packages of the same submission that it depends on, nothing else.
 
 from __future__ import annotations
 
+import hashlib
 import os
+import re
 import shutil
 import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from grader.arena.sandbox import LARGE, SHIMS, Sandbox
 from grader.model.package import PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.submission import SourcePackage, Submission
@@ -19,6 +22,8 @@ from grader.package.manifest import read_manifest
 
 IGNORED = {".git", "build", "devel", "install", "__pycache__"}
 SHEBANG = b"#!/usr/bin/env python3\n"
+ABSOLUTE_PYTHON = re.compile(r"/(\w+/)*python3?")
+LARGE_BYTES = 16 << 20
 READ_MAX = 8 << 20
 MANIFEST = """<package format="2"><name>{}</name><version>0.0.0</version><description>A repair</description>
 <maintainer email="student@example.org">student</maintainer><license>TODO</license>
@@ -28,31 +33,43 @@ MANIFEST = """<package format="2"><name>{}</name><version>0.0.0</version><descri
 
 class Workspace(Record):
     """`built` is the catkin workspace to build (`src/` in it), `repaired` the `src/` that runs; `folder` is the
-    package's folder name in both, `repairs` what was mended, by path."""
+    package's folder name in both, `repairs` what was mended, by path. Files of more than 16 MB are not copied into
+    each run: they lie in `large`, and links lead there."""
 
     built: Path
     repaired: Path
+    large: Path
     output: Path
     folder: str
     repairs: dict[str, tuple[str, ...]]
 
 
 def make_workspace(
-    place: Path, submission: Submission, facts: PackageFacts, scripts: Iterable[str], uid: int | None
+    place: Path, submission: Submission, facts: PackageFacts, scripts: Iterable[str], sandbox: Sandbox
 ) -> Workspace:
     """Copy the packages twice below `place`; `scripts` are the paths that get their repairs in the second copy."""
-    built, repaired, output = place / "ws", place / "run" / "src", place / "out"
-    output.mkdir()
+    workspace = Workspace(
+        built=place / "ws",
+        repaired=place / "run" / "src",
+        large=place / "run" / "large",
+        output=place / "out",
+        folder=_folder_name(submission.package),
+        repairs={},
+    )
+    workspace.output.mkdir()
+    copier = _Copier(workspace.large, Path(LARGE) if sandbox.bubblewrap else workspace.large)
     for package in needed_packages(submission):
-        for source_tree in (built / "src", repaired):
-            _copy(package, source_tree / _folder_name(package))
-    folder = _folder_name(submission.package)
-    repairs = {path: tuple(_repair(repaired / folder / path, facts.file(path))) for path in scripts}
+        for source_tree in (workspace.built / "src", workspace.repaired):
+            copier.copy(package, source_tree / _folder_name(package))
+    package_copy = workspace.repaired / workspace.folder
+    repairs = {path: tuple(_repair(package_copy / path, facts.file(path))) for path in scripts}
+    for file in facts.files:
+        _give_python(package_copy / file.path, file, SHIMS if sandbox.bubblewrap else str(place / "bin"))
     if facts.manifest is None:
-        _replace_manifest(repaired / folder / "package.xml", folder)
-    for path in (built, output):
-        _give_to(path, uid)
-    return Workspace(built=built, repaired=repaired, output=output, folder=folder, repairs=repairs)
+        _replace_manifest(package_copy / "package.xml", workspace.folder)
+    for path in (workspace.built, workspace.output):
+        _give_to(path, sandbox.uid)
+    return workspace.model_copy(update={"repairs": repairs})
 
 
 def needed_packages(submission: Submission) -> list[SourcePackage]:
@@ -72,9 +89,10 @@ def read_untrusted(path: Path, limit_bytes: int = READ_MAX) -> bytes | None:
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError:
         return None
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        return None
     with os.fdopen(descriptor, "rb") as file:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            return None
         return file.read(limit_bytes)
 
 
@@ -84,26 +102,39 @@ def _folder_name(package: SourcePackage) -> str:
     return name or "package"
 
 
-def _copy(package: SourcePackage, target: Path) -> None:
-    """Copy a package's tree, links as links, with the modes that its source gives."""
-    for folder, folders, files in os.walk(package.folder):
-        top = Path(folder) == package.folder
-        folders[:] = [f for f in folders if f not in IGNORED or (not top and f != ".git")]
-        here = target / Path(folder).relative_to(package.folder)
-        here.mkdir(parents=True, exist_ok=True)
-        for name in [*files, *(f for f in folders if (Path(folder) / f).is_symlink())]:
-            _copy_entry(Path(folder) / name, here / name, package)
+class _Copier:
+    """Copies packages' trees, links as links, with the modes that their source gives."""
 
+    def __init__(self, large: Path, large_inside: Path) -> None:
+        self._large = large
+        self._large_inside = large_inside
+        large.mkdir(parents=True)
 
-def _copy_entry(source: Path, target: Path, package: SourcePackage) -> None:
-    if source.is_symlink():
-        target.symlink_to(source.readlink())
-    elif source.is_file():
-        shutil.copyfile(source, target)
-        executable = package.executable.get(source.relative_to(package.folder).as_posix())
-        if executable is None:
-            executable = package.mode_source == "none" and _starts_as_script(source)
-        target.chmod(0o755 if executable else 0o644)
+    def copy(self, package: SourcePackage, target: Path) -> None:
+        for folder, folders, files in os.walk(package.folder):
+            top = Path(folder) == package.folder
+            folders[:] = [f for f in folders if f not in IGNORED or (not top and f != ".git")]
+            here = target / Path(folder).relative_to(package.folder)
+            here.mkdir(parents=True, exist_ok=True)
+            for name in [*files, *(f for f in folders if (Path(folder) / f).is_symlink())]:
+                self._copy_entry(Path(folder) / name, here / name, package)
+
+    def _copy_entry(self, source: Path, target: Path, package: SourcePackage) -> None:
+        if source.is_symlink():
+            target.symlink_to(source.readlink())
+        elif not source.is_file():
+            return
+        elif source.stat().st_size > LARGE_BYTES:
+            name = hashlib.sha256(os.fsencode(source)).hexdigest()
+            if not (self._large / name).exists():
+                shutil.copyfile(source, self._large / name)
+            target.symlink_to(self._large_inside / name)
+        else:
+            shutil.copyfile(source, target)
+            executable = package.executable.get(source.relative_to(package.folder).as_posix())
+            if executable is None:
+                executable = package.mode_source == "none" and _starts_as_script(source)
+            target.chmod(0o755 if executable else 0o644)
 
 
 def _starts_as_script(path: Path) -> bool:
@@ -136,6 +167,18 @@ def _replace_manifest(path: Path, name: str) -> None:
     if not path.is_dir():
         path.unlink(missing_ok=True)
         path.write_text(MANIFEST.format(name))
+
+
+def _give_python(path: Path, facts: SourceFile, shims: str) -> None:
+    """`/usr/bin/python` is as good as `env python` and need not be on this machine: then it becomes the arena's."""
+    words = facts.shebang.text.split() if facts.shebang else []
+    if not words or not ABSOLUTE_PYTHON.fullmatch(words[0]) or Path(words[0]).exists() or path.is_symlink():
+        return
+    data = path.read_bytes()
+    first, newline, rest = data.partition(b"\n")
+    if first.startswith(b"#!"):
+        words[0] = f"{shims}/{Path(words[0]).name}"
+        path.write_bytes(f"#!{' '.join(words)}".encode() + newline + rest)
 
 
 def _give_to(path: Path, uid: int | None) -> None:

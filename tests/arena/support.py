@@ -70,7 +70,7 @@ def make_place(
         prepare(top / "place", ros)
         scripts = [f for f in files if f.endswith(".py")]
         facts = read_package(submission.package)
-        workspace = make_workspace(top / "place", submission, facts, scripts, chosen.uid)
+        workspace = make_workspace(top / "place", submission, facts, scripts, chosen)
         place = Place(
             folder=top / "place",
             ros=ros,
