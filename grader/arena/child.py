@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import os
+import signal
 import subprocess
 from collections.abc import Callable, Sequence
 from typing import IO, Any
@@ -58,13 +59,18 @@ class ArenaProcess:
             await self._ended.wait()
             timer.cancel()
         finally:
-            self._popen.kill()
+            self._kill()
             self._popen.wait()
             for descriptor in self._open:
                 self._loop.remove_reader(descriptor)
             for pipe in (self._popen.stdout, self._popen.stderr):
                 if pipe is not None:
                     pipe.close()
+
+    def _kill(self) -> None:
+        """With its group: a bubblewrap that is killed while it starts leaves a second process that waits for ever."""
+        if self._popen.poll() is None:
+            os.killpg(self._popen.pid, signal.SIGKILL)
 
     def _watch(self, pipe: IO[bytes] | None, take: Callable[[bytes], None]) -> None:
         if pipe is None:

@@ -54,7 +54,8 @@ class Process:
             self._stopped_by = "KILL"
             self._signal_group(signal.SIGKILL)
             if self._status is None:
-                _kill(self.pid, signal.SIGKILL)
+                with contextlib.suppress(ProcessLookupError, PermissionError):  # already over
+                    os.killpg(self.pid, signal.SIGKILL)
 
     def reap(self):
         """Take the exit status if there is one; tell it once the last output is read.
