@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import signal
 import subprocess
 import sys
@@ -95,7 +96,7 @@ def test_judge_without_evidence_says_so(tmp_path, capsys):
 
 
 def test_a_closed_pipe_is_quiet():
-    command = f"{sys.executable} -m grader rubric schema | head -c 10 >/dev/null; exit ${{PIPESTATUS[0]}}"
+    command = f"{shlex.quote(sys.executable)} -m grader rubric schema | head -c 10 >/dev/null; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["/bin/bash", "-c", command], capture_output=True, check=False)
     assert done.stderr == b""
     assert done.returncode in {0, 141}
@@ -103,7 +104,7 @@ def test_a_closed_pipe_is_quiet():
 
 def test_closed_streams_do_no_harm():
     done = subprocess.run(
-        ["/bin/bash", "-c", f"{sys.executable} -m grader labs >&- 2>&-"], check=False, timeout=60
+        ["/bin/bash", "-c", f"{shlex.quote(sys.executable)} -m grader labs >&- 2>&-"], check=False, timeout=60
     )
     assert done.returncode == 0
 
