@@ -36,7 +36,7 @@ stress: setup ## the reference solution and every fixture, TIMES times each
 	@$(BIN)/python -m tests.stress --times $(TIMES)
 
 bench: setup ## the figures of benchmarks/README.md, measured here
-	@$(BIN)/python benchmarks/run.py
+	@$(BIN)/python benchmarks/run.py --write
 
 fixtures: setup ## write fixtures/<lab>/ anew from fixtures/<lab>.yaml
 	@$(BIN)/python fixtures/make.py

@@ -10,7 +10,7 @@ from pathlib import Path
 from grader.arena.place import Place
 from grader.arena.ros_env import keep_ros_variables, parse_env
 from grader.arena.session import ArenaSession
-from grader.arena.workspace import read_untrusted
+from grader.arena.workspace import read_untrusted, run_in_place
 from grader.evidence.events import ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.record import Record
@@ -61,6 +61,8 @@ async def build(
             ScenarioEvent(event="end", outcome=outcome, detail="" if ended else f"build over {BUILD_S:g} s")
         )
         await arena.finish()
+    if not place.sandbox.bubblewrap:
+        run_in_place(place.workspace, place.sandbox)
     return built, BuildOutcome(
         ok=ok,
         trace=_keep(place, TRACE),

@@ -73,15 +73,13 @@ class Place:
         A program that the build installed wins, as with `rosrun`; then the script's own place, then any other.
         """
         name = Path(script).name
-        package = self.workspace.repaired / self.workspace.folder
         found = self.script_path(script)
         installed = self.workspace.built / "devel" / "lib" / self.package / name
         if installed.is_file() and not installed.is_symlink() and os.access(installed, os.X_OK):
             return f"{self.inside_workspace}/devel/lib/{self.package}/{name}", found or script
         if found is None:
             return None
-        root = self.package_folder if self.sandbox.bubblewrap else str(package)
-        return f"{root}/{found}", found
+        return f"{self.package_folder}/{found}", found
 
     def script_path(self, script: str) -> str | None:
         """Where a script is in the package: at its place, else the shallowest file of that name."""

@@ -68,7 +68,7 @@ class Sandbox(Record):
     @property
     def label(self) -> str:
         if not self.bubblewrap:
-            return f"none ({self.reason})"
+            return f"none ({self.reason})" + (", but for an unprivileged user" if self.uid else "")
         return "bubblewrap, as root for an unprivileged user" if self.uid else "bubblewrap, unprivileged"
 
     def outer(self, argv: Sequence[str]) -> list[str]:
@@ -90,9 +90,9 @@ class Sandbox(Record):
         """One process tree's layer. `place` is the run's own folder (see `prepare`), `binds` bubblewrap arguments."""
         limits = ["prlimit", f"--fsize={FILE_BYTES}", f"--nofile={OPEN_FILES}", "--core=0"]
         limits += [f"--as={ADDRESS_SPACE_BYTES}", *([f"--nproc={TASKS}"] if self.uid else []), "--"]
-        if not self.bubblewrap:
-            return [*limits, *argv]
         drop = ["setpriv", f"--reuid={self.uid}", f"--regid={self.uid}", "--clear-groups"] if self.uid else []
+        if not self.bubblewrap:
+            return [*drop, *limits, *argv]
         return [
             *drop, *limits, "bwrap", *_system(ros), "--proc", "/proc", "--dev", "/dev",
             "--size", str(TMP_BYTES), "--tmpfs", "/tmp",  # noqa: S108 - the sandbox's own
@@ -161,15 +161,12 @@ def temporary_base(sandbox: Sandbox | None) -> Path:
 
 def choose(mode: Mode) -> Sandbox:
     """The sandbox to use: `require` raises SandboxMissing where there is none, `auto` goes without and says so."""
-    if mode == "none":
-        return Sandbox(bubblewrap=False, uid=None, reason="--sandbox none")
-    reason = why_not()
+    reason = "--sandbox none" if mode == "none" else why_not()
     if reason and mode == "require":
         raise SandboxMissing(f"no sandbox on this machine: {reason}", hint=INSTALL_HINT)
-    if reason:
-        return Sandbox(bubblewrap=False, uid=None, reason=reason)
-    uid = random.SystemRandom().randrange(30_000, 60_000) if os.geteuid() == 0 else None
-    return Sandbox(bubblewrap=True, uid=uid)
+    can_drop = os.geteuid() == 0 and shutil.which("setpriv") is not None
+    uid = random.SystemRandom().randrange(30_000, 60_000) if can_drop else None
+    return Sandbox(bubblewrap=not reason, uid=uid, reason=reason)
 
 
 @lru_cache(maxsize=1)

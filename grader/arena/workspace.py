@@ -67,9 +67,17 @@ def make_workspace(
         _give_python(package_copy / file.path, file, SHIMS if sandbox.bubblewrap else str(place / "bin"))
     if facts.manifest is None:
         _replace_manifest(package_copy / "package.xml", workspace.folder)
-    for path in (workspace.built, workspace.output):
+    for path in (workspace.built, workspace.output, place / "home"):
         _give_to(path, sandbox.uid)
     return workspace.model_copy(update={"repairs": repairs})
+
+
+def run_in_place(workspace: Workspace, sandbox: Sandbox) -> None:
+    """Without a sandbox, processes see one workspace only: after the build its sources become the repaired ones."""
+    sources = workspace.built / "src"
+    shutil.rmtree(sources)
+    shutil.copytree(workspace.repaired, sources, symlinks=True)
+    _give_to(sources, sandbox.uid)
 
 
 def needed_packages(submission: Submission) -> list[SourcePackage]:

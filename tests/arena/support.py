@@ -12,7 +12,7 @@ from grader.arena.place import Place
 from grader.arena.ros_env import require_ros
 from grader.arena.sandbox import Limits, choose, prepare
 from grader.arena.scenario import run_scenario
-from grader.arena.workspace import make_workspace
+from grader.arena.workspace import make_workspace, run_in_place
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.model.submission import SourcePackage, Submission
@@ -82,9 +82,16 @@ def make_place(
         yield place.from_source()
 
 
+def repaired(place: Place) -> Place:
+    """As after a build: what runs are the repaired sources."""
+    if not place.sandbox.bubblewrap:
+        run_in_place(place.workspace, place.sandbox)
+    return place
+
+
 def run(place: Place, scenario: Scenario, path: Path) -> Run:
     """Record a scenario and read it back."""
-    asyncio.run(_bounded(place, scenario, path))
+    asyncio.run(_bounded(repaired(place), scenario, path))
     return load_run(path)
 
 
