@@ -21,6 +21,8 @@ from grader.arena.sandbox import (
 )
 from grader.arena.workspace import Workspace
 
+LOOPBACK = "127.0.0.1"
+"""As an address: not every machine knows the name localhost."""
 LIBSTDBUF = Path("/usr/libexec/coreutils/libstdbuf.so")
 LIFELINE = "echo >&{lifeline} && read -r _ <&{lifeline} && exec {lifeline}>&- || exit 125; "
 """The first thing that runs says that it is there and waits for leave: an arena that has died gives none."""
@@ -91,7 +93,7 @@ class Place:
 
     def arena_env(self) -> dict[str, str]:
         """The managed roscore's environment: ROS and nothing of the shell's."""
-        return {"LANG": "C.UTF-8", "ROS_HOSTNAME": "localhost", **self.ros.env, "PATH": _path(self.ros, "")}
+        return {"LANG": "C.UTF-8", "ROS_IP": LOOPBACK, **self.ros.env, "PATH": _path(self.ros, "")}
 
     def spec(
         self,
@@ -157,7 +159,7 @@ class Place:
             "LOGNAME": "student",
             "PYTHONUNBUFFERED": "1",
             "ROSCONSOLE_STDOUT_LINE_BUFFERED": "1",
-            "ROS_HOSTNAME": "localhost",
+            "ROS_IP": LOOPBACK,
             "ROS_HOME": f"{home}/.ros",
             "SHELL": "/bin/bash",
             "TERM": "dumb",

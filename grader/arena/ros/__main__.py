@@ -74,7 +74,7 @@ class Arena:
         self._spawn(command["spec"])
 
     def _spawn(self, spec):
-        spec["env"].setdefault("ROS_MASTER_URI", os.environ.get("ROS_MASTER_URI", "http://localhost:11311"))
+        spec["env"].setdefault("ROS_MASTER_URI", os.environ.get("ROS_MASTER_URI", "http://127.0.0.1:11311"))
         try:
             self._processes[spec["name"]] = Process(self.loop, self._wire, spec, self._limits, self._exited)
         except OSError as error:

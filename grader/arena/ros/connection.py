@@ -24,7 +24,7 @@ class Connection:
         self._dropped = 0
         self._closed = False
         self._header = header
-        self._address = sock.getpeername()
+        self._port = sock.getpeername()[1]
         self._channel = None
         self._held = []
 
@@ -92,8 +92,11 @@ class Connection:
             threading.Thread(target=self._ask, daemon=True).start()
 
     def _ask(self):
-        latching = self._recorder.ask_latching(self._topic, self._address)
-        self._recorder.loop.call_soon(lambda: self._open(latching))
+        latching = False
+        try:
+            latching = self._recorder.ask_latching(self._topic, self._port)
+        finally:
+            self._recorder.loop.call_soon(lambda: self._open(latching))
 
     def _open(self, latching):
         if self._channel is not None:

@@ -104,7 +104,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         """The node's outgoing connections, as the node itself reports them."""
         try:
             entries = call(slave_api(api, BUS_INFO_S).getBusInfo, self._own_prefix)
-        except ProtocolError:
+        except (ProtocolError, ValueError):
             return
         for entry in entries if isinstance(entries, list) else ():
             if isinstance(entry, list) and len(entry) >= 5 and entry[2] == "o":

@@ -12,7 +12,6 @@ returns: `gate`. Neither waits longer than 1 s. Reading is the loop's work.
 
 import threading
 import time
-from urllib.parse import urlparse
 
 from connection import Connection
 from tcpros import ProtocolError, call, connect, read_header, slave_api, write_header
@@ -91,21 +90,24 @@ class Recorder:
             connection.close()
 
     def _handshake(self, topic, caller_api, deadline):
-        api = slave_api(caller_api, max(0.05, deadline - time.monotonic()))
+        try:
+            api = slave_api(caller_api, max(0.05, deadline - time.monotonic()))
+        except ValueError as error:
+            raise ProtocolError(str(error)) from error
         protocol = call(api.requestTopic, self._caller_id, topic, [["TCPROS"]])
         if not isinstance(protocol, list) or len(protocol) != 3 or not isinstance(protocol[2], int):
             raise ProtocolError("no TCPROS offered")
-        address = urlparse(caller_api).hostname, protocol[2]
+        port = protocol[2]
         try:
-            sock, header = self._subscribe(self._caller_id, topic, address, deadline)
-            self._subscribe(self._caller_id + KNOCK, topic, address, deadline)[0].close()
+            sock, header = self._subscribe(self._caller_id, topic, port, deadline)
+            self._subscribe(self._caller_id + KNOCK, topic, port, deadline)[0].close()
         except (OSError, ValueError) as error:
             raise ProtocolError(str(error)) from error
         sock.setblocking(False)
         return sock, header
 
-    def _subscribe(self, caller_id, topic, address, deadline):
-        sock = connect(address[0], address[1], max(0.05, deadline - time.monotonic()))
+    def _subscribe(self, caller_id, topic, port, deadline):
+        sock = connect(port, max(0.05, deadline - time.monotonic()))
         request = {"callerid": caller_id, "topic": topic, "md5sum": "*", "type": "*", "tcp_nodelay": "1"}
         write_header(sock, request)
         header = read_header(sock)
@@ -113,11 +115,11 @@ class Recorder:
             raise ProtocolError(header.get("error", "header without type and md5sum"))
         return sock, header
 
-    def ask_latching(self, topic, address):
+    def ask_latching(self, topic, port):
         """Whether the publisher latches: rospy knows it only once its constructor is through."""
         try:
             sock, header = self._subscribe(
-                self._caller_id + KNOCK, topic, address, time.monotonic() + LATCHING_S
+                self._caller_id + KNOCK, topic, port, time.monotonic() + LATCHING_S
             )
         except (OSError, ProtocolError):
             return False

@@ -4,9 +4,11 @@ import io
 import socket
 import struct
 import xmlrpc.client
+from urllib.parse import urlparse
 
 from rosgraph.network import decode_ros_handshake_header, encode_ros_handshake_header
 
+LOOPBACK = "127.0.0.1"
 LENGTH = struct.Struct("<I")
 HEADER_BYTES_MAX = 1 << 18
 
@@ -27,8 +29,12 @@ class _Transport(xmlrpc.client.Transport):
 
 
 def slave_api(uri, timeout_s):
-    """A proxy of a node's slave API that never waits longer than `timeout_s` for one read."""
-    return xmlrpc.client.ServerProxy(uri, transport=_Transport(timeout_s))
+    """A proxy of a node's slave API that never waits longer than `timeout_s` for one read.
+
+    Nodes are on this machine, by whatever name they call it.
+    """
+    local = "http://{}:{}/".format(LOOPBACK, urlparse(uri).port)
+    return xmlrpc.client.ServerProxy(local, transport=_Transport(timeout_s))
 
 
 def call(method, *args):
@@ -68,7 +74,7 @@ def write_header(sock, fields):
     sock.sendall(encode_ros_handshake_header(fields))
 
 
-def connect(host, port, timeout_s):
-    sock = socket.create_connection((host, port), timeout_s)
+def connect(port, timeout_s):
+    sock = socket.create_connection((LOOPBACK, port), timeout_s)
     sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return sock
