@@ -21,7 +21,10 @@ from grader.model.verdict import (
 )
 
 CATKIN_MAKE = "catkin_make"
-INSTALL_ROS = "install ROS 1: `make setup`, or `apt-get install python3-rospy catkin`, then grade again"
+INSTALL_ROS = (
+    "install ROS 1 with `make setup`, or `apt-get install python3-rospy python3-roslaunch rosbash catkin`, "
+    "and grade again"
+)
 _CMAKE_ERROR = re.compile(
     r"^CMake Error(?: at (?P<file>[^:()]+):(?P<line>\d+) \((?P<call>\w+)\))?:?\s*(?P<text>.*)"
 )
@@ -29,6 +32,13 @@ _COMPILER_ERROR = re.compile(r"^(?P<file>[^:\s][^:]*):(?P<line>\d+):(?:\d+:)? (?
 _OTHER_ERROR = re.compile(
     r"(?P<text>.*(?:\b[Ee]rror:|Error\(s\)|undefined reference|No rule to make|[A-Za-z]+Error:|\*\*\*).*)"
 )
+
+
+def run_hint(reason: str) -> str:
+    """What brings evidence that was not recorded, by the recording's own reason."""
+    if "only the files" in reason:
+        return "grade without --static"
+    return INSTALL_ROS if "no ROS" in reason else "grade the submission again"
 
 
 class BuildError(NamedTuple):
@@ -65,7 +75,7 @@ def build(package: PackageFacts, build: Run) -> Verdict:
     if "start" not in found and "exit" not in found:
         reason = build.metadata.get("not_run") or (build.outcome.detail if build.outcome else "")
         message = f"the package was not built{': ' + reason if reason else ''}"
-        return inconclusive(message, expected=expected, measured="not built", hint=INSTALL_ROS)
+        return inconclusive(message, expected=expected, measured="not built", hint=run_hint(reason))
     if "exit" not in found:
         return inconclusive("the recording of the build was cut short", expected=expected, hint="grade again")
     end_ns, end = found["exit"]

@@ -58,11 +58,12 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
     found = find_script(package, params.path)
     if found is None:
         return _missing(package, params.path, expected)
-    obstacles = [*_shebang_obstacles(found), *_mode_obstacles(found)]
+    remarks = package.hints_on(found.path)
+    obstacles = [*_shebang_obstacles(found), *_mode_obstacles(found, remarks)]
     measured = f"{found.path}: {_mode(found)}, {_first_line(found)}"
     line = (FileCitation(file=found.path, line=1),)
     elsewhere = found.path != params.path
-    hint = f"the handout puts it at {params.path}; move it there" if elsewhere else ""
+    hint = f"the handout puts it at {params.path}; move it there" if elsewhere else "; ".join(remarks)
     if has_wrapper(package, build, found.path):
         advice = f" (without it: {obstacles[0].why})" if obstacles else ""
         message = f"the build makes an executable wrapper of {found.path}{advice}"
@@ -121,12 +122,10 @@ def _missing(package: PackageFacts, path: str, expected: str) -> Verdict:
     )
 
 
-def _mode_obstacles(file: SourceFile) -> Iterator[Obstacle]:
+def _mode_obstacles(file: SourceFile, remarks: tuple[str, ...]) -> Iterator[Obstacle]:
     if file.executable is False:
-        yield Obstacle(
-            "has no executable bit",
-            f"chmod +x {file.path}, then git update-index --chmod=+x {file.path}, commit and push",
-        )
+        usual = f"chmod +x {file.path}, then git update-index --chmod=+x {file.path}, commit and push"
+        yield Obstacle("has no executable bit", "; ".join(remarks) or usual)
 
 
 def _shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
@@ -150,10 +149,11 @@ def _shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
 
 
 def _rosrun_answer(build: Run, path: str) -> str:
-    """The last line of what `rosrun` said to the file as handed in, where the build's recording has it."""
+    """The line that tells of what `rosrun` said to the file as handed in, where the build's recording has it."""
     names = {f"rosrun {path}", f"rosrun {PurePosixPath(path).name}"}
     lines = [c.line for _, c in build.console if c.process in names and c.line.strip()]
-    return f"; rosrun answers: {shown(lines[-1])}" if lines else ""
+    telling = [line for line in lines if "Couldn't find" in line] or lines[-1:]
+    return f"; rosrun answers: {shown(telling[0])}" if telling else ""
 
 
 def _mode(file: SourceFile) -> str:

@@ -54,7 +54,7 @@ def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
             f"{found.file} names the package {found.name!r}, the handout calls it {params.name!r}{slip}",
             expected=expected,
             measured=f"name {found.name}",
-            hint=f"write <name>{params.name}</name> in {found.file}",
+            hint="; ".join([f"write <name>{params.name}</name> in {found.file}", *package.general_hints()]),
             citations=(FileCitation(file=found.file, line=found.name_line),),
         )
     if not _builds_with_catkin(found):
@@ -70,6 +70,7 @@ def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
         f"{found.file} names {found.name}, built with catkin",
         expected=expected,
         measured=f"name {found.name}, format {found.format}",
+        hint="; ".join(package.general_hints()),
         citations=place,
     )
 

@@ -8,6 +8,7 @@ from pathlib import PurePosixPath
 
 from pydantic import ValidationError
 
+from grader.checks.build import run_hint
 from grader.checks.executable import find_script
 from grader.checks.registry import Check
 from grader.evidence.run import Run
@@ -18,10 +19,6 @@ from grader.rubric.model import Criterion, Rubric
 
 PACKAGE_RUN = "package"
 NOT_RUN = "not_run"
-INSTALL_ROS = (
-    "install ROS 1 with `make setup`, or `apt-get install python3-rospy python3-roslaunch rosbash catkin`, "
-    "and grade again"
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +51,7 @@ class Facts:
             recorded = self.runs.get(PACKAGE_RUN)
             reason = recorded.metadata.get(NOT_RUN, "") if recorded else ""
             message = f"the scenario {scenario!r} was not run{': ' + reason if reason else ''}"
-            return inconclusive(message, hint=INSTALL_ROS if reason else "grade the submission again")
+            return inconclusive(message, hint=run_hint(reason))
         outcome = run.outcome
         if outcome is None:
             return inconclusive(f"the recording of {scenario!r} was cut short", hint="grade again")

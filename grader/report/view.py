@@ -29,7 +29,7 @@ class Loss:
 
 @dataclass(frozen=True, kw_only=True)
 class ReportView:
-    """`open`: a person or another run must settle it. `advice`: not reached, and worth nothing."""
+    """`open`: a person or another run must settle it. `advice`: worth nothing, or reached with a hint."""
 
     lost: tuple[Loss, ...]
     open: tuple[Loss, ...]
@@ -55,7 +55,9 @@ def arrange(result: GradingResult, rubric: Rubric) -> ReportView:
     return ReportView(
         lost=tuple(loss for loss in losses if loss.criterion.status not in OPEN),
         open=_folded([loss for loss in losses if loss.criterion.status in OPEN]),
-        advice=tuple(c for c in unreached if c.id not in told),
+        advice=tuple(
+            c for c in result.criteria if c.id not in told and (c.hint or c.status is not Status.PASS)
+        ),
     )
 
 
