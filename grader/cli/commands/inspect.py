@@ -39,7 +39,7 @@ def _head(inspection: Inspection) -> Iterator[str]:
         yield f"this machine's timer was at most {inspection.late_max_ms:.1f} ms late"
     if inspection.nodes:
         yield f"nodes: {' '.join(inspection.nodes)}"
-    for process in inspection.processes:
+    for process in (p for p in inspection.processes if p.role != "grader"):
         yield f"process {process.name}: {_end(process)}"
 
 
