@@ -18,7 +18,7 @@ from grader import __version__
 from grader.arena.asynchronous import run_until_signal, side_by_side
 from grader.arena.build import BUILD_EXPECTED_S, BuildOutcome, build
 from grader.arena.place import Place
-from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
+from grader.arena.ros_env import RosInstallation, find_ros
 from grader.arena.sandbox import Limits, Mode, Sandbox, choose, prepare, temporary_base
 from grader.arena.scenario import ScenarioCost, expected_s, run_scenario
 from grader.arena.workspace import Workspace, make_workspace, read_untrusted
@@ -242,11 +242,6 @@ def lanes(scenarios: Mapping[str, Scenario]) -> tuple[tuple[str, ...], tuple[str
     """Names of the runs that measure rates in real time, and of the others."""
     measuring = tuple(n for n, s in scenarios.items() if s.clock == "real" and (s.until.window_s or 0) >= 3)
     return measuring, tuple(n for n in scenarios if n not in measuring)
-
-
-def install_hint() -> str:
-    """The command that brings what was missing."""
-    return INSTALL_HINT
 
 
 def _needs_answer(facts: PackageFacts, path: str) -> bool:

@@ -39,7 +39,6 @@ class ArenaSession:
         self.cpu_s = 0.0
         self.student_cpu_s = 0.0
         self.exit_codes: dict[str, int | None] = {}
-        self.left_behind: list[str] = []
         self._place = place
         self._writer = writer
         self._master = master
@@ -189,8 +188,6 @@ class ArenaSession:
             pairs = [c for c in fields["connections"] if not is_grader_node(c["subscriber"])]
             self.live.connected = {c["topic"] for c in pairs}
             self.live.graphs += 1
-        elif status == "left-behind":
-            self.left_behind.append(fields["name"])
         elif status == "spawn-failed":
             self._failure = f"{fields['name']} could not be started: {fields['detail']}"
         elif status == "done":

@@ -9,8 +9,6 @@ from pydantic import Field
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, FileCitation, Status
 
-RESULT_SCHEMA = "grader.result/1"
-
 
 class CriterionResult(Record):
     """One line of the report. `points` are those earned, rounded as the rubric says."""

@@ -129,9 +129,10 @@ class Arena:
         if self._clock:
             self._clock.stop()
         for process in list(self._processes.values()):
-            if process.role == "student":
-                for pid in process.left_behind():
-                    self._wire.status("left-behind", name=process.name, pid=pid)
+            left = process.left_behind() if process.role == "student" else []
+            if left:
+                detail = "{} of its processes still ran at the end and were stopped".format(len(left))
+                self._wire.event("/grader/actor", {"action": "note", "actor": process.name, "detail": detail})
             process.kill()
         if self._master:
             self._recorder.finish()
