@@ -110,12 +110,14 @@ class ArenaSession:
         await self.wait(lambda: self._done, END_S)
 
     def _config(self) -> dict[str, Any]:
+        rosout = self._rosout_spec() if self._master else None
+        self.rosout_up = rosout is None  # then nobody need wait for it
         return {
             "master": self._master,
             "port": PORT if self._place.sandbox.bubblewrap else 0,
             "limits": self._place.limits.model_dump(),
             "suffix": "_" + secrets.token_hex(4),
-            "rosout": self._rosout_spec() if self._master else None,
+            "rosout": rosout,
         }
 
     def _rosout_spec(self) -> dict[str, Any] | None:
