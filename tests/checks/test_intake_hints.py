@@ -19,7 +19,9 @@ SPELLED = "the package is spelled Lab1 here, the lab calls it lab1"
 
 def _facts(*, is_executable: bool) -> tuple[PackageFacts, Run]:
     file = {"path": "src/a.py", "executable": is_executable, "shebang": "#!/usr/bin/env python3"}
-    run = build_runs({"runs": {"package": {"package": {"name": "lab1", "manifest": {"name": "lab1"}, "files": [file]}}}})["package"]
+    run = build_runs(
+        {"runs": {"package": {"package": {"name": "lab1", "manifest": {"name": "lab1"}, "files": [file]}}}}
+    )["package"]
     return package_facts(run).model_copy(update={"hints": (SPELLED, NOT_IN_GIT)}), run
 
 
