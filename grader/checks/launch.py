@@ -10,7 +10,7 @@ from grader.checks.registry import check
 from grader.checks.support.process import lives
 from grader.checks.support.text import listed, near_names, plural, shown
 from grader.evidence.events import GraphEvent
-from grader.evidence.run import Run, is_grader_node
+from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import (
@@ -85,7 +85,7 @@ def connections(run: Run, topic: str) -> Iterator[tuple[str, str]]:
     for _, event in run.graph:
         for one in event.connections:
             pair = (one.publisher, one.subscriber)
-            if one.topic == topic and pair[0] != pair[1] and not any(map(is_grader_node, pair)):
+            if one.topic == topic and pair[0] != pair[1] and all(map(run.is_student_node, pair)):
                 yield pair
 
 
@@ -154,7 +154,7 @@ def _over_another_topic(run: Run, params: LaunchConnectsParams, quoted: str) -> 
         c.topic
         for _, event in run.graph
         for c in event.connections
-        if c.topic not in {params.topic, "/rosout"} and not is_grader_node(c.subscriber)
+        if c.topic not in {params.topic, "/rosout"} and run.is_student_node(c.subscriber)
     }
     if others:
         message = f"the nodes are connected over {listed(sorted(others))}, not over {params.topic}"
@@ -176,7 +176,7 @@ def _nodes_on(run: Run, topic: str, end: str) -> tuple[str, ...]:
     def nodes(event: GraphEvent) -> tuple[str, ...]:
         return (event.publishers if end == "publishers" else event.subscribers).get(topic, ())
 
-    found = (n for _, event in run.graph for n in nodes(event) if not is_grader_node(n))
+    found = (n for _, event in run.graph for n in nodes(event) if run.is_student_node(n))
     return tuple(dict.fromkeys(found))
 
 

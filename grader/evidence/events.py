@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+from pydantic import Field
+
 from grader.model.record import Record
 
 EVIDENCE_VERSION = "1"
@@ -48,7 +50,10 @@ class Connection(Record):
 
 
 class GraphEvent(Record):
-    """`/grader/graph`: the master's state after a change. Topics and services map to the nodes' names."""
+    """`/grader/graph`: the master's state after a change. Topics and services map to the nodes' names.
+
+    `processes` tells which process each node belongs to, `service_types` what services themselves say they are.
+    """
 
     nodes: tuple[str, ...]
     topic_types: dict[str, str]
@@ -56,6 +61,8 @@ class GraphEvent(Record):
     subscribers: dict[str, tuple[str, ...]]
     services: dict[str, tuple[str, ...]]
     connections: tuple[Connection, ...] = ()
+    processes: dict[str, str] = Field(default_factory=dict)
+    service_types: dict[str, str] = Field(default_factory=dict)
 
 
 class ParamEvent(Record):
@@ -78,9 +85,15 @@ class HostEvent(Record):
 
 
 class ActorEvent(Record):
-    """`/grader/actor`: what the grader did to the run. For `publish`, `value` is the field `data` as sent."""
+    """`/grader/actor`: what the grader, or a stand-in of its, did in the run.
 
-    action: Literal["publish", "clock", "interrupt", "param", "note"]
+    `publish`: `value` is the field `data` as sent, or a map of the message's fields. `param`: `topic` is the
+    parameter's name, `value` what it was set to. `call`: `topic` is the service, `value` the request's fields;
+    `answer`: the response's fields, or None and the reason in `detail`. `open`: the stand-in for the program `actor`
+    was started with the arguments `value`.
+    """
+
+    action: Literal["publish", "clock", "interrupt", "param", "call", "answer", "open", "note"]
     actor: str
     topic: str | None = None
     type: str | None = None

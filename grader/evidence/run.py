@@ -91,15 +91,33 @@ class Run:
     attachments: Mapping[str, bytes] = field(default_factory=dict)
     package_json: bytes | None = None
 
+    @property
+    def foreign(self) -> bool:
+        """Whether another tool recorded it: then it holds messages, and nothing of processes, graph or console."""
+        return not self.metadata
+
+    @cached_property
+    def grader_nodes(self) -> frozenset[str]:
+        """Nodes of the programs that a scenario starts beside the student's (`turtlesim_node`)."""
+        own = {e.name for _, e in self.processes if e.role == "grader"}
+        return frozenset(n for _, e in self.graph for n, process in e.processes.items() if process in own)
+
+    def is_student_node(self, name: str) -> bool:
+        return not is_grader_node(name) and name not in self.grader_nodes
+
     def student_channels(self, topic: str | None = None) -> tuple[Channel, ...]:
         """Channels of the student's publishers, on one topic or on all."""
-        return tuple(c for c in self.channels if not c.by_grader and topic in {None, c.topic})
+        return tuple(
+            c for c in self.channels if self.is_student_node(c.callerid) and topic in {None, c.topic}
+        )
 
-    def student_nodes(self) -> tuple[str, ...]:
-        """Every node of the student's that was ever registered, in order of appearance."""
+    def student_nodes(self, process: str | None = None) -> tuple[str, ...]:
+        """Every node of the student's, or of one process, that was ever registered, in order of appearance."""
         seen: dict[str, None] = {}
         for _, event in self.graph:
-            seen.update(dict.fromkeys(n for n in event.nodes if not is_grader_node(n)))
+            for node in event.nodes:
+                if self.is_student_node(node) and process in {None, event.processes.get(node)}:
+                    seen[node] = None
         return tuple(seen)
 
     def lines(self, process: str) -> Iterator[tuple[int, ConsoleLine]]:

@@ -10,35 +10,71 @@ from grader.model.record import Record
 
 Seconds = Annotated[float, Field(ge=0)]
 NAME_PATTERN = r"^[a-z][a-z0-9-]*$"
+PROGRAM_PATTERN = r"^[A-Za-z][\w-]*/[\w.-]+$"
+TYPE_PATTERN = r"^[A-Za-z]\w*/[A-Za-z]\w*$"
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 
 
 class Start(Record):
-    """A process of the student's. Give one of `script` and `launch`.
+    """A process of a run. Give one of `script`, `launch`, `load`, `program` and `built`.
 
-    `script` is the file and the place where the handout wants it (`src/numeric_talker.py`); it is found under
-    `scripts/`, `src/` and anywhere else in the package too. `launch` is the launch file's name.
+    `script` is the student's file and the place where the handout wants it (`src/numeric_talker.py`); it is found
+    under `scripts/`, `src/` and anywhere else in the package too. `launch` is the launch file's name. `load` is a
+    YAML file that `rosparam load` puts on the parameter server. `program` is a node of another package, as `rosrun`
+    takes it (`turtlesim/turtlesim_node`): it is the grader's, and what it does never counts as the student's.
+    `built` starts every program that the build made (`add_executable`), as processes `<name>/<program>`.
+    `after` names an earlier start: this one waits until a node of that one is registered.
     """
 
     name: Name
     script: str | None = None
     launch: str | None = None
+    load: str | None = None
+    program: Annotated[str, Field(pattern=PROGRAM_PATTERN)] | None = None
+    built: bool = False
     args: tuple[str, ...] = ()
+    after: Name | None = None
+
+
+class Param(Record):
+    """Parameters that are set before anything starts. Give `file`, or `name` with `value` or `made_up`.
+
+    `file` is a YAML file of the student's, read as `rosparam load` would, each of its values replaced by one of the
+    same type that the grader makes up for this run. Names of `also` that the file lacks get made-up values too.
+    `made_up` is the type of a value for `name` that nobody can guess.
+    """
+
+    name: str | None = None
+    value: Any = None
+    made_up: Literal["text", "integer", "number"] | None = None
+    file: str | None = None
+    also: tuple[str, ...] = ()
 
 
 class Probe(Record):
-    """Messages that the grader makes up for this run and publishes once the student's node has subscribed.
+    """Messages that the grader publishes once the student's node has subscribed.
 
-    `text` random strings, `integers` random values of the type's range, and the values of `among`, shuffled
-    together.
+    `type` is any message type of ROS's own packages. Made up for this run: `text` random strings, `integers` random
+    values of the type's range; they are shuffled together with the values of `among`. `values` are sent as they
+    stand and in their order, `times` times over: the field `data`, or a map of the message's fields.
     """
 
     topic: str
-    type: Literal["std_msgs/String", "std_msgs/Int8"]
+    type: Annotated[str, Field(pattern=TYPE_PATTERN)]
     text: Annotated[int, Field(ge=0)] = 0
     integers: Annotated[int, Field(ge=0)] = 0
     among: tuple[int, ...] = ()
+    values: tuple[Any, ...] = ()
+    times: Annotated[int, Field(ge=1, le=10_000)] = 1
     rate_hz: Annotated[float, Field(gt=0, le=100)] = 10.0
+
+
+class Call(Record):
+    """A service that the grader calls once it is offered, after the probes. Fields that `request` lacks are zero."""
+
+    service: str
+    type: Annotated[str, Field(pattern=TYPE_PATTERN)]
+    request: Annotated[dict[str, Any], Field(default_factory=dict)]
 
 
 class Until(Record):
@@ -47,9 +83,12 @@ class Until(Record):
     `window_s`: that long after the first message on every topic of `topics` (a topic that stays silent stops
     being waited for when `silent_s` have passed since the first message on another). `messages`: so many
     messages on each topic. `connected`: a student's publisher and a student's subscriber are connected over
-    the topic. `heard`: every probe's value was printed.
-    A run gives up when no message came within `first_message_s`, when all topics that are waited for have
-    been silent for `silent_s`, or after `limit_s`.
+    the topic. `heard`: every probe's value was printed. `nodes`: so many nodes of the student's have registered.
+    `alive_s`: that long after the student's first node registered. `opened`: these programs (`firefox`) were asked to
+    open something. `ended`: these processes have ended. `quiet_s`: for so long, nothing was printed, published,
+    registered or set, and something was before.
+    A run gives up when no message came within `first_message_s`, when all that is waited for has been silent for
+    `silent_s`, or after `limit_s`. With no condition at all it is watched for `limit_s`.
     """
 
     window_s: Seconds | None = None
@@ -57,6 +96,11 @@ class Until(Record):
     messages: Annotated[dict[str, int], Field(default_factory=dict)]
     connected: tuple[str, ...] = ()
     heard: bool = False
+    nodes: Annotated[int, Field(ge=0)] = 0
+    alive_s: Seconds | None = None
+    opened: tuple[str, ...] = ()
+    ended: tuple[Name, ...] = ()
+    quiet_s: Seconds | None = None
     first_message_s: Seconds = 20.0
     silent_s: Seconds = 6.0
     limit_s: Seconds = 60.0
@@ -68,8 +112,10 @@ class Scenario(Record):
     title: str
     clock: Literal["real", "warped"] = "real"
     warp: Annotated[float, Field(ge=1, le=40)] = 20.0
+    params: tuple[Param, ...] = ()
     start: Annotated[tuple[Start, ...], Field(min_length=1)]
     probes: tuple[Probe, ...] = ()
+    calls: tuple[Call, ...] = ()
     until: Until
 
 

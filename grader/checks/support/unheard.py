@@ -8,7 +8,7 @@ from grader.checks.support.ending import explain_end, explain_traceback, process
 from grader.checks.support.printed import Line, Probe, numbers_in
 from grader.checks.support.process import early_end, lives
 from grader.checks.support.text import listed, near_names, number, plural, shown
-from grader.evidence.run import Run, is_grader_node
+from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, unjudged
 
@@ -49,7 +49,7 @@ def student_subscriptions(run: Run) -> tuple[str, ...]:
         topic
         for _, event in run.graph
         for topic, nodes in event.subscribers.items()
-        if any(not is_grader_node(n) for n in nodes)
+        if any(run.is_student_node(n) for n in nodes)
     )
     return tuple(dict.fromkeys(found))
 
