@@ -192,14 +192,18 @@ def _graph(line: TimelineRun) -> GraphEvent:
         for publisher in publishers.get(topic, ())
         for subscriber in subscribers
     ]
+    processes = {node: process.name for process in line.processes for node in process.nodes}
     nodes = {n for names in (*publishers.values(), *line.subscribers.values()) for n in names}
+    nodes |= processes.keys() | {service.node for service in line.services.values()}
     return GraphEvent(
         nodes=("/rosout", *sorted(nodes - {"/rosout"})),
         topic_types={topic.topic: topic.type for topic in line.topics},
         publishers=publishers,
         subscribers=line.subscribers,
-        services={},
+        services={name: (service.node,) for name, service in line.services.items()},
         connections=tuple(Connection(topic=t, publisher=p, subscriber=s) for t, p, s in pairs),
+        processes=processes,
+        service_types={name: service.type for name, service in line.services.items() if service.type},
     )
 
 

@@ -92,10 +92,14 @@ class TopicLine(Record):
 
 
 class ProcessLine(Record):
-    """A process: its start and, where `exit_s`, `exit_code`, `signal` or `stopped_by` is given, its end."""
+    """A process: its start and, where `exit_s`, `exit_code`, `signal` or `stopped_by` is given, its end.
+
+    `nodes` are those that belong to it, in the graph that is made up.
+    """
 
     name: str
     role: Literal["student", "build", "grader"] = "student"
+    nodes: tuple[str, ...] = ()
     argv: tuple[str, ...] = ()
     script: str | None = None
     repairs: tuple[str, ...] = ()
@@ -110,6 +114,13 @@ class ProcessLine(Record):
     @property
     def ends(self) -> bool:
         return any(v is not None for v in (self.exit_s, self.exit_code, self.signal, self.stopped_by))
+
+
+class ServiceLine(Record):
+    """Who offers a service and, unless nobody could ask it, its type."""
+
+    node: str
+    type: str | None = None
 
 
 class Printed(ConsoleLine):
@@ -168,6 +179,7 @@ class TimelineRun(Record):
     metadata: dict[str, str] = Field(default_factory=dict)
     topics: tuple[TopicLine, ...] = ()
     subscribers: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    services: dict[str, ServiceLine] = Field(default_factory=dict)
     processes: tuple[ProcessLine, ...] = ()
     console: tuple[Printed, ...] = ()
     graph: tuple[Graph, ...] | None = None
@@ -180,3 +192,12 @@ class TimelineRun(Record):
     end_s: At | None = None
     attachments: dict[str, str] = Field(default_factory=dict)
     package: dict[str, Any] | None = None
+
+    @model_validator(mode="after")
+    def _one_graph(self) -> TimelineRun:
+        made_up = self.subscribers or self.services or any(process.nodes for process in self.processes)
+        if self.graph is not None and made_up:
+            raise ValueError(
+                "`subscribers`, `services` and `nodes` fill a graph that is made up: leave `graph` out"
+            )
+        return self

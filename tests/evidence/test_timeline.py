@@ -70,6 +70,9 @@ def test_one_run_stands_without_runs():
         {"package": {"files": [{"path": "a", "mode": 7}]}},
         {"outcome": "perfect"},
         {"console": [{"line": "of nobody"}]},
+        {"services": {"/reset": {"type": "std_srvs/Empty"}}},
+        {"graph": [], "services": {"/reset": {"node": "/a"}}},
+        {"graph": [], "processes": [{"name": "a", "nodes": ["/a"]}]},
     ],
 )
 def test_what_nobody_knows_is_an_error(timeline):
@@ -120,6 +123,26 @@ def test_what_is_left_out_is_calm_and_can_be_left_out_for_good():
     assert len(run.host) == len(run.recorder) == 1
     bare = build_runs({"scenario": "run", "graph": [], "host": [], "recorder": [], "outcome": None})["run"]
     assert (bare.graph, bare.host, bare.recorder, bare.outcome) == ((), (), (), None)
+
+
+def test_processes_have_nodes_and_nodes_have_services():
+    run = build_runs(
+        {
+            "topics": [{"topic": "/c", "callerid": "/sender_1_2"}],
+            "processes": [
+                {"name": "first", "nodes": ["/sender_1_2"]},
+                {"name": "turtlesim", "role": "grader", "nodes": ["/turtlesim"]},
+            ],
+            "services": {"/reset": {"node": "/turtlesim", "type": "std_srvs/Empty"}, "/mute": {"node": "/b"}},
+        }
+    )["run"]
+    [(_, graph)] = run.graph
+    assert graph.nodes == ("/rosout", "/b", "/sender_1_2", "/turtlesim")
+    assert graph.processes == {"/sender_1_2": "first", "/turtlesim": "turtlesim"}
+    assert graph.services == {"/reset": ("/turtlesim",), "/mute": ("/b",)}
+    assert graph.service_types == {"/reset": "std_srvs/Empty"}
+    assert run.student_nodes("first") == ("/sender_1_2",)
+    assert run.student_nodes() == ("/b", "/sender_1_2")
 
 
 def test_events_of_every_kind():
