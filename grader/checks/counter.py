@@ -34,7 +34,7 @@ class StepParams(Record):
     min_steps: Annotated[int, Field(ge=1)] = 10
 
 
-@check("counter-start", params=StartParams)
+@check("counter-start", params=StartParams, messages_only=True)
 def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdict:
     """The counter begins with the right value.
 
@@ -73,7 +73,7 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
     return failed(message, hint=hint, **fields)
 
 
-@check("counter-step", params=StepParams)
+@check("counter-step", params=StepParams, messages_only=True)
 def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict:
     """The counter goes up by one.
 
@@ -116,7 +116,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     )
 
 
-@check("counter-wrap", params=WrapParams)
+@check("counter-wrap", params=WrapParams, messages_only=True)
 def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict:
     """The counter starts again at its maximum.
 

@@ -61,7 +61,7 @@ class RateParams(Record):
         return 1e9 / self.rate_hz
 
 
-@check("rate", params=RateParams)
+@check("rate", params=RateParams, messages_only=True)
 def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     """The topic has the right rate, evenly.
 

@@ -19,7 +19,11 @@ class NoParams(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """One check: function, record of its parameters, the facts it asks for, its docstring in parts."""
+    """One check: function, record of its parameters, the facts it asks for, its docstring in parts.
+
+    `messages_only` checks ask a run for its messages alone, so they judge another tool's recording too. For such a
+    run `package` is empty where there is none.
+    """
 
     name: str
     function: Callable[..., Verdict]
@@ -27,6 +31,7 @@ class Check:
     facts: tuple[str, ...]
     title: str
     sections: dict[str, str]
+    messages_only: bool = False
 
     @property
     def needs_run(self) -> bool:
@@ -42,7 +47,7 @@ CHECKS: dict[str, Check] = {}
 
 
 def check(
-    name: str, *, params: type[Record] = NoParams
+    name: str, *, params: type[Record] = NoParams, messages_only: bool = False
 ) -> Callable[[Callable[..., Verdict]], Callable[..., Verdict]]:
     """Put a function into `CHECKS`. Raises ValueError for a name that is taken or a fact that nobody has."""
 
@@ -55,7 +60,13 @@ def check(
             )
         title, sections = _parts(inspect.getdoc(function) or "")
         CHECKS[name] = Check(
-            name=name, function=function, params=params, facts=facts, title=title, sections=sections
+            name=name,
+            function=function,
+            params=params,
+            facts=facts,
+            title=title,
+            sections=sections,
+            messages_only=messages_only,
         )
         return function
 

@@ -21,7 +21,7 @@ class TopicTypeParams(Record):
     type: str
 
 
-@check("topic-type", params=TopicTypeParams)
+@check("topic-type", params=TopicTypeParams, messages_only=True)
 def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verdict:
     """The topic carries the right type of message.
 

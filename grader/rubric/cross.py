@@ -57,6 +57,10 @@ def _place(
             yield (*path, "scenario"), f'is missing: "{check}" judges a run'
     elif isinstance(scenario, str) and scenario not in scenarios:
         yield (*path, "scenario"), f'there is no scenario "{scenario}"{did_you_mean(scenario, scenarios)}'
+    elif isinstance(scenario, str) and isinstance(check, str) and check in checks:
+        recorded = as_map(scenarios[scenario]).get("recording") is not None
+        if recorded and checks[check].needs_run and not checks[check].messages_only:
+            yield (*path, "check"), f'"{check}" judges more than messages, and a recording holds no more'
 
 
 def _names(criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:

@@ -107,16 +107,21 @@ class Until(Record):
 
 
 class Scenario(Record):
-    """One run in an arena. `clock` `warped` sets `/use_sim_time` and runs `/clock` `warp` times faster."""
+    """One run in an arena. `clock` `warped` sets `/use_sim_time` and runs `/clock` `warp` times faster.
+
+    With `recording` in place of `start` nothing is run: it is a pattern (`*.bag`, `bags/lab3*.mcap`) for the one
+    file of the submission that is judged as this run.
+    """
 
     title: str
+    recording: Annotated[str, Field(min_length=1)] | None = None
     clock: Literal["real", "warped"] = "real"
     warp: Annotated[float, Field(ge=1, le=40)] = 20.0
     params: tuple[Param, ...] = ()
-    start: Annotated[tuple[Start, ...], Field(min_length=1)]
+    start: tuple[Start, ...] = ()
     probes: tuple[Probe, ...] = ()
     calls: tuple[Call, ...] = ()
-    until: Until
+    until: Annotated[Until, Field(default_factory=lambda: Until(messages={}))]
 
 
 class Criterion(Record):

@@ -15,6 +15,7 @@ def scenario_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     """Every fault of one scenario that its record's types cannot say."""
     if "warp" in scenario and scenario.get("clock", "real") == "real":
         yield (*path, "warp"), 'only a scenario with "clock: warped" has a warp'
+    yield from _means(path, scenario)
     names: set[str] = set()
     for index, start in as_maps(scenario.get("start")):
         at = (*path, "start", index)
@@ -27,6 +28,19 @@ def scenario_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
         names.add(str(name))
     yield from _probes(path, scenario)
     yield from _until((*path, "until"), as_map(scenario.get("until")), bool(scenario.get("probes")))
+
+
+def _means(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
+    """A scenario starts something and says until when, or it names a recording and nothing else."""
+    if scenario.get("recording") is None:
+        if scenario.get("start") in (None, []):
+            yield (*path, "start"), "is missing: give start, or recording"
+        elif "until" not in scenario:
+            yield (*path, "until"), "is missing"
+        return
+    for key in ("start", "params", "probes", "calls", "until", "clock", "warp"):
+        if key in scenario:
+            yield (*path, key), "is not for a scenario with a recording: nothing is run"
 
 
 def _probes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:

@@ -277,3 +277,48 @@ def test_a_person_may_give_the_points(tmp_path):
         ("    check: rate\n    with:\n      topic: /chatter\n      rate_hz: 10\n", f"    check: {MANUAL}\n"),
     )
     assert load_rubric(str(path)).rubric.criteria[1].check == MANUAL
+
+
+RECORDED = (
+    "    start:\n      - {name: talker, script: src/talker.py}\n"
+    "    until: {window_s: 5, topics: [/chatter]}\n"
+)
+
+
+def test_a_recording_takes_the_place_of_what_is_started(tmp_path):
+    path = spoiled(tmp_path, (RECORDED, '    recording: "*.bag"\n'))
+    assert load_rubric(str(path)).rubric.scenarios["real"].recording == "*.bag"
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ([(RECORDED, "    clock: real\n")], ["scenarios.real.start: is missing: give start, or recording"]),
+        (
+            [(RECORDED, RECORDED.splitlines(keepends=True)[0] + "      - {name: a, script: b}\n")],
+            ["scenarios.real.until: is missing"],
+        ),
+        (
+            [(RECORDED, f'    recording: "*.bag"\n    clock: warped\n{RECORDED}')],
+            [
+                f"scenarios.real.{key}: is not for a scenario with a recording: nothing is run"
+                for key in ("clock", "start", "until")
+            ],
+        ),
+        (
+            [
+                (RECORDED, '    recording: "*.bag"\n'),
+                (
+                    "check: rate\n    with: {topic: /chatter, rate_hz: 10}",
+                    "check: node-lives\n    with: {process: talker}",
+                ),
+            ],
+            ['criteria[0].check: "node-lives" judges more than messages, and a recording holds no more'],
+        ),
+    ],
+)
+def test_a_scenario_starts_something_or_names_a_recording(tmp_path, changes, expected):
+    path = spoiled(tmp_path, *changes)
+    with pytest.raises(RubricError) as caught:
+        load_rubric(str(path))
+    assert [fault.split(": ", 1)[1] for fault in caught.value.faults] == expected
