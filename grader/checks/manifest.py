@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from grader.checks.registry import check
-from grader.checks.support.text import listed, near_names
+from grader.checks.registry import NoParams, check
+from grader.checks.support.text import listed, near_names, shown
 from grader.model.package import Fault, Manifest, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
 
 RUNTIME_KINDS = ("depend", "exec_depend", "run_depend")
 BUILD_TOOL_KINDS = ("buildtool_depend", "build_depend", "depend")
+LEFT_AS_MADE = "@todo.todo"
 
 
 class ManifestParams(Record):
-    """`name` is the name that the handout gives the package."""
+    """`name` is the name that the handout gives the package, `dependencies` what it has to declare for run time."""
 
     name: str
+    dependencies: tuple[str, ...] = ()
 
 
 class DependenciesParams(Record):
@@ -29,8 +31,8 @@ def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
     """The manifest names the package.
 
     What it checks
-        That `package.xml` can be read, gives the package the handout's name, and has `catkin` as its build
-        tool.
+        That `package.xml` can be read, gives the package the handout's name, has `catkin` as its build
+        tool, and declares the packages that the lab needs at run time, where the lab asks for that.
 
     Why it matters on a robot
         A robot's software is found by the names in its manifests. With a broken or misnamed one, `rosrun`
@@ -38,13 +40,16 @@ def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
 
     How it is measured
         The manifest is read with `catkin_pkg`, the library that catkin itself uses, and nothing is
-        executed. A `TODO` licence or maintainer costs nothing here.
+        executed. At run time count `<depend>`, `<exec_depend>` and `<run_depend>`; `<build_depend>` alone
+        does not. A `TODO` licence or maintainer costs nothing here.
 
     How to fix
         Open `package.xml` at the line that is named. `<name>` holds the package's name exactly as in the
-        handout, and `<buildtool_depend>catkin</buildtool_depend>` names the build tool.
+        handout, `<buildtool_depend>catkin</buildtool_depend>` names the build tool, and one `<exec_depend>`
+        line (`<run_depend>` in format 1) each package that a node imports.
     """
-    expected = f"package.xml, readable, name {params.name}, build tool catkin"
+    needs = f", {listed(params.dependencies)} at run time" if params.dependencies else ""
+    expected = f"package.xml, readable, name {params.name}, build tool catkin{needs}"
     found = package.manifest
     if found is None:
         return _unreadable(package.manifest_fault, expected)
@@ -65,9 +70,12 @@ def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
             hint="add <buildtool_depend>catkin</buildtool_depend>",
             citations=(FileCitation(file=found.file, line=found.name_line),),
         )
+    if lacking := _lacking(found, params.dependencies):
+        return lacking.model_copy(update={"expected": expected})
     place = (FileCitation(file=found.file, line=found.name_line),)
+    declares = f", declares {listed(params.dependencies)}" if params.dependencies else ""
     return passed(
-        f"{found.file} names {found.name}, built with catkin",
+        f"{found.file} names {found.name}, built with catkin{declares}",
         expected=expected,
         measured=f"name {found.name}, format {found.format}",
         hint="; ".join(package.general_hints()),
@@ -98,19 +106,70 @@ def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
     if found is None:
         message = "package.xml cannot be read, so its dependencies are not known"
         return unjudged(message, expected=expected, hint="first mend package.xml")
-    declared = [d for d in found.dependencies if d.kind in RUNTIME_KINDS]
-    missing = [n for n in params.names if n not in {d.name for d in declared}]
-    measured = listed(dict.fromkeys(d.name for d in declared)) or "none"
+    if lacking := _lacking(found, params.names):
+        return lacking.model_copy(update={"expected": expected})
+    message = f"{found.file} declares {listed(params.names)}"
+    return passed(message, expected=expected, measured=_declared(found))
+
+
+@check("maintainer", params=NoParams)
+def maintainer(package: PackageFacts) -> Verdict:
+    """The manifest names a maintainer who can be reached.
+
+    What it checks
+        That no maintainer of `package.xml` still has the e-mail address that `catkin_create_pkg` fills in,
+        which ends in `@todo.todo`.
+
+    Why it matters on a robot
+        When a package breaks on somebody else's robot, the maintainer's address is whom they ask.
+
+    How it is measured
+        By the `email` attribute of each `<maintainer>`. Any other address will do: it is not written to.
+
+    How to fix
+        Open `package.xml` and write your own address: `<maintainer email="you@university.ac.uk">Your
+        Name</maintainer>`. The comments with examples beside it may go.
+    """
+    expected = "a maintainer's e-mail address of one's own, none that ends in @todo.todo"
+    found = package.manifest
+    if found is None:
+        message = "package.xml cannot be read, so its maintainer is not known"
+        return unjudged(message, expected=expected, measured="not known", hint="first mend package.xml")
+    people = found.maintainers
+    measured = listed(shown(p.email) for p in people) or "no maintainer"
+    left = [p for p in people if p.email.strip().casefold().endswith(LEFT_AS_MADE)]
+    cited = tuple(FileCitation(file=found.file, line=p.line) for p in left or people)
+    cited = cited or (FileCitation(file=found.file, line=found.name_line),)
+    hint = 'write your own: <maintainer email="you@university.ac.uk">Your Name</maintainer>'
+    if left:
+        message = f"{found.file} still has {shown(left[0].email)}, which catkin_create_pkg fills in"
+        return failed(message, expected=expected, measured=measured, hint=hint, citations=cited)
+    if not any(p.email.strip() for p in people):
+        message = f"{found.file} gives no maintainer's e-mail address"
+        return failed(message, expected=expected, measured=measured, hint=hint, citations=cited)
+    return passed(f"the maintainer is {measured}", expected=expected, measured=measured, citations=cited)
+
+
+def _declared(found: Manifest) -> str:
+    names = dict.fromkeys(d.name for d in found.dependencies if d.kind in RUNTIME_KINDS)
+    return f"at run time: {listed(names) or 'none'}"
+
+
+def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
+    """What the manifest does not declare for run time; None where it declares all."""
+    declared = {d.name for d in found.dependencies if d.kind in RUNTIME_KINDS}
+    missing = [n for n in names if n not in declared]
     if not missing:
-        return passed(f"{found.file} declares {listed(params.names)}", expected=expected, measured=measured)
+        return None
     tag = "run_depend" if found.format == 1 else "exec_depend"
     at_build = [d for d in found.dependencies if d.name in missing]
     only = f"; {listed(dict.fromkeys(d.name for d in at_build))} only for building" if at_build else ""
+    near = [n for name in missing for n in near_names(name, declared) if n not in names]
+    slip = f"; it declares {listed(near)}" if near else ""
     lines = tuple(FileCitation(file=found.file, line=d.line) for d in at_build)
     return failed(
-        f"{found.file} does not declare {listed(missing)} for run time{only}",
-        expected=expected,
-        measured=measured,
+        f"{found.file} does not declare {listed(missing)} for run time{only or slip}",
+        measured=_declared(found),
         hint="add " + " ".join(f"<{tag}>{n}</{tag}>" for n in missing),
         citations=lines or (FileCitation(file=found.file, line=found.name_line),),
     )
