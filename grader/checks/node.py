@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import re
-from typing import Literal
+from typing import Annotated
+
+from pydantic import Field
 
 from grader.checks.registry import check
 from grader.checks.support.ending import (
@@ -14,6 +15,7 @@ from grader.checks.support.ending import (
     process_tracebacks,
 )
 from grader.checks.support.lockup import fell_silent, is_flood, was_talking
+from grader.checks.support.nodes import Anonymous, are_noted, is_named, name_hint, nodes_of, wanted_names
 from grader.checks.support.process import Life, life, lives
 from grader.checks.support.text import listed, plural, seconds
 from grader.evidence.run import Run
@@ -32,17 +34,26 @@ LOOP = "loop with `while not rospy.is_shutdown():` and catch rospy.ROSInterruptE
 
 
 class NodeLivesParams(Record):
-    """`process` is the scenario's name for it; `min_s` how long it has to live after its first message."""
+    """`process` is the scenario's name for it; `min_s` how long it has to live after its first message.
+
+    With `names`, one of them has to be the node's name, as `node-name` judges it.
+    """
 
     process: str
     min_s: float = 5.0
+    names: tuple[str, ...] = ()
+    anonymous: Anonymous = "allowed"
 
 
 class NodeNameParams(Record):
-    """`names` without the slash; anonymous ones end in `_<digits>_<digits>`, as rospy makes them."""
+    """`names` without the slash; anonymous ones end in `_<digits>_<digits>`, as rospy makes them.
 
-    names: tuple[str, ...]
-    anonymous: Literal["allowed", "required", "forbidden"] = "allowed"
+    With `process`, only that process's nodes count.
+    """
+
+    names: Annotated[tuple[str, ...], Field(min_length=1)]
+    anonymous: Anonymous = "allowed"
+    process: str = ""
 
 
 @check("node-lives", params=NodeLivesParams)
@@ -51,7 +62,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
 
     What it checks
         That the running script registers with the master as one node, lives as long as it is watched, and
-        ends without a traceback when Ctrl-C is pressed.
+        ends without a traceback when Ctrl-C is pressed. Where the lab asks for a name, that it has this name.
 
     Why it matters on a robot
         A node that dies takes its part of the robot with it, and one that does not end on Ctrl-C keeps the
@@ -66,17 +77,19 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
         Call `rospy.init_node(…)` once. Loop with `while not rospy.is_shutdown():`, sleep with `rospy.Rate`,
         and catch `rospy.ROSInterruptException` around the call of your main function, as talker.py does.
     """
-    expected = f"one node, alive {params.min_s:g} s and more after its first message, ending on Ctrl-C"
+    named = f", named {wanted_names(params.names, params.anonymous)}" if params.names else ""
+    expected = f"one node{named}, alive {params.min_s:g} s and more after its first message, ending on Ctrl-C"
     one = life(run, params.process)
     if one is None:
         message = f"{params.process} was not started: there is no script to run"
         return unjudged(message, expected=expected, hint="add the script to the package, and push it")
-    nodes = run.student_nodes()
-    up_ns = _up_ns(one, run)
+    nodes = nodes_of(run, one.name)
+    up_ns = _up_ns(one, run, nodes)
     message = f"{_script(one)} is the node {listed(nodes)}, stayed alive and ended on Ctrl-C"
     verdict = (
         _early_end(one, run, package)
         or _registration(one, run, nodes)
+        or _misnamed(nodes, params)
         or _short_watch(one, up_ns, params)
         or _bad_end(one, run, package)
         or passed(message)
@@ -105,35 +118,35 @@ def node_name(run: Run, params: NodeNameParams) -> Verdict:
         Give `rospy.init_node('<name>')` the name, with or without `anonymous=True` as the lab asks.
         `rosnode list` shows it.
     """
-    nodes = run.student_nodes()
-    kind = {"allowed": "plain or anonymous", "required": "anonymous", "forbidden": "plain"}[params.anonymous]
-    expected = f"{listed((f'/{n}' for n in params.names), 'or')}, {kind}"
+    nodes = nodes_of(run, params.process)
+    expected = wanted_names(params.names, params.anonymous)
     if not nodes:
         message, hint = "no node was registered, so there is no name", "call rospy.init_node(…)"
         return unjudged(message, expected=expected, measured="no node", hint=hint)
     cite = (EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),)
     measured = listed(nodes)
-    if fitting := [n for n in nodes if _fits(n, params)]:
-        return passed(f"the node is {fitting[0]}", expected=expected, measured=measured, citations=cite)
-    flag = {"required": ", anonymous=True", "forbidden": ""}.get(params.anonymous, "")
+    wrong = _misnamed(nodes, params)
+    verdict = wrong or passed(f"the node is {_fitting(nodes, params)[0]}")
+    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": cite})
+
+
+def _fitting(nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams) -> list[str]:
+    return [n for n in nodes if is_named(n, params.names, params.anonymous)]
+
+
+def _misnamed(nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams) -> Verdict | None:
+    """None where a name fits, or none is asked for."""
+    if not params.names or _fitting(nodes, params):
+        return None
     return failed(
-        f"the node is named {measured}, not {expected}",
-        expected=expected,
-        measured=measured,
-        hint=f"write rospy.init_node('{params.names[0]}'{flag})",
-        citations=cite,
+        f"the node is named {listed(nodes)}, not {wanted_names(params.names, params.anonymous)}",
+        hint=name_hint(params.names, nodes, params.anonymous),
     )
 
 
-def _fits(node: str, params: NodeNameParams) -> bool:
-    plain = any(node == f"/{name}" for name in params.names)
-    anonymous = any(re.fullmatch(rf"/{re.escape(name)}_\d+_\d+", node) for name in params.names)
-    return (plain and params.anonymous != "required") or (anonymous and params.anonymous != "forbidden")
-
-
-def _up_ns(one: Life, run: Run) -> int:
+def _up_ns(one: Life, run: Run, nodes: tuple[str, ...]) -> int:
     """How long it lived freely after its first message, or after its start where it published none."""
-    channels = (c for c in run.student_channels() if c.topic != "/rosout")
+    channels = (c for c in run.student_channels() if c.topic != "/rosout" and c.callerid in nodes)
     first = min((c.times_ns[0] for c in channels if c.messages), default=one.start_ns)
     return max(0, one.until_ns(run) - first)
 
@@ -150,7 +163,7 @@ def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None
     if not nodes:
         hint = "call rospy.init_node(…) before anything that waits"
         return failed(f"{_script(one)} runs, but never registers as a node", hint=hint)
-    if len(nodes) > max(1, len(lives(run))):
+    if len(nodes) > (1 if are_noted(run) else max(1, len(lives(run)))):
         message = f"{_script(one)} registers as {len(nodes)} nodes: {listed(nodes)}"
         return failed(
             message, hint="one script is one node: call rospy.init_node(…) once, start no other process"

@@ -1,0 +1,54 @@
+"""Which nodes a process registered, and whether a name is the one that was asked for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Literal
+
+from grader.checks.support.text import listed
+from grader.evidence.run import Run
+
+Anonymous = Literal["allowed", "required", "forbidden"]
+_KINDS = {"allowed": "plain or anonymous", "required": "anonymous", "forbidden": "plain"}
+_SUFFIX = re.compile(r"_\d+_\d+$")
+
+
+def nodes_of(run: Run, process: str) -> tuple[str, ...]:
+    """The nodes of one process, or the student's all where `process` is empty or nobody noted whose they are."""
+    return run.student_nodes(process) if process and are_noted(run) else run.student_nodes()
+
+
+def are_noted(run: Run) -> bool:
+    """Whether the graph says which process each of the student's nodes belongs to."""
+    return any(run.is_student_node(node) for _, event in run.graph for node in event.processes)
+
+
+def is_named(node: str, names: Iterable[str], anonymous: Anonymous) -> bool:
+    """Anonymous is the base name with `_<digits>_<digits>` after it, as rospy makes it."""
+    bases = _bases(names)
+    plain = node in bases and anonymous != "required"
+    return plain or (base_name(node) != node and base_name(node) in bases and anonymous != "forbidden")
+
+
+def base_name(node: str) -> str:
+    """`/talker` for `/talker_4711_1700000000000`, and any other name as it is."""
+    return _SUFFIX.sub("", node)
+
+
+def wanted_names(names: Iterable[str], anonymous: Anonymous) -> str:
+    """`/talker or /numeric_talker, plain or anonymous`."""
+    return f"{listed(_bases(names), 'or')}, {_KINDS[anonymous]}"
+
+
+def name_hint(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous) -> str:
+    """What to write into `init_node`."""
+    flag = ", anonymous=True" if anonymous == "required" else ""
+    spare = anonymous == "forbidden" and not {base_name(n) for n in nodes}.isdisjoint(_bases(names))
+    return (
+        f"write rospy.init_node('{names[0].lstrip('/')}'{flag}){' without anonymous=True' if spare else ''}"
+    )
+
+
+def _bases(names: Iterable[str]) -> list[str]:
+    return ["/" + name.lstrip("/") for name in names]
