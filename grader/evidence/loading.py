@@ -9,6 +9,7 @@ from typing import Any
 from mcap import records as mcap
 
 from grader.errors import EvidenceError
+from grader.evidence.channels import merged
 from grader.evidence.container import ContainerError, records
 from grader.evidence.events import EVIDENCE_VERSION, METADATA_NAME, PACKAGE_TOPIC, TOPICS
 from grader.evidence.run import Channel, Message, Run
@@ -38,6 +39,7 @@ class Loading:
         self._messages: dict[int, list[Message]] = defaultdict(list)
         self._attachments: dict[str, bytes] = {}
         self._metadata: dict[str, str] | None = None
+        self._profile = ""
 
     def read(self, data: bytes) -> Run:
         """Raises EvidenceError for another format, and what `container.records` and pydantic raise."""
@@ -67,6 +69,8 @@ class Loading:
                 raise ContainerError(f"more than {MAX_CHANNELS} channels")
         elif isinstance(record, mcap.Attachment):
             self._attachments[record.name] = record.data
+        elif isinstance(record, mcap.Header):
+            self._profile = record.profile
         elif isinstance(record, mcap.Metadata) and record.name == METADATA_NAME and self._metadata is None:
             self._metadata = record.metadata
 
@@ -74,7 +78,9 @@ class Loading:
         about = self._about()
         times = [t for m in self._messages.values() for t in (m[0].log_time_ns, m[-1].log_time_ns)]
         own: dict[str, Any] = {}
-        if self._metadata is not None:
+        if self._metadata is None:
+            self._refuse_what_is_not_ros1()
+        else:
             own = {name: self._events(topic) for name, topic in _FIELDS.items()}
             own["package_json"] = self._package()
         return Run(
@@ -103,34 +109,41 @@ class Loading:
         except (KeyError, ValueError) as error:
             raise ContainerError("its metadata does not say scenario, clock and warp") from error
 
-    def _ros_channels(self) -> tuple[Channel, ...]:
-        """Channels that differ in nothing (a publisher that connected twice) become one."""
-        merged: dict[tuple[str, str, str, str, str], tuple[bool, list[Message]]] = {}
-        for number, channel in self._channels.items():
-            if channel.message_encoding != "ros1":
-                continue
+    def _refuse_what_is_not_ros1(self) -> None:
+        """Of another tool's recording; channels of other encodings beside ROS 1's are left alone."""
+        encodings = {channel.message_encoding for channel in self._channels.values()}
+        if self._profile == "ros2" or "cdr" in encodings:
+            raise EvidenceError(
+                f"{self._name}: a recording of ROS 2, and this grader reads those of ROS 1",
+                hint="record again with ROS 1: `rosbag record`",
+            )
+        if encodings and "ros1" not in encodings:
+            raise EvidenceError(
+                f"{self._name}: no message of ROS 1 in it, only {', '.join(sorted(encodings))}"
+            )
+        for channel in self._channels.values():
             schema = self._schemas.get(channel.schema_id)
-            about = channel.metadata
-            key = (
-                channel.topic,
-                about.get("callerid", ""),
-                schema.name if schema else "",
-                about.get("md5sum", ""),
-                schema.data.decode(errors="replace") if schema else "",
-            )
-            _, messages = merged.setdefault(key, (about.get("latching") in {"1", "true", "True"}, []))
-            messages.extend(self._messages.get(number, ()))
-        return tuple(
-            Channel(
-                topic=topic,
-                callerid=callerid,
-                type=type_,
-                md5sum=md5sum,
-                definition=definition,
-                latching=latching,
-                messages=tuple(sorted(messages, key=lambda message: message.log_time_ns)),
-            )
-            for (topic, callerid, type_, md5sum, definition), (latching, messages) in merged.items()
+            if channel.message_encoding == "ros1" and (schema is None or schema.encoding != "ros1msg"):
+                raise EvidenceError(f"{self._name}: {channel.topic} has no message definition (ros1msg)")
+
+    def _ros_channels(self) -> tuple[Channel, ...]:
+        found = (
+            self._ros_channel(number, channel)
+            for number, channel in self._channels.items()
+            if channel.message_encoding == "ros1"
+        )
+        return merged(found, renumber=self._metadata is None)
+
+    def _ros_channel(self, number: int, channel: mcap.Channel) -> Channel:
+        schema, about = self._schemas.get(channel.schema_id), channel.metadata
+        return Channel(
+            topic=channel.topic,
+            callerid=about.get("callerid", ""),
+            type=schema.name.replace("/msg/", "/") if schema else "",
+            md5sum=about.get("md5sum", ""),
+            definition=schema.data.decode(errors="replace") if schema else "",
+            latching=about.get("latching") in {"1", "true", "True"},
+            messages=tuple(self._messages.get(number, ())),
         )
 
     def _json(self, topic: str) -> list[Message]:

@@ -19,6 +19,7 @@ from grader.evidence.loading import Loading
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 
+SUFFIXES = {".mcap", ".bag"}
 _DAMAGE = (
     McapError,
     ZstdError,
@@ -49,14 +50,17 @@ def load_run(source: Path | BinaryIO) -> Run:
 
 
 def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
-    """The runs of these files by scenario; a folder stands for its `*.mcap` and those of `evidence/` in it.
+    """The runs of these files by scenario; a folder stands for its recordings and those of `evidence/` in it.
 
-    Raises EvidenceError where nothing is found, a file cannot be read, or two files hold the same scenario.
+    Recordings are `*.mcap` and `*.bag`. Raises EvidenceError where nothing is found, a file cannot be read,
+    another tool's recording is empty, or two files hold the same scenario.
     """
     runs: dict[str, Run] = {}
     origin: dict[str, Path] = {}
     for path in _files(paths):
         run = load_run(path)
+        if run.foreign and not any(channel.messages for channel in run.channels):
+            raise EvidenceError(f"{path}: holds no messages", hint="record while the nodes run")
         if run.scenario in runs:
             raise EvidenceError(
                 f"{origin[run.scenario]} and {path} both hold the scenario {run.scenario!r}",
@@ -97,8 +101,12 @@ def _load(name: str, data: bytes, *, shown: str = "") -> Run:
 
 
 def _damage(data: bytes) -> str:
+    if data.startswith(b"version https://git-lfs"):
+        return "only a pointer of Git LFS, the recording itself is not here"
+    if data.startswith(b"SQLite format 3"):
+        return "a bag of ROS 2, and this grader reads those of ROS 1"
     if not data.startswith(b"\x89MCAP"):
-        return "not an MCAP file"
+        return "not an MCAP file and not a bag"
     return "damaged" if data.endswith(b"\x89MCAP0\r\n") else "cut short: it has no end"
 
 
@@ -124,9 +132,11 @@ def _readable(path: Path) -> Iterator[None]:
 def _files(paths: Iterable[Path]) -> list[Path]:
     found: dict[Path, Path] = {}
     for path in paths:
-        inside = _mcap_files(path) if path.is_dir() else [path]
+        inside = _recordings(path) if path.is_dir() else [path]
         if not inside:
-            raise EvidenceError(f"{path}: no evidence (*.mcap) in this folder or in evidence/ below it")
+            raise EvidenceError(
+                f"{path}: no evidence (*.mcap, *.bag) in this folder or in evidence/ below it"
+            )
         for file in inside:
             found.setdefault(file.resolve(), file)
     if not found:
@@ -136,12 +146,11 @@ def _files(paths: Iterable[Path]) -> list[Path]:
     return list(found.values())
 
 
-def _mcap_files(folder: Path) -> list[Path]:
+def _recordings(folder: Path) -> list[Path]:
     with _listable(folder):
         places = (folder, folder / "evidence")
-        return [
-            f for p in places for f in sorted(p.glob("*.mcap")) if f.is_file() and not f.name.startswith(".")
-        ]
+        found = [f for p in places for f in sorted(p.glob("*")) if f.suffix in SUFFIXES]
+        return [f for f in found if f.is_file() and not f.name.startswith(".")]
 
 
 @contextmanager

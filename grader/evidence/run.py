@@ -44,6 +44,11 @@ class Channel:
     def by_grader(self) -> bool:
         return is_grader_node(self.callerid)
 
+    @property
+    def publisher(self) -> str:
+        """Its node's name, for messages: another tool's recording need not know it."""
+        return self.callerid or "an unnamed node"
+
     @cached_property
     def times_ns(self) -> tuple[int, ...]:
         return tuple(m.log_time_ns for m in self.messages)
