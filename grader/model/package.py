@@ -136,6 +136,7 @@ class LaunchNode(Record):
     """One `<node>`, its attributes as written; an attribute that is not there is None.
 
     `remaps` are those in force: those that come before it in `<launch>` and its `<group>`s, then its own.
+    `file` is where it stands, `namespace` that of its groups, includes and its own `ns`, with both slashes.
     """
 
     pkg: str | None
@@ -147,12 +148,46 @@ class LaunchNode(Record):
     args: str | None
     remaps: tuple[tuple[str, str], ...]
     line: int
+    file: str = ""
+    namespace: str = "/"
+    machine: str | None = None
+    respawn: str | None = None
+    required: str | None = None
+
+    @property
+    def full_name(self) -> str:
+        """The name in the graph, `/robot/talker`. What only roslaunch can resolve is still `$(…)` in it."""
+        return f"{self.namespace}{self.name or ''}"
+
+
+class LaunchParam(Record):
+    """One `<param>`; `name` is the whole name on the server, `value` None where a file or command gives it."""
+
+    name: str
+    value: str | None
+    type: str | None
+    file: str
+    line: int
+
+
+class LaunchLoad(Record):
+    """One `<rosparam>`; `source` is its `file` (None for text in the tag), `namespace` where its names go."""
+
+    source: str | None
+    command: str
+    namespace: str
+    file: str
+    line: int
 
 
 class LaunchFile(Record):
     """`fault` is set where the file is not well-formed or does not begin with `<launch>`.
 
-    Nodes and includes that a literal `if="false"` or `unless="true"` switches off are left out.
+    Nodes and includes that a literal `if="false"` or `unless="true"` switches off are left out. `nodes` are the
+    file's own. What `roslaunch` makes of it all, with the package's own included files and with `$(arg …)`,
+    `$(dirname)` and namespaces resolved: `brings` (nodes), `tests` (`<test>`, which only rostest runs), `params`,
+    `loads`, `include_faults` (own files that cannot be included). A path below the package reads
+    `$(find <package>)/…`. `unknown_tags` are tags, with their lines, that roslaunch skips.
     """
 
     path: str
@@ -160,6 +195,12 @@ class LaunchFile(Record):
     nodes: tuple[LaunchNode, ...]
     includes: tuple[str, ...]
     fault: Fault | None = None
+    brings: tuple[LaunchNode, ...] = ()
+    tests: tuple[LaunchNode, ...] = ()
+    params: tuple[LaunchParam, ...] = ()
+    loads: tuple[LaunchLoad, ...] = ()
+    include_faults: tuple[Fault, ...] = ()
+    unknown_tags: tuple[tuple[str, int], ...] = ()
 
 
 class PackageFacts(Record):

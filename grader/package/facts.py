@@ -44,7 +44,11 @@ def read_package(
         manifest_fault=manifest_fault,
         cmake=read_cmake(package.folder, package.name, trace=cmake_trace, root=cmake_root),
         files=_with_faults(files, faults),
-        launch_files=read_launch_files(package.folder, ((e.file.path, e.path) for e in _readable(entries))),
+        launch_files=read_launch_files(
+            package.folder,
+            ((e.file.path, e.path) for e in _readable(entries)),
+            (manifest.name if manifest else package.name, package.name),
+        ),
         hints=hints,
         slips=report.slips,
     )

@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 from lxml import etree
 
 from grader.model.package import Fault, LaunchFile, LaunchNode
+from grader.package.launch_loader import Find, load
+from grader.package.launch_scope import Scope, wanted
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_xml
 
 _SUFFIXES = (".launch", ".launch.xml", ".test")
-_TRUE, _FALSE = frozenset({"true", "1"}), frozenset({"false", "0"})
+_TAGS = frozenset(
+    {"arg", "env", "group", "include", "machine", "master", "node", "param", "remap", "rosparam", "test"}
+)
 
 Remaps = tuple[tuple[str, str], ...]
+
+
+class _Parsed(NamedTuple):
+    """`element` is the root where there is no fault, `root` its tag."""
+
+    element: etree._Element | None
+    fault: Fault | None
+    root: str | None = None
 
 
 def is_launch_file(path: str) -> bool:
@@ -22,38 +35,95 @@ def is_launch_file(path: str) -> bool:
     return path.lower().endswith(_SUFFIXES)
 
 
-def read_launch_files(folder: Path, paths: Iterable[tuple[str, str]]) -> tuple[LaunchFile, ...]:
-    """Each launch file; `paths` are pairs of the name to show and the path on disk relative to `folder`."""
-    return tuple(_read(folder, shown, path) for shown, path in paths if is_launch_file(shown))
+def read_launch_files(
+    folder: Path, paths: Iterable[tuple[str, str]], names: Iterable[str] = ()
+) -> tuple[LaunchFile, ...]:
+    """Each launch file; `paths` are pairs of the name to show and the path on disk relative to `folder`.
 
-
-def _read(folder: Path, shown: str, path: str) -> LaunchFile:
-    data = read_markup(folder, path)
-    if isinstance(data, Fault):
-        return _broken(shown, data.model_copy(update={"file": shown}))
-    return parse_launch(data, shown)
+    `names` are the package's own, as `$(find …)` calls it.
+    """
+    library = _Library(folder, dict(paths))
+    own = tuple(dict.fromkeys(names))
+    return tuple(
+        _record(path, library.parsed(path), own, library.find)
+        for path in library.paths
+        if is_launch_file(path)
+    )
 
 
 def parse_launch(data: bytes, path: str) -> LaunchFile:
     """One launch file from its bytes. Never raises: what is wrong with it is the record's `fault`."""
+    return _record(path, _parse(data, path), (), lambda _: (None, None))
+
+
+class _Library:
+    """The package's files as launch files, each parsed once."""
+
+    def __init__(self, folder: Path, paths: dict[str, str]) -> None:
+        self._folder = folder
+        self.paths = paths
+        self._parsed: dict[str, _Parsed] = {}
+
+    def parsed(self, path: str) -> _Parsed:
+        if path not in self._parsed:
+            data = read_markup(self._folder, self.paths[path])
+            self._parsed[path] = (
+                _Parsed(None, data.model_copy(update={"file": path}))
+                if isinstance(data, Fault)
+                else _parse(data, path)
+            )
+        return self._parsed[path]
+
+    def find(self, path: str) -> tuple[etree._Element | None, Fault | None]:
+        if path not in self.paths:
+            return None, None
+        found = self.parsed(path)
+        return found.element, found.fault
+
+
+def _parse(data: bytes, path: str) -> _Parsed:
     element, fault = parse_xml(data, path, root="launch")
     if element is None:
-        return _broken(path, fault)
+        return _Parsed(None, fault)
     root = str(element.tag)
     if root != "launch":
-        return _broken(path, _wrong_root(path, root, line_of(element)), root)
+        return _Parsed(None, _wrong_root(path, root, line_of(element)), root)
     nested = next((e for e in element.iter("launch") if e is not element), None)
     if nested is not None:
-        return _broken(path, _nested_root(path, line_of(nested)), root)
+        return _Parsed(None, _nested_root(path, line_of(nested)), root)
+    return _Parsed(element, None, root)
+
+
+def _record(path: str, parsed: _Parsed, own: tuple[str, ...], find: Find) -> LaunchFile:
     nodes: list[LaunchNode] = []
     includes: list[str] = []
-    if _wanted(element):
-        _walk(element, (), nodes, includes)
-    return LaunchFile(path=path, root=root, nodes=tuple(nodes), includes=tuple(includes))
+    if parsed.element is None:
+        return LaunchFile(path=path, root=parsed.root, nodes=(), includes=(), fault=parsed.fault)
+    if wanted(parsed.element):
+        _walk(parsed.element, (), nodes, includes)
+    loaded = load(parsed.element, Scope(file=path, own=own), find)
+    return LaunchFile(
+        path=path,
+        root=parsed.root,
+        nodes=tuple(nodes),
+        includes=tuple(includes),
+        brings=tuple(loaded.nodes),
+        tests=tuple(loaded.tests),
+        params=tuple(loaded.params),
+        loads=tuple(loaded.loads),
+        include_faults=tuple(loaded.faults),
+        unknown_tags=tuple(_unknown(parsed.element)),
+    )
 
 
-def _broken(path: str, fault: Fault | None, root: str | None = None) -> LaunchFile:
-    return LaunchFile(path=path, root=root, nodes=(), includes=(), fault=fault)
+def _unknown(parent: etree._Element) -> Iterator[tuple[str, int]]:
+    """Tags that roslaunch skips with a warning, `<Node>` for one."""
+    for child in parent:
+        if isinstance(child.tag, str):
+            if child.tag not in _TAGS:
+                yield child.tag, line_of(child) or 0
+            elif child.tag == "group":
+                yield from _unknown(child)
 
 
 def _wrong_root(path: str, root: str, line: int | None) -> Fault:
@@ -67,16 +137,9 @@ def _nested_root(path: str, line: int | None) -> Fault:
     return Fault(file=path, line=line, kind="WrongRoot", message="more than one <launch>", cause=cause)
 
 
-def _wanted(element: etree._Element) -> bool:
-    """False where a literal `if` or `unless` switches the element off; anything else is left to run time."""
-    on = (element.get("if") or "").strip().lower()
-    off = (element.get("unless") or "").strip().lower()
-    return on not in _FALSE and off not in _TRUE
-
-
 def _walk(parent: etree._Element, remaps: Remaps, nodes: list[LaunchNode], includes: list[str]) -> None:
     for child in parent:
-        if not isinstance(child.tag, str) or not _wanted(child):
+        if not isinstance(child.tag, str) or not wanted(child):
             continue
         if child.tag == "remap":
             remaps += _remap(child)
@@ -94,7 +157,7 @@ def _remap(element: etree._Element) -> Remaps:
 
 def _node(element: etree._Element, remaps: Remaps) -> LaunchNode:
     for child in element.iterchildren("remap"):
-        if _wanted(child):
+        if wanted(child):
             remaps += _remap(child)
     return LaunchNode(
         pkg=element.get("pkg"),

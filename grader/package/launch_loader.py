@@ -1,0 +1,191 @@
+"""What `roslaunch` makes of a launch file with all that it includes of the same package; nothing is executed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from lxml import etree
+
+from grader.model.package import Fault, LaunchLoad, LaunchNode, LaunchParam
+from grader.package.launch_scope import Remaps, Scope, wanted
+from grader.package.xml import line_of
+
+INCLUDES_MAX = 50
+DEPTH_MAX = 10
+
+
+class Find(Protocol):
+    """Gives the root of a launch file of the package by its path, or its fault; neither where there is no such file."""
+
+    def __call__(self, path: str, /) -> tuple[etree._Element | None, Fault | None]: ...
+
+
+@dataclass(kw_only=True)
+class Loaded:
+    """All that was found, in the file's order."""
+
+    nodes: list[LaunchNode] = field(default_factory=list)
+    tests: list[LaunchNode] = field(default_factory=list)
+    params: list[LaunchParam] = field(default_factory=list)
+    loads: list[LaunchLoad] = field(default_factory=list)
+    faults: list[Fault] = field(default_factory=list)
+    included: int = 0
+
+
+def load(root: etree._Element, scope: Scope, find: Find) -> Loaded:
+    """Walk the file. `find` gives the root of another launch file of the package by its path, or its fault."""
+    loader = _Loader(find)
+    if wanted(root, scope):
+        loader.walk(root, scope, 0)
+    return loader.loaded
+
+
+def node_of(element: etree._Element, scope: Scope, remaps: Remaps) -> LaunchNode:
+    """One `<node>` as it stands in this scope."""
+    return LaunchNode(
+        pkg=scope.get(element, "pkg"),
+        type=scope.get(element, "type"),
+        name=scope.get(element, "name"),
+        ns=scope.get(element, "ns"),
+        output=scope.get(element, "output"),
+        launch_prefix=scope.get(element, "launch-prefix"),
+        args=scope.get(element, "args"),
+        machine=scope.get(element, "machine"),
+        respawn=scope.get(element, "respawn"),
+        required=scope.get(element, "required"),
+        remaps=remaps,
+        line=line_of(element) or 0,
+        file=scope.file,
+        namespace=scope.below(scope.get(element, "ns")).namespace,
+    )
+
+
+class _Loader:
+    def __init__(self, find: Find) -> None:
+        self.loaded = Loaded()
+        self._find = find
+
+    def walk(self, parent: etree._Element, scope: Scope, depth: int) -> None:
+        """Tag by tag: each changes the scope for those that follow it."""
+        for child in parent:
+            if not isinstance(child.tag, str) or not wanted(child, scope):
+                continue
+            if child.tag == "group":
+                self.walk(child, scope.below(scope.get(child, "ns")), depth)
+            elif child.tag == "include":
+                self._include(child, scope, depth)
+            elif child.tag in {"arg", "remap", "param"}:
+                scope = self._changed(child, scope)
+            else:
+                self._add(child, scope)
+
+    def _changed(self, child: etree._Element, scope: Scope) -> Scope:
+        if child.tag == "arg":
+            return _with_arg(child, scope)
+        if child.tag == "remap":
+            return scope.model_copy(update={"remaps": (*scope.remaps, _remap(child, scope))})
+        return self._param(child, scope)
+
+    def _add(self, child: etree._Element, scope: Scope) -> None:
+        if child.tag == "node":
+            self._node(child, scope)
+        elif child.tag == "rosparam":
+            self._load(child, scope)
+        elif child.tag == "test":
+            self.loaded.tests.append(node_of(child, scope, scope.remaps))
+
+    def _node(self, element: etree._Element, scope: Scope) -> None:
+        own = [c for c in element if isinstance(c.tag, str) and wanted(c, scope)]
+        remaps = (*scope.remaps, *(_remap(c, scope) for c in own if c.tag == "remap"))
+        node = node_of(element, scope, remaps)
+        self.loaded.nodes.append(node)
+        inside = scope.model_copy(update={"namespace": f"{node.full_name}/"})
+        for child in own:
+            if child.tag == "rosparam":
+                self._load(child, inside)
+            elif child.tag == "param":
+                self.loaded.params.append(_private(_param(child, inside), inside))
+        self.loaded.params += [_private(param, inside) for param in scope.private]
+
+    def _param(self, element: etree._Element, scope: Scope) -> Scope:
+        param = _param(element, scope)
+        if param.name.startswith("~"):
+            return scope.model_copy(update={"private": (*scope.private, param)})
+        self.loaded.params.append(param.model_copy(update={"name": scope.resolved(param.name)}))
+        return scope
+
+    def _load(self, element: etree._Element, scope: Scope) -> None:
+        below = scope.below(scope.get(element, "ns")).below(scope.get(element, "param"))
+        load = LaunchLoad(
+            source=scope.get(element, "file"),
+            command=scope.get(element, "command") or "load",
+            namespace=below.namespace,
+            file=scope.file,
+            line=line_of(element) or 0,
+        )
+        self.loaded.loads.append(load)
+
+    def _include(self, element: etree._Element, scope: Scope, depth: int) -> None:
+        path = scope.own_path(scope.get(element, "file") or "")
+        if path is None:
+            return
+        self.loaded.included += 1
+        if depth >= DEPTH_MAX or self.loaded.included > INCLUDES_MAX:
+            message = "launch files that include each other without an end"
+            self.loaded.faults.append(_fault(element, scope, message))
+            return
+        root, fault = self._find(path)
+        if root is None:
+            reason = (
+                f"it is not well-formed: {fault.cause or fault.message}"
+                if fault
+                else "it is not in the package"
+            )
+            self.loaded.faults.append(_fault(element, scope, f"it includes {path}, and {reason}"))
+        elif wanted(root, scope):
+            self.walk(root, _included(element, scope, path), depth + 1)
+
+
+def _included(element: etree._Element, scope: Scope, path: str) -> Scope:
+    """An included file sees only the arguments that it is given."""
+    passed = (scope.get(element, "pass_all_args") or "").lower() == "true"
+    given = Scope(file=path, own=scope.own)
+    for child in element.iterchildren("arg"):
+        if wanted(child, scope):
+            value = scope.get(child, "value") or scope.get(child, "default") or ""
+            given = given.model_copy(update={"args": {**given.args, child.get("name") or "": value}})
+    args = {**scope.args, **given.args} if passed else given.args
+    inside = scope.below(scope.get(element, "ns"))
+    return inside.model_copy(update={"file": path, "args": args})
+
+
+def _with_arg(element: etree._Element, scope: Scope) -> Scope:
+    name = scope.get(element, "name") or ""
+    value, default = scope.get(element, "value"), scope.get(element, "default")
+    if value is None and (default is None or name in scope.args):
+        return scope
+    return scope.model_copy(update={"args": {**scope.args, name: value if value is not None else default}})
+
+
+def _remap(element: etree._Element, scope: Scope) -> tuple[str, str]:
+    return scope.get(element, "from") or "", scope.get(element, "to") or ""
+
+
+def _param(element: etree._Element, scope: Scope) -> LaunchParam:
+    return LaunchParam(
+        name=(scope.get(element, "name") or "").strip(),
+        value=scope.get(element, "value"),
+        type=scope.get(element, "type"),
+        file=scope.file,
+        line=line_of(element) or 0,
+    )
+
+
+def _private(param: LaunchParam, inside: Scope) -> LaunchParam:
+    """A parameter of a node's own: a slash in front of its name does not lead out of it."""
+    return param.model_copy(update={"name": inside.resolved(param.name.lstrip("~/"))})
+
+
+def _fault(element: etree._Element, scope: Scope, message: str) -> Fault:
+    return Fault(file=scope.file, line=line_of(element), kind="Include", message=message)
