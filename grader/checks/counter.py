@@ -65,6 +65,9 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
     }
     if first.values[0] == params.start and first.sequences[0] == 0:
         return passed(f"{params.topic} begins with {params.start}", **fields)
+    if run.foreign:
+        message = f"{run.evidence} may have begun after the first message on {params.topic}"
+        return inconclusive(message, hint="start the recording, and then the node", **fields)
     if first.sequences[0] > 0 or _recorder_was_late(run, params.topic, first.callerid):
         message = f"the recorder missed the first messages on {params.topic}"
         return inconclusive(message, hint="grade again", **fields)

@@ -129,7 +129,7 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
         message = f"only {seen} on {params.topic}: the node ended ({end.cause})"
         return unjudged(message, hint=end.hint, citations=end.citations)
     message = f"only {seen} on {params.topic}, a rate needs {params.min_window_s:g} s"
-    return inconclusive(message, hint="grade again")
+    return inconclusive(message, hint="record for longer" if run.foreign else "grade again")
 
 
 def _uneven(found: Rhythm, params: RateParams) -> Verdict | None:

@@ -47,17 +47,17 @@ def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verd
     if wrong:
         verdict = _wrong_type(wrong[0], params)
     elif not heard:
-        verdict = _silent(package, run, params)
+        verdict = _not_recorded(run, params.topic) if run.foreign else _silent(package, run, params)
     else:
         count = sum(len(c.messages) for c in heard)
-        publishers = listed(c.callerid for c in heard)
+        publishers = listed(dict.fromkeys(c.publisher for c in heard))
         verdict = passed(
             f"{publishers} publishes {params.type} on {params.topic} ({plural(count, 'message')})"
         )
     expected = f"{params.type} on {params.topic}"
-    measured = listed(f"{plain_type(c.type)} by {c.callerid}" for c in channels) or published_topics(run)
+    measured = listed(f"{plain_type(c.type)} by {c.publisher}" for c in channels) or published_topics(run)
     return verdict.model_copy(
-        update={"expected": expected, "measured": measured, "citations": (_cite(run, channels),)}
+        update={"expected": expected, "measured": measured, "citations": _cite(run, channels)}
     )
 
 
@@ -78,7 +78,7 @@ def published_topics(run: Run) -> str:
 def _wrong_type(channel: Channel, params: TopicTypeParams) -> Verdict:
     package, _, name = params.type.partition("/")
     hint = f"from {package}.msg import {name}, then rospy.Publisher('{params.topic}', {name}, queue_size=10)"
-    message = f"{channel.callerid} publishes {plain_type(channel.type)} on {params.topic}, not {params.type}"
+    message = f"{channel.publisher} publishes {plain_type(channel.type)} on {params.topic}, not {params.type}"
     return failed(message, hint=hint)
 
 
@@ -109,8 +109,18 @@ def _silent(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verdict
     return failed(message, hint=f"{only}add rospy.Publisher('{params.topic}', …) and publish in the loop")
 
 
-def _cite(run: Run, channels: tuple[Channel, ...]) -> EvidenceCitation:
+def _not_recorded(run: Run, topic: str) -> Verdict:
+    """Another tool's recording does not tell whether the topic was silent or only not recorded."""
+    near = near_names(topic, student_topics(run))
+    instead = f"; {listed(near)} is" if near else ""
+    hint = f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all topics"
+    return unjudged(f"{topic} is not in {run.evidence}{instead}", hint=hint)
+
+
+def _cite(run: Run, channels: tuple[Channel, ...]) -> tuple[EvidenceCitation, ...]:
     times = sorted(t for c in channels for t in c.times_ns[:1] + c.times_ns[-1:])
     if not times:
-        return EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
-    return EvidenceCitation(evidence=run.evidence, topic=channels[0].topic, from_ns=times[0], to_ns=times[-1])
+        graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
+        return () if run.foreign else (graph,)
+    cite = EvidenceCitation(evidence=run.evidence, topic=channels[0].topic, from_ns=times[0], to_ns=times[-1])
+    return (cite,)

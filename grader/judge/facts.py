@@ -12,13 +12,16 @@ from grader.checks.build import run_hint
 from grader.checks.executable import find_script
 from grader.checks.registry import Check
 from grader.evidence.run import Run
+from grader.judge.recordings import PACKAGE_RUN, unread_recording, with_recordings
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, inconclusive
 from grader.rubric.model import Criterion, Rubric
 
-PACKAGE_RUN = "package"
 NOT_RUN = "not_run"
+NO_PACKAGE = PackageFacts(
+    name="", path=".", manifest=None, manifest_fault=None, cmake=None, files=(), launch_files=()
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,16 +35,26 @@ class Facts:
     def of(self, check: Check, criterion: Criterion, params: Record) -> dict[str, object] | Verdict:
         """The facts by the names that the check asks for, or the verdict where one of them is not there."""
         found: dict[str, object] = {"params": params}
-        if {"package", "build"} & set(check.facts):
-            if self.package is None:
-                return inconclusive("the evidence holds no package facts", hint="grade the submission again")
-            found |= {"package": self.package, "build": self.runs[PACKAGE_RUN]}
         if check.needs_run:
             run = self._run(criterion.scenario or "")
             if isinstance(run, Verdict):
                 return run
+            if run.foreign and not check.messages_only:
+                return _not_in_messages(run)
+            if run.foreign:
+                found["package"] = NO_PACKAGE
             found["run"] = run
+        if {"package", "build"} & (set(check.facts) - found.keys()) and self.package is None:
+            return self._no_package()
+        if self.package is not None:
+            found |= {"package": self.package, "build": self.runs[PACKAGE_RUN]}
         return {name: found[name] for name in check.facts}
+
+    def _no_package(self) -> Verdict:
+        if not any(run.foreign for run in self.runs.values()):
+            return inconclusive("the evidence holds no package facts", hint="grade the submission again")
+        message = "a recording was handed in, and the package's files are not part of it"
+        return inconclusive(message, hint="hand in the package too, to have its files judged")
 
     def _run(self, scenario: str) -> Run | Verdict:
         run = self.runs.get(scenario)
@@ -52,6 +65,9 @@ class Facts:
             reason = recorded.metadata.get(NOT_RUN, "") if recorded else ""
             message = f"the scenario {scenario!r} was not run{': ' + reason if reason else ''}"
             return inconclusive(message, hint=run_hint(reason))
+        return run if run.foreign else unread_recording(run) or self._of_the_arena(run, scenario)
+
+    def _of_the_arena(self, run: Run, scenario: str) -> Run | Verdict:
         outcome = run.outcome
         if outcome is None:
             return inconclusive(f"the recording of {scenario!r} was cut short", hint="grade again")
@@ -66,7 +82,7 @@ class Facts:
     def _lacks_files(self, scenario: str) -> bool:
         """Whether the package has none of the files that the scenario starts: then there was nothing to run."""
         known = self.rubric.scenarios.get(scenario)
-        if known is None or self.package is None:
+        if known is None or self.package is None or known.recording is not None:
             return False
         launch_files = {PurePosixPath(f.path).name for f in self.package.launch_files}
         return not any(
@@ -80,8 +96,14 @@ class Facts:
         return replace(recorded, scenario=scenario, clock=clock, processes=(), console=(), graph=())
 
 
+def _not_in_messages(run: Run) -> Verdict:
+    message = f"{run.evidence} holds messages, and nothing of the processes and nodes that this is about"
+    return inconclusive(message, hint="hand in the package too, so that its nodes can be run")
+
+
 def try_facts(rubric: Rubric, runs: Mapping[str, Run]) -> Facts:
     """The facts; `package` is None where none was recorded, or where it is of another version."""
+    runs = with_recordings(rubric, runs)
     recorded = runs.get(PACKAGE_RUN)
     if recorded is None or recorded.package_json is None:
         return Facts(rubric=rubric, runs=runs, package=None)

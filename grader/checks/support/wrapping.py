@@ -151,4 +151,5 @@ def _too_few(count: Count, good: list[Step], run: Run, params: WrapParams) -> Ve
     end = {"timeout": "the run's time was over", "host": "the grading machine failed"}.get(
         outcome or "", "the run ended"
     )
-    return inconclusive(f"right as far as it goes, but {end} after {seen}", hint="grade again")
+    hint = "record for longer" if run.foreign else "grade again"
+    return inconclusive(f"right as far as it goes, but {end} after {seen}", hint=hint)
