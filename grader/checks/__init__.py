@@ -15,6 +15,7 @@ FAMILIES = (
     "counter",
     "hears",
     "launch",
+    "message",
 )
 for family in FAMILIES:
     import_module(f"grader.checks.{family}")

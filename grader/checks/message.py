@@ -1,0 +1,152 @@
+"""Whether messages say what they should, and tell the time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+from pydantic import Field
+
+from grader.checks.registry import check
+from grader.checks.support.clocks import clocks_at
+from grader.checks.support.ending import explain_end
+from grader.checks.support.growth import GET_TIME, WATCHED_S, wrong_growth
+from grader.checks.support.process import early_end, observed_until_ns
+from grader.checks.support.text import plural, shown
+from grader.checks.support.wording import NUMBER, SECONDS, in_words, message_pattern
+from grader.evidence.run import Channel, Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+
+ENOUGH = 3
+UNFILLED = ("%s", "%d", "%f", "{}", "{0}")
+
+
+class MessageParams(Record):
+    """`template` is the whole text, `{seconds}` in it a time that grows: `hello world {seconds}`."""
+
+    topic: str
+    template: Annotated[str, Field(min_length=1)]
+
+
+@check("message", params=MessageParams)
+def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
+    """Each message says what the handout asks, and tells the time.
+
+    What it checks
+        That every message on the topic has the handout's words, and a time in seconds that grows from
+        message to message.
+
+    Why it matters on a robot
+        Whoever reads the messages goes by their form, and measurements without the right time cannot be put
+        in order or be told from old ones.
+
+    How it is measured
+        Each text is compared with the template; capitals, and how many blanks stand between words, do not
+        matter. The number has to grow as the clock did between the arrivals, within 1.5 s and 5 %. Whole
+        seconds and seconds since the node's start will do; nanoseconds, milliseconds and a number that
+        stays the same will not.
+
+    How to fix
+        Make the text anew in each turn of the loop: `"hello world %s" % rospy.get_time()`. `rostopic echo
+        <topic>` shows what is sent.
+    """
+    heard = [c for c in run.student_channels(params.topic) if c.messages]
+    grows = ", the seconds growing as the clock does" if SECONDS in params.template else ""
+    expected = f"each message on {params.topic} is '{in_words(params.template)}'{grows}"
+    if not heard or not all(isinstance(text, str) for c in heard for text in c.data):
+        return _no_text(package, run, heard, params).model_copy(update={"expected": expected})
+    count = sum(len(c.messages) for c in heard)
+    verdict = (
+        _misfit(run, heard, params)
+        or _wrong_time(package, run, heard, params)
+        or passed(f"all {count} messages on {params.topic} are '{in_words(params.template)}'{grows}")
+    )
+    measured = f"{shown(heard[0].data[0])!r} to {shown(heard[0].data[-1])!r} ({plural(count, 'message')})"
+    span = EvidenceCitation(
+        evidence=run.evidence,
+        topic=params.topic,
+        from_ns=min(c.times_ns[0] for c in heard),
+        to_ns=max(c.times_ns[-1] for c in heard),
+    )
+    citations = verdict.citations or (span,)
+    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
+
+
+def _no_text(package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict:
+    if heard:
+        message = f"{params.topic} carries {heard[0].type}, and no text that could be compared"
+        return unjudged(message, hint="publish std_msgs/String", measured=heard[0].type)
+    ended = early_end(run)
+    if ended is not None:
+        end = explain_end(ended, run, package)
+        message = f"nothing came on {params.topic}: the node ended before ({end.cause})"
+        return unjudged(message, hint=end.hint, measured="no message", citations=end.citations)
+    hint = f"first publish on {params.topic}: rostopic echo {params.topic} shows what comes"
+    return unjudged(f"nothing came on {params.topic}", hint=hint, measured="no message")
+
+
+def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict | None:
+    """The first message that does not have the template's words, or no number where the time belongs."""
+    fits, loose = (message_pattern(params.template, value) for value in (NUMBER, ".*?"))
+    wrong = (
+        (t, text)
+        for c in heard
+        for t, text in zip(c.times_ns, c.data, strict=True)
+        if not fits.fullmatch(text)
+    )
+    at_ns, text = next(wrong, (0, ""))
+    if not at_ns:
+        return None
+    found = loose.fullmatch(text)
+    part = shown(found[1]) if found and found.groups() else ""
+    wanted = in_words(params.template)
+    form = params.template.replace(SECONDS, "%s")
+    if any(mark in text for mark in UNFILLED):
+        message = f"a message reads {shown(text)!r}: its placeholder was never filled in"
+    elif part:
+        message = (
+            f"a message says {part!r} where the time in seconds belongs: {shown(text)!r}, not '{wanted}'"
+        )
+    else:
+        message = f"a message reads {shown(text)!r}, not '{wanted}'"
+    cited = EvidenceCitation(evidence=run.evidence, topic=params.topic, from_ns=at_ns, to_ns=at_ns)
+    value = " % rospy.get_time()" if SECONDS in params.template else ""
+    return failed(message, hint=f'publish "{form}"{value}', citations=(cited,))
+
+
+def _wrong_time(
+    package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams
+) -> Verdict | None:
+    if SECONDS not in params.template:
+        return None
+    pattern = message_pattern(params.template, NUMBER)
+    longest = [c for c in heard if len(c.messages) >= ENOUGH]
+    if not longest:
+        return _too_few(package, run, heard, params)
+    for channel in longest:
+        told = [float(found[1]) for text in channel.data if (found := pattern.fullmatch(text))]
+        clocks = clocks_at(run, channel.times_ns)
+        if not clocks:
+            message = "the time in the messages cannot be judged: the run's /clock was not recorded"
+            return inconclusive(message, hint="grade again")
+        wrong = wrong_growth(told, clocks)
+        if wrong is not None:
+            ended = early_end(run) if wrong.status.value == "inconclusive" else None
+            return _too_few(package, run, heard, params) if ended else wrong
+    return None
+
+
+def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict:
+    """Too little came: the node's own fault where it died, or was watched long enough."""
+    few = f"only {plural(sum(len(c.messages) for c in heard), 'message')} came on {params.topic}"
+    ended = early_end(run)
+    if ended is not None:
+        end = explain_end(ended, run, package)
+        message = f"{few} before the node ended ({end.cause}): too few to see the time grow"
+        return unjudged(message, hint=end.hint, citations=end.citations)
+    first_ns = min(c.times_ns[0] for c in heard)
+    if (observed_until_ns(run) or run.end_ns) - first_ns >= WATCHED_S * 1e9:
+        return unjudged(f"{few}: too few to see the time grow", hint=f"publish in the loop; {GET_TIME}")
+    return inconclusive(f"{few} while it was watched: too few to see the time grow", hint="grade again")

@@ -1,0 +1,74 @@
+"""Whether numbers are a time in seconds: they grow as a clock does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from grader.checks.support.clocks import Seconds
+from grader.checks.support.text import number, plural
+from grader.model.verdict import Verdict, failed, inconclusive
+
+SLACK_S = 1.5
+SLACK_SHARE = 0.05
+WATCHED_S = 3.0
+UNITS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
+GET_TIME = "rospy.get_time() gives the time in seconds; ask it again for every message"
+
+
+def wrong_growth(told: Sequence[float], clocks: Sequence[Seconds]) -> Verdict | None:
+    """None where the numbers told go along with one of the clocks, from wherever they start.
+
+    Whole seconds may repeat. The first clock is the one that a message speaks of.
+    """
+    span_s = clocks[0][-1]
+    if told[0] == told[-1] == max(told) == min(told):
+        message = f"the time in the messages stays at {number(told[0])} for {span_s:.1f} s"
+        return failed(message, hint=GET_TIME) if span_s >= WATCHED_S else _too_short(span_s)
+    back = next(((a, b) for a, b in pairwise(told) if b < a), None)
+    if back is not None:
+        return _falls_back(*back)
+    along = [clock[-1] for clock in clocks if _go_along(told, clock)]
+    if along:
+        return None if max(along) >= WATCHED_S else _too_short(max(along))
+    return _other_pace(told, span_s)
+
+
+def _go_along(told: Sequence[float], clock: Seconds) -> bool:
+    slack_s = SLACK_S + SLACK_SHARE * clock[-1]
+    return all(abs(value - told[0] - at_s) <= slack_s for value, at_s in zip(told, clock, strict=True))
+
+
+def _too_short(span_s: float) -> Verdict:
+    message = (
+        f"the messages were watched for {span_s:.1f} s only: too short to tell how the time in them grows"
+    )
+    return inconclusive(message, hint="grade again")
+
+
+def _falls_back(before: float, after: float) -> Verdict:
+    message = f"the time in the messages falls back from {_plain(before)} to {_plain(after)}"
+    within = before < 1e9 and before == int(before) and before > 1e6
+    why = "`.nsecs` is only the part behind the whole second; " if within else ""
+    return failed(message, hint=why + GET_TIME)
+
+
+def _other_pace(told: Sequence[float], span_s: float) -> Verdict:
+    growth = told[-1] - told[0]
+    pace = growth / span_s if span_s > 0 else 0.0
+    unit = next((name for factor, name in UNITS.items() if 0.7 <= pace / factor <= 1.4), "")
+    if unit:
+        return failed(f"the time in the messages is in {unit}, not in seconds", hint=GET_TIME)
+    if all(b - a == 1 for a, b in pairwise(told)):
+        message = (
+            f"the number in the messages counts them ({_plain(told[0])}, {_plain(told[1])}, …) and is no time"
+        )
+        return failed(message, hint=GET_TIME)
+    message = (
+        f"the number in the messages grows by {_plain(growth)} in {span_s:.1f} s: it is no time in seconds"
+    )
+    return failed(f"{message} ({plural(len(told), 'message')})", hint=GET_TIME)
+
+
+def _plain(value: float) -> str:
+    return f"{value:.0f}" if value == int(value) else f"{value:.3f}"
