@@ -1,6 +1,8 @@
 """The whole data flow: begin reading here.
 
 intake → package facts → arena → evidence → judge → report
+
+A recording that is handed in is evidence already: it skips the package and the arena.
 """
 
 from __future__ import annotations
@@ -17,10 +19,11 @@ from platform import python_version
 from grader import __version__
 from grader.arena.recording import Recorder, Recording
 from grader.arena.sandbox import Mode
+from grader.errors import UsageError
 from grader.evidence.reader import load_evidence
 from grader.evidence.run import Run
 from grader.files import unwritable
-from grader.intake import open_submission
+from grader.intake import open_recorded, open_recording, open_submission
 from grader.judge import judge
 from grader.judge.summary import overall_status, total_points
 from grader.model.progress import Progress
@@ -32,10 +35,13 @@ from grader.model.result import (
     SubmissionInfo,
     TimingInfo,
 )
-from grader.model.submission import Submission
+from grader.model.submission import RecordedSubmission, Submission
 from grader.model.verdict import Status
+from grader.recordings import keep_recording, keep_scenarios
 from grader.report.files import write_reports
 from grader.rubric.load import LoadedRubric
+from grader.rubric.model import Rubric
+from grader.rubric.needs import needs_package, started
 
 RETRIES = 2
 
@@ -58,7 +64,10 @@ def grade(
     with _opened(source, rubric, options, progress) as submission:
         folder = out / submission.id
         with _new_evidence(folder) as evidence:
-            recording, criteria = _recorded_and_judged(submission, rubric, evidence, options, progress)
+            if isinstance(submission, RecordedSubmission):
+                recording, criteria = None, _kept_and_judged(submission, rubric, evidence, progress)
+            else:
+                recording, criteria = _recorded_and_judged(submission, rubric, evidence, options, progress)
             console = console_log(load_evidence([evidence]))
         result = _result(submission, rubric, recording, criteria, clock)
         write_reports(result, folder, console=console, rubric=rubric.rubric, keep_hidden=options.keep_hidden)
@@ -70,12 +79,17 @@ def record(
 ) -> list[Path]:
     """Record the rubric's scenarios into `out/<its id>/evidence/` and judge nothing."""
     with _opened(source, rubric, options, progress) as submission:
+        if isinstance(submission, RecordedSubmission):
+            raise UsageError(
+                f"{submission.source}: there is nothing to run in it", hint="grade it, or judge it"
+            )
         folder = out / submission.id
         with (
             _new_evidence(folder) as evidence,
             _recorder(submission, rubric, evidence, options, progress) as recorder,
         ):
             recorder.record_all()
+            keep_scenarios(rubric.rubric, submission, evidence, progress)
             names = [path.name for path in recorder.recording.files]
     return [folder / "evidence" / name for name in names]
 
@@ -99,28 +113,45 @@ class _Clock:
     def __init__(self) -> None:
         self._wall, self._cpu = time.monotonic(), time.process_time()
 
-    def timing(self, recording: Recording) -> TimingInfo:
+    def timing(self, recording: Recording | None) -> TimingInfo:
+        cpu_s, student_cpu_s = (recording.cpu_s, recording.student_cpu_s) if recording else (0.0, 0.0)
         return TimingInfo(
             wall_s=round(time.monotonic() - self._wall, 3),
-            cpu_s=round(time.process_time() - self._cpu + recording.cpu_s, 3),
-            student_cpu_s=round(recording.student_cpu_s, 3),
+            cpu_s=round(time.process_time() - self._cpu + cpu_s, 3),
+            student_cpu_s=round(student_cpu_s, 3),
         )
 
 
 @contextmanager
 def _opened(
     source: str, rubric: LoadedRubric, options: GradeOptions, progress: Progress
-) -> Iterator[Submission]:
+) -> Iterator[Submission | RecordedSubmission]:
     progress.step("intake", "running", source)
     with tempfile.TemporaryDirectory(prefix="grader-source-", ignore_cleanup_errors=True) as folder:
-        submission = open_submission(
-            source,
-            package=rubric.rubric.package,
-            workdir=Path(folder),
-            submission_id=options.submission_id,
-        )
+        recorded = open_recording(source, submission_id=options.submission_id)
+        submission = recorded or _opened_tree(source, rubric.rubric, Path(folder), options)
         progress.step("intake", "done", submission.id)
         yield submission
+
+
+def _opened_tree(
+    source: str, rubric: Rubric, workdir: Path, options: GradeOptions
+) -> Submission | RecordedSubmission:
+    if not needs_package(rubric):
+        return open_recorded(source, workdir=workdir, submission_id=options.submission_id)
+    return open_submission(
+        source, package=rubric.package, workdir=workdir, submission_id=options.submission_id
+    )
+
+
+def _kept_and_judged(
+    submission: RecordedSubmission, rubric: LoadedRubric, evidence: Path, progress: Progress
+) -> tuple[CriterionResult, ...]:
+    if submission.file is None:
+        keep_scenarios(rubric.rubric, submission, evidence, progress)
+    else:
+        keep_recording(submission.file, evidence)
+    return judge(rubric.rubric, load_evidence([evidence]))
 
 
 @contextmanager
@@ -152,7 +183,7 @@ def _recorder(
 ) -> Recorder:
     return Recorder(
         submission,
-        rubric.rubric,
+        started(rubric.rubric),
         evidence,
         mode=options.sandbox,
         static_only=options.static_only,
@@ -166,6 +197,7 @@ def _recorded_and_judged(
     """What the evidence cannot say because the machine was late is recorded again, alone, at most twice."""
     with _recorder(submission, rubric, evidence, options, progress) as recorder:
         recorder.record_all()
+        keep_scenarios(rubric.rubric, submission, evidence, progress)
         criteria = judge(rubric.rubric, load_evidence([evidence]))
         for _ in range(RETRIES):
             again = _inconclusive_scenarios(criteria, recorder.recording)
@@ -183,20 +215,20 @@ def _inconclusive_scenarios(criteria: tuple[CriterionResult, ...], recording: Re
 
 
 def _result(
-    submission: Submission,
+    submission: Submission | RecordedSubmission,
     rubric: LoadedRubric,
-    recording: Recording,
+    recording: Recording | None,
     criteria: tuple[CriterionResult, ...],
     clock: _Clock,
 ) -> GradingResult:
-    ros, sandbox = recording.ros, recording.sandbox
+    ros, sandbox = (recording.ros, recording.sandbox) if recording else (None, None)
     return GradingResult(
         submission=SubmissionInfo(
             id=submission.id,
             source=submission.source,
             commit=submission.commit,
             digest=submission.digest,
-            package=submission.package.name,
+            package=submission.package.name if isinstance(submission, Submission) else "",
         ),
         rubric=RubricInfo(id=rubric.rubric.id, version=rubric.rubric.version, digest=rubric.digest),
         status=overall_status(criteria),

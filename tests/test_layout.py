@@ -28,7 +28,10 @@ ALLOWED = {
     "judge": BASE | {"checks", "evidence", "rubric"},
     "report": BASE | {"files", "rubric.model"},
     "arena": BASE | {"evidence", "files", "package", "rubric.model"},
-    "pipeline": BASE | {"arena", "evidence", "files", "intake", "judge", "package", "report", "rubric"},
+    "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
+    "pipeline": {
+        *BASE, "arena", "evidence", "files", "intake", "judge", "package", "recordings", "report", "rubric"
+    },
     "cli": {
         *BASE, "arena", "checks", "evidence", "files", "intake", "judge", "package", "pipeline", "report", "rubric"
     },

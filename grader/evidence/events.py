@@ -10,6 +10,8 @@ from grader.model.record import Record
 
 EVIDENCE_VERSION = "1"
 METADATA_NAME = "grader.evidence"
+RECORDING_MISSING = "recording.missing"
+RECORDING_PROBLEM = "recording.problem"
 
 
 class ProcessEvent(Record):

@@ -15,10 +15,20 @@ from grader.intake.git import Git
 from grader.intake.limits import Limits
 from grader.intake.names import printable, safe_name
 from grader.intake.open import describe, locate, open_source
+from grader.intake.recordings import find_recordings, is_recording, several, single
 from grader.intake.source import Source, parse_source
-from grader.model.submission import Submission
+from grader.model.submission import RecordedSubmission, Submission
 
-__all__ = ["Limits", "enclosing_package", "find_packages", "open_submission", "safe_name"]
+__all__ = [
+    "Limits",
+    "enclosing_package",
+    "find_packages",
+    "find_recordings",
+    "open_recorded",
+    "open_recording",
+    "open_submission",
+    "safe_name",
+]
 
 
 def open_submission(
@@ -51,6 +61,43 @@ def open_submission(
     if submission_id is None:
         return submission
     return submission.model_copy(update={"id": safe_name(submission_id)})
+
+
+def open_recording(source: str, *, submission_id: str | None = None) -> RecordedSubmission | None:
+    """The submission where `source` is itself a recording (a bag or an MCAP file), None where it is anything else.
+
+    Raises what `open_submission` raises.
+    """
+    parsed = _parsed(source)
+    try:
+        if parsed.kind != "archive" or parsed.path is None or not is_recording(parsed.path):
+            return None
+        submission = single(parsed, parsed.path)
+    except OSError as error:
+        raise _unreadable(parsed.given, error) from error
+    return (
+        submission
+        if submission_id is None
+        else submission.model_copy(update={"id": safe_name(submission_id)})
+    )
+
+
+def open_recorded(
+    source: str, *, workdir: Path, submission_id: str | None = None, git_timeout_s: float = 120.0
+) -> RecordedSubmission:
+    """The submission of a lab that asks for recordings alone: as `open_submission`, and no package is looked for."""
+    parsed = _parsed(source)
+    with _base(workdir) as base:
+        try:
+            git = Git(base / "git-home", timeout_s=git_timeout_s)
+            submission = several(open_source(parsed, git, base, Limits()), git)
+        except OSError as error:
+            raise _unreadable(parsed.given, error) from error
+    return (
+        submission
+        if submission_id is None
+        else submission.model_copy(update={"id": safe_name(submission_id)})
+    )
 
 
 def _parsed(source: str) -> Source:

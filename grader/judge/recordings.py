@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from pathlib import PurePosixPath
 
+from grader.evidence.events import RECORDING_MISSING, RECORDING_PROBLEM
 from grader.evidence.run import Run
 from grader.model.verdict import Verdict, inconclusive, unjudged
 from grader.rubric.model import Rubric, Scenario
 
 PACKAGE_RUN = "package"
-MISSING = "recording.missing"
-PROBLEM = "recording.problem"
 
 
 def with_recordings(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
@@ -42,11 +41,13 @@ def _named(name: str, scenario: Scenario, foreign: list[Run]) -> Run | None:
 
 def unread_recording(run: Run) -> Verdict | None:
     """Why there is nothing to judge where a scenario's recording was not found or could not be read."""
-    if MISSING in run.metadata:
-        pattern = run.metadata[MISSING]
+    if RECORDING_MISSING in run.metadata:
+        pattern = run.metadata[RECORDING_MISSING]
         message = f"no recording {pattern} is in the submission"
         hint = "record with `rosbag record`, end it with Ctrl-C, and hand the file in"
         return unjudged(message, measured="no recording", hint=hint)
-    if PROBLEM in run.metadata:
-        return inconclusive(run.metadata[PROBLEM], hint="hand in one recording that `rosbag info` can read")
+    if RECORDING_PROBLEM in run.metadata:
+        return inconclusive(
+            run.metadata[RECORDING_PROBLEM], hint="hand in one recording that `rosbag info` can read"
+        )
     return None

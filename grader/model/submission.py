@@ -42,3 +42,18 @@ class Submission(Record):
     package: SourcePackage
     packages: tuple[SourcePackage, ...]
     hints: tuple[str, ...] = ()
+
+
+class RecordedSubmission(Record):
+    """Recordings and no package: there is nothing to build or to run.
+
+    `file` is the recording that the source itself is; where it is None, recordings lie below `root`. `digest` is the
+    sha256 of the file, or of the tree.
+    """
+
+    id: str
+    source: str
+    root: Path
+    file: Path | None
+    commit: str | None
+    digest: str

@@ -33,7 +33,8 @@ def _head(result: GradingResult, rubric: Rubric, hidden: int) -> Iterator[str]:
     yield f"{_text(rubric.title)} ({_code(result.rubric.id)}, version {_text(result.rubric.version)})"
     yield ""
     commit = f", commit {_code(submission.commit[:12])}" if submission.commit else ""
-    yield f"Submission {_code(submission.id)}, package {_code(submission.package)}{commit}."
+    kind = f"package {_code(submission.package)}" if submission.package else "a recording"
+    yield f"Submission {_code(submission.id)}, {kind}{commit}."
     yield ""
     if result.status == "inconclusive":
         yield "**Not settled yet:** some criteria could not be judged; no points are lost for good."
@@ -106,10 +107,10 @@ def _table(criteria: Iterable[CriterionResult]) -> Iterator[str]:
 def _foot(result: GradingResult) -> Iterator[str]:
     environment = result.environment
     yield (
-        f"Graded by grader {_text(environment.grader)} with ROS {_text(environment.ros)}, "
+        f"Graded by grader {_text(environment.grader)} with ROS {_text(environment.ros or 'not used')}, "
         f"Python {_text(environment.python)}, sandbox {_text(environment.sandbox)}, "
         f"in {result.timing.wall_s:.1f} s. Rubric digest {_code(result.rubric.digest[:12])}, "
-        f"package digest {_code(result.submission.digest[:12])}."
+        f"{'package' if result.submission.package else 'recording'} digest {_code(result.submission.digest[:12])}."
     )
 
 

@@ -1,0 +1,92 @@
+"""Recordings that are handed in: SOURCE itself, or files of what SOURCE holds."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from grader.intake.digest import tree_digest
+from grader.intake.git import Git
+from grader.intake.modes import head_commit
+from grader.intake.names import safe_name
+from grader.intake.open import Opened
+from grader.intake.source import Source
+from grader.intake.tree import NO_CONTENT, is_there, list_entries, walk
+from grader.model.submission import RecordedSubmission
+
+_SUFFIX = re.compile(r"\.(bag|bag\.active|bag\.orig|mcap|db3)$", re.IGNORECASE)
+_MAGIC = (b"#ROSBAG V", b"\x89MCAP0\r\n")
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a file is a recording by its name or its first bytes; a damaged one is one too.
+
+    Raises OSError where it cannot be read.
+    """
+    if not path.is_file():
+        return False
+    if _SUFFIX.search(path.name):
+        return True
+    with path.open("rb") as file:
+        return file.read(16).startswith(_MAGIC)
+
+
+def single(source: Source, path: Path) -> RecordedSubmission:
+    """The submission that is one recording. Raises OSError where it cannot be read."""
+    return RecordedSubmission(
+        id=safe_name(_SUFFIX.sub("", path.name)),
+        source=source.given,
+        root=path.parent,
+        file=path,
+        commit=None,
+        digest=_sha256(path),
+    )
+
+
+def several(opened: Opened, git: Git) -> RecordedSubmission:
+    """The submission whose recordings lie somewhere in what was opened, with or without a package."""
+    entries = list_entries(opened.root, leave_out=opened.leave_out)
+    commit = opened.commit
+    if opened.in_place and is_there(opened.root / ".git"):
+        commit = head_commit(opened.root, git)
+    return RecordedSubmission(
+        id=safe_name(opened.name),
+        source=opened.source.given,
+        root=opened.root,
+        file=None,
+        commit=commit,
+        digest=tree_digest(opened.root, entries, {}),
+    )
+
+
+def find_recordings(root: Path, pattern: str) -> list[Path]:
+    """The files below `root` that fit a pattern, nearest first; each content once, links left out.
+
+    A pattern without a slash is for a file's name in any folder; capitals make no difference.
+    """
+    wanted = pattern.casefold().removeprefix("./")
+    found: dict[str, Path] = {}
+    for folder in walk(root, tolerant=True):
+        folder.folders[:] = [n for n in folder.folders if n not in NO_CONTENT and not n.startswith(".")]
+        for entry in folder.others:
+            if entry.is_file(follow_symlinks=False) and _fits(folder.inside(entry.name), wanted):
+                path = root / folder.inside(entry.name)
+                found.setdefault(_sha256(path), path)
+    return list(found.values())
+
+
+def _fits(path: str, wanted: str) -> bool:
+    name = path.rpartition("/")[2]
+    if name.startswith("."):
+        return False
+    return fnmatchcase(path.casefold() if "/" in wanted else name.casefold(), wanted)
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()

@@ -1,0 +1,97 @@
+"""Recordings of other tools take their place in a submission's evidence, each as it was handed in."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+from grader.errors import EvidenceError, SubmissionError
+from grader.evidence.events import RECORDING_MISSING, RECORDING_PROBLEM, ScenarioEvent
+from grader.evidence.reader import SUFFIXES, load_evidence
+from grader.evidence.writer import EvidenceWriter
+from grader.files import unwritable
+from grader.intake import find_recordings, safe_name
+from grader.model.progress import Progress
+from grader.model.submission import RecordedSubmission, Submission
+from grader.rubric.model import Rubric
+
+NAMES_SHOWN = 4
+
+
+def keep_recording(path: Path, folder: Path) -> Path:
+    """The recording that is the whole submission, in the evidence under its own name.
+
+    Raises EvidenceError where it cannot be read, SubmissionError where it is evidence of the grader's own.
+    """
+    name = safe_name(path.stem) + _suffix(path)
+    _check(path)
+    return _copied(path, folder / name)
+
+
+def keep_scenarios(
+    rubric: Rubric, submission: Submission | RecordedSubmission, folder: Path, progress: Progress
+) -> None:
+    """For every scenario with a recording its file, or a file of the grader's own that says why there is none."""
+    for name, scenario in rubric.scenarios.items():
+        if scenario.recording is None:
+            continue
+        progress.step(name, "running", f"looking for {scenario.recording}")
+        found = find_recordings(submission.root, scenario.recording)
+        reason = _reason(found, scenario.recording, submission.root)
+        if reason:
+            _note(folder / f"{name}.mcap", name, reason, submission)
+        else:
+            _copied(found[0], folder / f"{name}{_suffix(found[0])}")
+        progress.step(
+            name, "failed" if reason else "done", next(iter(reason.values()), found[0].name if found else "")
+        )
+
+
+def _reason(found: list[Path], pattern: str, root: Path) -> dict[str, str]:
+    """What keeps a scenario from having its recording; empty where nothing does."""
+    if not found:
+        return {RECORDING_MISSING: pattern}
+    if len(found) > 1:
+        names = ", ".join(path.relative_to(root).as_posix() for path in found[:NAMES_SHOWN])
+        return {RECORDING_PROBLEM: f"{len(found)} recordings fit {pattern}: {names}"}
+    try:
+        _check(found[0])
+    except (EvidenceError, SubmissionError) as error:
+        return {RECORDING_PROBLEM: error.message.replace(f"{root}/", "")}
+    return {}
+
+
+def _check(path: Path) -> None:
+    """Raise EvidenceError or SubmissionError where this is no recording that another tool made."""
+    (run,) = load_evidence([path]).values()
+    if not run.foreign:
+        raise SubmissionError(
+            f"{path}: evidence of the grader's own, no recording", hint="`grader judge` judges it again"
+        )
+
+
+def _suffix(path: Path) -> str:
+    """`.bag` or `.mcap`, by which the evidence is found again."""
+    suffix = path.suffix.casefold()
+    if suffix in SUFFIXES:
+        return suffix
+    with path.open("rb") as file:
+        return ".mcap" if file.read(5) == b"\x89MCAP" else ".bag"
+
+
+def _copied(path: Path, target: Path) -> Path:
+    try:
+        shutil.copyfile(path, target)
+    except OSError as error:
+        raise unwritable(target, error) from error
+    return target
+
+
+def _note(
+    path: Path, scenario: str, reason: Mapping[str, str], submission: Submission | RecordedSubmission
+) -> None:
+    about = {"submission.id": submission.id, "submission.digest": submission.digest, **reason}
+    with EvidenceWriter(path, scenario=scenario, clock="real", warp=1.0, metadata=about) as writer:
+        writer.event("/grader/scenario", time.time_ns(), ScenarioEvent(event="end", outcome="silent"))

@@ -1,0 +1,22 @@
+"""What a submission has to hold for a rubric."""
+
+from __future__ import annotations
+
+from grader.checks import CHECKS
+from grader.rubric.model import Criterion, Rubric
+
+
+def started(rubric: Rubric) -> Rubric:
+    """The rubric without the scenarios for which nothing is run."""
+    scenarios = {name: s for name, s in rubric.scenarios.items() if s.recording is None}
+    return rubric.model_copy(update={"scenarios": scenarios})
+
+
+def needs_package(rubric: Rubric) -> bool:
+    """Whether there is anything to run, or any check that looks at the package's files."""
+    return bool(started(rubric).scenarios) or any(_looks_at_files(c) for c in rubric.criteria)
+
+
+def _looks_at_files(criterion: Criterion) -> bool:
+    check = CHECKS.get(criterion.check)
+    return check is not None and not check.messages_only and bool({"package", "build"} & set(check.facts))
