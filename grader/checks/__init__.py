@@ -15,6 +15,7 @@ FAMILIES = (
     "counter",
     "hears",
     "launch",
+    "launch_xml",
     "message",
 )
 for family in FAMILIES:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import PurePosixPath
 
-from grader.checks.executable import find_script
 from grader.checks.registry import check
+from grader.checks.support.launching import find_launch, node_slip, unreadable
 from grader.checks.support.process import lives
-from grader.checks.support.text import listed, near_names, plural, shown
+from grader.checks.support.text import listed, plural, shown
 from grader.evidence.events import GraphEvent
 from grader.evidence.run import Run
-from grader.model.package import LaunchFile, LaunchNode, PackageFacts
+from grader.model.package import LaunchFile, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import (
     Citation,
@@ -21,7 +20,6 @@ from grader.model.verdict import (
     failed,
     inconclusive,
     passed,
-    unjudged,
 )
 
 _ERRORS = ("ERROR: cannot launch", "RLException", "Invalid ", "ERROR:", "process has died", "roslaunch:")
@@ -56,11 +54,11 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
         `roslaunch <package> <file>`, then `rosnode list` and `rostopic info <topic>` show what came up.
     """
     expected = f"{params.launch} brings up a publisher and a subscriber connected over {params.topic}"
-    file = next((f for f in package.launch_files if PurePosixPath(f.path).name == params.launch), None)
+    file = find_launch(package, params.launch)
     found = list(connections(run, params.topic))
     nodes = run.student_nodes()
     verdict = (
-        _unreadable(package, file, params)
+        unreadable(package, file, params.launch)
         or _not_run(run)
         or _names_missing(nodes, file, params)
         or (None if found else _unconnected(package, file, run, params))
@@ -89,26 +87,6 @@ def connections(run: Run, topic: str) -> Iterator[tuple[str, str]]:
                 yield pair
 
 
-def _unreadable(
-    package: PackageFacts, file: LaunchFile | None, params: LaunchConnectsParams
-) -> Verdict | None:
-    if file is None:
-        others = [f.path for f in package.launch_files]
-        names = {PurePosixPath(f.path).name: f.path for f in package.files}
-        near = [names[n] for n in near_names(params.launch, names)]
-        seen = f"; there is {listed(dict.fromkeys([*near, *others]))}" if near or others else ""
-        message = f"{params.launch} is not in the package{seen}"
-        hint = f"put it at launch/{params.launch}, then git add, commit and push it"
-        cited = tuple(FileCitation(file=p) for p in (near or others)[:3])
-        return failed(message, hint=hint, citations=cited or (FileCitation(file="package.xml"),))
-    if file.fault is None:
-        return None
-    line = f", line {file.fault.line}" if file.fault.line else ""
-    message = f"{file.path}{line} is not well-formed: {file.fault.cause or file.fault.message}"
-    hint = "close every element, and begin with <launch> and end with </launch>"
-    return failed(message, hint=hint, citations=(FileCitation(file=file.path, line=file.fault.line),))
-
-
 def _not_run(run: Run) -> Verdict | None:
     if lives(run) or run.graph:
         return None
@@ -132,14 +110,14 @@ def _unconnected(
     """Why no two nodes are connected: a wrong attribute, an error of roslaunch's, or what the graph shows."""
     said = _roslaunch_error(run)
     quoted = f"; roslaunch says: {said}" if said else ""
-    wrong = next(_wrong_attributes(package, file, said), None) if file else None
-    if wrong is not None and file is not None:
-        node, message, hint = wrong
-        cited = (FileCitation(file=file.path, line=node.line),)
-        # Where the launch file has the folder's name and the manifest another one, the manifest is at fault.
-        of_folder = node.pkg != package.name and node.pkg == PurePosixPath(package.path).name
-        verdict = unjudged if of_folder else failed
-        return verdict(f"{file.path}, line {node.line}: {message}{quoted}", hint=hint, citations=cited)
+    slips = (
+        (node_slip(package, node.model_copy(update={"file": file.path}), said) for node in file.nodes)
+        if file
+        else ()
+    )
+    wrong = next(filter(None, slips), None)
+    if wrong is not None:
+        return wrong.verdict(quoted)
     nodes = run.student_nodes()
     if len(nodes) < 2:
         up = f"only {nodes[0]} comes up" if nodes else "no node comes up"
@@ -178,33 +156,6 @@ def _nodes_on(run: Run, topic: str, end: str) -> tuple[str, ...]:
 
     found = (n for _, event in run.graph for n in nodes(event) if run.is_student_node(n))
     return tuple(dict.fromkeys(found))
-
-
-def _wrong_attributes(
-    package: PackageFacts, file: LaunchFile, said: str
-) -> Iterator[tuple[LaunchNode, str, str]]:
-    """Nodes that cannot start by what the file says of them. Names with `$(…)` are roslaunch's to resolve."""
-    for node in file.nodes:
-        name = str(node.type)
-        missing = [a for a in ("pkg", "type", "name") if not getattr(node, a)]
-        if missing:
-            yield node, f"<node> has no {listed(missing)}", "a <node> needs pkg, type and name"
-        elif "$(" in f"{node.pkg}{name}":
-            continue
-        elif node.pkg == package.name:
-            if not _has_program(package, name):
-                python = find_script(package, f"{name}.py")
-                hint = f'write type="{name}.py"' if python else "type is the script's file name, with .py"
-                yield node, f"there is no {name} in the package", hint
-        elif near_names(package.name, [str(node.pkg)]) or f"[{node.pkg}/{name}]" in said:
-            yield node, f"there is no {name} in a package {node.pkg}", f'write pkg="{package.name}"'
-
-
-def _has_program(package: PackageFacts, name: str) -> bool:
-    """A file of that name, or a program that CMake builds under it."""
-    calls = package.cmake.calls if package.cmake else ()
-    built = any(c.name == "add_executable" and c.args[:1] == (name,) for c in calls)
-    return built or find_script(package, name) is not None
 
 
 def _roslaunch_error(run: Run) -> str:

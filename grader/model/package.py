@@ -137,6 +137,7 @@ class LaunchNode(Record):
 
     `remaps` are those in force: those that come before it in `<launch>` and its `<group>`s, then its own.
     `file` is where it stands, `namespace` that of its groups, includes and its own `ns`, with both slashes.
+    `uncertain`: whether it counts is for roslaunch to work out (`if="$(eval …)"`).
     """
 
     pkg: str | None
@@ -153,6 +154,7 @@ class LaunchNode(Record):
     machine: str | None = None
     respawn: str | None = None
     required: str | None = None
+    uncertain: bool = False
 
     @property
     def full_name(self) -> str:

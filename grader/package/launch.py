@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -42,13 +42,13 @@ def read_launch_files(
 
     `names` are the package's own, as `$(find …)` calls it.
     """
-    library = _Library(folder, dict(paths))
-    own = tuple(dict.fromkeys(names))
-    return tuple(
-        _record(path, library.parsed(path), own, library.find)
-        for path in library.paths
-        if is_launch_file(path)
-    )
+    places = dict(paths)
+    return _records(_Library(places, lambda path: read_markup(folder, places[path])), names)
+
+
+def parse_launch_files(texts: Mapping[str, bytes], names: Iterable[str] = ()) -> tuple[LaunchFile, ...]:
+    """The same from the files' bytes by path."""
+    return _records(_Library(texts, lambda path: texts[path]), names)
 
 
 def parse_launch(data: bytes, path: str) -> LaunchFile:
@@ -56,17 +56,23 @@ def parse_launch(data: bytes, path: str) -> LaunchFile:
     return _record(path, _parse(data, path), (), lambda _: (None, None))
 
 
+def _records(library: _Library, names: Iterable[str]) -> tuple[LaunchFile, ...]:
+    own = tuple(dict.fromkeys(names))
+    paths = filter(is_launch_file, library.paths)
+    return tuple(_record(path, library.parsed(path), own, library.find) for path in paths)
+
+
 class _Library:
     """The package's files as launch files, each parsed once."""
 
-    def __init__(self, folder: Path, paths: dict[str, str]) -> None:
-        self._folder = folder
+    def __init__(self, paths: Collection[str], read: Callable[[str], bytes | Fault]) -> None:
         self.paths = paths
+        self._read = read
         self._parsed: dict[str, _Parsed] = {}
 
     def parsed(self, path: str) -> _Parsed:
         if path not in self._parsed:
-            data = read_markup(self._folder, self.paths[path])
+            data = self._read(path)
             self._parsed[path] = (
                 _Parsed(None, data.model_copy(update={"file": path}))
                 if isinstance(data, Fault)

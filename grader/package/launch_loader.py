@@ -58,6 +58,7 @@ def node_of(element: etree._Element, scope: Scope, remaps: Remaps) -> LaunchNode
         line=line_of(element) or 0,
         file=scope.file,
         namespace=scope.below(scope.get(element, "ns")).namespace,
+        uncertain=scope.uncertain,
     )
 
 
@@ -72,13 +73,13 @@ class _Loader:
             if not isinstance(child.tag, str) or not wanted(child, scope):
                 continue
             if child.tag == "group":
-                self.walk(child, scope.below(scope.get(child, "ns")), depth)
+                self.walk(child, scope.of(child).below(scope.get(child, "ns")), depth)
             elif child.tag == "include":
-                self._include(child, scope, depth)
+                self._include(child, scope.of(child), depth)
             elif child.tag in {"arg", "remap", "param"}:
                 scope = self._changed(child, scope)
             else:
-                self._add(child, scope)
+                self._add(child, scope.of(child))
 
     def _changed(self, child: etree._Element, scope: Scope) -> Scope:
         if child.tag == "arg":

@@ -20,7 +20,10 @@ Remaps = tuple[tuple[str, str], ...]
 
 
 class Scope(Record):
-    """`own` are the package's names, the first its usual one; `private` are `<param name="~…">` for later nodes."""
+    """`own` are the package's names, the first its usual one; `private` are `<param name="~…">` for later nodes.
+
+    `uncertain`: an `if` or `unless` that only roslaunch can work out decides whether the tag counts.
+    """
 
     file: str
     own: tuple[str, ...]
@@ -28,6 +31,7 @@ class Scope(Record):
     args: Mapping[str, str] = Field(default_factory=dict)
     remaps: Remaps = ()
     private: tuple[LaunchParam, ...] = ()
+    uncertain: bool = False
 
     def text(self, written: str) -> str:
         """`$(arg …)`, `$(dirname)` and `$(optenv NAME DEFAULT)` resolved; what only roslaunch knows stays as it is."""
@@ -37,6 +41,11 @@ class Scope(Record):
         """An attribute resolved, None where it is not there."""
         written = element.get(name)
         return None if written is None else self.text(written)
+
+    def of(self, element: etree._Element) -> Scope:
+        """The scope in the element, as far as its own conditions go."""
+        conditions = f"{self.get(element, 'if') or ''}{self.get(element, 'unless') or ''}"
+        return self.model_copy(update={"uncertain": True}) if "$(" in conditions else self
 
     def below(self, namespace: str | None) -> Scope:
         """The scope in a group, node or include with this `ns`."""

@@ -14,6 +14,7 @@ from grader.evidence.run import Run
 from grader.evidence.timeline import build_runs
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status, Verdict
+from grader.package.launch import parse_launch_files
 
 TIMELINES = Path(__file__).parent / "timelines"
 KEYS = {"expect", "with", "run", "build", "package"}
@@ -50,8 +51,20 @@ def judge_example(check: str, data: dict[str, Any]) -> Verdict:
 
 
 def runs_of(data: dict[str, Any]) -> dict[str, Run]:
-    recorded = {**data.get("build", {}), "package": data.get("package", {})}
+    recorded = {**data.get("build", {}), "package": _package(data.get("package", {}))}
     return build_runs({"runs": {"run": data.get("run", {}), "package": recorded}})
+
+
+def _package(given: dict[str, Any]) -> dict[str, Any]:
+    """Launch files that are given as text (`launch: {path: xml}`) are read as those of a real package."""
+    if "launch" not in given:
+        return given
+    facts = {key: value for key, value in given.items() if key != "launch"}
+    texts = {path: text.encode() for path, text in given["launch"].items()}
+    read = parse_launch_files(texts, (facts.get("name", "lab1"),))
+    known = {file["path"] for file in facts.get("files", ())}
+    facts["files"] = [*facts.get("files", ()), *({"path": path} for path in texts if path not in known)]
+    return {**facts, "launch_files": [file.model_dump() for file in read]}
 
 
 def judge_runs(name: str, params: dict[str, Any], runs: dict[str, Run]) -> Verdict:
