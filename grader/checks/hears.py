@@ -14,8 +14,9 @@ from grader.checks.support.printed import (
     probes_on,
     text_places,
 )
-from grader.checks.support.text import plural
+from grader.checks.support.text import plural, shown
 from grader.checks.support.unheard import never_sent, not_printed
+from grader.checks.support.wording import VALUE, in_words
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -23,10 +24,13 @@ from grader.model.verdict import EvidenceCitation, Verdict, failed, passed
 
 
 class HearsParams(Record):
-    """`template` is what a line has to say of a text, `{value}` being the message: `I heard {value}`."""
+    """`template` is what a line has to say of a text, `{value}` being the message: `I heard {value}`.
+
+    Whether the template's own words are in capitals does not matter.
+    """
 
     topic: str
-    template: str = "{value}"
+    template: str = VALUE
 
 
 @check("hears", params=HearsParams)
@@ -44,14 +48,16 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
     How it is measured
         The grader publishes messages that it makes up for this run. Each has to be on stdout, on stderr or
         on /rosout, at its time or later. Other words on the line do not matter; a number has to stand for
-        itself (`12` is not in `127`).
+        itself (`12` is not in `127`). Where the lab gives the line's own words (`I heard …`), they have to
+        stand before the message, in capitals or not.
 
     How to fix
         Subscribe with `rospy.Subscriber('<topic>', <Type>, callback)`, print `data.data` in the callback
         without any condition, and end with `rospy.spin()`. `rostopic pub <topic> <type> <value>` sends a
         message by hand.
     """
-    expected = f"each message on {params.topic} is printed, in order"
+    form = "" if params.template == VALUE else f" as '{in_words(params.template)}'"
+    expected = f"each message on {params.topic} is printed{form}, in order"
     probes = probes_on(run, params.topic)
     if not probes:
         return never_sent(package, run, params.topic).model_copy(update={"expected": expected})
@@ -62,7 +68,9 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
         message = "it prints so many numbers that it cannot be told which of them it heard"
         verdict = failed(message, hint="print each number once, in the callback")
     elif missing:
-        verdict = not_printed(package, run, probes, missing, lines)
+        verdict = _other_words(probes, missing, lines, params) or not_printed(
+            package, run, probes, missing, lines
+        )
     elif not in_order(places):
         message = f"what came on {params.topic} is printed, but not in the order in which it was sent"
         verdict = failed(message, hint="print in the callback itself, not later from a variable")
@@ -88,3 +96,26 @@ def _places(
         texts = {e.value for _, e in run.actors if e.action == "publish" and isinstance(e.value, str)}
         return number_places(probes, lines, texts)
     return text_places(probes, lines, params.template)
+
+
+def _other_words(
+    probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line], params: HearsParams
+) -> Verdict | None:
+    """All that is missing is printed, with other words around it; None where something is not there at all."""
+    if params.template == VALUE or not all(text_places(missing, lines, VALUE)):
+        return None
+    said = [line.text for line in lines if _squeezed(missing[0].value) in _squeezed(line.text)]
+    seen = f": it prints {shown(said[0])!r}" if said else ""
+    wanted = in_words(params.template)
+    message = f"{_how_many(missing, probes)} printed, but not as '{wanted}'{seen}"
+    return failed(message, hint=f"print '{wanted}', with the handout's own words")
+
+
+def _how_many(missing: Sequence[Probe], probes: Sequence[Probe]) -> str:
+    if len(missing) == len(probes):
+        return "each message is"
+    return f"{len(missing)} of {plural(len(probes), 'message')} are"
+
+
+def _squeezed(text: object) -> str:
+    return "".join(str(text).split())

@@ -20,7 +20,7 @@ FORMS = [
 ]  # fmt: skip
 
 
-def status(topic: str, sent: list[Any], lines: list[str]) -> Status:
+def status(topic: str, sent: list[Any], lines: list[str], **params: Any) -> Status:
     kind = "std_msgs/Int8" if isinstance(sent[0], int) else "std_msgs/String"
     run = {
         "processes": [{"name": "listener", "stopped_by": "INT", "exit_s": 9}],
@@ -29,7 +29,8 @@ def status(topic: str, sent: list[Any], lines: list[str]) -> Status:
         ],
         "console": [{"process": "listener", "lines": lines, "at_s": 1.01, "every_s": 0.05}] if lines else [],
     }
-    return judge_runs("hears", {"topic": topic}, build_runs({"runs": {"run": run}, "package": {}})).status
+    runs = build_runs({"runs": {"run": run}, "package": {}})
+    return judge_runs("hears", {"topic": topic, **params}, runs).status
 
 
 @pytest.mark.parametrize("form", [f for f in FORMS if f != "+{}"])
@@ -79,6 +80,21 @@ def test_who_prints_other_numbers_fails(sent: list[int], shift: int) -> None:
 )
 def test_texts(sent: list[str]) -> None:
     assert status("/chatter", sent, [f"I heard {text}" for text in sent]) is Status.PASS
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    sent=st.lists(st.text("abcdefghijXYZ", min_size=6, max_size=16), min_size=2, max_size=6, unique=True),
+    words=st.sampled_from(
+        ["I heard {}", "i HEARD {}", "  I  heard   {}", "/listener: I heard {}", "I got {}", "{}"]
+    ),
+)
+def test_a_template_s_own_words(sent: list[str], words: str) -> None:
+    lines = [words.format(text) for text in sent]
+    expected = Status.PASS if "heard" in words.lower() else Status.FAIL
+    assert status("/chatter", sent, lines, template="I heard {value}") is expected
+    swapped = [words.format(text.swapcase()) for text in sent]
+    assert status("/chatter", sent, swapped, template="I heard {value}") is Status.FAIL
 
 
 def test_nothing_printed_fails() -> None:

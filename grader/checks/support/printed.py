@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from grader.checks.support.text import bare
 from grader.checks.support.traceback import HEADING, tracebacks
+from grader.checks.support.wording import VALUE, line_pattern
 from grader.evidence.run import Run
 
 NUMBERS_PER_LINE = 6
@@ -115,8 +116,11 @@ def number_places(
 
 
 def text_places(probes: Sequence[Probe], lines: Sequence[Line], template: str) -> list[tuple[int, ...]]:
-    """The same for texts, as offsets in all that was printed. A text may be split over lines."""
-    blank = "" if template == "{value}" else " "
+    """The same for texts, as offsets in all that was printed. A text may be split over lines.
+
+    The template's own words may be in capitals or not; the text itself stands letter by letter.
+    """
+    blank = "" if template == VALUE else " "
     blob, starts = "", []
     for line in lines:
         starts.append((line.at_ns, len(blob)))
@@ -124,12 +128,10 @@ def text_places(probes: Sequence[Probe], lines: Sequence[Line], template: str) -
     places = []
     for probe in probes:
         begin = next((at for t, at in starts if t >= probe.at_ns - CLOCK_SLACK_NS), len(blob))
-        wanted = template.replace("{value}", str(probe.value))
-        spellings = {
-            blank.join(w.split()) for w in (wanted, template.replace("{value}", repr(probe.value)[1:-1]))
-        }
-        found = {m.start() for w in spellings if w for m in re.finditer(re.escape(w), blob[begin:])}
-        places.append(tuple(sorted(begin + at for at in found)))
+        spellings = {blank.join(text.split()) for text in (str(probe.value), repr(probe.value)[1:-1])}
+        patterns = [line_pattern(template, text) for text in spellings if text]
+        found = {m.start() for pattern in patterns for m in pattern.finditer(blob, begin)}
+        places.append(tuple(sorted(found)))
     return places
 
 
