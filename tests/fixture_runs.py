@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import multiprocessing
 import re
+import shutil
+import subprocess
+import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 import yaml
@@ -21,19 +25,33 @@ from grader.rubric.load import load_rubric
 from grader.rubric.model import Rubric
 
 ROOT = Path(__file__).resolve().parent.parent
+GIT = shutil.which("git") or "git"
 REFERENCE = "reference"
 SIDE_BY_SIDE = 3  # they wait most of the time
 
 
 class Fixture(Record):
     """`fixture.yaml`. Criteria that `expect` does not name must pass; `message` holds patterns for what the report
-    says of a criterion (message, measured value, hint, case ignored); `points` only where a score is partial."""
+    says of a criterion (message, measured value, hint, case ignored); `points` only where a score is partial.
+    With `git_links`, what is graded is a git repository with links to other repositories at these paths and without
+    a .gitmodules."""
 
     lab: str
     summary: str = Field(min_length=10, pattern=r"^\S.*\.$")
     expect: dict[str, Status]
     message: dict[str, str] = Field(default_factory=dict)
     points: float | None = None
+    git_links: tuple[str, ...] = ()
+
+
+def labs() -> list[str]:
+    """Those that have fixtures."""
+    return sorted(path.stem for path in (ROOT / "fixtures").glob("*.yaml"))
+
+
+@cache
+def rubric_of(lab: str) -> Rubric:
+    return load_rubric(lab).rubric
 
 
 def fixture_names(lab: str) -> list[str]:
@@ -54,10 +72,24 @@ def read_fixture(lab: str, name: str) -> Fixture:
 
 
 def grade_fixture(lab: str, name: str, out: Path) -> GradingResult:
-    """Grade it for real. Called in a process of its own."""
-    return grade(
-        str(source_of(lab, name)), load_rubric(lab), out, GradeOptions(submission_id=name), Silence()
-    )
+    """Grade it for real into `out/<lab>/<name>/`. Called in a process of its own."""
+    source, links = source_of(lab, name), read_fixture(lab, name).git_links
+    with tempfile.TemporaryDirectory(prefix="grader-fixture-") as folder:
+        if links:
+            source = _repository(source, Path(folder) / name, links)
+        options = GradeOptions(submission_id=name)
+        return grade(str(source), load_rubric(lab), out / lab, options, Silence())
+
+
+def _repository(source: Path, folder: Path, links: tuple[str, ...]) -> Path:
+    """`folder`, made a repository of what `source` holds, one commit with links to other repositories in it."""
+    shutil.copytree(source, folder, symlinks=True)
+    nobody = ["-c", "user.name=A student", "-c", "user.email=student@localhost"]
+    commands = [["init", "--quiet"], ["add", "--all", "--force"]]
+    commands += [["update-index", "--add", "--cacheinfo", f"160000,{'1' * 40},{link}"] for link in links]
+    for command in [*commands, [*nobody, "commit", "--quiet", "--message", "Hand in"]]:
+        subprocess.run([GIT, *command], cwd=folder, check=True)
+    return folder
 
 
 @contextmanager

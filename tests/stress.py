@@ -1,4 +1,4 @@
-"""Grades the reference solution and every fixture, many times each: `make stress`.
+"""Grades the reference solution and every fixture of every lab, many times each: `make stress`.
 
 A verdict that differs even once between runs is a fault of the grader's.
 """
@@ -13,31 +13,32 @@ from concurrent.futures import as_completed
 from pathlib import Path
 
 from grader.errors import GraderError
-from grader.rubric.load import load_rubric
 from tests.fixture_runs import (
     REFERENCE,
     SIDE_BY_SIDE,
     fixture_names,
     grade_fixture,
+    labs,
     read_fixture,
+    rubric_of,
     surprises,
     workers,
 )
 
-LAB = "leeds-comp3631-lab1"
+Named = tuple[str, str]
 
 
 def main() -> int:
     options = _parse()
-    names = options.only or [REFERENCE, *fixture_names(LAB)]
+    names = _chosen(options.only)
     began_s, wrong = time.monotonic(), 0
     with tempfile.TemporaryDirectory() as temporary:
         for turn in range(1, options.times + 1):
             found = _one_round(names, (options.out or Path(temporary)) / str(turn), options.jobs)
             wrong += len(found)
             print(f"round {turn} of {options.times}: {len(names) - len(found)} of {len(names)} as declared")
-            for name, lines in sorted(found.items()):
-                print("\n  ".join([f"  {name}:", *lines]), flush=True)
+            for (lab, name), lines in sorted(found.items()):
+                print("\n  ".join([f"  {lab}/{name}:", *lines]), flush=True)
     runs = len(names) * options.times
     print(f"{runs - wrong} of {runs} runs as declared, {time.monotonic() - began_s:.0f} s")
     return 1 if wrong else 0
@@ -48,26 +49,39 @@ def _parse() -> argparse.Namespace:
     parser.add_argument("--times", type=int, default=10, help="rounds")
     parser.add_argument("--jobs", type=int, default=SIDE_BY_SIDE, help="how many side by side")
     parser.add_argument(
-        "--only", nargs="+", metavar="NAME", help=f"these fixtures ({REFERENCE}: the reference)"
+        "--only",
+        nargs="+",
+        metavar="NAME",
+        help=f"these labs, fixtures, or fixtures of a lab (LAB/NAME); {REFERENCE} is the reference solution",
     )
-    parser.add_argument("--out", type=Path, help="keep the results here, by round and fixture")
+    parser.add_argument("--out", type=Path, help="keep the results here, by round, lab and fixture")
     return parser.parse_args()
 
 
-def _one_round(names: list[str], folder: Path, jobs: int) -> dict[str, list[str]]:
+def _chosen(only: list[str] | None) -> list[Named]:
+    every = [(lab, name) for lab in labs() for name in [REFERENCE, *fixture_names(lab)]]
+    if only is None:
+        return every
+    titles = {pair: {pair[0], pair[1], "/".join(pair)} for pair in every}
+    unknown = set(only).difference(*titles.values())
+    if unknown:
+        sys.exit(f"no such lab or fixture: {', '.join(sorted(unknown))}")
+    return [pair for pair in every if titles[pair] & set(only)]
+
+
+def _one_round(names: list[Named], folder: Path, jobs: int) -> dict[Named, list[str]]:
     """Surprises by fixture; those without any are left out."""
-    rubric = load_rubric(LAB).rubric
-    found: dict[str, list[str]] = {}
+    found: dict[Named, list[str]] = {}
     with workers(jobs) as pool:
-        futures = {pool.submit(grade_fixture, LAB, name, folder): name for name in names}
+        futures = {pool.submit(grade_fixture, *pair, folder): pair for pair in names}
         for future in as_completed(futures):
-            name = futures[future]
+            lab, name = futures[future]
             try:
-                lines = surprises(future.result(), read_fixture(LAB, name), rubric)
+                lines = surprises(future.result(), read_fixture(lab, name), rubric_of(lab))
             except GraderError as error:
                 lines = [f"not graded: {error.message}"]
             if lines:
-                found[name] = lines
+                found[lab, name] = lines
     return found
 
 

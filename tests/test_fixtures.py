@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -13,60 +12,65 @@ import pytest
 
 from grader.model.result import GradingResult
 from grader.model.verdict import Status
-from grader.rubric.load import load_rubric
-from grader.rubric.model import Rubric
 from tests.fixture_runs import (
+    GIT,
     REFERENCE,
     ROOT,
     expected_points,
     fixture_names,
     grade_fixture,
+    labs,
     read_fixture,
+    rubric_of,
     surprises,
     workers,
 )
 
-LAB = "leeds-comp3631-lab1"
-NAMES = fixture_names(LAB)
+LABS = labs()
+FAULTY_AT_LEAST = {"leeds-comp3631-lab1": 20}
+NAMED = [(lab, name) for lab in LABS for name in fixture_names(lab)]
+GRADED = [pair for lab in LABS for pair in [(lab, REFERENCE), *(p for p in NAMED if p[0] == lab)]]
 MAKE = ROOT / "fixtures" / "make.py"
 SCRIPT_MODE = "100755"
 
 
-@pytest.fixture(scope="module")
-def rubric() -> Rubric:
-    return load_rubric(LAB).rubric
+each_lab = pytest.mark.parametrize("lab", LABS)
+each_fixture = pytest.mark.parametrize(("lab", "name"), NAMED)
 
 
 @pytest.fixture(scope="module")
-def graded(request, tmp_path_factory) -> Iterator[dict[str, Future[GradingResult]]]:
+def graded(request, tmp_path_factory) -> Iterator[dict[tuple[str, str], Future[GradingResult]]]:
     """The selected fixtures, graded side by side while the tests wait for their own one."""
-    chosen = [i.callspec.params["graded_name"] for i in request.session.items if _is_graded(i)]
+    every = [getattr(getattr(item, "callspec", None), "params", {}) for item in request.session.items]
+    chosen = [(params["lab"], params["graded_name"]) for params in every if "graded_name" in params]
     out = tmp_path_factory.mktemp("graded")
     with workers() as pool:
-        yield {name: pool.submit(grade_fixture, LAB, name, out) for name in dict.fromkeys(chosen)}
+        yield {(lab, name): pool.submit(grade_fixture, lab, name, out) for lab, name in dict.fromkeys(chosen)}
 
 
-def _is_graded(item: pytest.Item) -> bool:
-    return "graded_name" in getattr(getattr(item, "callspec", None), "params", {})
+@each_lab
+def test_there_are_enough_faults(lab) -> None:
+    faulty = [name for name in fixture_names(lab) if not name.startswith("ok-")]
+    assert len(faulty) >= FAULTY_AT_LEAST.get(lab, 12)
+    assert all(read_fixture(lab, name).expect for name in faulty)
 
 
-def test_there_are_enough_faults() -> None:
-    faulty = [name for name in NAMES if set(read_fixture(LAB, name).expect.values()) - {Status.PASS}]
-    assert len(faulty) >= 20
-
-
-def test_every_criterion_is_missed_by_a_fixture(rubric) -> None:
+@each_lab
+def test_every_criterion_is_missed_by_a_fixture(lab) -> None:
     missed = {
-        i for name in NAMES for i, status in read_fixture(LAB, name).expect.items() if status is Status.FAIL
+        i
+        for name in fixture_names(lab)
+        for i, status in read_fixture(lab, name).expect.items()
+        if status in {Status.FAIL, Status.PARTIAL}
     }
-    assert missed == {criterion.id for criterion in rubric.criteria}
+    assert missed == {criterion.id for criterion in rubric_of(lab).criteria}
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_declaration(name, rubric) -> None:
-    fixture = read_fixture(LAB, name)
+@each_fixture
+def test_declaration(lab, name) -> None:
+    fixture, rubric = read_fixture(lab, name), rubric_of(lab)
     ids = {criterion.id for criterion in rubric.criteria}
-    assert fixture.lab == LAB
+    assert fixture.lab == lab
     assert set(fixture.expect) | set(fixture.message) <= ids
     assert Status.PASS not in fixture.expect.values()
     assert 0 <= expected_points(fixture, rubric) <= rubric.max_points
@@ -75,10 +79,10 @@ def test_declaration(name, rubric) -> None:
         re.compile(pattern)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_one_cause_explains_what_is_blocked(name, rubric) -> None:
-    expect = read_fixture(LAB, name).expect
-    requires = {criterion.id: criterion.requires for criterion in rubric.criteria}
+@each_fixture
+def test_one_cause_explains_what_is_blocked(lab, name) -> None:
+    expect = read_fixture(lab, name).expect
+    requires = {criterion.id: criterion.requires for criterion in rubric_of(lab).criteria}
     blocked = [i for i, status in expect.items() if status is Status.BLOCKED]
     assert [i for i in blocked if not set(requires[i]) & set(expect)] == []
 
@@ -90,9 +94,8 @@ def test_files_are_as_declared() -> None:
 
 def test_git_keeps_the_executable_bits() -> None:
     """A checkout's file system may lie; what is graded on another machine comes from git's tree."""
-    folders = ("fixtures/" + LAB, "reference_solutions/" + LAB)
-    git = shutil.which("git") or "git"
-    done = subprocess.run([git, "ls-files", "-sz", *folders], cwd=ROOT, capture_output=True, check=False)
+    folders = ("fixtures", "reference_solutions")
+    done = subprocess.run([GIT, "ls-files", "-sz", *folders], cwd=ROOT, capture_output=True, check=False)
     if done.returncode or not done.stdout:
         pytest.skip("not in a git checkout")
     entries = dict(reversed(line.split("\t")) for line in done.stdout.decode().split("\0") if line)
@@ -108,9 +111,9 @@ def test_git_keeps_the_executable_bits() -> None:
 
 @pytest.mark.ros
 @pytest.mark.slow
-@pytest.mark.parametrize("graded_name", [REFERENCE, *NAMES])
-def test_graded_for_real(graded_name, graded, rubric) -> None:
-    result = graded[graded_name].result()
-    found = surprises(result, read_fixture(LAB, graded_name), rubric)
-    assert not found, "\n  ".join([f"{graded_name} is not graded as declared:", *found])
+@pytest.mark.parametrize(("lab", "graded_name"), GRADED)
+def test_graded_for_real(lab, graded_name, graded) -> None:
+    result, rubric = graded[lab, graded_name].result(), rubric_of(lab)
+    found = surprises(result, read_fixture(lab, graded_name), rubric)
+    assert not found, "\n  ".join([f"{lab}/{graded_name} is not graded as declared:", *found])
     assert {c.id for c in result.criteria} == {c.id for c in rubric.criteria}
