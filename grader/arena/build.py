@@ -48,10 +48,10 @@ async def build(
         arena.course(ScenarioEvent(event="begin"))
         arena.start(place.spec("catkin_make", _catkin_make(place), role="build", build=True))
         arena.start(place.spec("syntax", _syntax(place), role="grader", build=True))
-        ended = await arena.wait(lambda: "catkin_make" in arena.live.ended, BUILD_S)
+        ended = await arena.wait(lambda: "catkin_make" in arena.exit_codes, BUILD_S)
         if not ended:
             await arena.interrupt("catkin_make", int_s=2.0, term_s=1.0)
-        await arena.wait(lambda: "syntax" in arena.live.ended, STEP_S)
+        await arena.wait(lambda: "syntax" in arena.exit_codes, STEP_S)
         ok = arena.exit_codes.get("catkin_make") == 0
         built = await _with_setup(place, arena) if ok else place.from_source()
         for script in answers:
@@ -93,7 +93,7 @@ async def _with_setup(place: Place, arena: ArenaSession) -> Place:
     script = 'source "$1/devel/setup.bash" && env -0 > "$2"'
     argv = ["/bin/bash", "-c", script, "bash", place.inside_workspace, f"{place.output}/{ENVIRONMENT}"]
     arena.start(place.spec("setup.bash", argv, role="build", build=True))
-    await arena.wait(lambda: "setup.bash" in arena.live.ended, STEP_S)
+    await arena.wait(lambda: "setup.bash" in arena.exit_codes, STEP_S)
     dump = read_untrusted(place.workspace.output / ENVIRONMENT)
     if not dump or arena.exit_codes.get("setup.bash") != 0:
         return place.from_source()
@@ -105,7 +105,7 @@ async def _answer(place: Place, arena: ArenaSession, script: str) -> None:
     file = Path(script).name
     name = f"rosrun {file}"
     arena.start(place.spec(name, ["rosrun", place.package, file], role="student", build=True))
-    if not await arena.wait(lambda: name in arena.live.ended, ROSRUN_S):
+    if not await arena.wait(lambda: name in arena.exit_codes, ROSRUN_S):
         await arena.interrupt(name, int_s=1.0, term_s=1.0)
 
 

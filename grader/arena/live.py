@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from grader.rubric.model import Until
@@ -25,12 +25,20 @@ class TopicSeen:
 
 @dataclass
 class Live:
-    """The state that conditions look at."""
+    """The state that conditions look at. `running` and `ended` are the student's processes, `helpers` the grader's own
+    programs that run beside them, `registered` the processes of which a node has registered."""
 
     started_s: float = 0.0
     topics: dict[str, TopicSeen] = field(default_factory=lambda: defaultdict(TopicSeen))
     running: set[str] = field(default_factory=set)
     ended: set[str] = field(default_factory=set)
+    helpers: set[str] = field(default_factory=set)
+    nodes: set[str] = field(default_factory=set)
+    registered: set[str] = field(default_factory=set)
+    first_node_s: float = 0.0
+    services: set[str] = field(default_factory=set)
+    opened: set[str] = field(default_factory=set)
+    activity_s: float = 0.0
     subscribed: set[str] = field(default_factory=set)
     connected: set[str] = field(default_factory=set)
     unheard: dict[str, re.Pattern[str]] = field(default_factory=dict)
@@ -44,6 +52,21 @@ class Live:
         seen.first_s = seen.first_s or now_s
         seen.last_s = now_s
         seen.count += count
+        self.active(now_s)
+
+    def active(self, now_s: float) -> None:
+        """Something of the student's happened."""
+        self.activity_s = now_s
+
+    def graph(self, nodes: Iterable[str], processes: Mapping[str, str], now_s: float) -> None:
+        """The master's nodes of the student's, and the processes that nodes belong to."""
+        self.graph_changed_s = now_s
+        self.registered |= set(processes.values())
+        own = {n for n in nodes if processes.get(n) not in self.helpers}
+        if own - self.nodes:
+            self.first_node_s = self.first_node_s or now_s
+            self.active(now_s)
+        self.nodes |= own
 
     def sent(self, value: str, now_s: float) -> None:
         """A probe went out: its value is to be printed, as a word of its own."""
@@ -52,6 +75,7 @@ class Live:
 
     def printed(self, line: str, now_s: float) -> None:
         self.last_line_s = now_s
+        self.active(now_s)
         self.unheard = {value: word for value, word in self.unheard.items() if not word.search(line)}
 
 
@@ -60,14 +84,16 @@ def settled(live: Live, until: Until, now_s: float) -> Outcome | None:
 
     `silent`: what was waited for stopped coming, or never came though the nodes were up.
     """
-    if live.ended and not live.running:
-        return "ended", ""
     enough = (
         _window(live, until, now_s),
         _messages(live, until),
         _connected(live, until),
         _heard(live, until, now_s),
+        _nodes(live, until, now_s),
+        _quiet(live, until, now_s),
     )
+    if live.ended and not live.running:
+        return "complete" if until.ended and all(enough) else "ended", ""
     if _waits(until):
         if all(enough):
             return "complete", ""
@@ -83,7 +109,9 @@ def settled(live: Live, until: Until, now_s: float) -> Outcome | None:
 
 def _waits(until: Until) -> bool:
     """Whether anything ends the run before its limit."""
-    return until.window_s is not None or bool(until.messages or until.connected or until.heard)
+    lasting = (until.window_s, until.alive_s, until.quiet_s)
+    seen = (until.messages, until.connected, until.heard, until.nodes, until.opened, until.ended)
+    return any(seconds is not None for seconds in lasting) or any(seen)
 
 
 def waiting_for(live: Live, until: Until) -> str:
@@ -96,6 +124,8 @@ def waiting_for(live: Live, until: Until) -> str:
             return f"{live.topics[topic].count} of {wanted} messages on {topic}"
     if not _connected(live, until):
         return f"waiting for a connection over {', '.join(until.connected)}"
+    if len(live.nodes) < until.nodes:
+        return f"{len(live.nodes)} of {until.nodes} nodes are up"
     return "observing"
 
 
@@ -109,6 +139,8 @@ def next_look_s(live: Live, until: Until, now_s: float) -> float:
             seen.first_s + until.silent_s,
         ]
     looks += [live.graph_changed_s + until.silent_s, max(live.last_line_s, live.last_sent_s) + HEARD_S]
+    looks += [live.activity_s + (until.quiet_s or 0), live.activity_s + until.silent_s]
+    looks += [live.first_node_s + (until.alive_s or 0)]
     ahead = [look - now_s for look in looks if look > now_s]
     return min([*ahead, 1.0]) + 0.001
 
@@ -137,6 +169,17 @@ def _connected(live: Live, until: Until) -> bool:
     return set(until.connected) <= live.connected
 
 
+def _nodes(live: Live, until: Until, now_s: float) -> bool:
+    """Everything that is there or not there: nodes, programs asked to open something, processes that ended."""
+    alive = until.alive_s is None or (bool(live.nodes) and now_s >= live.first_node_s + until.alive_s)
+    up = len(live.nodes) >= until.nodes and set(until.opened) <= live.opened
+    return alive and up and set(until.ended) <= live.ended
+
+
+def _quiet(live: Live, until: Until, now_s: float) -> bool:
+    return until.quiet_s is None or (live.activity_s > 0 and now_s >= live.activity_s + until.quiet_s)
+
+
 def _heard(live: Live, until: Until, now_s: float) -> bool:
     if not until.heard or not live.unheard:
         return True
@@ -158,4 +201,14 @@ def _silent(live: Live, until: Until, now_s: float) -> str:
             return f"no message on {topic} for {until.silent_s:g} s"
     if until.connected and live.graph_changed_s and now_s > live.graph_changed_s + until.silent_s:
         return f"the graph has not changed for {until.silent_s:g} s"
+    return _standstill(live, until, now_s)
+
+
+def _standstill(live: Live, until: Until, now_s: float) -> str:
+    """Nothing happens any more, though more nodes, programs or ends were waited for."""
+    if _nodes(live, until, now_s) or (until.alive_s is not None and live.nodes):
+        return ""
+    patience_s = until.silent_s if live.nodes else max(until.silent_s, until.first_message_s)
+    if now_s > max(live.activity_s, live.started_s) + patience_s:
+        return f"nothing happened for {patience_s:g} s"
     return ""

@@ -16,9 +16,11 @@ from grader.arena.sandbox import (
     LARGE,
     OUTPUT,
     SHIMS,
+    STANDINS,
     Limits,
     Sandbox,
 )
+from grader.arena.standins import with_standins
 from grader.arena.workspace import Workspace
 
 LOOPBACK = "127.0.0.1"
@@ -64,6 +66,11 @@ class Place:
         """Where processes find `python` and the grader's helpers."""
         return SHIMS if self.sandbox.bubblewrap else str(self.folder / "bin")
 
+    @property
+    def standins(self) -> str:
+        """Where processes find the packages that stand in for missing ones."""
+        return STANDINS if self.sandbox.bubblewrap else str(self.folder / "standins")
+
     def from_source(self) -> Place:
         """Without a build: ROS still finds the package's sources."""
         path = f"{self.inside_workspace}/src:{self.ros.env.get('ROS_PACKAGE_PATH', '')}"
@@ -78,10 +85,27 @@ class Place:
         found = self.script_path(script)
         installed = self.workspace.built / "devel" / "lib" / self.package / name
         if installed.is_file() and not installed.is_symlink() and os.access(installed, os.X_OK):
-            return f"{self.inside_workspace}/devel/lib/{self.package}/{name}", found or script
+            return f"{self.devel_programs}/{name}", found or script
         if found is None:
             return None
         return f"{self.package_folder}/{found}", found
+
+    @property
+    def devel_programs(self) -> str:
+        """Where the build puts the package's programs, as processes see it."""
+        return f"{self.inside_workspace}/devel/lib/{self.package}"
+
+    @property
+    def share_folders(self) -> tuple[Path, ...]:
+        """Folders that hold installed packages side by side, the stand-ins' last."""
+        known = [Path(p) / "share" for p in self.ros.prefixes]
+        known += [Path(p) for p in self.ros.env.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p]
+        return (*known, self.folder / "standins" / "share")
+
+    def package_file(self, file: str) -> Path | None:
+        """Where a file of the package is on disk, found as `script_path` finds it."""
+        found = self.script_path(file)
+        return None if found is None else self.workspace.repaired / self.workspace.folder / found
 
     def script_path(self, script: str) -> str | None:
         """Where a script is in the package: at its place, else the shallowest file of that name."""
@@ -167,7 +191,7 @@ class Place:
         }
         if LIBSTDBUF.exists():
             base |= {"LD_PRELOAD": str(LIBSTDBUF), "_STDBUF_O": "L", "_STDBUF_E": "L"}
-        merged = {**base, **self.ros.env, **self.env}
+        merged = with_standins({**base, **self.ros.env, **self.env}, self.folder / "standins", self.standins)
         return {**merged, "PATH": _path(self.ros, merged.get("PATH", ""), self.shims)}
 
 

@@ -5,30 +5,45 @@ from __future__ import annotations
 import base64
 import random
 import string
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import zip_longest
 from typing import Any, NamedTuple
 
 from grader.evidence.decode import definition, encode, md5sum
 from grader.rubric.model import Probe
 
-TEXT_LENGTH = 10
-RANGES = {"std_msgs/Int8": (-128, 127)}
+WORD_LETTERS = 6
+RANGES = {
+    f"std_msgs/{'U' * (not signed)}Int{bits}": (-(1 << bits - 1), (1 << bits - 1) - 1)
+    if signed
+    else (0, (1 << bits) - 1)
+    for bits in (8, 16, 32, 64)
+    for signed in (True, False)
+}
 _random = random.SystemRandom()
 
 
 class Shot(NamedTuple):
-    """One message to send; `pause_s` is the time to the next one."""
+    """One message to send; `pause_s` is the time to the next one. `value` is its `data`, or a map of its fields."""
 
     topic: str
     type: str
-    value: str | int
+    value: Any
     pause_s: float
+
+    @property
+    def word(self) -> str | None:
+        """What a listener prints of it; None where that is no single word."""
+        return (
+            str(self.value)
+            if isinstance(self.value, str | int) and not isinstance(self.value, bool)
+            else None
+        )
 
 
 def make_shots(probes: tuple[Probe, ...]) -> list[Shot]:
     """All probes' messages in the order of sending: the topics take turns."""
-    rows = zip_longest(*(_values(probe) for probe in probes))
+    rows = zip_longest(*(list(_values(probe)) for probe in probes))
     shots: list[Shot] = []
     for row in rows:
         sent = [(p, v) for p, v in zip(probes, row, strict=True) if v is not None]
@@ -56,20 +71,39 @@ def publication(shot: Shot) -> dict[str, Any]:
         "type": shot.type,
         "value": shot.value,
     }
-    data = base64.b64encode(encode(shot.type, {"data": shot.value})).decode()
+    data = base64.b64encode(encode(shot.type, fields_of(shot.value))).decode()
     return {"topic": shot.topic, "data": data, "record": record}
 
 
-def _values(probe: Probe) -> Iterator[str | int]:
+def fields_of(value: object) -> Mapping[str, Any]:
+    """A message by its fields; a bare value is the field `data`."""
+    return value if isinstance(value, Mapping) else {"data": value}
+
+
+def _values(probe: Probe) -> Iterator[Any]:
     values: list[str | int] = [_text() for _ in range(probe.text)]
     if probe.integers or probe.among:
         low, high = RANGES[probe.type]
-        others = [n for n in range(low, high + 1) if n not in probe.among]
-        values += [*_random.sample(others, probe.integers), *probe.among]
+        values += [*_integers(probe, low, high), *probe.among]
     _random.shuffle(values)
     yield from values
+    for _ in range(probe.times if probe.values else 0):
+        yield from probe.values
+
+
+def _integers(probe: Probe, low: int, high: int) -> Iterator[int]:
+    """Different from each other and from those of `among`."""
+    taken = set(probe.among)
+    for _ in range(min(probe.integers, high - low + 1 - len(taken))):
+        value = _random.randint(low, high)
+        while value in taken:
+            value = _random.randint(low, high)
+        taken.add(value)
+        yield value
 
 
 def _text() -> str:
-    """Letters first: never to be taken for a number of another probe."""
-    return "".join(_random.choice(string.ascii_lowercase) for _ in range(TEXT_LENGTH))
+    """Two words of letters, large and small: never to be taken for a number of another probe."""
+    return " ".join(
+        "".join(_random.choice(string.ascii_letters) for _ in range(WORD_LETTERS)) for _ in range(2)
+    )

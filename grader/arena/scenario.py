@@ -6,12 +6,13 @@ import asyncio
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
+from grader.arena.calls import call_services
 from grader.arena.live import next_look_s, settled, waiting_for
 from grader.arena.place import Place
 from grader.arena.probes import advertisement, make_shots, publication
 from grader.arena.session import ArenaSession
+from grader.arena.starting import Spec, process_specs, set_params, stop
 from grader.errors import ArenaError
 from grader.evidence.events import ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
@@ -24,9 +25,6 @@ UNFOLLOWED_HZ = 15.0
 SUBSCRIBE_S = 6.0
 HEARD_SETTLE_S = 0.3
 GRAPH_EVERY_S = 0.25
-CTRL_C_S = 5.0
-LAUNCH_CTRL_C_S = 20.0
-TERM_S = 2.0
 STARTING_S = 1.5
 EXPECTED_HZ = 10.0
 
@@ -49,7 +47,8 @@ def expected_s(scenario: Scenario) -> float:
         / (scenario.warp if scenario.clock == "warped" else 1)
     )
     probing = sum(shot.pause_s for shot in make_shots(scenario.probes))
-    return STARTING_S + (until.window_s or 0) + messages + probing
+    watched = max(until.window_s or 0, until.alive_s or 0, until.quiet_s or 0)
+    return STARTING_S + watched + messages + probing
 
 
 async def run_scenario(
@@ -57,17 +56,17 @@ async def run_scenario(
 ) -> ScenarioCost:
     """Record the scenario at `path`. An arena that fails still leaves evidence, with the outcome `host`."""
     warp = scenario.warp if scenario.clock == "warped" else 1.0
-    specs = [spec for start in scenario.start if (spec := process_spec(start, place)) is not None]
+    starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place)]
     with EvidenceWriter(path, scenario=name, clock=scenario.clock, warp=warp, metadata=metadata) as writer:
         session = ArenaSession(place, writer)
-        if not specs:
+        if not any(spec["role"] == "student" for _, spec in starts):
             session.course(ScenarioEvent(event="end", outcome="ended", detail="there was nothing to start"))
             return ScenarioCost(cpu_s=0, student_cpu_s=0)
         try:
             async with session as arena:
                 arena.course(ScenarioEvent(event="begin"))
-                outcome, detail = await _run(scenario, specs, arena, tell)
-                await _stop(scenario, arena)
+                outcome, detail = await _run(scenario, starts, arena, tell)
+                await stop(scenario.start, arena)
                 await arena.finish()
                 arena.course(ScenarioEvent(event="end", outcome=outcome, detail=detail))
         except ArenaError as error:
@@ -76,32 +75,34 @@ async def run_scenario(
 
 
 async def _run(
-    scenario: Scenario, specs: list[dict[str, Any]], arena: ArenaSession, tell: Tell
+    scenario: Scenario, starts: list[tuple[Start, Spec]], arena: ArenaSession, tell: Tell
 ) -> tuple[str, str]:
     tell("starting the managed roscore")
     await arena.wait(lambda: arena.rosout_up, 3.0)
     if scenario.clock == "warped":
         arena.send(do="warp", warp=scenario.warp, step_s=CLOCK_STEP_S)
-    for probe in scenario.probes:
-        arena.send(do="advertise", fields=advertisement(probe))
+    set_params(scenario.params, arena)
+    for topic, probe in {probe.topic: probe for probe in scenario.probes}.items():
+        arena.send(do="advertise", fields=advertisement(probe) | {"topic": topic})
     arena.live.started_s = time.monotonic()
-    for spec in specs:
+    for start, spec in starts:
+        if start.after is not None:
+            await _await_node(start.after, scenario, arena, tell)
         arena.start(spec)
     if scenario.probes:
         await _send_probes(scenario, arena, tell)
+    if scenario.calls:
+        await call_services(scenario, arena, tell)
     return await _observe(scenario, arena, tell)
 
 
-def process_spec(start: Start, place: Place) -> dict[str, Any] | None:
-    """How `rosrun` or `roslaunch` would start it; None for a script that is not in the package."""
-    if start.launch is not None:
-        return place.spec(start.name, ["roslaunch", place.package, start.launch, *start.args])
-    found = place.find_program(start.script or "")
-    if found is None:
-        return None
-    program, path = found
-    repairs = list(place.workspace.repairs.get(path, ()))
-    return place.spec(start.name, [program, *start.args], script=path, repairs=repairs)
+async def _await_node(process: str, scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:
+    """Until a node of that process is registered, or it has ended, or never will be."""
+    live = arena.live
+    tell(f"waiting for {process}")
+    await arena.wait(
+        lambda: process in live.registered or process in live.ended, scenario.until.first_message_s
+    )
 
 
 async def _send_probes(scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:
@@ -118,7 +119,8 @@ async def _send_probes(scenario: Scenario, arena: ArenaSession, tell: Tell) -> N
         if not live.running:
             return
         if shot.topic in live.subscribed:
-            live.sent(str(shot.value), time.monotonic())
+            if shot.word is not None:
+                live.sent(shot.word, time.monotonic())
             arena.send(do="publish", **publication(shot))
             await asyncio.sleep(shot.pause_s)
 
@@ -162,17 +164,3 @@ async def _look_at_connections(arena: ArenaSession) -> None:
     await arena.wait(lambda: arena.live.graphs > looks or not arena.live.running, 5.0)
     if not arena.live.connected:
         await arena.wait(lambda: not arena.live.running, GRAPH_EVERY_S)
-
-
-async def _stop(scenario: Scenario, arena: ArenaSession) -> None:
-    """Take a last look at the graph, then Ctrl-C for everything that runs."""
-    if arena.live.running:
-        looks = arena.live.graphs
-        arena.send(do="graph")
-        await arena.wait(lambda: arena.live.graphs > looks, 2.0)
-    launched = {start.name for start in scenario.start if start.launch is not None}
-    stops = [
-        arena.interrupt(name, int_s=LAUNCH_CTRL_C_S if name in launched else CTRL_C_S, term_s=TERM_S)
-        for name in sorted(arena.live.running)
-    ]
-    await asyncio.gather(*stops)

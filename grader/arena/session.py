@@ -16,7 +16,7 @@ from grader.arena.frames import Frame, FrameReader
 from grader.arena.live import Live
 from grader.arena.place import Place
 from grader.errors import ArenaError, GraderError
-from grader.evidence.events import TOPICS, ProcessEvent, ScenarioEvent
+from grader.evidence.events import TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
 from grader.evidence.run import is_grader_node
 from grader.evidence.writer import EvidenceWriter
 
@@ -39,7 +39,7 @@ class ArenaSession:
         self.cpu_s = 0.0
         self.student_cpu_s = 0.0
         self.exit_codes: dict[str, int | None] = {}
-        self._place = place
+        self.place = place
         self._writer = writer
         self._master = master
         self._changed = asyncio.Event()
@@ -50,10 +50,12 @@ class ArenaSession:
         self._failure = ""
         self._error: GraderError | None = None
         self._frames = FrameReader()
+        self._calls = 0
+        self._answers: dict[int, dict[str, Any]] = {}
 
     async def __aenter__(self) -> Self:
-        argv = self._place.sandbox.outer([self._place.ros.python, "-s", "-B", str(ARENA)])
-        self._process = ArenaProcess(argv, self._place.arena_env(), self._read)
+        argv = self.place.sandbox.outer([self.place.ros.python, "-s", "-B", str(ARENA)])
+        self._process = ArenaProcess(argv, self.place.arena_env(), self._read)
         try:
             self.send(**self._config())
             await self._await_ready()
@@ -74,16 +76,29 @@ class ArenaSession:
         self._process.send(command)
 
     def start(self, spec: dict[str, Any]) -> None:
-        self.live.running.add(spec["name"])
+        (self.live.helpers if spec["role"] == "grader" else self.live.running).add(spec["name"])
         self.send(do="start", spec=spec)
 
     async def interrupt(self, name: str, *, int_s: float, term_s: float) -> None:
         """Ctrl-C; TERM after `int_s`, KILL after another `term_s`. Returns when the process has ended."""
         self.send(do="interrupt", name=name, int_s=int_s, term_s=term_s)
-        await self.wait(lambda: name in self.live.ended, int_s + term_s + END_S)
+        await self.wait(lambda: name in self.exit_codes, int_s + term_s + END_S)
 
     def course(self, event: ScenarioEvent) -> None:
         self._writer.event("/grader/scenario", time.time_ns(), event)
+
+    def note(self, event: ActorEvent) -> None:
+        """Write down what the grader did, or learnt."""
+        self._writer.event("/grader/actor", time.time_ns(), event)
+
+    async def call(self, timeout_s: float, **command: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
+        """Call a service: `{"data": base64}` of its response, or `{"error": why not}`."""
+        self._calls += 1
+        number = self._calls
+        self.send(do="call", id=number, timeout_s=timeout_s, **command)
+        if not await self.wait(lambda: number in self._answers, timeout_s + END_S):
+            return {"error": f"no answer within {timeout_s:g} s"}
+        return self._answers.pop(number)
 
     async def wait(self, condition: Callable[[], bool], timeout_s: float) -> bool:
         """Wait until the condition holds; False when it does not in time. Raises ArenaError if the arena dies."""
@@ -114,18 +129,18 @@ class ArenaSession:
         self.rosout_up = rosout is None  # then nobody need wait for it
         return {
             "master": self._master,
-            "port": PORT if self._place.sandbox.bubblewrap else 0,
-            "limits": self._place.limits.model_dump(),
+            "port": PORT if self.place.sandbox.bubblewrap else 0,
+            "limits": self.place.limits.model_dump(),
             "suffix": "_" + secrets.token_hex(4),
             "rosout": rosout,
         }
 
     def _rosout_spec(self) -> dict[str, Any] | None:
         for name in ROSOUT:
-            for prefix in ("/", *self._place.ros.prefixes):
+            for prefix in ("/", *self.place.ros.prefixes):
                 program = Path(prefix) / name
                 if program.exists():
-                    return self._place.spec("rosout", [*LOG_FOLDER, str(program)], role="grader", copy=False)
+                    return self.place.spec("rosout", [*LOG_FOLDER, str(program)], role="grader", copy=False)
         return None
 
     def _read(self, chunk: bytes) -> None:
@@ -163,11 +178,18 @@ class ArenaSession:
         self._writer.event(topic, frame.time_ns, TOPICS[topic].model_validate(record))
         if topic == "/grader/graph":
             self.rosout_up = self.rosout_up or "/rosout" in record["nodes"]
-            self.live.graph_changed_s = time.monotonic()
+            nodes = [n for n in record["nodes"] if not is_grader_node(n)]
+            self.live.graph(nodes, record["processes"], time.monotonic())
+            self.live.services = set(record["services"])
         elif topic == "/grader/console":
             self.live.printed(record["line"], time.monotonic())
         elif topic == "/grader/process" and record["event"] == "exit":
             self._exited(record)
+        elif topic == "/grader/param" and not is_grader_node(record["caller_id"]):
+            self.live.active(time.monotonic())
+        elif topic == "/grader/actor" and record["action"] == "open":
+            self.live.opened.add(record["actor"])
+            self.live.active(time.monotonic())
 
     def _exited(self, record: dict[str, Any]) -> None:
         name = record["name"]
@@ -176,9 +198,11 @@ class ArenaSession:
         else:
             self.student_cpu_s += record["cpu_s"]
         self.exit_codes[name] = record["exit_code"]
-        self.live.running.discard(name)
-        if name != "rosout":
+        self.live.helpers.discard(name)
+        if name in self.live.running:
+            self.live.running.remove(name)
             self.live.ended.add(name)
+            self.live.active(time.monotonic())
 
     def _status(self, fields: dict[str, Any]) -> None:
         status = fields["status"]
@@ -186,6 +210,8 @@ class ArenaSession:
             self._ready = True
         elif status == "subscribed" and not is_grader_node(fields["subscriber"]):
             self.live.subscribed.add(fields["topic"])
+        elif status == "answer":
+            self._answers[fields["id"]] = fields
         elif status == "graph":
             pairs = [c for c in fields["connections"] if not is_grader_node(c["subscriber"])]
             self.live.connected = {c["topic"] for c in pairs}

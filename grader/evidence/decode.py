@@ -61,6 +61,20 @@ class Decoder:
             return None
 
 
+class Encoder:
+    """Makes messages of one type from its full definition. Raises ValueError for one that cannot be followed."""
+
+    def __init__(self, type: str, definition: str) -> None:  # noqa: A002 - ROS's own word
+        plan = _plan(type, definition)
+        if plan is None:
+            raise ValueError(f"the definition of {type} cannot be followed")
+        self._plan = plan
+
+    def encode(self, value: Mapping[str, Any]) -> bytes:
+        """The message's bytes; fields that `value` leaves out are zero. Raises ValueError where it does not fit."""
+        return self._plan.encode(value)
+
+
 class _Plan:
     def __init__(self, type_: str, definition: str) -> None:
         self._types: Types = parse(type_, definition)
@@ -71,7 +85,34 @@ class _Plan:
         self._store.get_msgdef(self._name)
 
     def decode(self, data: bytes) -> dict[str, Any]:
+        if not self._types[self._type] and not data:
+            return {}
         return self._plain(self._type, self._store.deserialize_ros1(data, self._name))
+
+    def encode(self, value: Mapping[str, Any]) -> bytes:
+        if not self._types[self._type]:
+            return _nothing(self._type, value)
+        message = _message(self._store, self._name, self._renamed(self._type, value))
+        try:
+            return bytes(self._store.serialize_ros1(message, self._name))
+        except (struct.error, OverflowError, SerdeError, AttributeError, TypeError) as error:
+            raise ValueError(f"{self._type} cannot hold {value!r}: {error}") from error
+
+    def _renamed(self, type_: str, value: Value) -> Value:
+        """The fields by the names that they have in generated code."""
+        if not isinstance(value, Mapping):
+            raise ValueError(f"{type_} is made of fields, not {value!r}")  # noqa: TRY004 - as every other misfit
+        fields = {f.name: f for f in self._types[type_]}
+        if unknown := value.keys() - fields.keys():
+            raise ValueError(f"{type_} has no field {', '.join(sorted(map(str, unknown)))}")
+        return {fields[name].attribute: self._inner(fields[name], item) for name, item in value.items()}
+
+    def _inner(self, field: Field, value: Value) -> Value:
+        if field.primitive:
+            return value
+        if field.array:
+            return [self._renamed(field.type, item) for item in value]
+        return self._renamed(field.type, value)
 
     def _plain(self, type_: str, message: object) -> dict[str, Any]:
         return {f.name: self._value(f, getattr(message, f.attribute)) for f in self._types[type_]}
@@ -157,6 +198,12 @@ def _field(store: Typestore, desc: Value, value: Value) -> Value:
     if inner[0] == Nodetype.BASE and inner[1][0] != "string":
         return np.array(converted, dtype=_dtype(inner[1][0]))
     return converted
+
+
+def _nothing(type_: str, value: Mapping[str, Any]) -> bytes:
+    if value:
+        raise ValueError(f"{type_} has no field {', '.join(sorted(value))}")
+    return b""
 
 
 def _dtype(base: str) -> str:

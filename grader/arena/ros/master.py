@@ -3,23 +3,34 @@
 import threading
 
 import rosmaster.master_api
+import services
 from rosgraph.xmlrpc import XmlRpcNode
 from tcpros import ProtocolError, call, slave_api
 
 GRAPH_QUIET_S = 0.02
 BUS_INFO_S = 0.5
+OPENED_MAX, ARGUMENTS_MAX, ARGUMENT_CHARS = 200, 50, 2000
+PROBE_S = 0.5
+EVERY_NODE_HAS = ("/get_loggers", "/set_logger_level")
 
 
 class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
-    """A node's publishers are recorded before it can publish (see `recorder`)."""
+    """A node's publishers are recorded before it can publish (see `recorder`).
 
-    def __init__(self, loop, wire, recorder, own_prefix):
+    `owner` gives the name of the process whose node has a slave API, or None; it is asked while the node registers,
+    when the process is sure to be there.
+    """
+
+    def __init__(self, loop, wire, recorder, own_prefix, owner):
         super().__init__(3)
+        self._owner = owner
+        self._service_types = {}
         self._loop = loop
         self._wire = wire
         self._recorder = recorder
         self._own_prefix = own_prefix
         self._graph_due = False
+        self._opened = 0
         self.listening = threading.Event()
         # Unset, every rospy.loginfo asks the master for it, and a SIGINT during that call locks the node up for ever.
         self.param_server.set_param("/rosout_disable_topics_generation", False)
@@ -30,6 +41,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
 
     def registerPublisher(self, caller_id, topic, topic_type, caller_api):
         answer = super().registerPublisher(caller_id, topic, topic_type, caller_api)
+        self._owner(caller_api)
         if answer[0] == 1 and not caller_id.startswith(self._own_prefix):
             self._recorder.connect(topic, caller_id, caller_api)
         self._graph_changed()
@@ -39,6 +51,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         return self._after(super().unregisterPublisher(caller_id, topic, caller_api))
 
     def registerSubscriber(self, caller_id, topic, topic_type, caller_api):
+        self._owner(caller_api)
         return self._after(super().registerSubscriber(caller_id, topic, topic_type, caller_api))
 
     def unregisterSubscriber(self, caller_id, topic, caller_api):
@@ -47,6 +60,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
     def registerService(self, caller_id, service, service_api, caller_api):
         if str(service).endswith("/get_loggers"):
             self._recorder.gate(caller_id)
+        self._owner(caller_api)
         return self._after(super().registerService(caller_id, service, service_api, caller_api))
 
     def getParam(self, caller_id, key):
@@ -75,12 +89,22 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         )
         return -1, "refused", 0
 
+    def noteOpened(self, caller_id, program, arguments):  # noqa: ARG002 - shaped as the master API is
+        """What a stand-in for a browser was asked to open (see `opener`)."""
+        self._opened += 1
+        if self._opened <= OPENED_MAX:
+            shown = [str(argument)[:ARGUMENT_CHARS] for argument in arguments[:ARGUMENTS_MAX]]
+            record = {"action": "open", "actor": str(program)[:ARGUMENT_CHARS], "value": shown}
+            self._wire.event("/grader/actor", record)
+        return 1, "noted", 0
+
     def graph(self, *, connections=False):
         """The state as a GraphEvent's fields."""
         with self.ps_lock:
             publishers = self.publishers.get_state()
             subscribers = self.subscribers.get_state()
-            services = self.services.get_state()
+            offered = self.services.get_state()
+            service_apis = {name: self.services.get_service_api(name) for name, _ in offered}
             types = dict(self.topics_types)
             apis = {name: ref.api for name, ref in self.reg_manager.nodes.items()}
         record = {
@@ -88,8 +112,11 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
             "topic_types": types,
             "publishers": dict(publishers),
             "subscribers": dict(subscribers),
-            "services": dict(services),
+            "services": dict(offered),
+            "processes": {name: owner for name, api in apis.items() if (owner := self._owner(api))},
         }
+        if connections:
+            record["service_types"] = self._types_of(service_apis)
         if connections:
             publishing = {node for _, nodes in publishers for node in nodes}
             record["connections"] = [
@@ -99,6 +126,22 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
                 for found in self._connections(node, apis[node])
             ]
         return record
+
+    def service_api(self, service):
+        """Where a service is offered, or None."""
+        with self.ps_lock:
+            return self.services.get_service_api(service)
+
+    def _types_of(self, apis):
+        """What the services themselves say they are; each is asked once."""
+        for name, api in sorted(apis.items()):
+            if (name, api) not in self._service_types and api and not name.endswith(EVERY_NODE_HAS):
+                try:
+                    self._service_types[name, api] = services.probe(name, api, self._own_prefix, PROBE_S)
+                except ProtocolError:
+                    self._service_types[name, api] = ""
+        found = {name: self._service_types.get((name, api)) for name, api in apis.items()}
+        return {name: type_ for name, type_ in found.items() if type_}
 
     def _connections(self, node, api):
         """The node's outgoing connections, as the node itself reports them."""

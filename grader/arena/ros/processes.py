@@ -157,6 +157,10 @@ class Process:
         tree = _descendants(self.pid)
         return [pid for pid in tree if pid != self._inner_pid]
 
+    def tree(self):
+        """Ids of all its processes, bubblewrap's own too."""
+        return [self.pid, *_descendants(self.pid)]
+
     def left_behind(self):
         """Process ids of the tree that still run."""
         return self._tree() if self.alive else []
@@ -164,7 +168,7 @@ class Process:
     def _watch(self):
         if not self.alive:
             return
-        tree = [self.pid, *_descendants(self.pid)]
+        tree = self.tree()
         size = sum(map(_resident_bytes, tree))
         self._peak_bytes = max(self._peak_bytes, size)
         if size > self._limits["memory_bytes"]:

