@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Literal
 
 from grader.arena.ros_env import RosInstallation
+from grader.arena.standins import copy_standins
 from grader.errors import HostError, SandboxMissing
 from grader.model.record import Record
 
@@ -28,6 +29,7 @@ OUTPUT = "/run/grader/out"
 BUILT_WORKSPACE = "/run/grader/ws"
 LARGE = "/run/grader/large"
 SHIMS = "/run/grader/bin"
+STANDINS = "/run/grader/standins"
 ETC = (
     "alternatives", "ld.so.cache", "ld.so.conf", "ld.so.conf.d", "localtime", "timezone", "nsswitch.conf",
     "os-release", "debian_version", "lsb-release", "python3", "python3.11", "mime.types", "catkin", "ros",
@@ -38,6 +40,11 @@ TERMINAL = Path(__file__).parent / "ros" / "terminal.sh"
 TERMINALS = (
     "gnome-terminal", "konsole", "lxterminal", "mate-terminal", "rxvt", "terminator", "tilix", "urxvt",
     "x-terminal-emulator", "xfce4-terminal", "xterm",
+)  # fmt: skip
+OPENER = (Path(__file__).parent / "ros" / "open.sh", Path(__file__).parent / "ros" / "opener.py")
+BROWSERS = (
+    "brave-browser", "chromium", "chromium-browser", "firefox", "firefox-esr", "google-chrome", "google-chrome-stable",
+    "opera", "sensible-browser", "www-browser", "x-www-browser", "xdg-open",
 )  # fmt: skip
 TMP_BYTES = 256 << 20
 FILE_BYTES = 64 << 20
@@ -100,7 +107,7 @@ class Sandbox(Record):
             "--ro-bind", str(place / "etc" / "passwd"), "/etc/passwd",
             "--ro-bind", str(place / "etc" / "group"), "/etc/group",
             "--ro-bind", str(place / "etc" / "hosts"), "/etc/hosts",
-            "--ro-bind", str(place / "bin"), SHIMS, *binds,
+            "--ro-bind", str(place / "bin"), SHIMS, "--ro-bind", str(place / "standins"), STANDINS, *binds,
             "--remount-ro", "/", "--uid", "1000", "--gid", "1000", "--hostname", "localhost", "--chdir", HOME,
             "--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try",
             *([] if net else ["--unshare-net"]),
@@ -125,8 +132,9 @@ def _system(ros: RosInstallation) -> list[str]:
 
 
 def prepare(place: Path, ros: RosInstallation) -> None:
-    """Write what every inner layer binds: `etc/` with one user in it, `bin/` with `python` as ROS means it and
-    stand-ins for terminals, which launch files name as their `launch-prefix`."""
+    """Write what every inner layer binds: `etc/` with one user in it, `bin/` with `python` as ROS means it, stand-ins
+    for terminals, which launch files name as their `launch-prefix`, and for browsers, and `standins/` with the
+    packages that this ROS lacks."""
     etc, shims = place / "etc", place / "bin"
     for folder in (etc, shims, place / "home"):
         folder.mkdir(parents=True)
@@ -136,11 +144,18 @@ def prepare(place: Path, ros: RosInstallation) -> None:
     for name in ("python", "python3"):
         (shims / name).symlink_to(ros.python)
     shutil.copyfile(SYNTAX, shims / "grader-syntax.py")
-    terminal = shims / "grader-terminal"
-    shutil.copyfile(TERMINAL, terminal)
-    terminal.chmod(0o755)
-    for name in TERMINALS:
-        (shims / name).symlink_to(terminal.name)
+    _program(shims, TERMINAL, "grader-terminal", TERMINALS)
+    _program(shims, OPENER[0], "grader-open", BROWSERS)
+    shutil.copyfile(OPENER[1], shims / "grader-open.py")
+    copy_standins(place / "standins", ros)
+
+
+def _program(shims: Path, source: Path, name: str, called: Sequence[str]) -> None:
+    """One program under the names that it is called by."""
+    shutil.copyfile(source, shims / name)
+    (shims / name).chmod(0o755)
+    for other in called:
+        (shims / other).symlink_to(name)
 
 
 def temporary_base(sandbox: Sandbox | None) -> Path:

@@ -16,6 +16,7 @@ from typing import Literal
 
 from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
 from grader.arena.sandbox import why_not
+from grader.arena.standins import missing_packages
 from grader.errors import RosMissing
 from grader.model.record import Record
 
@@ -80,6 +81,7 @@ def _ros() -> Iterator[Row]:
         mend = "" if path else INSTALL_HINT
         yield Row(name=program, state="ok" if path else "missing", detail=path or "not found", mend=mend)
     yield from _modules(ros)
+    yield _standins(ros)
 
 
 def _modules(ros: RosInstallation) -> Iterator[Row]:
@@ -98,6 +100,12 @@ def _modules(ros: RosInstallation) -> Iterator[Row]:
             yield Row(name=module, state="missing", detail=f"{ros.python} cannot import it", mend=mend)
         else:
             yield Row(name=module, state="ok", detail="found")
+
+
+def _standins(ros: RosInstallation) -> Row:
+    missing = missing_packages(ros)
+    detail = f"for {', '.join(missing)}, which this ROS lacks" if missing else "not needed for any package"
+    return Row(name="stand-ins", state="ok", detail=detail)
 
 
 def _sandbox() -> Row:

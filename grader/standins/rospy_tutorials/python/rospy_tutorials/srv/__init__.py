@@ -1,0 +1,3 @@
+from standin_messages import define
+
+define(globals())
