@@ -1,0 +1,39 @@
+"""All operators, a file for each family. Importing this fills the registry."""
+
+from grader.mutation.operators import (
+    build,
+    counter,
+    files,
+    launch,
+    life,
+    listener,
+    logs,
+    manifest,
+    message,
+    names,
+    params,
+    shebang,
+    syntax,
+    timing,
+    topics,
+    yaml,
+)
+
+__all__ = [
+    "build",
+    "counter",
+    "files",
+    "launch",
+    "life",
+    "listener",
+    "logs",
+    "manifest",
+    "message",
+    "names",
+    "params",
+    "shebang",
+    "syntax",
+    "timing",
+    "topics",
+    "yaml",
+]
