@@ -77,7 +77,7 @@ class _Adder:
 
 
 def _grading(add: _Adder) -> None:
-    grade = add("grade", "grade one submission: a folder, a .zip or .tar.*, a git URL with @ref")
+    grade = add("grade", "grade one submission: a folder, a .zip or .tar.*, a git URL with @ref, a .bag")
     grade.add_argument("source", metavar="SOURCE")
     _rubric(grade, required=True)
     _out(grade, "results go to DIR/<submission id>/ (default: ./grader-results)")
@@ -97,7 +97,7 @@ def _grading(add: _Adder) -> None:
 def _evidence(add: _Adder) -> None:
     judge = add("judge", "judge recorded evidence again; needs no ROS")
     judge.add_argument(
-        "evidence", metavar="EVIDENCE", nargs="+", type=Path, help=".mcap files or folders of them"
+        "evidence", metavar="EVIDENCE", nargs="+", type=Path, help=".mcap and .bag files, or folders of them"
     )
     _rubric(judge, required=True)
     judge.add_argument(
@@ -113,6 +113,15 @@ def _evidence(add: _Adder) -> None:
     record.add_argument("--seconds", metavar="N", type=float, default=10.0, help="how long (default: 10)")
     _out(record, "evidence goes to DIR/<submission id>/evidence/", required=True)
     _sandbox(record)
+
+    export = add("export", "write recorded evidence in another form")
+    forms = export.add_subparsers(metavar="FORM", required=True, title="forms", parser_class=Parser)
+    bag = _Adder(forms, add.common)("bag", "write recorded evidence as a ROS 1 bag", "export_bag")
+    bag.add_argument("evidence", metavar="EVIDENCE", type=Path, help="a recording, or a folder of them")
+    bag.add_argument("--out", metavar="FILE", type=Path, help="the bag, or a folder (default: here)")
+    bag.add_argument(
+        "--all", action="store_true", dest="everything", help="the grader's own records too, as JSON text"
+    )
 
     inspect = add("inspect", "say what is in an evidence file or a bag: rates, gaps, nodes")
     inspect.add_argument("file", metavar="FILE", type=Path)

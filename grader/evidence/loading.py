@@ -17,7 +17,7 @@ from grader.evidence.run import Channel, Message, Run
 MAX_MESSAGES = 2_000_000
 MAX_CHANNELS = 4_096
 
-_FIELDS = {
+FIELDS = {
     "processes": "/grader/process",
     "console": "/grader/console",
     "graph": "/grader/graph",
@@ -81,7 +81,7 @@ class Loading:
         if self._metadata is None:
             self._refuse_what_is_not_ros1()
         else:
-            own = {name: self._events(topic) for name, topic in _FIELDS.items()}
+            own = {name: self._events(topic) for name, topic in FIELDS.items()}
             own["package_json"] = self._package()
         return Run(
             evidence=self._name,
