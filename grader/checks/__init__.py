@@ -14,9 +14,17 @@ FAMILIES = (
     "rate",
     "counter",
     "hears",
+    "install",
     "launch",
     "launch_xml",
     "message",
+    "services",
+    "latched",
+    "bounds",
+    "topics",
+    "connections",
+    "path",
+    "param_value",
 )
 for family in FAMILIES:
     import_module(f"grader.checks.{family}")

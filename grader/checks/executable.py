@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from grader.checks.build import CATKIN_MAKE
 from grader.checks.registry import check
+from grader.checks.support.installing import PYTHON, installed, is_found, names_script
 from grader.checks.support.text import listed, near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts, SourceFile
@@ -88,22 +89,25 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
 
 def find_script(package: PackageFacts, path: str) -> SourceFile | None:
     """The file at this path, or one of the same name in another folder (those for nodes first)."""
-    name = PurePosixPath(path).name
-    same = [f for f in package.files if PurePosixPath(f.path).name == name and not _is_product(f.path)]
 
     def rank(file: SourceFile) -> tuple[bool, bool, bool, str]:
         folder = PurePosixPath(file.path).parts[0]
         return file.path != path, folder not in NODE_FOLDERS, file.executable is False, file.path
 
-    return min(same, key=rank, default=None)
+    return min(copies_of(package, path), key=rank, default=None)
+
+
+def copies_of(package: PackageFacts, path: str) -> list[SourceFile]:
+    """All files of this name in the package, whatever their folder; what a build made is none of them."""
+    name = PurePosixPath(path).name
+    return [f for f in package.files if PurePosixPath(f.path).name == name and not _is_product(f.path)]
 
 
 def has_wrapper(package: PackageFacts, build: Run, path: str) -> bool:
-    """The build worked, and `catkin_install_python` names this script."""
+    """The build worked, and `catkin_install_python` put this script where `rosrun` looks."""
     built = any(e.event == "exit" and e.name == CATKIN_MAKE and e.exit_code == 0 for _, e in build.processes)
-    calls = package.cmake.calls if package.cmake else ()
-    named = (a for c in calls if c.name == "catkin_install_python" for a in c.args)
-    return built and any(a == path or a.endswith("/" + path) for a in named)
+    named = (i for i in installed(package) if i.call.name == PYTHON and i.kind == "PROGRAMS")
+    return built and any(names_script(i, path) and is_found(i.destination or "", package) for i in named)
 
 
 def _missing(package: PackageFacts, path: str, expected: str) -> Verdict:

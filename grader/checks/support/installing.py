@@ -1,0 +1,92 @@
+"""What `CMakeLists.txt` installs: the calls of `install` and `catkin_install_python`, and the scripts they name."""
+
+from __future__ import annotations
+
+import posixpath
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from grader.model.package import CMakeCall, PackageFacts
+
+PYTHON = "catkin_install_python"
+_KINDS = ("PROGRAMS", "FILES", "TARGETS", "DIRECTORY", "SCRIPT", "CODE")
+_OPTIONS = (
+    *("DESTINATION", "TYPE", "OPTIONAL", "PERMISSIONS", "CONFIGURATIONS", "COMPONENT", "RENAME"),
+    *("EXCLUDE_FROM_ALL", "ARCHIVE", "LIBRARY", "RUNTIME"),
+)
+_HERE = (
+    "${CMAKE_CURRENT_SOURCE_DIR}",
+    "${PROJECT_SOURCE_DIR}",
+    "${CMAKE_SOURCE_DIR}",
+    "${CMAKE_CURRENT_LIST_DIR}",
+)
+_BIN = ("${CATKIN_PACKAGE_BIN_DESTINATION}", "lib/${PROJECT_NAME}")
+
+
+class Installed(NamedTuple):
+    """One file that a call names. `kind` is the signature (`PROGRAMS`), "" where the call gives none.
+
+    `destination` is None where the call has no such word, and "" where nothing stands behind it.
+    """
+
+    call: CMakeCall
+    kind: str
+    path: str
+    destination: str | None
+
+    @property
+    def known(self) -> bool:
+        """False where CMake was not asked and the name is a variable that only it knows."""
+        return "${" not in self.path
+
+
+def installed(package: PackageFacts) -> Iterator[Installed]:
+    """Every file that `install` or `catkin_install_python` names, in the order of the calls."""
+    for call in package.cmake.calls if package.cmake else ():
+        if call.name in {PYTHON, "install"}:
+            yield from _named(call)
+
+
+def names_script(one: Installed, path: str) -> bool:
+    """Whether the file named is the one at `path`, which is relative to the package."""
+    text = one.path
+    for here in _HERE:
+        text = text.removeprefix(here + "/")
+    if text.startswith("/"):
+        return posixpath.normpath(text).endswith("/" + path)
+    return posixpath.normpath(posixpath.join(posixpath.dirname(one.call.file), text)) == path
+
+
+def is_bin(destination: str, package: PackageFacts) -> bool:
+    """Whether it is `${CATKIN_PACKAGE_BIN_DESTINATION}`, which CMake gives as `lib/<project>`."""
+    place = "/" + posixpath.normpath(destination)
+    return destination in _BIN or any(place.endswith(f"/lib/{name}") for name in _names(package))
+
+
+def is_found(destination: str, package: PackageFacts) -> bool:
+    """Whether `rosrun` looks for programs there: it does so in all of `lib/<package>` and `share/<package>`."""
+    place = f"/{posixpath.normpath(destination)}/"
+    below = any(f"/{kind}/{name}/" in place for kind in ("lib", "share") for name in _names(package))
+    return below or is_bin(destination, package)
+
+
+def _names(package: PackageFacts) -> set[str]:
+    """The package's, by its manifest, its folder and its CMake project."""
+    calls = package.cmake.calls if package.cmake else ()
+    projects = {call.args[0] for call in calls if call.name == "project" and call.args}
+    return {package.name, *projects} | ({package.manifest.name} if package.manifest else set())
+
+
+def _named(call: CMakeCall) -> Iterator[Installed]:
+    kind, words = "", list(call.args)
+    if words and words[0].upper() in _KINDS:
+        kind = words.pop(0).upper()
+    destination: str | None = None
+    if "DESTINATION" in words:
+        at = words.index("DESTINATION")
+        given = [w for w in words[at + 1 : at + 2] if w not in _OPTIONS]
+        destination = "".join(given)
+        del words[at : at + 1 + len(given)]
+    last = next((i for i, word in enumerate(words) if word in _OPTIONS), len(words))
+    for path in words[:last]:
+        yield Installed(call, kind, path, destination)
