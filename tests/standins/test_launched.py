@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import itertools
 
 import pytest
 
@@ -58,7 +58,7 @@ def test_talker_and_listener_are_connected_under_the_launch_files_names(launched
     texts = channel.data
     assert 20 <= len(texts) <= 32
     seconds = [float(text.removeprefix("hello world ")) for text in texts]
-    assert all(0.05 < later - earlier < 0.2 for earlier, later in zip(seconds, seconds[1:], strict=False))
+    assert all(0.05 < later - earlier < 0.2 for earlier, later in itertools.pairwise(seconds))
     heard = [line for line in printed(launched, "all") if "/listenerI heard hello world" in line]
     assert len(heard) >= len(texts) - 3
     assert any("/listener" in e.subscribers.get("/chatter", ()) for _, e in launched.graph)
