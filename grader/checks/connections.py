@@ -1,0 +1,149 @@
+"""Whether two nodes are connected over a topic."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+from grader.checks.registry import check
+from grader.checks.support.absence import no_node
+from grader.checks.support.names import GlobalName, is_called
+from grader.checks.support.text import listed, near_names
+from grader.evidence.run import Run, is_grader_node
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import EvidenceCitation, Verdict, failed, passed
+
+End = Literal["publisher", "subscriber"]
+ENDS: tuple[End, End] = ("publisher", "subscriber")
+
+
+class ConnectedParams(Record):
+    """`publisher` and `subscriber` are nodes' names; an empty one is any node of the package's."""
+
+    topic: GlobalName
+    publisher: str = ""
+    subscriber: str = ""
+
+    def name(self, end: End) -> str:
+        return self.publisher if end == "publisher" else self.subscriber
+
+
+@check("connected", params=ConnectedParams)
+def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
+    """Two nodes are connected over a topic.
+
+    What it checks
+        That messages go from one node to the other over the topic: not only that both name it.
+
+    Why it matters on a robot
+        A publisher on one name and a subscriber on another run side by side in perfect silence, and nothing
+        ever says so.
+
+    How it is measured
+        The subscribing node itself is asked whom it hears. A node that the rubric does not name may have
+        any name; the `_<digits>_<digits>` of an anonymous one does not matter.
+
+    How to fix
+        Both ends need the same topic name, with the namespace and after every `<remap>`, and the same
+        message type. `rosnode info <node>` and `rqt_graph` show the connections.
+    """
+    found = next(_pairs(run, params), None)
+    ends = [_wanted(params.name(end), end) for end in ENDS]
+    verdict = (
+        passed(f"{found[0]} and {found[1]} are connected over {params.topic}")
+        if found
+        else _apart(package, run, params)
+    )
+    over = {c.topic: None for _, e in run.graph for c in e.connections if run.is_student_node(c.publisher)}
+    return verdict.model_copy(
+        update={
+            "expected": f"{ends[0]} connected to {ends[1]} over {params.topic}",
+            "measured": verdict.measured or (f"connections over {listed(over)}" if over else "no connection"),
+            "citations": (
+                *verdict.citations,
+                EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),
+            ),
+        }
+    )
+
+
+def _pairs(run: Run, params: ConnectedParams) -> Iterator[tuple[str, str]]:
+    for _, event in run.graph:
+        for one in event.connections:
+            pair = (one.publisher, one.subscriber)
+            fits = _fits(run, pair[0], params.publisher) and _fits(run, pair[1], params.subscriber)
+            if one.topic == params.topic and pair[0] != pair[1] and fits:
+                yield pair
+
+
+def _fits(run: Run, node: str, wanted: str) -> bool:
+    """Programs of other packages (`/turtlesim`) only by their name, the grader's own nodes never."""
+    if is_grader_node(node):
+        return False
+    return is_called(node, wanted) if wanted else run.is_student_node(node)
+
+
+def _apart(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
+    """Why no two nodes are connected: one is missing, or not on the topic, or the types differ."""
+    lacking = [end for end in ENDS if not _on(run, params.topic, end, params)]
+    for end in lacking:
+        if verdict := _misnamed(run, end, params):
+            return verdict
+    if lacking:
+        absent = no_node(package, run, f"nothing is connected over {params.topic}")
+        return absent or _not_on_topic(run, lacking[0], params)
+    first, second = (_on(run, params.topic, end, params)[0] for end in ENDS)
+    if first == second:
+        message = f"{first} is alone on {params.topic}: it hears only itself"
+        return failed(message, hint=f"let a second node subscribe to {params.topic}")
+    if absent := no_node(package, run, f"{first} and {second} were not seen connected over {params.topic}"):
+        return absent
+    message = f"{first} and {second} are both on {params.topic}, but not connected"
+    return failed(message, hint="do both use the same message type?")
+
+
+def _misnamed(run: Run, end: End, params: ConnectedParams) -> Verdict | None:
+    """The node is there under another name."""
+    wanted, there = params.name(end), [n for n in _nodes(run) if not is_grader_node(n)]
+    if not wanted or not there or any(is_called(n, wanted) for n in there):
+        return None
+    near = near_names(f"/{wanted.lstrip('/')}", there)
+    seen = listed(near or there)
+    hint = f"the node's name is what rospy.init_node(…) or the launch file gives it: {wanted.lstrip('/')}"
+    return failed(f"there is no node /{wanted.lstrip('/')}; there is {seen}", hint=hint)
+
+
+def _not_on_topic(run: Run, end: End, params: ConnectedParams) -> Verdict:
+    wanted, does = params.name(end), "publishes on" if end == "publisher" else "subscribes to"
+    who = f"/{wanted.lstrip('/')}" if wanted else "no node"
+    topics = [t for t in _topics(run, end) if _on(run, t, end, params)]
+    near = near_names(params.topic, topics) or topics
+    message = f"{who} never {does} {params.topic}" if wanted else f"{who} {does} {params.topic}"
+    kind = "Publisher" if end == "publisher" else "Subscriber"
+    hint = f"rospy.{kind}('{params.topic}', …); look for a <remap> or a namespace"
+    return failed(f"{message}; it {does} {listed(near)}" if near and wanted else message, hint=hint)
+
+
+def _on(run: Run, topic: str, end: End, params: ConnectedParams) -> tuple[str, ...]:
+    """The nodes that fit this end and were ever on the topic."""
+    found = (
+        node
+        for _, event in run.graph
+        for node in (event.publishers if end == "publisher" else event.subscribers).get(topic, ())
+        if _fits(run, node, params.name(end))
+    )
+    return tuple(dict.fromkeys(found))
+
+
+def _topics(run: Run, end: End) -> tuple[str, ...]:
+    found = (t for _, e in run.graph for t in (e.publishers if end == "publisher" else e.subscribers))
+    return tuple(t for t in dict.fromkeys(found) if t != "/rosout")
+
+
+def _nodes(run: Run) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(node for _, event in run.graph for node in event.nodes))
+
+
+def _wanted(name: str, end: End) -> str:
+    return f"/{name.lstrip('/')}" if name else f"a {end} of the package"

@@ -1,0 +1,123 @@
+"""Whether a robot takes the way that it should."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from grader.checks.registry import check
+from grader.checks.support.absence import no_message
+from grader.checks.support.gaps import lateness_ms
+from grader.checks.support.geometry import followed, relative
+from grader.checks.support.names import GlobalName
+from grader.checks.support.straying import Way, measured, metres, spot, what_is_wrong
+from grader.checks.support.text import listed, number
+from grader.checks.support.tracks import Track, run_seconds, track
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+
+LATE_MS = 100.0
+ORIGIN = (0.0, 0.0)
+
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
+class PathParams(Record):
+    """`points` in metres, `[x, y]`, in the order in which they have to be passed.
+
+    With `relative` they are seen from the start, x being forward there and y to the left; the start itself is put
+    before them. A velocity holds until the next one, but no longer than `hold_s` (null: for ever).
+    """
+
+    topic: GlobalName
+    points: Annotated[tuple[tuple[Coordinate, Coordinate], ...], Field(min_length=1)]
+    tolerance_m: Annotated[float, Field(gt=0)]
+    relative: bool = True
+    hold_s: Annotated[float, Field(gt=0)] | None = 1.0
+
+    @model_validator(mode="after")
+    def _is_a_way(self) -> PathParams:
+        way = self.way.points
+        if len(way) < 2:
+            raise ValueError("points: a way needs two points at least")
+        shortest_m = min(math.dist(a, b) for a, b in pairwise(way))
+        if self.tolerance_m > shortest_m / 2:
+            near = f"two points that follow each other are {shortest_m:g} m apart"
+            raise ValueError(f"tolerance_m, {self.tolerance_m:g}, is too large: {near}")
+        return self
+
+    @property
+    def way(self) -> Way:
+        added = self.relative and math.dist(self.points[0], ORIGIN) > self.tolerance_m
+        return Way((ORIGIN, *self.points) if added else self.points, self.tolerance_m, added)
+
+
+@check("path", params=PathParams, messages_only=True)
+def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
+    """The robot takes the right way.
+
+    What it checks
+        That the path passes the points in their order, each within the tolerance, strays from the straight
+        line between two of them no farther than that, and ends at the last one.
+
+    Why it matters on a robot
+        Time and speed make the way. A turn that lasts a tenth of a second too long leaves the robot beside
+        its door, and every later turn adds to it.
+
+    How it is measured
+        Velocities (geometry_msgs/Twist) are added up over time, along exact arcs, each of them until the
+        next one came or its robot would have stopped by itself. Poses (turtlesim/Pose, Odometry) are taken
+        as they are. In a run with a fast clock, time is the clock's.
+
+    How to fix
+        Distance is speed times time, an angle is `angular.z` times time, in radians: a quarter turn is
+        `math.pi / 2`. Publish at a steady rate while it has to move, and a zero velocity at the end.
+    """
+    found = track(run, params.topic, params.hold_s)
+    if found is None:
+        verdict, figures = _nothing(package, run, params), ""
+    elif found.fault:
+        message = f"the messages on {params.topic} {found.fault}"
+        verdict, figures = unjudged(message, hint=f"rostopic info {params.topic} shows their type"), ""
+    else:
+        verdict, figures = _judged(found, run, params)
+    span = EvidenceCitation(evidence=run.evidence, topic=params.topic)
+    return verdict.model_copy(
+        update={
+            "expected": f"a way through {listed(map(spot, params.points))}, within {metres(params.tolerance_m)}",
+            "measured": verdict.measured or figures or (found.fault if found else "no path"),
+            "citations": (*verdict.citations, span),
+        }
+    )
+
+
+def _nothing(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
+    if run_seconds(run) is None:
+        return inconclusive("the run's fast clock was not recorded", hint="grade again")
+    return no_message(package, run, params.topic)
+
+
+def _judged(found: Track, run: Run, params: PathParams) -> tuple[Verdict, str]:
+    taken = relative(found.path) if params.relative else list(found.path)
+    course = followed(taken, params.way.points, params.tolerance_m)
+    figures = measured(taken, course, params.way)
+    if course.done:
+        count = f"{len(params.points)} points" if len(params.points) > 1 else "its point"
+        return passed(f"the path passes {count} within {number(params.tolerance_m)} m"), figures
+    words = what_is_wrong(taken, params.way, course, mirror=params.relative)
+    nearly = followed(taken, params.way.points, 2 * params.tolerance_m).done
+    return _excused(failed(words.message, hint=words.hint), run, nearly=nearly), figures
+
+
+def _excused(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
+    """Where the machine itself was late, a robot that only just strays may have strayed with it."""
+    late_ms = lateness_ms(run, run.start_ns, run.end_ns)[2]
+    if late_ms < LATE_MS or not nearly:
+        return verdict
+    message = f"{verdict.message}; but the grading machine was late itself, by up to {late_ms:.0f} ms"
+    return inconclusive(message, hint="grade again while the machine has less to do")

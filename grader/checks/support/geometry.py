@@ -1,0 +1,142 @@
+"""Ways in the plane: where velocities lead, and how far a path strays from the way that it should take."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+SAMPLE_M = 0.02
+SAMPLES_MAX = 2000
+
+Point = tuple[float, float]
+
+
+class Pose(NamedTuple):
+    """Metres and radians, at a time in seconds."""
+
+    time_s: float
+    x: float
+    y: float
+    heading: float = 0.0
+
+    @property
+    def point(self) -> Point:
+        return self.x, self.y
+
+
+class Command(NamedTuple):
+    """A velocity in the robot's own frame: forward and left in m/s, to the left in rad/s."""
+
+    time_s: float
+    forward: float
+    left: float
+    turn: float
+
+    @property
+    def speed(self) -> float:
+        return math.hypot(self.forward, self.left)
+
+
+def moved(pose: Pose, command: Command, duration_s: float) -> Pose:
+    """Where a command leads in that time: exactly, along the arc that it describes."""
+    half = command.turn * duration_s / 2
+    chord = duration_s * (math.sin(half) / half if abs(half) > 1e-9 else 1.0)
+    cos, sin = math.cos(pose.heading + half), math.sin(pose.heading + half)
+    return Pose(
+        pose.time_s + duration_s,
+        pose.x + chord * (command.forward * cos - command.left * sin),
+        pose.y + chord * (command.forward * sin + command.left * cos),
+        pose.heading + 2 * half,
+    )
+
+
+def driven(commands: Sequence[Command], hold_s: float | None, end_s: float) -> list[Pose]:
+    """The path from the origin, heading along x: each command holds until the next one, and at most `hold_s`.
+
+    Without `hold_s` the last one holds until `end_s`.
+    """
+    path = [Pose(commands[0].time_s, 0.0, 0.0)] if commands else []
+    last_s = end_s if hold_s is None else math.inf
+    for command, next_s in zip(commands, [*(c.time_s for c in commands[1:]), last_s], strict=True):
+        until_s = next_s if hold_s is None else min(next_s, command.time_s + hold_s)
+        path += _samples(
+            path[-1]._replace(time_s=command.time_s), command, max(0.0, until_s - command.time_s)
+        )
+    return path
+
+
+def _samples(start: Pose, command: Command, duration_s: float) -> Iterator[Pose]:
+    """Close enough to each other that no arc strays unseen between two of them."""
+    count = min(SAMPLES_MAX, max(1, math.ceil(command.speed * duration_s / SAMPLE_M)))
+    for number in range(1, count + 1):
+        yield moved(start, command, duration_s * number / count)
+
+
+def relative(path: Sequence[Pose]) -> list[Pose]:
+    """The path as seen from its first pose."""
+    if not path:
+        return []
+    first = path[0]
+    cos, sin = math.cos(first.heading), math.sin(first.heading)
+    return [
+        Pose(
+            p.time_s,
+            (p.x - first.x) * cos + (p.y - first.y) * sin,
+            (p.y - first.y) * cos - (p.x - first.x) * sin,
+            p.heading - first.heading,
+        )
+        for p in path
+    ]
+
+
+def length_m(path: Sequence[Pose]) -> float:
+    return sum(math.dist(a.point, b.point) for a, b in pairwise(path))
+
+
+def off_m(point: Point, start: Point, end: Point) -> float:
+    """The distance of a point from the line between two others."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    square = dx * dx + dy * dy
+    share = ((point[0] - start[0]) * dx + (point[1] - start[1]) * dy) / square if square else 0.0
+    share = min(1.0, max(0.0, share))
+    return math.dist(point, (start[0] + share * dx, start[1] + share * dy))
+
+
+class Course(NamedTuple):
+    """How a path follows a way of several points.
+
+    `reached` is how many of the points it passed, in order; `strayed` the index of its first pose that is too far
+    from the way there, None where none is; `off_m` the largest distance from the way, up to then. `done` is set
+    where it passed them all and ends at the last.
+    """
+
+    reached: int
+    strayed: int | None
+    off_m: float
+    done: bool = False
+
+
+def followed(path: Sequence[Pose], points: Sequence[Point], tolerance_m: float) -> Course:
+    """Follow the way along the path: within the tolerance of each point, and of the line between two of them.
+
+    A pose may belong to more than one leg, near a corner or where the way crosses itself: all are followed.
+    """
+    legs = list(pairwise(points))
+    if not path or not math.dist(path[0].point, points[0]) <= tolerance_m:
+        return Course(0, 0 if path else None, 0.0)
+    on, reached, largest = {0}, 1, 0.0
+    for index, pose in enumerate(path):
+        near = {leg: d for leg in on if (d := off_m(pose.point, *legs[leg])) <= tolerance_m}
+        if not near:
+            return Course(reached, index, largest)
+        largest = max(largest, min(near.values()))
+        on = set(near)
+        for leg in range(min(on), len(legs)):
+            if leg in on and math.dist(pose.point, legs[leg][1]) <= tolerance_m:
+                reached = max(reached, leg + 2)
+                on |= {leg + 1} & set(range(len(legs)))
+    last = len(legs) - 1
+    done = last in on and math.dist(path[-1].point, points[-1]) <= tolerance_m
+    return Course(reached, None, largest, done)

@@ -1,0 +1,158 @@
+"""Where and how a path leaves the way that it should take, in a student's words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from grader.checks.support.geometry import Course, Point, Pose, followed, length_m, off_m
+from grader.checks.support.text import number
+
+MOVED_M = 0.01
+
+
+class Words(NamedTuple):
+    """What is wrong with a path, and what to do."""
+
+    message: str
+    hint: str
+
+
+class Way(NamedTuple):
+    """The points of a rubric; `added` where the start was put before them."""
+
+    points: tuple[Point, ...]
+    tolerance_m: float
+    added: bool
+
+    def name(self, index: int) -> str:
+        """`point 2 (2, 0)`, counted as the rubric counts."""
+        if index == 0 and self.added:
+            return "its start"
+        return f"point {index + (0 if self.added else 1)} {spot(self.points[index])}"
+
+
+def spot(point: Point) -> str:
+    return f"({number(round(point[0], 2))}, {number(round(point[1], 2))})"
+
+
+def metres(distance_m: float) -> str:
+    return f"{distance_m:.2f} m"
+
+
+def what_is_wrong(path: Sequence[Pose], way: Way, course: Course, *, mirror: bool) -> Words:
+    """The likeliest cause; `mirror` where the way is seen from the path's own start."""
+    if max(math.dist(p.point, path[0].point) for p in path) <= MOVED_M:
+        return Words(
+            "it never moves", "publish a linear.x that is not 0, again and again while it has to drive"
+        )
+    return (
+        (_mirrored(path, way) if mirror else None)
+        or _wrong_start(path, way, course)
+        or (_strays(path, way, course) if course.strayed is not None else _ends_short(path, way, course))
+    )
+
+
+def _mirrored(path: Sequence[Pose], way: Way) -> Words | None:
+    for sign_x, sign_y, message, hint in (
+        (1, -1, "the path is mirrored: it turns right for left", "a positive angular.z turns to the left"),
+        (-1, -1, "the path is driven backwards", "a positive linear.x drives forward"),
+        (-1, 1, "the path is driven backwards and mirrored", "a positive linear.x drives forward"),
+    ):
+        other = [p._replace(x=sign_x * p.x, y=sign_y * p.y) for p in path]
+        if followed(other, way.points, way.tolerance_m).done:
+            return Words(message, hint)
+    return None
+
+
+def _wrong_start(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
+    if course.reached:
+        return None
+    apart = metres(math.dist(path[0].point, way.points[0]))
+    return Words(
+        f"it starts at {spot(path[0].point)}, {apart} from {way.name(0)}", "bring it to the start first"
+    )
+
+
+def _strays(path: Sequence[Pose], way: Way, course: Course) -> Words:
+    peak, far_m = _peak(path, way, course)
+    allowed = f"{number(way.tolerance_m)} m are allowed"
+    where = f"at {spot(peak.point)}, {_after(path, peak)}"
+    if course.reached == len(way.points):
+        apart = metres(math.dist(peak.point, way.points[-1]))
+        message = f"it passes every point, and goes on: it is {apart} from the last {where}"
+        return Words(message, f"publish a zero velocity once you are there; {allowed}")
+    start, end = way.points[course.reached - 1], way.points[course.reached]
+    if course.reached > 1 and _beyond(peak.point, way.points[course.reached - 2], start, way.tolerance_m):
+        message = (
+            f"it drives {metres(math.dist(peak.point, start))} past {way.name(course.reached - 1)} {where}"
+        )
+        return Words(message, f"turn sooner, or drive slower or for less time; {allowed}")
+    if course.reached + 1 < len(way.points) and _cuts(peak.point, start, end, way.points[course.reached + 1]):
+        message = (
+            f"it turns off {metres(_short(peak.point, start, end))} before {way.name(course.reached)} {where}"
+        )
+        return Words(message, f"drive on to the point before you turn; {allowed}")
+    line = f"{way.name(course.reached - 1)} to {way.name(course.reached)}"
+    return Words(f"it strays {metres(far_m)} from the line from {line}, {where}", f"only {allowed}")
+
+
+def _ends_short(path: Sequence[Pose], way: Way, course: Course) -> Words:
+    goal = min(course.reached, len(way.points) - 1)
+    left = metres(math.dist(path[-1].point, way.points[goal]))
+    every = course.reached == len(way.points)
+    passed = "it passes every point" if every else f"it passes {course.reached} of {len(way.points)} points"
+    message = f"{passed} and ends at {spot(path[-1].point)}, {left} from {way.name(goal)}"
+    if every:
+        return Words(message, "publish a zero velocity once you are at the last point")
+    return Words(message, "drive longer, or let the node live until it is there")
+
+
+def _peak(path: Sequence[Pose], way: Way, course: Course) -> tuple[Pose, float]:
+    """Where it is farthest off, from where it strayed until it comes back to this part of the way."""
+    index = min(course.reached, len(way.points) - 1)
+    line = way.points[index - 1], way.points[index]
+    peak, far_m = path[course.strayed or 0], 0.0
+    for pose in path[course.strayed or 0 :]:
+        distance_m = off_m(pose.point, *line)
+        if distance_m <= way.tolerance_m:
+            break
+        if distance_m > far_m:
+            peak, far_m = pose, distance_m
+    return peak, far_m
+
+
+def _beyond(point: Point, start: Point, end: Point, tolerance_m: float) -> bool:
+    """Straight on behind the end of a line."""
+    along, aside = _along(point, start, end)
+    return along > math.dist(start, end) and abs(aside) <= tolerance_m
+
+
+def _cuts(point: Point, start: Point, end: Point, following: Point) -> bool:
+    """Off the line before its end, to the side where the way goes on."""
+    along, aside = _along(point, start, end)
+    return 0 < along < math.dist(start, end) and aside * _along(following, start, end)[1] > 0
+
+
+def _short(point: Point, start: Point, end: Point) -> float:
+    return math.dist(start, end) - _along(point, start, end)[0]
+
+
+def _along(point: Point, start: Point, end: Point) -> tuple[float, float]:
+    """How far along the line through two points, and how far to the left of it (m)."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    length = math.hypot(dx, dy)
+    x, y = point[0] - start[0], point[1] - start[1]
+    return (x * dx + y * dy) / length, (y * dx - x * dy) / length
+
+
+def _after(path: Sequence[Pose], pose: Pose) -> str:
+    moving = next((p for p in path if math.dist(p.point, path[0].point) > MOVED_M), path[0])
+    return f"{max(0.0, pose.time_s - moving.time_s):.1f} s after it set off"
+
+
+def measured(path: Sequence[Pose], course: Course, way: Way) -> str:
+    """The figures of a path in one line."""
+    off = metres(course.off_m) if course.strayed is None else metres(_peak(path, way, course)[1])
+    return f"{off} off at most, {metres(length_m(path))} long, {course.reached} of {len(way.points)} points"
