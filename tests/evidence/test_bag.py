@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import struct
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -142,3 +143,23 @@ def test_a_folder_stands_for_its_bags_too(tmp_path):
     (tmp_path / "evidence").mkdir()
     write_bag(tmp_path / "evidence" / "lab.bag", COUNT)
     assert list(load_evidence([tmp_path])) == ["lab"]
+
+
+WRITE = """
+import sys, rosbag, rospy
+from std_msgs.msg import Int8
+with rosbag.Bag(sys.argv[1], "w", compression=sys.argv[2], chunk_threshold=2000) as bag:
+    for n in range(300):
+        bag.write("/n", Int8(n % 128), rospy.Time(1000, n * 1000000))
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
+def test_what_rosbag_itself_writes_is_read(tmp_path, compression):
+    path = tmp_path / "lab.bag"
+    subprocess.run(["/usr/bin/python3", "-c", WRITE, str(path), compression], check=True, timeout=60)
+    (channel,) = load_run(path).channels
+    assert (channel.topic, channel.type, channel.callerid) == ("/n", "std_msgs/Int8", "")
+    assert channel.data == tuple(n % 128 for n in range(300))
+    assert channel.times_ns == tuple(1_000_000_000_000 + n * 1_000_000 for n in range(300))

@@ -27,7 +27,9 @@ with rosbag.Bag(sys.argv[1]) as bag:
     print(json.dumps({
         "topics": {t: [i.msg_type, i.message_count] for t, i in info.topics.items()},
         "md5": info.msg_types,
-        "headers": sorted([c.topic, c.header["callerid"].decode(), c.header["latching"].decode()] for c in bag._get_connections()),
+        "headers": sorted(
+            [c.topic, c.header["callerid"].decode(), c.header["latching"].decode()] for c in bag._get_connections()
+        ),
         "values": [[t, str(getattr(m, "data", "")), s.to_nsec()] for t, m, s in bag.read_messages()],
     }))
 """
