@@ -48,7 +48,7 @@ async def _call(call: Call, arena: ArenaSession) -> None:
         "type": call.type,
         "value": call.request,
     }
-    answer = await arena.call(ANSWER_S, service=call.service, data=data, record=record)
+    answer = await arena.call(ANSWER_S, service=call.service, type=call.type, data=data, record=record)
     if "data" not in answer:
         arena.note(_answer(call, None, answer["error"]))
         return

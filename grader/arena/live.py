@@ -34,6 +34,7 @@ class Live:
     ended: set[str] = field(default_factory=set)
     helpers: set[str] = field(default_factory=set)
     nodes: set[str] = field(default_factory=set)
+    helper_nodes: set[str] = field(default_factory=set)
     registered: set[str] = field(default_factory=set)
     first_node_s: float = 0.0
     services: set[str] = field(default_factory=set)
@@ -47,12 +48,14 @@ class Live:
     graphs: int = 0
     last_line_s: float = 0.0
 
-    def message(self, topic: str, count: int, now_s: float) -> None:
+    def message(self, topic: str, count: int, now_s: float, *, active: bool = True) -> None:
+        """Messages came, of the student's (`active`) or of a program that runs beside."""
         seen = self.topics[topic]
         seen.first_s = seen.first_s or now_s
         seen.last_s = now_s
         seen.count += count
-        self.active(now_s)
+        if active:
+            self.active(now_s)
 
     def active(self, now_s: float) -> None:
         """Something of the student's happened."""
@@ -62,7 +65,8 @@ class Live:
         """The master's nodes of the student's, and the processes that nodes belong to."""
         self.graph_changed_s = now_s
         self.registered |= set(processes.values())
-        own = {n for n in nodes if processes.get(n) not in self.helpers}
+        self.helper_nodes |= {n for n in nodes if processes.get(n) in self.helpers}
+        own = {n for n in nodes if n not in self.helper_nodes}
         if own - self.nodes:
             self.first_node_s = self.first_node_s or now_s
             self.active(now_s)

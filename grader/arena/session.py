@@ -171,7 +171,8 @@ class ArenaSession:
         fields = self._channels[frame.channel]
         self._writer.message(**fields, log_time_ns=frame.time_ns, data=frame.data)
         if not is_grader_node(fields["callerid"]):
-            self.live.message(fields["topic"], 1, time.monotonic())
+            own = fields["callerid"] not in self.live.helper_nodes
+            self.live.message(fields["topic"], 1, time.monotonic(), active=own)
 
     def _event(self, frame: Frame) -> None:
         topic, record = frame.fields["topic"], frame.fields["record"]
@@ -182,7 +183,8 @@ class ArenaSession:
             self.live.graph(nodes, record["processes"], time.monotonic())
             self.live.services = set(record["services"])
         elif topic == "/grader/console":
-            self.live.printed(record["line"], time.monotonic())
+            if record["process"] not in self.live.helpers:
+                self.live.printed(record["line"], time.monotonic())
         elif topic == "/grader/process" and record["event"] == "exit":
             self._exited(record)
         elif topic == "/grader/param" and not is_grader_node(record["caller_id"]):

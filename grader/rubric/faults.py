@@ -11,10 +11,14 @@ from typing import Annotated, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from grader.rubric.model import NAME_PATTERN
+from grader.rubric.model import NAME_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
 from grader.rubric.source import Fault, KeyPath
 
-NAME_RULE = "must be lower-case letters, digits and hyphens, beginning with a letter"
+PATTERN_RULES = {
+    NAME_PATTERN: "must be lower-case letters, digits and hyphens, beginning with a letter",
+    TYPE_PATTERN: "must be a type like std_msgs/String",
+    PROGRAM_PATTERN: "must be a program like turtlesim/turtlesim_node",
+}
 MUST_BE = {
     "string_type": "text",
     "float_type": "a number",
@@ -103,7 +107,7 @@ def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str
 
 
 def _pattern(pattern: str) -> str:
-    return NAME_RULE if pattern == NAME_PATTERN else f"must match {pattern}"
+    return PATTERN_RULES.get(pattern, f"must match {pattern}")
 
 
 def _literal(value: object, expected: str) -> str:

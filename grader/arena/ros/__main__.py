@@ -119,7 +119,14 @@ class Arena:
         def ask():
             request = base64.b64decode(command["data"])
             try:
-                data = services.call(service, uri, self._actor.caller_id, request, command["timeout_s"])
+                data = services.call(
+                    service,
+                    uri,
+                    self._actor.caller_id,
+                    type_=command["type"],
+                    request=request,
+                    timeout_s=command["timeout_s"],
+                )
             except services.ProtocolError as error:
                 self._wire.status("answer", id=command["id"], error=str(error))
             else:

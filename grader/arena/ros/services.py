@@ -18,8 +18,14 @@ def probe(service, uri, caller_id, timeout_s):
     return header["type"]
 
 
-def call(service, uri, caller_id, request, timeout_s):
-    """The bytes of the response; raise ProtocolError, with the service's own words, for anything else."""
+def call(service, uri, caller_id, *, type_, request, timeout_s):
+    """The bytes of the response; raise ProtocolError, with the service's own words, for anything else.
+
+    A service of another type would wait for bytes that never come, so it is asked first.
+    """
+    found = probe(service, uri, caller_id, timeout_s)
+    if found != type_:
+        raise ProtocolError("the service is of type {}".format(found))
     with _connected(service, uri, caller_id, timeout_s) as sock:
         try:
             _header(sock)
