@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.registry import NoParams, check
-from grader.checks.support.text import seconds, shown
+from grader.checks.registry import check
+from grader.checks.support.text import listed, near_names, seconds, shown
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
+from grader.model.record import Record
 from grader.model.verdict import (
     EvidenceCitation,
     FileCitation,
+    Status,
     Verdict,
     failed,
     inconclusive,
@@ -21,6 +24,7 @@ from grader.model.verdict import (
 )
 
 CATKIN_MAKE = "catkin_make"
+EXPECTED = "catkin_make exits with 0"
 INSTALL_ROS = (
     "install ROS 1 with `make setup`, or `apt-get install python3-rospy python3-roslaunch rosbash catkin`, "
     "and grade again"
@@ -41,6 +45,12 @@ def run_hint(reason: str) -> str:
     return INSTALL_ROS if "no ROS" in reason else "grade the submission again"
 
 
+class BuildParams(Record):
+    """`scripts` have to be there to run after the build, paths as the handout gives them."""
+
+    scripts: tuple[str, ...] = ()
+
+
 class BuildError(NamedTuple):
     """The first error that the build printed; `kind` is `cmake`, `compiler` or `other`."""
 
@@ -50,13 +60,14 @@ class BuildError(NamedTuple):
     line: int | None
 
 
-@check("build", params=NoParams)
-def build(package: PackageFacts, build: Run) -> Verdict:
+@check("build", params=BuildParams)
+def build(package: PackageFacts, build: Run, params: BuildParams) -> Verdict:
     """The package builds.
 
     What it checks
         That `catkin_make` succeeds in a fresh workspace which holds this package, and the packages of the
-        same repository that it depends on.
+        same repository that it depends on. Where the lab asks for scripts, that each is there to run
+        afterwards.
 
     Why it matters on a robot
         On the robot the workspace is built from what was pushed. What only builds beside files on your own
@@ -64,42 +75,76 @@ def build(package: PackageFacts, build: Run) -> Verdict:
 
     How it is measured
         By the exit code of `catkin_make`; the first error that it printed is quoted. Nodes are run all the
-        same, from their sources.
+        same, from their sources. A script is there where `catkin_install_python` puts it into `devel/lib`,
+        or where `rosrun` finds it in the package; whether it has its executable bit counts elsewhere.
 
     How to fix
         Clone your repository into a new workspace, run `catkin_make`, and mend the first error: the later
         ones often follow from it.
     """
-    expected = "catkin_make exits with 0"
+    scripts = f", and {listed(params.scripts)} there to run" if params.scripts else ""
+    verdict = judge_build(package, build)
+    if verdict.status is Status.PASS:
+        verdict = _lost_scripts(package, params.scripts) or verdict
+    return verdict.model_copy(update={"expected": f"{verdict.expected or EXPECTED}{scripts}"})
+
+
+def judge_build(package: PackageFacts, build: Run) -> Verdict:
+    """Whether `catkin_make` succeeded, and if not, why."""
     found = {e.event: (t, e) for t, e in build.processes if e.name == CATKIN_MAKE}
     if "start" not in found and "exit" not in found:
         reason = build.metadata.get("not_run") or (build.outcome.detail if build.outcome else "")
         message = f"the package was not built{': ' + reason if reason else ''}"
-        return inconclusive(message, expected=expected, measured="not built", hint=run_hint(reason))
+        return inconclusive(message, expected=EXPECTED, measured="not built", hint=run_hint(reason))
     if "exit" not in found:
-        return inconclusive("the recording of the build was cut short", expected=expected, hint="grade again")
+        return inconclusive("the recording of the build was cut short", expected=EXPECTED, hint="grade again")
     end_ns, end = found["exit"]
     took = seconds(end_ns - found.get("start", found["exit"])[0])
     if end.exit_code == 0:
-        return passed("catkin_make succeeded", expected=expected, measured=f"exit code 0 after {took}")
+        return passed("catkin_make succeeded", expected=EXPECTED, measured=f"exit code 0 after {took}")
     if end.stopped_by is not None:
         return failed(
             f"catkin_make had not finished after {took} and was stopped",
-            expected=expected,
+            expected=EXPECTED,
             measured=f"stopped after {took}",
             hint="look for a command in CMakeLists.txt that waits or never ends",
         )
+    return _broken_build(package, build, end.exit_code)
+
+
+def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> Verdict:
     error = _first_error([c.line for _, c in build.console if c.process == CATKIN_MAKE])
     place = _place(error, package)
     explained = package.manifest is None or (error is not None and error.kind == "cmake")
     verdict = unjudged if explained else failed
     return verdict(
         f"catkin_make failed: {error.text}" if error else "catkin_make failed without naming an error",
-        expected=expected,
-        measured=f"exit code {end.exit_code}",
+        expected=EXPECTED,
+        measured=f"exit code {exit_code}",
         hint="run catkin_make in a fresh clone and mend the first error that it prints",
         citations=(place or EvidenceCitation(evidence=build.evidence, topic="/grader/console"),),
     )
+
+
+def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | None:
+    """Scripts that are nowhere in the package: their own criteria say so first."""
+    there = {PurePosixPath(f.path).name: f for f in package.files if not is_product(f.path)}
+    lost = [s for s in scripts if PurePosixPath(s).name not in there]
+    if not lost:
+        return None
+    near = [there[n].path for s in lost for n in near_names(PurePosixPath(s).name, there)]
+    seen = f"; there is {listed(dict.fromkeys(near))}" if near else ""
+    return unjudged(
+        f"catkin_make succeeded, but there is no {listed(lost, 'or')} to run{seen}",
+        expected=EXPECTED,
+        measured=f"rosrun finds no {listed((PurePosixPath(s).name for s in lost), 'or')}",
+        hint=f"add {listed(lost)} to the package, then git add, commit and push",
+    )
+
+
+def is_product(path: str) -> bool:
+    """Whether a build made it: nothing of what was handed in counts there."""
+    return PurePosixPath(path).parts[0] in {"build", "devel", "install"}
 
 
 def _first_error(lines: Sequence[str]) -> BuildError | None:

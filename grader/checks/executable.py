@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.build import CATKIN_MAKE
+from grader.checks.build import CATKIN_MAKE, is_product
 from grader.checks.registry import check
 from grader.checks.support.installing import PYTHON, installed, is_found, names_script
 from grader.checks.support.text import listed, near_names, shown
@@ -100,7 +100,7 @@ def find_script(package: PackageFacts, path: str) -> SourceFile | None:
 def copies_of(package: PackageFacts, path: str) -> list[SourceFile]:
     """All files of this name in the package, whatever their folder; what a build made is none of them."""
     name = PurePosixPath(path).name
-    return [f for f in package.files if PurePosixPath(f.path).name == name and not _is_product(f.path)]
+    return [f for f in package.files if PurePosixPath(f.path).name == name and not is_product(f.path)]
 
 
 def has_wrapper(package: PackageFacts, build: Run, path: str) -> bool:
@@ -111,7 +111,7 @@ def has_wrapper(package: PackageFacts, build: Run, path: str) -> bool:
 
 
 def _missing(package: PackageFacts, path: str, expected: str) -> Verdict:
-    names = {PurePosixPath(f.path).name: f.path for f in package.files if not _is_product(f.path)}
+    names = {PurePosixPath(f.path).name: f.path for f in package.files if not is_product(f.path)}
     wanted = PurePosixPath(path)
     near = [names[n] for n in near_names(wanted.name, names)]
     near += [p for n, p in names.items() if n == wanted.stem and p not in near]
@@ -170,7 +170,3 @@ def _first_line(file: SourceFile) -> str:
 
 def _interpreter(file: SourceFile) -> str:
     return file.shebang.interpreter if file.shebang else "its target's interpreter"
-
-
-def _is_product(path: str) -> bool:
-    return PurePosixPath(path).parts[0] in {"build", "devel", "install"}
