@@ -237,3 +237,39 @@ def test_a_package_and_a_recording_together(tmp_path):
     assert (code, set(statuses(result).values())) == (0, {"pass"})
     assert {p.name for p in (kept / "evidence").iterdir()} == {"package.mcap", "mine.bag"}
     assert result["submission"]["package"] == "lab1"
+
+
+GENERAL = """\
+  - {id: words, title: w, points: 20, check: message, scenario: mine,
+     with: {topic: /hello, template: "hello world {seconds}"}}
+  - {id: bounds, title: b, points: 20, check: field-bounds, scenario: mine,
+     with: {topic: /cmd_vel, field: linear.x, min: 0, max: 1}}
+  - {id: way, title: p, points: 30, check: path, scenario: mine,
+     with: {topic: /cmd_vel, points: [[2, 0]], tolerance_m: 0.2}}
+  - {id: latched, title: l, points: 30, check: latched, scenario: mine, with: {topic: /goal}}
+"""
+DRIVE = [{"linear": {"x": 1.0}}] * 20 + [{}] * 5
+HELLO = Topic("/hello", "std_msgs/String", [f"hello world {100 + n / 10}" for n in range(60)])
+GOAL = Topic("/goal", "std_msgs/String", ["there"], latching=True)
+
+
+@pytest.fixture
+def general(tmp_path: Path) -> Path:
+    (tmp_path / "general.yaml").write_text(RUBRIC.split("criteria:\n", maxsplit=1)[0] + "criteria:\n" + GENERAL)
+    return tmp_path / "general.yaml"
+
+
+@pytest.mark.parametrize("callerid", ["/talker", None])
+def test_the_general_checks_judge_a_bag(tmp_path, general, callerid):
+    topics = [HELLO, Topic("/cmd_vel", "geometry_msgs/Twist", DRIVE), GOAL._replace(callerid="/goal")]
+    bag = write_bag(tmp_path / "lab.bag", *(t._replace(callerid=callerid) for t in topics[:2]), topics[2])
+    code, result, _ = graded(tmp_path, bag, general)
+    assert (code, result["points"]) == (0, 100)
+
+
+def test_the_general_checks_find_faults_in_a_bag(tmp_path, general):
+    fast = Topic("/cmd_vel", "geometry_msgs/Twist", [{"linear": {"x": 3.0}}] * 20 + [{}] * 5)
+    still = HELLO._replace(values=["hello world 100"] * 60)
+    bag = write_bag(tmp_path / "lab.bag", still, fast, GOAL._replace(latching=False))
+    _, result, _ = graded(tmp_path, bag, general)
+    assert statuses(result) == {"words": "fail", "bounds": "fail", "way": "fail", "latched": "inconclusive"}

@@ -30,7 +30,7 @@ class MessageParams(Record):
     template: Annotated[str, Field(min_length=1)]
 
 
-@check("message", params=MessageParams)
+@check("message", params=MessageParams, messages_only=True)
 def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
     """Each message says what the handout asks, and tells the time.
 
