@@ -17,6 +17,7 @@ FAMILIES = (
     "install",
     "launch",
     "layout",
+    "logs",
     "launch_xml",
     "launch_runs",
     "message",

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from grader.checks.registry import check
 from grader.checks.support.launching import find_launch, node_slip, unreadable
 from grader.checks.support.process import lives
-from grader.checks.support.text import listed, plural, shown
+from grader.checks.support.roslaunch import roslaunch_error
+from grader.checks.support.text import listed, plural
 from grader.evidence.events import GraphEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, PackageFacts
@@ -21,8 +22,6 @@ from grader.model.verdict import (
     inconclusive,
     passed,
 )
-
-_ERRORS = ("ERROR: cannot launch", "RLException", "Invalid ", "ERROR:", "process has died", "roslaunch:")
 
 
 class LaunchConnectsParams(Record):
@@ -59,7 +58,7 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
     nodes = run.student_nodes()
     verdict = (
         unreadable(package, file, params.launch)
-        or _not_run(run)
+        or not_run(run)
         or _names_missing(nodes, file, params)
         or (None if found else _unconnected(package, file, run, params))
         or passed(f"roslaunch connects {found[0][0]} and {found[0][1]} over {params.topic}")
@@ -87,7 +86,8 @@ def connections(run: Run, topic: str) -> Iterator[tuple[str, str]]:
                 yield pair
 
 
-def _not_run(run: Run) -> Verdict | None:
+def not_run(run: Run) -> Verdict | None:
+    """Nothing was started at all."""
     if lives(run) or run.graph:
         return None
     return inconclusive("roslaunch was not run", hint="grade again")
@@ -108,7 +108,7 @@ def _unconnected(
     package: PackageFacts, file: LaunchFile | None, run: Run, params: LaunchConnectsParams
 ) -> Verdict:
     """Why no two nodes are connected: a wrong attribute, an error of roslaunch's, or what the graph shows."""
-    said = _roslaunch_error(run)
+    said = roslaunch_error(run)
     quoted = f"; roslaunch says: {said}" if said else ""
     slips = (
         (node_slip(package, node.model_copy(update={"file": file.path}), said) for node in file.nodes)
@@ -124,29 +124,26 @@ def _unconnected(
         message = f"{up}; the file declares {plural(len(file.nodes) if file else 0, 'node')}{quoted}"
         hint = "give the talker and the listener a <node> each, and try each script alone with rosrun"
         return failed(message, hint=hint)
-    return _over_another_topic(run, params, quoted)
+    return over_another_topic(run, params.topic, quoted)
 
 
-def _over_another_topic(run: Run, params: LaunchConnectsParams, quoted: str) -> Verdict:
+def over_another_topic(run: Run, topic: str, quoted: str = "") -> Verdict:
+    """Why nodes that are there are not connected: other topics, other types, or an end that is missing."""
     others = {
         c.topic
         for _, event in run.graph
         for c in event.connections
-        if c.topic not in {params.topic, "/rosout"} and run.is_student_node(c.subscriber)
+        if c.topic not in {topic, "/rosout"} and run.is_student_node(c.subscriber)
     }
     if others:
-        message = f"the nodes are connected over {listed(sorted(others))}, not over {params.topic}"
-        return failed(
-            message + quoted, hint=f"both have to use {params.topic}; look for a <remap> or a namespace"
-        )
-    publishers, subscribers = (_nodes_on(run, params.topic, end) for end in ("publishers", "subscribers"))
+        message = f"the nodes are connected over {listed(sorted(others))}, not over {topic}"
+        return failed(message + quoted, hint=f"both have to use {topic}; look for a <remap> or a namespace")
+    publishers, subscribers = (_nodes_on(run, topic, end) for end in ("publishers", "subscribers"))
     if publishers and subscribers:
-        message = (
-            f"{listed(publishers)} and {listed(subscribers)} are both on {params.topic}, but not connected"
-        )
+        message = f"{listed(publishers)} and {listed(subscribers)} are both on {topic}, but not connected"
         return failed(message + quoted, hint="do both use the same message type?")
     lacking = "publishes on" if not publishers else "subscribes to"
-    message = f"{listed(run.student_nodes())} are not connected: none {lacking} {params.topic}"
+    message = f"{listed(run.student_nodes())} are not connected: none {lacking} {topic}"
     return failed(message + quoted, hint="launch a talker and a listener")
 
 
@@ -156,10 +153,3 @@ def _nodes_on(run: Run, topic: str, end: str) -> tuple[str, ...]:
 
     found = (n for _, event in run.graph for n in nodes(event) if run.is_student_node(n))
     return tuple(dict.fromkeys(found))
-
-
-def _roslaunch_error(run: Run) -> str:
-    """The first line in which roslaunch, or a node that it started, says what is wrong."""
-    lines = [c.line for _, c in run.console if c.line.strip()]
-    found = (line for mark in _ERRORS for line in lines if mark in line)
-    return shown(next(found, ""))

@@ -1,0 +1,194 @@
+"""Whether roslaunch brings up what the launch file names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import PurePosixPath
+from typing import Annotated, NamedTuple
+
+from pydantic import Field
+
+from grader.checks.launch import connections, not_run, over_another_topic
+from grader.checks.launch_params import params_misplaced
+from grader.checks.launch_xml import missing_node
+from grader.checks.registry import check
+from grader.checks.support.launching import (
+    Slip,
+    find_launch,
+    nodes_of_program,
+    nodes_of_script,
+    refusals,
+    unreadable,
+)
+from grader.checks.support.names import GlobalName
+from grader.checks.support.roslaunch import is_exact, nodes_up, quoted, why_died, why_not_up
+from grader.checks.support.text import listed, near_names, plural
+from grader.evidence.run import Run
+from grader.model.package import LaunchFile, LaunchNode, PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import Citation, EvidenceCitation, FileCitation, Verdict, failed, passed, unjudged
+
+
+class LaunchRunsParams(Record):
+    """`launch` is the file's name, in whatever folder.
+
+    `scripts` are the student's; `nodes` maps names to the packages that they have to come from; `programs` are
+    `package/program` under any name; `params` have to be where the node of the first program reads them.
+    """
+
+    launch: str
+    topic: GlobalName | None = None
+    scripts: tuple[str, ...] = ()
+    nodes: Annotated[dict[str, str], Field(default_factory=dict)]
+    programs: tuple[str, ...] = ()
+    params: Annotated[dict[str, int | float | str], Field(default_factory=dict)]
+
+
+class Wanted(NamedTuple):
+    """A node that has to come up, and whether it is a script of the student's."""
+
+    node: LaunchNode
+    own: bool
+
+
+@check("launch-runs", params=LaunchRunsParams)
+def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Verdict:
+    """The launch file brings up its nodes under the names that it gives them.
+
+    What it checks
+        That `roslaunch` brings up every node that the lab asks for under the name in the launch file, that
+        two of them are connected over the topic where one is asked for, and that parameters are where the
+        node reads them.
+
+    Why it matters on a robot
+        The launch file's names are those that all other tools and files go by. A node that comes up under
+        another one, or in another namespace, is there and talks to nobody.
+
+    How it is measured
+        `roslaunch` runs the file; names come from the master, connections from the subscribing node itself.
+        `<arg>`, `ns` and `<group>` are worked out, and `$(anon x)` may be followed by anything. Names given to
+        `init_node` do not matter. Parameters are read as they were when the node started.
+
+    How to fix
+        `roslaunch <package> <file>` prints in red what it could not start; `rosnode list`, `rostopic info
+        <topic>` and `rosparam list` show what came up. `output="screen"` shows what a node prints.
+    """
+    what = [
+        *(PurePosixPath(s).name for s in params.scripts),
+        *(f"/{n}" for n in params.nodes),
+        *params.programs,
+    ]
+    over = f", connected over {params.topic}" if params.topic else ""
+    expected = f"{params.launch} brings up {listed(what) or 'its nodes'} under the file's names{over}"
+    file = find_launch(package, params.launch)
+    nodes = run.student_nodes()
+    measured = f"{plural(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node came up"
+    if file is None or file.fault is not None:
+        verdict = unreadable(package, file, params.launch) or failed(f"{params.launch} cannot be read")
+        verdict = verdict.model_copy(update={"unjudged": bool(params.scripts)})
+        return verdict.model_copy(
+            update={"expected": expected, "measured": "no launch file that can be read"}
+        )
+    verdict = not_run(run) or _unnamed(package, file, params) or _judged(package, file, run, params)
+    place: tuple[Citation, ...] = (FileCitation(file=file.path, line=1),)
+    graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
+    citations = verdict.citations or (*place, graph)
+    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
+
+
+def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams) -> Verdict:
+    """By what came up. The file names all that is wanted."""
+    wanted = list(_wanted(package, file, params))
+    lacking = next((w for w in wanted if not nodes_up(run, w.node)), None)
+    if lacking is not None:
+        return _not_up(package, file, run, lacking)
+    names = [name for w in wanted for name in nodes_up(run, w.node)]
+    if params.topic and not _connected(run, params.topic, names):
+        return _unconnected(package, run, wanted, params.topic)
+    if params.programs and params.params:
+        program = nodes_of_program(file, params.programs[0])[0]
+        misplaced = params_misplaced(run, file, nodes_up(run, program), params.params)
+        if misplaced is not None:
+            return misplaced
+    over = f", connected over {params.topic}" if params.topic else ""
+    return passed(f"roslaunch brings up {listed(dict.fromkeys(names))}{over}")
+
+
+def _wanted(package: PackageFacts, file: LaunchFile, params: LaunchRunsParams) -> Iterator[Wanted]:
+    for script in params.scripts:
+        nodes = nodes_of_script(package, file, script)
+        yield from (Wanted(node, own=True) for node in [n for n in nodes if not n.uncertain] or nodes[:1])
+    for name in params.nodes:
+        yield from (Wanted(node, own=node.pkg == package.name) for node in _named(file, name)[:1])
+    for program in params.programs:
+        yield Wanted(nodes_of_program(file, program)[0], own=False)
+
+
+def _unnamed(package: PackageFacts, file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
+    """The file does not even name a node that is wanted. For scripts that is launch-xml's to judge."""
+    for script in params.scripts:
+        if verdict := missing_node(package, file, script):
+            return verdict.model_copy(update={"unjudged": True})
+    for name, pkg in params.nodes.items():
+        if verdict := _wrong_name(file, name, pkg):
+            return verdict
+    for program in params.programs:
+        if not nodes_of_program(file, program):
+            pkg, _, name = program.partition("/")
+            hint = f'add <node pkg="{pkg}" type="{name}" name="…"/>'
+            seen = f"; it has {listed(f'{n.pkg}/{n.type}' for n in file.brings)}" if file.brings else ""
+            return failed(f"{file.path} has no <node> for {program}{seen}", hint=hint)
+    return None
+
+
+def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
+    found = _named(file, name)
+    if any(n.pkg == pkg or "$(" in (n.pkg or "") for n in found):
+        return None
+    if found:
+        why = f'/{name.lstrip("/")} is a node of the package "{found[0].pkg}", not of {pkg}'
+        return Slip(found[0].file, found[0].line, why, f'write pkg="{pkg}"').verdict()
+    others = [n.full_name for n in file.brings]
+    near = near_names(f"/{name.lstrip('/')}", others) or tuple(others)
+    seen = f"; it has {listed(near)}" if near else ""
+    hint = f'write <node pkg="{pkg}" name="{name.lstrip("/")}" …/>'
+    return failed(f"{file.path} has no node /{name.lstrip('/')}{seen}", hint=hint)
+
+
+def _named(file: LaunchFile, name: str) -> list[LaunchNode]:
+    exact = [n for n in file.brings if n.full_name == f"/{name.lstrip('/')}"]
+    return exact or [n for n in file.brings if not is_exact(n) and "$(anon" not in n.full_name]
+
+
+def _not_up(package: PackageFacts, file: LaunchFile, run: Run, lacking: Wanted) -> Verdict:
+    """A slip of the file's first, then what roslaunch and the script say."""
+    if slip := next(refusals(package, file), None):
+        return slip.verdict(quoted(run)).model_copy(update={"unjudged": lacking.own})
+    node = lacking.node
+    absence = why_not_up(package, run, node)
+    name = node.full_name if is_exact(node) else f"the node of {node.type}"
+    verdict = unjudged if lacking.own and absence.of_script else failed
+    place = FileCitation(file=node.file or file.path, line=node.line)
+    return verdict(
+        f"{name} did not come up: {absence.why}", hint=absence.hint, citations=(*absence.citations, place)
+    )
+
+
+def _connected(run: Run, topic: str, names: list[str]) -> bool:
+    return any(
+        publisher in names and subscriber in names for publisher, subscriber in connections(run, topic)
+    )
+
+
+def _unconnected(package: PackageFacts, run: Run, wanted: list[Wanted], topic: str) -> Verdict:
+    """A node that died, the launch file's remaps and namespaces, or the scripts' own topics."""
+    for one in wanted:
+        if absence := why_died(package, run, one.node):
+            verdict = unjudged if one.own else failed
+            message = f"{one.node.full_name} came up, but before it was connected {absence.why}"
+            return verdict(message, hint=absence.hint, citations=absence.citations)
+    other = over_another_topic(run, topic)
+    moved = [w.node for w in wanted if w.node.remaps or w.node.namespace != "/"]
+    if moved or not all(w.own for w in wanted):
+        return other
+    return other.model_copy(update={"unjudged": True})
