@@ -1,0 +1,234 @@
+"""What a scenario can do beside running one script: parameters, several processes, services, other packages."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from grader.evidence.run import Run
+from grader.rubric.model import Call, Param, Probe, Scenario, Start, Until
+from tests.arena.support import SCRIPT, make_place, printed, run
+
+pytestmark = pytest.mark.ros
+SANDBOXES = ["auto", "none"]
+NODE = SCRIPT + "import rospy\n"
+SENDER = (
+    NODE
+    + "from std_msgs.msg import String\nrospy.init_node('sender', anonymous={})\n"
+    + "pub = rospy.Publisher('data', String, queue_size=10)\nrate = rospy.Rate(10)\n"
+    + "while not rospy.is_shutdown():\n    pub.publish(str(rospy.get_time()))\n    rate.sleep()\n"
+)
+SERVER = (
+    NODE
+    + "from std_srvs.srv import SetBool, SetBoolResponse\nfrom geometry_msgs.msg import Twist\n"
+    + "rospy.init_node('server')\n"
+    + "def answer(request):\n    if not request.data:\n        raise ValueError('not false')\n"
+    + "    return SetBoolResponse(True, 'done')\n"
+    + "rospy.Service('enable', SetBool, answer)\n"
+    + "rospy.Subscriber('cmd_vel', Twist, lambda m: print('x is', m.linear.x))\nrospy.spin()\n"
+)
+READER = NODE + "rospy.init_node('reader')\nprint(rospy.get_param('details'))\nrospy.set_param('/done', 5)\n"
+CONFIG = "details:\n  name: Ada\n  phone: 77777\n  weight: 1.5\n  digits: '0123'\n  flags: [true, 2]\n"
+
+
+def _run(tmp_path: Path, files: dict[str, str], scenario: Scenario, *, sandbox: str = "auto") -> Run:
+    with make_place(files, sandbox=sandbox) as place:
+        return run(place, scenario, tmp_path / "run.mcap")
+
+
+def _two(anonymous: bool) -> tuple[dict[str, str], Scenario]:
+    starts = (
+        Start(name="first", script="sender.py"),
+        Start(name="second", script="sender.py", after="first"),
+    )
+    scenario = Scenario(
+        title="two", start=starts, until=Until(messages={"/data": 15}, silent_s=3, first_message_s=10)
+    )
+    return {"scripts/sender.py": SENDER.format(anonymous)}, scenario
+
+
+@pytest.mark.parametrize("sandbox", SANDBOXES)
+def test_nodes_are_known_by_their_process(tmp_path: Path, sandbox: str) -> None:
+    seen = _run(tmp_path, *_two(anonymous=True), sandbox=sandbox)
+    (first,), (second,) = seen.student_nodes("first"), seen.student_nodes("second")
+    assert {first, second} == set(seen.student_nodes())
+    assert first != second
+    assert all(channel.messages for channel in seen.student_channels("/data"))
+    assert [e.stopped_by for _, e in seen.processes if e.event == "exit" and e.role == "student"] == [
+        "INT"
+    ] * 2
+
+
+@pytest.mark.parametrize("sandbox", SANDBOXES)
+def test_a_name_that_is_taken_over(tmp_path: Path, sandbox: str) -> None:
+    seen = _run(tmp_path, *_two(anonymous=False), sandbox=sandbox)
+    owners = [e.processes.get("/sender") for _, e in seen.graph if "/sender" in e.nodes]
+    assert owners.index("first") < owners.index("second")
+    assert seen.student_nodes("first") == seen.student_nodes("second") == ("/sender",)
+    ends = {e.name: e for _, e in seen.processes if e.event == "exit"}
+    assert (ends["first"].stopped_by, ends["second"].stopped_by) == (None, "INT")
+
+
+def test_nodes_of_roslaunch_belong_to_it(tmp_path: Path) -> None:
+    files = {
+        "scripts/sender.py": SENDER.format(False),
+        "launch/two.launch": '<launch><node pkg="lab" type="sender.py" name="one" />'
+        '<node pkg="lab" type="sender.py" name="two" ns="deep" /></launch>',
+    }
+    scenario = Scenario(
+        title="launch",
+        start=(Start(name="roslaunch", launch="two.launch"),),
+        until=Until(nodes=2, silent_s=10),
+    )
+    seen = _run(tmp_path, files, scenario)
+    assert set(seen.student_nodes("roslaunch")) == {"/one", "/deep/two"}
+    assert seen.outcome.outcome == "complete"
+
+
+@pytest.mark.parametrize("sandbox", SANDBOXES)
+def test_parameters_of_a_file_are_made_up(tmp_path: Path, sandbox: str) -> None:
+    params = (
+        Param(file="config/c.yaml", also=("details/name", "details/street")),
+        Param(name="/fixed", value={"a": 1}),
+        Param(name="guess", made_up="integer"),
+    )
+    scenario = Scenario(
+        title="params",
+        params=params,
+        start=(Start(name="reader", script="reader.py"),),
+        until=Until(quiet_s=5),
+    )
+    files = {"scripts/reader.py": READER, "config/c.yaml": CONFIG}
+    seen = _run(tmp_path, files, scenario, sandbox=sandbox)
+    set_by_us = {e.topic: (e.value, e.detail) for _, e in seen.actors if e.action == "param"}
+    values = {name: value for name, (value, _) in set_by_us.items()}
+    assert values["/fixed"] == {"a": 1}
+    assert values["/details/name"] != "Ada"
+    assert values["/details/phone"] not in {77777, values["/guess"]}
+    assert [type(values[f"/details/{n}"]) for n in ("name", "phone", "weight", "digits")] == [
+        str,
+        int,
+        float,
+        str,
+    ]
+    assert values["/details/digits"].isdigit()
+    assert values["/details/flags"][0] is True
+    assert set_by_us["/details/street"][1] == "made up, not in the file config/c.yaml"
+    (line,) = printed(seen, "reader")
+    assert all(repr(values[f"/details/{n}"]) in line for n in ("name", "phone", "weight", "digits", "street"))
+    assert [(e.name, e.value) for _, e in seen.params if e.caller_id == "/reader"] == [("/done", 5)]
+    assert seen.outcome.outcome == "ended"
+
+
+@pytest.mark.parametrize(
+    ("text", "remark"),
+    [
+        ("details:\n\tname: x\n", "not YAML"),
+        ("- 1\n", "no names in it"),
+        ("a: &a [x, x]\n" + "".join(f"b{i}: [*a, *a]\n" for i in range(20)), "too much in it"),
+        (None, "no such file"),
+    ],
+)
+def test_a_file_of_parameters_that_cannot_be_read(tmp_path: Path, text: str | None, remark: str) -> None:
+    files = {"scripts/reader.py": READER} | ({"c.yaml": text} if text is not None else {})
+    scenario = Scenario(
+        title="params",
+        params=(Param(file="c.yaml", also=("details/name",)),),
+        start=(Start(name="reader", script="reader.py"),),
+        until=Until(ended=("reader",)),
+    )
+    seen = _run(tmp_path, files, scenario)
+    (noted,) = [e.detail for _, e in seen.actors if e.action == "note"]
+    assert noted.startswith(f"c.yaml: {remark}")
+    (value,) = [e.value for _, e in seen.actors if e.action == "param"]
+    assert value in printed(seen, "reader")[0]
+    assert seen.outcome.outcome == "complete"
+
+
+@pytest.mark.parametrize("sandbox", SANDBOXES)
+def test_rosparam_loads_a_file_of_the_students(tmp_path: Path, sandbox: str) -> None:
+    scenario = Scenario(
+        title="load",
+        start=(
+            Start(name="load", load="config/c.yaml"),
+            Start(name="reader", script="reader.py", after="load"),
+        ),
+        until=Until(ended=("load", "reader")),
+    )
+    files = {"scripts/reader.py": READER, "config/c.yaml": CONFIG}
+    seen = _run(tmp_path, files, scenario, sandbox=sandbox)
+    loaded = {e.name: e.value for _, e in seen.params if e.caller_id.startswith("/rosparam")}
+    assert loaded["/details/phone"] == 77777
+    assert "'name': 'Ada'" in printed(seen, "reader")[0]
+
+
+def test_services_are_called_and_answer(tmp_path: Path) -> None:
+    calls = (
+        Call(service="/enable", type="std_srvs/SetBool", request={"data": True}),
+        Call(service="/enable", type="std_srvs/SetBool", request={}),
+        Call(service="/enable", type="std_srvs/Trigger", request={}),
+        Call(service="/enable", type="std_srvs/SetBool", request={"dat": True}),
+        Call(service="/enable", type="std_srvs/Nothing", request={}),
+    )
+    probes = (Probe(topic="/cmd_vel", type="geometry_msgs/Twist", values=({"linear": {"x": 1.5}},), times=2),)
+    scenario = Scenario(
+        title="services",
+        start=(
+            Start(name="server", script="server.py"),
+            Start(name="other", program="rospy_tutorials/talker"),
+        ),
+        probes=probes,
+        calls=calls,
+        until=Until(quiet_s=0.5),
+    )
+    seen = _run(tmp_path, {"scripts/server.py": SERVER}, scenario)
+    answers = [(e.value, e.detail) for _, e in seen.actors if e.action == "answer"]
+    assert answers[0] == ({"success": True, "message": "done"}, "")
+    assert answers[1][0] is None
+    assert "not false" in answers[1][1]
+    assert answers[2] == (None, "the service is of type std_srvs/SetBool")
+    assert "has no field dat" in answers[3][1]
+    assert "the grader could not call it" in answers[4][1]
+    assert {"/enable": "std_srvs/SetBool"} in [e.service_types for _, e in seen.graph]
+    assert printed(seen, "server").count("x is 1.5") == 2
+    assert seen.student_nodes() == ("/server",)
+    assert [c.topic for c in seen.student_channels() if c.topic != "/rosout"] == []
+    assert seen.outcome.outcome == "complete"
+
+
+def test_a_service_that_is_never_offered(tmp_path: Path) -> None:
+    scenario = Scenario(
+        title="services",
+        start=(Start(name="reader", script="reader.py"),),
+        params=(Param(name="details", value="x"),),
+        calls=(Call(service="/enable", type="std_srvs/SetBool", request={}),),
+        until=Until(quiet_s=0.5),
+    )
+    seen = _run(tmp_path, {"scripts/reader.py": READER}, scenario)
+    assert not [e for _, e in seen.actors if e.action in {"call", "answer"}]
+    assert seen.outcome.outcome == "ended"
+
+
+def test_watching_a_node_for_a_while(tmp_path: Path) -> None:
+    code = NODE + "rospy.init_node('hello')\nprint('hello')\nrospy.spin()\n"
+    scenario = Scenario(
+        title="hello", start=(Start(name="hello", script="hello.py"),), until=Until(alive_s=1.0)
+    )
+    seen = _run(tmp_path, {"scripts/hello.py": code}, scenario)
+    up_ns = next(t for t, e in seen.graph if "/hello" in e.nodes)
+    stopped_ns = next(t for t, e in seen.actors if e.action == "interrupt")
+    assert (stopped_ns - up_ns) / 1e9 + 0.05 >= 1.0
+    assert seen.outcome.outcome == "complete"
+
+
+def test_a_node_that_never_comes(tmp_path: Path) -> None:
+    scenario = Scenario(
+        title="nothing",
+        start=(Start(name="idle", script="idle.py"),),
+        until=Until(nodes=1, first_message_s=1.0, silent_s=0.5),
+    )
+    seen = _run(
+        tmp_path, {"scripts/idle.py": SCRIPT + "import threading\nthreading.Event().wait()\n"}, scenario
+    )
+    assert (seen.outcome.outcome, seen.outcome.detail) == ("silent", "nothing happened for 1 s")
