@@ -1,0 +1,155 @@
+"""Whether a node logs a line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import SequenceMatcher
+from typing import Annotated
+
+from pydantic import Field
+
+from grader.checks.registry import check
+from grader.checks.support.ending import explain_end
+from grader.checks.support.nodes import nodes_of
+from grader.checks.support.process import early_end, life, lives
+from grader.checks.support.rosout import CALLS, Level, Logged, console_log, logged_by
+from grader.checks.support.text import listed, plural, shown
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+
+ALIKE = 0.7
+
+
+class LogsParams(Record):
+    """`text` is part of a log message, letter by letter. With `process`, only that process's nodes count."""
+
+    text: Annotated[str, Field(min_length=1)]
+    level: Level = "info"
+    process: str = ""
+
+
+@check("logs", params=LogsParams)
+def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
+    """The node logs the line.
+
+    What it checks
+        That the node logs this text at this level.
+
+    Why it matters on a robot
+        What is logged is kept with its time, its level and the node's name, and `rqt_console` shows it on
+        any machine. What is only printed is gone with its terminal.
+
+    How it is measured
+        By the messages on /rosout, where every `rospy.loginfo(…)`, `logwarn(…)` and `logerr(…)` goes. The
+        text has to stand in one of them letter by letter, capitals and punctuation included; more may stand
+        around it.
+
+    How to fix
+        `rospy.loginfo("…")` after `rospy.init_node(…)` for the level INFO. `print(…)` does not log.
+        `rostopic echo /rosout` shows what is logged.
+    """
+    expected = f"{params.text!r} logged at level {params.level.upper()}"
+    nodes = nodes_of(run, params.process)
+    lines = logged_by(run, nodes)
+    right = next((one for one in lines if _has(one.text, params) and one.level == params.level), None)
+    verdict = (
+        (
+            passed(f"{right.node} logs {shown(right.text)!r} at level {params.level.upper()}")
+            if right
+            else None
+        )
+        or _other_level(lines, params)
+        or _only_printed(run, params)
+        or _near(run, lines, params)
+        or _nothing(package, run, nodes, lines, params)
+    )
+    seen = listed(f"{shown(t)!r}" for t in dict.fromkeys(one.text for one in lines[:3]))
+    measured = (
+        f"{plural(len(lines), 'log message')}{': ' if seen else ''}{seen}{', …' if len(lines) > 3 else ''}"
+    )
+    times = (right.at_ns, right.at_ns) if right else (None, None)
+    cite = EvidenceCitation(evidence=run.evidence, topic="/rosout", from_ns=times[0], to_ns=times[1])
+    citations = verdict.citations or (cite,)
+    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
+
+
+def _has(text: str, params: LogsParams) -> bool:
+    return " ".join(params.text.split()) in " ".join(text.split())
+
+
+def _other_level(lines: Iterable[Logged], params: LogsParams) -> Verdict | None:
+    one = next((one for one in lines if _has(one.text, params)), None)
+    if one is None:
+        return None
+    level = (one.level or "unknown").upper()
+    message = f"{one.node} logs {shown(one.text)!r} at level {level}, not {params.level.upper()}"
+    return failed(message, hint=_call(params))
+
+
+def _only_printed(run: Run, params: LogsParams) -> Verdict | None:
+    """On the console and not on /rosout: printed, or logged in a way that the recorder missed."""
+    said = [
+        line for _, line in run.console if _is_asked(run, line.process, params) and _has(line.line, params)
+    ]
+    if not said:
+        return None
+    of_logger = next((log for log in map(console_log, (line.line for line in said)) if log), None)
+    if of_logger is None:
+        message = f"{shown(said[0].line)!r} is only printed, and not logged"
+        return failed(message, hint=f"{_call(params)} instead of print(…)")
+    if of_logger[0] != params.level:
+        message = f"{params.text!r} is logged at level {of_logger[0].upper()}, not {params.level.upper()}"
+        return failed(message, hint=_call(params))
+    message = f"{shown(said[0].line)!r} was logged on the console, and did not arrive on /rosout"
+    return inconclusive(message, hint="grade again")
+
+
+def _is_asked(run: Run, process: str, params: LogsParams) -> bool:
+    return process == params.process if params.process else process in {one.name for one in lives(run)}
+
+
+def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | None:
+    """Other capitals, a missing sign, a typing error: in what was logged, or else in what was printed."""
+    logged = [one.text for one in lines]
+    printed = [line.line for _, line in run.console if _is_asked(run, line.process, params)]
+    for texts, how in ((logged, "is logged"), (printed, "is printed")):
+        alike = max(texts, key=lambda text: _likeness(text, params.text), default="")
+        if _likeness(alike, params.text) >= ALIKE:
+            text = (console_log(alike) or ("", alike))[1]
+            return failed(f"{shown(text)!r} {how}, and not {params.text!r}", hint=_call(params))
+    return None
+
+
+def _likeness(text: str, wanted: str) -> float:
+    plain = " ".join((console_log(text) or ("", text))[1].casefold().split())
+    matcher = SequenceMatcher(None, plain, " ".join(wanted.casefold().split()), autojunk=False)
+    return matcher.ratio()
+
+
+def _nothing(
+    package: PackageFacts, run: Run, nodes: tuple[str, ...], lines: tuple[Logged, ...], params: LogsParams
+) -> Verdict:
+    """Nothing like it came: no process, a dead one, no node, or a node that logs other things or nothing."""
+    asked = life(run, params.process) if params.process else next(iter(lives(run)), None)
+    if asked is None:
+        message = "the node was not started: there is no script to run"
+        return unjudged(message, hint="add the script to the package, and push it")
+    ended = asked if asked.ended_early else (None if params.process else early_end(run))
+    if ended is not None:
+        end = explain_end(ended, run, package)
+        message = f"the node ended before it logged {params.text!r}: {end.cause}"
+        return unjudged(message, hint=end.hint, citations=end.citations)
+    if not nodes:
+        return unjudged(
+            "no node was registered that could log", hint="call rospy.init_node(…) before logging"
+        )
+    if lines:
+        message = f"{listed(nodes)} logs {shown(lines[0].text)!r}, and not {params.text!r}"
+        return failed(message, hint=_call(params))
+    return failed(f"{listed(nodes)} logs nothing", hint=_call(params))
+
+
+def _call(params: LogsParams) -> str:
+    return f'write {CALLS[params.level]}("{params.text}")'
