@@ -21,6 +21,7 @@ FAMILIES = (
     "launch_xml",
     "launch_runs",
     "message",
+    "programs",
     "services",
     "latched",
     "bounds",
