@@ -1,8 +1,25 @@
-"""The checks: one pure function each, in family files. No I/O in here."""
+"""The checks: one pure function each, in family files. No I/O in here.
+
+What an instructor's own check needs can be imported from here (docs/own-checks.md) and stays.
+"""
 
 from importlib import import_module
 
-from grader.checks.registry import CHECKS, HEADINGS, Check
+from grader.checks.evidence import Evidence
+from grader.checks.registry import CHECKS, HEADINGS, Check, check
+from grader.evidence.run import Channel, Message, Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import (
+    EvidenceCitation,
+    FileCitation,
+    Verdict,
+    failed,
+    inconclusive,
+    partial,
+    passed,
+    unjudged,
+)
 
 FAMILIES = (
     "manifest",
@@ -20,8 +37,11 @@ FAMILIES = (
     "logs",
     "launch_xml",
     "launch_runs",
+    "launch_loads",
+    "launch_opens",
     "message",
     "programs",
+    "copies",
     "services",
     "latched",
     "bounds",
@@ -33,4 +53,24 @@ FAMILIES = (
 for family in FAMILIES:
     import_module(f"grader.checks.{family}")
 
-__all__ = ["CHECKS", "FAMILIES", "HEADINGS", "Check"]
+__all__ = [
+    "CHECKS",
+    "FAMILIES",
+    "HEADINGS",
+    "Channel",
+    "Check",
+    "Evidence",
+    "EvidenceCitation",
+    "FileCitation",
+    "Message",
+    "PackageFacts",
+    "Record",
+    "Run",
+    "Verdict",
+    "check",
+    "failed",
+    "inconclusive",
+    "partial",
+    "passed",
+    "unjudged",
+]

@@ -1,16 +1,24 @@
-"""The checks by name. A family decorates its functions with `@check`; `__init__` imports the families."""
+"""The checks by name. A family decorates its functions with `@check`; `__init__` imports the families.
+
+An instructor's own file uses the same decorator: within `collecting()` checks go to a registry of its own.
+"""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 
 from grader.model.record import Record
 from grader.model.verdict import Verdict
 
 HEADINGS = ("What it checks", "Why it matters on a robot", "How it is measured", "How to fix")
-FACTS = ("package", "build", "run", "params")
+FACTS = ("package", "build", "run", "evidence", "params")
+RESERVED = frozenset({"manual", "pytest"})
+NAME = re.compile(r"[a-z][a-z0-9-]*")
 
 
 class NoParams(Record):
@@ -22,7 +30,7 @@ class Check:
     """One check: function, record of its parameters, the facts it asks for, its docstring in parts.
 
     `messages_only` checks ask a run for its messages alone, so they judge another tool's recording too. For such a
-    run `package` is empty where there is none.
+    run `package` is empty where there is none. `source` is the file of an instructor's own check.
     """
 
     name: str
@@ -32,6 +40,7 @@ class Check:
     title: str
     sections: dict[str, str]
     messages_only: bool = False
+    source: str = ""
 
     @property
     def needs_run(self) -> bool:
@@ -46,31 +55,79 @@ class Check:
 CHECKS: dict[str, Check] = {}
 
 
+@dataclass(kw_only=True)
+class Collection:
+    """An instructor's own checks by name, and what is wrong with them, each with its line in the file."""
+
+    source: str
+    checks: dict[str, Check] = field(default_factory=dict)
+    faults: list[tuple[int, str]] = field(default_factory=list)
+
+
+_COLLECTION: ContextVar[Collection | None] = ContextVar("collection", default=None)
+
+
+@contextmanager
+def collecting(source: str) -> Iterator[Collection]:
+    """Checks that are registered in here are not the grader's; their faults are kept and not raised."""
+    collection = Collection(source=source)
+    token = _COLLECTION.set(collection)
+    try:
+        yield collection
+    finally:
+        _COLLECTION.reset(token)
+
+
 def check(
     name: str, *, params: type[Record] = NoParams, messages_only: bool = False
 ) -> Callable[[Callable[..., Verdict]], Callable[..., Verdict]]:
-    """Put a function into `CHECKS`. Raises ValueError for a name that is taken or a fact that nobody has."""
+    """Register a function under a name. Raises ValueError for a name that is taken or a fact that nobody has."""
 
     def register(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
-        facts = tuple(inspect.signature(function).parameters)
-        unknown = set(facts) - set(FACTS)
-        if unknown or name in CHECKS:
-            raise ValueError(
-                f"check {name}: unknown facts {sorted(unknown)}" if unknown else f"check {name} twice"
-            )
+        own = _COLLECTION.get()
+        problems = [*_problems(name, function), *(_own_problems(name, function, params, own) if own else ())]
+        if problems and own is None:
+            raise ValueError(f"check {name}: {problems[0]}")
+        if problems and own is not None:
+            line = getattr(getattr(function, "__code__", None), "co_firstlineno", 1)
+            own.faults += [(line, f'check "{name}": {problem}') for problem in problems]
+            return function
         title, sections = _parts(inspect.getdoc(function) or "")
-        CHECKS[name] = Check(
+        (own.checks if own else CHECKS)[name] = Check(
             name=name,
             function=function,
             params=params,
-            facts=facts,
+            facts=tuple(inspect.signature(function).parameters),
             title=title,
             sections=sections,
             messages_only=messages_only,
+            source=own.source if own else "",
         )
         return function
 
     return register
+
+
+def _problems(name: str, function: Callable[..., Verdict]) -> Iterator[str]:
+    unknown = [fact for fact in inspect.signature(function).parameters if fact not in FACTS]
+    if unknown:
+        yield f"there is no fact {', '.join(unknown)}; a check can ask for {', '.join(FACTS)}"
+    if name in CHECKS or name in RESERVED:
+        yield "the grader itself has a check of that name"
+
+
+def _own_problems(
+    name: str, function: Callable[..., Verdict], params: object, own: Collection
+) -> Iterator[str]:
+    """What the grader's own tests hold for its own checks, and nothing but this holds for an instructor's."""
+    if not NAME.fullmatch(name):
+        yield "a name is lower-case letters, digits and hyphens, beginning with a letter"
+    if name in own.checks:
+        yield "is registered twice"
+    if not (inspect.getdoc(function) or "").strip():
+        yield "has no docstring: its first line is the title that a student reads"
+    if not (isinstance(params, type) and issubclass(params, Record)):
+        yield "params must be a class derived from Record"
 
 
 def _parts(docstring: str) -> tuple[str, dict[str, str]]:

@@ -9,6 +9,7 @@ from pathlib import PurePosixPath
 from pydantic import ValidationError
 
 from grader.checks.build import run_hint
+from grader.checks.evidence import Evidence
 from grader.checks.executable import find_script
 from grader.checks.registry import Check
 from grader.evidence.run import Run
@@ -44,11 +45,20 @@ class Facts:
             if run.foreign:
                 found["package"] = NO_PACKAGE
             found["run"] = run
+        if "evidence" in check.facts:
+            found["evidence"] = self._evidence(criterion)
         if {"package", "build"} & (set(check.facts) - found.keys()) and self.package is None:
             return self._no_package()
         if self.package is not None:
             found |= {"package": self.package, "build": self.runs[PACKAGE_RUN]}
         return {name: found[name] for name in check.facts}
+
+    def _evidence(self, criterion: Criterion) -> Evidence:
+        found = {name: self._run(name) for name in self.rubric.scenarios}
+        if PACKAGE_RUN in self.runs:
+            found[PACKAGE_RUN] = self.runs[PACKAGE_RUN]
+        package = self.package or self._no_package()
+        return Evidence(found, scenario=criterion.scenario, package=package)
 
     def _no_package(self) -> Verdict:
         if not any(run.foreign for run in self.runs.values()):

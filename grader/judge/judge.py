@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from graphlib import TopologicalSorter
+from pathlib import PurePath
+from traceback import extract_tb
 
-from grader.checks import CHECKS
+from grader.checks import CHECKS, Check
+from grader.checks.evidence import NotRecorded
 from grader.evidence.run import Run
 from grader.judge.facts import Facts, try_facts
 from grader.judge.points import round_half_up
@@ -19,26 +22,29 @@ OPEN = {Status.INCONCLUSIVE, Status.ERROR, Status.MANUAL}
 WITH_HINT = {Status.FAIL, Status.PARTIAL, Status.BLOCKED, Status.INCONCLUSIVE}
 
 
-def judge(rubric: Rubric, runs: Mapping[str, Run]) -> tuple[CriterionResult, ...]:
+def judge(
+    rubric: Rubric, runs: Mapping[str, Run], checks: Mapping[str, Check] = CHECKS
+) -> tuple[CriterionResult, ...]:
     """Every criterion in the rubric's order. `runs` maps scenarios, and `package`, to their recorded runs.
 
-    The same evidence and rubric always give equal results; nothing that is wrong with the evidence raises.
+    `checks` are the grader's and the rubric's own (`LoadedRubric.checks`). The same evidence and rubric always give
+    equal results; nothing that is wrong with the evidence raises.
     """
     facts = try_facts(rubric, runs)
     criteria = {c.id: c for c in rubric.criteria}
     verdicts: dict[str, Verdict] = {}
     roots: dict[str, str] = {}
     for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():
-        verdict = verdict_of(criteria[name], facts)
+        verdict = verdict_of(criteria[name], facts, checks)
         verdicts[name] = _settled(criteria[name], verdict, verdicts, roots)
     return tuple(_result(c, verdicts[c.id], rubric.digits) for c in rubric.criteria)
 
 
-def verdict_of(criterion: Criterion, facts: Facts) -> Verdict:
-    """What the criterion's check says; an exception inside it is the grader's own fault and says so."""
+def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> Verdict:
+    """What the criterion's check says; an exception inside it is not the student's fault and says so."""
     if criterion.check == MANUAL:
         return Verdict(status=Status.MANUAL, score=0.0, message="a person gives these points")
-    check = CHECKS.get(criterion.check)
+    check = checks.get(criterion.check)
     if check is None:
         message = f"this grader has no check {criterion.check!r}"
         return Verdict(
@@ -46,13 +52,31 @@ def verdict_of(criterion: Criterion, facts: Facts) -> Verdict:
         )
     try:
         asked = facts.of(check, criterion, check.params.model_validate(criterion.parameters))
-        return asked if isinstance(asked, Verdict) else check.function(**asked)
+        return asked if isinstance(asked, Verdict) else _sound(check.function(**asked))
+    except NotRecorded as missing:
+        return missing.verdict
     except Exception as error:  # noqa: BLE001 - whatever goes wrong in a check must not cost a student a mark
-        kind = type(error).__name__
-        message = f"the check {check.name!r} itself failed ({kind}); no mark is lost by this"
-        return Verdict(
-            status=Status.ERROR, score=0.0, message=message, hint="please report this with the evidence file"
-        )
+        return _broken(check, error)
+
+
+def _sound(verdict: object) -> Verdict:
+    """Raise TypeError or ValueError for what an instructor's own check must not return."""
+    if not isinstance(verdict, Verdict):
+        raise TypeError(f"it returned {type(verdict).__name__}, no verdict: return passed(…) or failed(…)")
+    if not 0 <= verdict.score <= 1:
+        raise ValueError(f"its score is {verdict.score:g}: a score is 0 to 1")
+    return verdict
+
+
+def _broken(check: Check, error: Exception) -> Verdict:
+    kind = type(error).__name__
+    message = f"the check {check.name!r} itself failed ({kind}); no mark is lost by this"
+    hint = "please report this with the evidence file"
+    if check.source:
+        lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == check.source]
+        place = f"{PurePath(check.source).name}:{lines[-1]}" if lines else PurePath(check.source).name
+        hint = f"for the instructor: {place}: {kind}: {error}"
+    return Verdict(status=Status.ERROR, score=0.0, message=message, hint=hint)
 
 
 def _settled(
