@@ -82,5 +82,5 @@ def _not_there(package: PackageFacts, run: Run, names: list[str], params: ParamV
         return failed(message, hint=hint)
     if absent := no_node(package, run, f"there is no parameter {params.name}"):
         return absent
-    message = f"nothing ever set the parameter {params.name}"
+    message = f"nothing set the parameter {params.name}, or it was deleted again"
     return failed(message, hint=f"rospy.set_param('{params.name}', …), or a <param> in the launch file")

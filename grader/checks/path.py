@@ -80,17 +80,20 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
     """
     found = track(run, params.topic, params.hold_s)
     if found is None:
-        verdict, figures = _nothing(package, run, params), ""
+        verdict = _nothing(package, run, params)
+    elif found.misfit:
+        hint = f"rostopic info {params.topic} shows their type"
+        verdict = unjudged(f"the messages on {params.topic} {found.misfit}", measured=found.misfit, hint=hint)
     elif found.fault:
-        message = f"the messages on {params.topic} {found.fault}"
-        verdict, figures = unjudged(message, hint=f"rostopic info {params.topic} shows their type"), ""
+        hint = "print what you publish: a division by zero, or a square root of a negative number?"
+        verdict = failed(f"the messages on {params.topic} {found.fault}", measured=found.fault, hint=hint)
     else:
-        verdict, figures = _judged(found, run, params)
+        verdict = _judged(found, run, params)
     span = EvidenceCitation(evidence=run.evidence, topic=params.topic)
     return verdict.model_copy(
         update={
             "expected": f"a way through {listed(map(spot, params.points))}, within {metres(params.tolerance_m)}",
-            "measured": verdict.measured or figures or (found.fault if found else "no path"),
+            "measured": verdict.measured or "no path",
             "citations": (*verdict.citations, span),
         }
     )
@@ -102,16 +105,17 @@ def _nothing(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
     return no_message(package, run, params.topic)
 
 
-def _judged(found: Track, run: Run, params: PathParams) -> tuple[Verdict, str]:
+def _judged(found: Track, run: Run, params: PathParams) -> Verdict:
     taken = relative(found.path) if params.relative else list(found.path)
     course = followed(taken, params.way.points, params.tolerance_m)
     figures = measured(taken, course, params.way)
     if course.done:
         count = f"{len(params.points)} points" if len(params.points) > 1 else "its point"
-        return passed(f"the path passes {count} within {number(params.tolerance_m)} m"), figures
+        return passed(f"the path passes {count} within {number(params.tolerance_m)} m", measured=figures)
     words = what_is_wrong(taken, params.way, course, mirror=params.relative)
     nearly = followed(taken, params.way.points, 2 * params.tolerance_m).done
-    return _excused(failed(words.message, hint=words.hint), run, nearly=nearly), figures
+    verdict = failed(words.message, hint=words.hint, measured=figures)
+    return _excused(verdict, run, nearly=nearly)
 
 
 def _excused(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
@@ -120,4 +124,5 @@ def _excused(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
     if late_ms < LATE_MS or not nearly:
         return verdict
     message = f"{verdict.message}; but the grading machine was late itself, by up to {late_ms:.0f} ms"
-    return inconclusive(message, hint="grade again while the machine has less to do")
+    hint = "grade again while the machine has less to do"
+    return inconclusive(message, hint=hint, measured=verdict.measured)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from grader.checks.registry import check
 from grader.checks.support.absence import no_node, published_topics
-from grader.checks.support.names import plain_type
+from grader.checks.support.names import GlobalName, plain_type
 from grader.checks.support.text import listed, near_names
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -15,7 +15,7 @@ from grader.model.verdict import EvidenceCitation, Verdict, failed, passed
 class OnlyTopicsParams(Record):
     """`topics` that may be published: full names, or the beginning of names with `*` after it (`/square/*`)."""
 
-    topics: tuple[str, ...]
+    topics: tuple[GlobalName, ...]
 
     def allows(self, topic: str) -> bool:
         return any(

@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 SAMPLE_M = 0.02
+SAMPLE_RAD = 0.2
 SAMPLES_MAX = 2000
 
 Point = tuple[float, float]
@@ -57,9 +58,9 @@ def driven(commands: Sequence[Command], hold_s: float | None, end_s: float) -> l
 
     Without `hold_s` the last one holds until `end_s`.
     """
-    path = [Pose(commands[0].time_s, 0.0, 0.0)] if commands else []
-    last_s = end_s if hold_s is None else math.inf
-    for command, next_s in zip(commands, [*(c.time_s for c in commands[1:]), last_s], strict=True):
+    path = [Pose(c.time_s, 0.0, 0.0) for c in commands[:1]]
+    ends = [c.time_s for c in commands[1:]] + [end_s if hold_s is None else math.inf]
+    for command, next_s in zip(commands, ends, strict=False):
         until_s = next_s if hold_s is None else min(next_s, command.time_s + hold_s)
         path += _samples(
             path[-1]._replace(time_s=command.time_s), command, max(0.0, until_s - command.time_s)
@@ -69,7 +70,9 @@ def driven(commands: Sequence[Command], hold_s: float | None, end_s: float) -> l
 
 def _samples(start: Pose, command: Command, duration_s: float) -> Iterator[Pose]:
     """Close enough to each other that no arc strays unseen between two of them."""
-    count = min(SAMPLES_MAX, max(1, math.ceil(command.speed * duration_s / SAMPLE_M)))
+    turned = abs(command.turn) / SAMPLE_RAD if command.speed else 0.0
+    steps = math.ceil(max(command.speed / SAMPLE_M, turned) * duration_s)
+    count = min(SAMPLES_MAX, max(1, steps))
     for number in range(1, count + 1):
         yield moved(start, command, duration_s * number / count)
 

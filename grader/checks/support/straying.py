@@ -77,25 +77,53 @@ def _wrong_start(path: Sequence[Pose], way: Way, course: Course) -> Words | None
 
 def _strays(path: Sequence[Pose], way: Way, course: Course) -> Words:
     peak, far_m = _peak(path, way, course)
-    allowed = f"{number(way.tolerance_m)} m are allowed"
     where = f"at {spot(peak.point)}, {_after(path, peak)}"
+    allowed = f"{number(way.tolerance_m)} m are allowed"
     if course.reached == len(way.points):
         apart = metres(math.dist(peak.point, way.points[-1]))
         message = f"it passes every point, and goes on: it is {apart} from the last {where}"
         return Words(message, f"publish a zero velocity once you are there; {allowed}")
-    start, end = way.points[course.reached - 1], way.points[course.reached]
-    if course.reached > 1 and _beyond(peak.point, way.points[course.reached - 2], start, way.tolerance_m):
-        message = (
-            f"it drives {metres(math.dist(peak.point, start))} past {way.name(course.reached - 1)} {where}"
-        )
-        return Words(message, f"turn sooner, or drive slower or for less time; {allowed}")
-    if course.reached + 1 < len(way.points) and _cuts(peak.point, start, end, way.points[course.reached + 1]):
-        message = (
-            f"it turns off {metres(_short(peak.point, start, end))} before {way.name(course.reached)} {where}"
-        )
-        return Words(message, f"drive on to the point before you turn; {allowed}")
     line = f"{way.name(course.reached - 1)} to {way.name(course.reached)}"
-    return Words(f"it strays {metres(far_m)} from the line from {line}, {where}", f"only {allowed}")
+    return (
+        _too_far(path, way, course)
+        or _too_early(path, way, course)
+        or Words(f"it strays {metres(far_m)} from the line from {line}, {where}", f"only {allowed}")
+    )
+
+
+def _too_far(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
+    """Straight on behind a point at which it should have turned."""
+    first, corner = course.strayed or 0, course.reached - 1
+    if corner < 1:
+        return None
+    start, end = way.points[corner - 1 : corner + 1]
+    length_along = math.dist(start, end)
+    beyond_m = 0.0
+    for pose in path[first:]:
+        along, aside = _along(pose.point, start, end)
+        if along < length_along or abs(aside) > way.tolerance_m:
+            break
+        beyond_m = max(beyond_m, along - length_along)
+    if not beyond_m:
+        return None
+    message = f"it drives {metres(beyond_m)} past {way.name(corner)}, {_after(path, path[first])}"
+    return Words(
+        message, f"turn sooner: {number(way.tolerance_m)} m are allowed; distance is speed times time"
+    )
+
+
+def _too_early(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
+    """Off the line before its end, to the side where the way goes on."""
+    if course.reached + 1 >= len(way.points):
+        return None
+    start, end, following = way.points[course.reached - 1 : course.reached + 2]
+    pose = path[course.strayed or 0]
+    along, aside = _along(pose.point, start, end)
+    short_m = math.dist(start, end) - along
+    if along <= 0 or short_m <= way.tolerance_m or aside * _along(following, start, end)[1] <= 0:
+        return None
+    message = f"it turns off {metres(short_m)} before {way.name(course.reached)}, {_after(path, pose)}"
+    return Words(message, "drive on to the point before you turn: distance is speed times time")
 
 
 def _ends_short(path: Sequence[Pose], way: Way, course: Course) -> Words:
@@ -121,22 +149,6 @@ def _peak(path: Sequence[Pose], way: Way, course: Course) -> tuple[Pose, float]:
         if distance_m > far_m:
             peak, far_m = pose, distance_m
     return peak, far_m
-
-
-def _beyond(point: Point, start: Point, end: Point, tolerance_m: float) -> bool:
-    """Straight on behind the end of a line."""
-    along, aside = _along(point, start, end)
-    return along > math.dist(start, end) and abs(aside) <= tolerance_m
-
-
-def _cuts(point: Point, start: Point, end: Point, following: Point) -> bool:
-    """Off the line before its end, to the side where the way goes on."""
-    along, aside = _along(point, start, end)
-    return 0 < along < math.dist(start, end) and aside * _along(following, start, end)[1] > 0
-
-
-def _short(point: Point, start: Point, end: Point) -> float:
-    return math.dist(start, end) - _along(point, start, end)[0]
 
 
 def _along(point: Point, start: Point, end: Point) -> tuple[float, float]:

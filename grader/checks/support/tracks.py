@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from grader.checks.support.geometry import Command, Pose, driven
+from grader.checks.support.names import plain_type
 from grader.checks.support.process import observed_until_ns
 from grader.evidence.run import Channel, Run
 
@@ -18,10 +19,10 @@ Seconds = Callable[[int], float]
 
 
 class Track(NamedTuple):
-    """`kind` is `poses`, `velocities`, or what the messages are instead; `fault` why they tell of no path."""
+    """The path, or why the messages tell of none: `misfit` if they are of another type, `fault` if they are bad."""
 
-    kind: str
-    path: tuple[Pose, ...]
+    path: tuple[Pose, ...] = ()
+    misfit: str = ""
     fault: str = ""
 
 
@@ -37,13 +38,13 @@ def track(run: Run, topic: str, hold_s: float | None) -> Track | None:
     poses = [p for t, value in pairs if (p := _pose(seconds(t), value))]
     commands = [c for t, value in pairs if (c := _command(seconds(t), value))]
     if len(poses) < len(pairs) and len(commands) < len(pairs):
-        return Track("messages", (), f"are {channels[0].type}: neither velocities nor poses")
+        return Track(misfit=f"are {plain_type(channels[0].type)}: neither velocities nor poses")
     if not all(_finite(*one[1:]) for one in (*poses, *commands)):
-        return Track("messages", (), "hold what is no number, or none that a robot could follow")
+        return Track(fault="hold what is no number, or none that a robot could follow")
     if poses:
-        return Track("poses", tuple(poses))
+        return Track(tuple(poses))
     end_s = seconds(observed_until_ns(run) or run.end_ns)
-    return Track("velocities", tuple(driven(commands, hold_s, end_s)))
+    return Track(tuple(driven(commands, hold_s, end_s)))
 
 
 def run_seconds(run: Run) -> Seconds | None:
