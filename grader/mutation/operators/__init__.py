@@ -18,8 +18,10 @@ from grader.mutation.operators import (
     topics,
     yaml,
 )
+from grader.mutation.registry import OPERATORS
 
 __all__ = [
+    "OPERATORS",
     "build",
     "counter",
     "files",
