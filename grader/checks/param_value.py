@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from grader.checks.registry import check
@@ -9,7 +10,7 @@ from grader.checks.support.absence import no_node
 from grader.checks.support.calls import text
 from grader.checks.support.comparing import differences
 from grader.checks.support.names import GlobalName
-from grader.checks.support.parameters import MISSING, at, leaves, server
+from grader.checks.support.param_tree import absolute, own, tree
 from grader.checks.support.process import lives
 from grader.checks.support.text import listed, near_names, shown
 from grader.evidence.run import Run
@@ -18,6 +19,7 @@ from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, passed
 
 EXACT = 1e-9
+MISSING = object()
 
 
 class ParamValueParams(Record):
@@ -46,9 +48,9 @@ def param_value(package: PackageFacts, run: Run, params: ParamValueParams) -> Ve
         `rospy.set_param('<name>', value)`, a `<param>` in the launch file, or a YAML file that `rosparam`
         loads. Within `<node>`, and with `~`, a name is below the node's own. `rosparam get <name>` shows it.
     """
-    held = server(run, _until_ns(run))
-    got = at(held, params.name)
-    verdict = _not_there(package, run, leaves(held), params) if got is MISSING else _judged(got, params)
+    held = tree(run, until_ns=_until_ns(run))
+    got = _held(held, absolute(params.name))
+    verdict = _not_there(package, run, own(held), params) if got is MISSING else _judged(got, params)
     cite = EvidenceCitation(evidence=run.evidence, topic="/grader/param")
     return verdict.model_copy(
         update={
@@ -65,6 +67,14 @@ def _until_ns(run: Run) -> int:
     return min(pressed, default=run.end_ns)
 
 
+def _held(leaves: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401 - a parameter may be anything
+    """The value, or the map of all values below the name."""
+    if name in leaves:
+        return leaves[name]
+    parts = [n.removeprefix(f"{name}/").partition("/")[0] for n in leaves if n.startswith(f"{name}/")]
+    return {part: _held(leaves, f"{name}/{part}") for part in dict.fromkeys(parts)} or MISSING
+
+
 def _judged(got: object, params: ParamValueParams) -> Verdict:
     wrong = [str(one) for one in differences(got, params.value, EXACT)]
     if not wrong:
@@ -74,7 +84,7 @@ def _judged(got: object, params: ParamValueParams) -> Verdict:
     return failed(message, hint=hint or f"rosparam get {params.name} shows it; set it to the lab's value")
 
 
-def _not_there(package: PackageFacts, run: Run, names: list[str], params: ParamValueParams) -> Verdict:
+def _not_there(package: PackageFacts, run: Run, names: Iterable[str], params: ParamValueParams) -> Verdict:
     near = near_names(params.name, names)
     if near:
         message = f"there is no parameter {params.name}; there is {listed(near)}"
