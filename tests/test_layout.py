@@ -33,8 +33,11 @@ ALLOWED = {
     "pipeline": {
         *BASE, "arena", "evidence", "files", "intake", "judge", "package", "recordings", "report", "rubric"
     },
+    "authoring": {
+        *BASE, "checks", "evidence", "intake", "package", "pipeline", "rubric"
+    },
     "cli": {
-        *BASE, "arena", "checks", "evidence", "files", "intake", "judge", "package", "pipeline", "report", "rubric"
+        *BASE, "arena", "authoring", "checks", "evidence", "files", "intake", "judge", "package", "pipeline", "report", "rubric"
     },
     "__main__": {"cli"},
 }  # fmt: skip

@@ -140,6 +140,52 @@ def _authoring(add: _Adder) -> None:
     validate = inner("validate", "check rubric files; every fault is named", "rubric_validate")
     validate.add_argument("files", metavar="FILE", nargs="+")
     inner("schema", "print the JSON Schema of rubrics, for editors", "rubric_schema")
+    new = inner("new", "write a first rubric from a run of a correct package", "rubric_new")
+    new.add_argument(
+        "--from", metavar="SOLUTION", dest="solution", required=True, help="a folder, archive or git URL"
+    )
+    new.add_argument("--package", metavar="NAME", help="the package, where there are several")
+    new.add_argument(
+        "--id", metavar="NAME", dest="rubric_id", help="the rubric's id (default: from FILE or the package)"
+    )
+    new.add_argument("--out", metavar="FILE", default="-", help="where it goes (default: -)")
+    new.add_argument("--force", action="store_true", help="write over a file that exists")
+    _sandbox(new)
+    test = inner("test", "grade a correct package, then mutants of it that must lose marks", "rubric_test")
+    _mutants(test)
+
+
+def _mutants(test: argparse.ArgumentParser) -> None:
+    test.add_argument("rubric", metavar="LAB|FILE")
+    test.add_argument(
+        "--solution", metavar="DIR", type=Path, help="a correct package (default: the lab's own)"
+    )
+    test.add_argument(
+        "--only",
+        metavar="MUTANT",
+        nargs="+",
+        default=[],
+        help="these mutants, or these operators; * is allowed",
+    )
+    test.add_argument(
+        "--jobs", metavar="N", type=_count, default=4, help="how many side by side (default: 4)"
+    )
+    _out(test, "keep everything in DIR/<mutant>/ (default: only what was not killed, in a temporary folder)")
+    test.add_argument(
+        "--write",
+        metavar="FILE",
+        type=Path,
+        help="try every operator and write a mutants file from what it cost",
+    )
+    _sandbox(test)
+    _json(test)
+
+
+def _count(text: str) -> int:
+    number = int(text) if text.isdecimal() else 0
+    if not 1 <= number <= 64:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number from 1 to 64")
+    return number
 
 
 def _rubric(parser: argparse.ArgumentParser, *, required: bool) -> None:

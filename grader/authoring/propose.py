@@ -1,0 +1,287 @@
+"""From what was observed to a rubric's scenarios and criteria, with points that add up: pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import PurePosixPath
+from typing import Any
+
+from grader.authoring.discover import INTEGER_PROBES, STRING, TEXT_PROBES, Parts, probe_for
+from grader.authoring.observe import Observed, Topic, heard_template, wraps_of
+from grader.checks.manifest import RUNTIME_KINDS
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.rubric.cross import TOTAL_POINTS
+
+WINDOW_S = 6
+WRAPS = 2
+LIVES_S = 5
+WEIGHTS = {
+    "manifest": 1, "cmake": 1, "build": 1, "executable": 1, "node-lives": 1, "node-name": 1, "topic-type": 2, "rate": 3,
+    "counter-start": 1, "counter-step": 1, "counter-wrap": 3, "message": 1, "hears": 2, "service": 2, "latched": 1,
+    "cmake-install": 2, "launch-xml": 2, "launch-runs": 2,
+}  # fmt: skip
+
+Entry = dict[str, Any]
+
+
+class Proposal:
+    """Collects the parts of a rubric. `notes` are for the author: what was seen and is not covered."""
+
+    def __init__(
+        self, facts: PackageFacts, parts: Parts, seen: Mapping[str, Observed], runs: Mapping[str, Run]
+    ) -> None:
+        self.notes: list[str] = []
+        self.scenarios: dict[str, Entry] = {}
+        self.criteria: list[Entry] = []
+        self._facts, self._parts, self._seen, self._runs = facts, parts, seen, runs
+        self._files()
+        for name, script in parts.nodes.items():
+            self._node(name, script, seen[name])
+        for name, launch in parts.launches.items():
+            self._launch(name, launch, seen[name])
+        _share_out(self.criteria)
+
+    def _add(self, id_: str, title: str, check: str, parameters: Entry, **more: object) -> str:
+        taken = {c["id"] for c in self.criteria}
+        name = next(n for n in (id_, *(f"{id_}-{i}" for i in range(2, 100))) if n not in taken)
+        entry = {"id": name, "title": title, "points": 0, "check": check}
+        self.criteria.append(
+            entry | ({"with": parameters} if parameters else {}) | {k: v for k, v in more.items() if v}
+        )
+        return name
+
+    def _files(self) -> None:
+        facts = self._facts
+        declared = facts.manifest.dependencies if facts.manifest else ()
+        names = list(dict.fromkeys(d.name for d in declared if d.kind in RUNTIME_KINDS))
+        package = {"name": facts.name}
+        self._add(
+            "manifest", "The manifest names the package and what it needs", "manifest",
+            package | ({"dependencies": names} if names else {}), reproduce="cat package.xml",
+        )  # fmt: skip
+        self._add(
+            "cmake",
+            "CMakeLists.txt makes it a catkin package",
+            "cmake",
+            package,
+            reproduce="cat CMakeLists.txt",
+        )
+        installed = self._installed()
+        if installed:
+            parameters: Entry = {"scripts": installed}
+            self._add(
+                "cmake-install", "CMake installs the scripts", "cmake-install", parameters, requires=["cmake"]
+            )
+        self._add(
+            "build",
+            "The package builds",
+            "build",
+            {},
+            requires=["manifest", "cmake"],
+            reproduce="catkin_make",
+        )
+
+    def _installed(self) -> list[str]:
+        calls = self._facts.cmake.calls if self._facts.cmake else ()
+        named = {PurePosixPath(a).name for c in calls if c.name == "catkin_install_python" for a in c.args}
+        return [s for s in self._parts.nodes.values() if PurePosixPath(s).name in named]
+
+    def _node(self, name: str, script: str, seen: Observed) -> None:
+        file = PurePosixPath(script).name
+        requires: list[str] = []
+        if script.endswith(".py"):
+            requires = [
+                self._add(
+                    f"{name}-executable", f"{file} can be run", "executable", {"path": script},
+                    reproduce=f"ls -lF {PurePosixPath(script).parent}",
+                )
+            ]  # fmt: skip
+        if seen.failed or not seen.nodes:
+            why = seen.failed or "no node was registered"
+            self.notes.append(f"{script} was not observed ({why}): does it need parameters or another node?")
+            return
+        self._scenario(name, script, seen)
+        node = self._life(name, script, seen, requires)
+        for topic in seen.topics:
+            self._topic(name, topic, node, self._runs.get(f"{name}-fast"))
+        for service, kind in seen.services.items():
+            if kind:
+                parameters = {"service": service, "type": kind}
+                self._add(
+                    f"service-{_id(service)}",
+                    f"{service} is offered",
+                    "service",
+                    parameters,
+                    scenario=name,
+                    requires=[node],
+                )
+        self._hearing(name, script, seen, requires)
+
+    def _scenario(self, name: str, script: str, seen: Observed) -> None:
+        periodic = [t.name for t in seen.topics if t.rate_hz]
+        until: Entry = {"window_s": WINDOW_S, "topics": periodic} if periodic else {"alive_s": LIVES_S + 1}
+        if seen.ended:
+            until = {"quiet_s": 2}
+        title = f"{PurePosixPath(script).name} in real time"
+        self.scenarios[name] = {"title": title, "start": [{"name": name, "script": script}], "until": until}
+
+    def _life(self, name: str, script: str, seen: Observed, requires: list[str]) -> str:
+        anonymous = "required" if seen.anonymous else "allowed"
+        named: Entry = {"names": list(seen.nodes[:1]), "anonymous": anonymous}
+        run = f"rosrun {self._facts.name} {PurePosixPath(script).name}"
+        if seen.ended:
+            title = f"The node is /{seen.nodes[0]}"
+            return self._add(
+                f"{name}-node", title, "node-name", named, scenario=name, requires=requires, reproduce=run
+            )
+        title = f"/{seen.nodes[0]} stays alive and ends on Ctrl-C"
+        parameters = {"process": name, "min_s": LIVES_S, **named}
+        return self._add(
+            f"{name}-node", title, "node-lives", parameters, scenario=name, requires=requires, reproduce=run
+        )
+
+    def _topic(self, name: str, topic: Topic, node: str, fast: Run | None) -> None:
+        label = self._label(name, topic)
+        kind = self._add(
+            label, f"{topic.name} carries {topic.type}", "topic-type", {"topic": topic.name, "type": topic.type},
+            scenario=name, requires=[node], reproduce=f"rostopic info {topic.name}",
+        )  # fmt: skip
+        needs: Entry = {"scenario": name, "requires": [kind, node]}
+        if topic.rate_hz:
+            parameters: Entry = {"topic": topic.name, "rate_hz": _plain(topic.rate_hz)}
+            hz = f"{topic.name} has {topic.rate_hz:g} Hz"
+            self._add(f"{label}-rate", hz, "rate", parameters, **needs, reproduce=f"rostopic hz {topic.name}")
+        if topic.latched:
+            self._add(
+                f"{label}-latched", f"{topic.name} is latched", "latched", {"topic": topic.name}, **needs
+            )
+        if topic.template:
+            parameters = {"topic": topic.name, "template": topic.template}
+            self._add(
+                f"{label}-message",
+                f"The messages on {topic.name} tell the time",
+                "message",
+                parameters,
+                **needs,
+            )
+        if topic.counts_from is not None:
+            self._counter(name, topic, [kind, node], fast)
+
+    def _label(self, name: str, topic: Topic) -> str:
+        """By the topic, and by the node too where several publish on it."""
+        publishers = [n for n in self._parts.nodes if topic.name in {t.name for t in self._seen[n].topics}]
+        return _id(topic.name) if len(publishers) == 1 else f"{name}-{_id(topic.name)}"
+
+    def _counter(self, name: str, topic: Topic, requires: list[str], fast: Run | None) -> None:
+        label, about = self._label(name, topic), {"topic": topic.name}
+        wrap = wraps_of(fast, topic.name) if fast else None
+        rate: Entry = {"rate_hz": _plain(topic.rate_hz)} if topic.rate_hz else {}
+        needs: Entry = {"scenario": name, "requires": requires}
+        if wrap:
+            last, first = wrap
+            script = self._parts.nodes[name]
+            self.scenarios[f"{name}-fast"] = {
+                "title": f"{PurePosixPath(script).name} with a fast clock, {WRAPS} times around",
+                "clock": "warped",
+                "start": [{"name": name, "script": script}],
+                "until": {"messages": {topic.name: WRAPS * (last - first + 1) + 2}},
+            }
+            needs["scenario"] = f"{name}-fast"
+        start = {**about, "start": topic.counts_from}
+        self._add(
+            f"{label}-start", f"The counter begins with {topic.counts_from}", "counter-start", start, **needs
+        )
+        maximum = {"maximum": wrap[0]} if wrap else {"maximum": 2**31 - 1}
+        self._add(
+            f"{label}-step",
+            "The counter goes up by one",
+            "counter-step",
+            {**about, **maximum, **rate},
+            **needs,
+        )
+        if wrap:
+            parameters = {**about, "minimum": wrap[1], "maximum": wrap[0], "wraps": WRAPS, **rate}
+            title = f"After {wrap[0]} comes {wrap[1]}"
+            self._add(f"{label}-wrap", title, "counter-wrap", parameters, **needs)
+
+    def _hearing(self, name: str, script: str, seen: Observed, requires: list[str]) -> None:
+        run = self._runs.get(f"{name}-hears")
+        found = {t: k for t, k in seen.listens.items() if run and probe_for(t, k)}
+        heard = {t: template for t in found if run and (template := heard_template(run, t))}
+        self.notes += [
+            f"{script} listens to {t} ({k}), which is not covered"
+            for t, k in seen.listens.items()
+            if t not in heard
+        ]
+        if not heard:
+            return
+        scenario = f"{name}-hears"
+        self.scenarios[scenario] = {
+            "title": f"{PurePosixPath(script).name}, with messages made up for this run",
+            "start": [{"name": name, "script": script}],
+            "probes": [_probe(topic, found[topic]) for topic in heard],
+            "until": {"heard": True},
+        }
+        for topic, template in heard.items():
+            parameters = {"topic": topic} | ({"template": template} if template != "{value}" else {})
+            title = f"{PurePosixPath(script).name} prints what it hears on {topic}"
+            self._add(
+                f"{name}-hears-{_id(topic)}", title, "hears", parameters, scenario=scenario, requires=requires
+            )
+
+    def _launch(self, name: str, launch: str, seen: Observed) -> None:
+        file = next(f for f in self._facts.launch_files if PurePosixPath(f.path).name == launch)
+        types = {n.type for n in file.nodes if n.pkg == self._facts.name}
+        scripts = [s for s in self._parts.nodes.values() if PurePosixPath(s).name in types]
+        others = {
+            str(n.name): str(n.pkg) for n in file.nodes if n.pkg != self._facts.name and n.name and n.pkg
+        }
+        if not scripts:
+            self.notes.append(f"{launch} starts no script of the package: not covered")
+            return
+        xml = self._add(
+            f"{name}-xml", f"{launch} is well-formed and names its nodes", "launch-xml",
+            {"launch": launch, "scripts": scripts},
+        )  # fmt: skip
+        self.scenarios[name] = {
+            "title": f"roslaunch {launch}",
+            "start": [{"name": name, "launch": launch}],
+            "until": {"connected": list(seen.connected[:1])}
+            if seen.connected
+            else {"nodes": len(seen.nodes), "alive_s": 1},
+        }
+        parameters: Entry = {"launch": launch, "scripts": scripts}
+        parameters |= {"topic": seen.connected[0]} if seen.connected else {}
+        parameters |= {"nodes": others} if others else {}
+        self._add(
+            f"{name}-runs", f"roslaunch brings up the nodes of {launch}", "launch-runs", parameters,
+            scenario=name, requires=[xml], reproduce=f"roslaunch {self._facts.name} {launch}",
+        )  # fmt: skip
+
+
+def _probe(topic: str, kind: str) -> Entry:
+    made_up = {"text": TEXT_PROBES} if kind == STRING else {"integers": INTEGER_PROBES, "among": [0]}
+    return {"topic": topic, "type": kind, **made_up}
+
+
+def _share_out(criteria: list[Entry]) -> None:
+    """Points by weight, whole numbers, the largest remainders rounded up: together 100."""
+    weights = [WEIGHTS.get(c["check"], 1) for c in criteria]
+    exact = [TOTAL_POINTS * w / sum(weights) for w in weights]
+    for criterion, points in zip(criteria, exact, strict=True):
+        criterion["points"] = int(points)
+    order = sorted(range(len(exact)), key=lambda i: (int(exact[i]) - exact[i], i))
+    for index in order[: TOTAL_POINTS - sum(c["points"] for c in criteria)]:
+        criteria[index]["points"] += 1
+
+
+def _plain(number: float) -> float | int:
+    return int(number) if number == int(number) else number
+
+
+def _id(name: str) -> str:
+    """A criterion's id from a topic or service: letters, digits and hyphens."""
+    letters: Iterator[str] = (c if c.isalnum() and c.isascii() else "-" for c in name.lower())
+    label = "-".join(part for part in "".join(letters).split("-") if part)
+    return label if label[:1].isalpha() else f"t-{label}"

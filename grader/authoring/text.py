@@ -1,0 +1,69 @@
+"""A proposed rubric as YAML, laid out as people write it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Any
+
+import yaml
+
+HEAD = """\
+# Proposed by `grader rubric new` from a run of a correct package. Look through it: it asks for what this package does,
+# and only you know what the handout asks for. `grader explain CHECK` tells more about each check, and
+# `grader rubric test` whether the rubric notices what students do wrong.
+"""
+
+
+class _Dumper(yaml.SafeDumper):
+    """Short lists and maps on one line, long ones not."""
+
+    def ignore_aliases(self, _data: object) -> bool:
+        return True
+
+    def increase_indent(self, flow: bool = False, indentless: bool = False) -> None:  # noqa: ARG002 - PyYAML's own
+        """Indent the entries of lists."""
+        super().increase_indent(flow, False)
+
+
+def rubric_text(
+    package: str,
+    rubric_id: str,
+    scenarios: dict[str, Any],
+    criteria: list[dict[str, Any]],
+    notes: Iterable[str],
+) -> str:
+    """The rubric's file."""
+    about = {
+        "schema": "grader.rubric/1",
+        "id": rubric_id,
+        "title": f"The lab {rubric_id}",
+        "version": "1",
+        "package": package,
+    }
+    parts = [HEAD + "".join(f"# NOTE: {_one_line(note)}\n" for note in notes), _block(about)]
+    runs = [_indented({name: scenario}) for name, scenario in scenarios.items()]
+    parts.append("scenarios:\n" + "\n".join(runs) if runs else "scenarios: {}\n")
+    parts.append("criteria:\n" + "\n".join(_indented([criterion]) for criterion in criteria))
+    return "\n".join(parts)
+
+
+def _block(data: object) -> str:
+    return yaml.dump(
+        data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110, default_flow_style=False
+    )
+
+
+def _indented(data: object) -> str:
+    return "".join(f"  {line}\n" if line else "\n" for line in _compact(data).splitlines())
+
+
+def _compact(data: object) -> str:
+    """Innermost lists and maps in flow style: `[rospy, std_msgs]`."""
+    return yaml.dump(
+        data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110, default_flow_style=None
+    )
+
+
+def _one_line(text: str) -> str:
+    return re.sub(r"\s+", " ", text)[:300]
