@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from grader.checks.support.text import listed, near_names
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 
@@ -57,3 +58,12 @@ def _apply(found: dict[str, Any], event: ParamEvent) -> None:
         for known in [n for n in found if name.startswith(f"{n}/")]:
             del found[known]  # a value gives way to a map
         found.update(leaves(name, event.value))
+
+
+def instead(found: Mapping[str, Any], name: str) -> str:
+    """`there is no /details/name/first` with what is there in its place."""
+    last = name.rpartition("/")[2]
+    others = own(found)
+    same = [n for n in others if n.rpartition("/")[2] == last]
+    near = same or near_names(name, others) or list(others)
+    return f"there is no {name}" + (f"; there is {listed(near)}" if near else "")
