@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import NamedTuple
 
 from grader.checks.support.text import bare
@@ -54,11 +54,20 @@ def printed_lines(run: Run) -> tuple[Line, ...]:
     )
 
 
-def _logged(run: Run) -> list[tuple[int, str]]:
-    """The messages on /rosout, line by line."""
+def stream_lines(run: Run, process: str) -> tuple[tuple[Line, ...], ...]:
+    """What one process printed on stdout and on stderr, and what its nodes logged, each by time."""
+    nodes = run.student_nodes(process)
+    console = ([(t, c.line) for t, c in run.lines(process) if c.stream == s] for s in ("stdout", "stderr"))
+    streams = (*console, _logged(run, nodes))
+    return tuple(tuple(Line(t, _bare(text, nodes)) for t, text in stream) for stream in streams)
+
+
+def _logged(run: Run, nodes: Collection[str] | None = None) -> list[tuple[int, str]]:
+    """The messages on /rosout, line by line: of these nodes, or of all that are the student's."""
     texts = (
         (t, str(value.get("msg", "")))
         for channel in run.student_channels("/rosout")
+        if nodes is None or channel.callerid in nodes
         for t, value in zip(channel.times_ns, channel.values, strict=True)
         if isinstance(value, dict)
     )

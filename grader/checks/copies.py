@@ -1,0 +1,233 @@
+"""Whether two copies of a node can live at once."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Annotated, NamedTuple
+
+from pydantic import Field
+
+from grader.checks.registry import check
+from grader.checks.support.ending import ended_after, explain_end
+from grader.checks.support.nodes import are_noted, nodes_of
+from grader.checks.support.pairs import Sent, both_from_ns, heard_of, printed_times, sent_by
+from grader.checks.support.process import Life, life, lives
+from grader.checks.support.text import listed, plural
+from grader.checks.support.wording import VALUE, in_words
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, partial, passed, unjudged
+
+SAME_NAME = "new node registered with same name"
+FEW = 2
+
+
+class CopiesParams(Record):
+    """`first` and `second` are processes of one script, `listener` the process that has to print both's messages.
+
+    `template` is what it has to say of each, `taken_over_score` what is earned where the second copy takes the
+    name over and the first is shut down.
+    """
+
+    first: str
+    second: str
+    listener: str
+    topic: str
+    template: str = VALUE
+    taken_over_score: Annotated[float, Field(ge=0, le=1)] = 0.3333
+
+
+class Trio(NamedTuple):
+    """The three processes, and the nodes of the two copies."""
+
+    first: Life
+    second: Life
+    listener: Life
+    first_nodes: tuple[str, ...]
+    second_nodes: tuple[str, ...]
+
+
+@check("copies", params=CopiesParams)
+def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
+    """Two copies of the node live at once, and the listener hears both.
+
+    What it checks
+        That a second copy of the script can be started beside the first: both live on, under two names, and
+        the listener prints messages of both.
+
+    Why it matters on a robot
+        A robot often has two of a kind, wheels or cameras, run by the same program. ROS allows each name
+        once: a second node of the same name has the first one shut down.
+
+    How it is measured
+        The grader starts the script twice, beside the listener. The names come from the master, and the
+        messages are told apart by their texts. Where the second copy takes the name over and the first is
+        shut down, part of the points is earned.
+
+    How to fix
+        `rospy.init_node('<name>', anonymous=True)` adds a number of its own to each copy's name. `rosnode
+        list` shows both.
+    """
+    expected = f"two copies alive under two names, and {params.listener} printing messages of both"
+    trio = _trio(package, run, params)
+    if isinstance(trio, Verdict):
+        return trio.model_copy(update={"expected": expected})
+    verdict = (
+        _taken_over(run, trio, params)
+        or _not_both_alive(package, run, trio)
+        or _unnamed(run, trio)
+        or _heard(package, run, trio, params)
+    )
+    names = dict.fromkeys((*trio.first_nodes, *trio.second_nodes))
+    graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
+    measured = verdict.measured or f"names of the copies: {listed(names) or 'none'}"
+    citations = verdict.citations or (graph,)
+    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
+
+
+def _trio(package: PackageFacts, run: Run, params: CopiesParams) -> Trio | Verdict:
+    first, second, listener = (life(run, name) for name in (params.first, params.second, params.listener))
+    if first is None or second is None:
+        return _not_started(package, run, params)
+    if listener is None:
+        message = f"{params.listener} was not started, so nobody can tell whose messages arrive"
+        return unjudged(message, measured="no listener", hint="add the listener's script, and push it")
+    return Trio(first, second, listener, run.student_nodes(first.name), run.student_nodes(second.name))
+
+
+def _not_started(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
+    """A process may have to wait for another one's node: then that one is the cause."""
+    measured = listed(one.name for one in lives(run)) or "nothing"
+    waited_for = [one for one in lives(run) if one.name in {params.first, params.second, params.listener}]
+    for one in waited_for:
+        if one.ended_early:
+            end = explain_end(one, run, package)
+            message = f"{one.name} ended before the copies were started: {end.cause}"
+            return unjudged(message, measured=f"started: {measured}", hint=end.hint, citations=end.citations)
+        if not nodes_of(run, one.name):
+            message = f"{one.name} never registers as a node, so what waits for it was not started"
+            hint = "call rospy.init_node(…) before anything that waits"
+            return unjudged(message, measured=f"started: {measured}", hint=hint)
+    if any(one.name in {params.first, params.second} for one in waited_for):
+        message = "only one copy was started"
+        return inconclusive(message, measured=f"started: {measured}", hint="grade again")
+    message = "no copy was started: there is no script to run"
+    hint = "add the script to the package, and push it"
+    return unjudged(message, measured=f"started: {measured}", hint=hint)
+
+
+def _taken_over(run: Run, trio: Trio, params: CopiesParams) -> Verdict | None:
+    """One name for both: the master has the copy that had it first shut down."""
+    shared = [n for n in trio.first_nodes if n in trio.second_nodes]
+    told = any(SAME_NAME in c.line for one in trio[:2] for _, c in run.lines(one.name))
+    if trio.second.ended_early or not (shared or told):
+        return None
+    name = shared[0] if shared else next(iter((*trio.second_nodes, *trio.first_nodes)), "its name")
+    down = "the first copy is shut down" if trio.first.ended_early else "the first copy is told to shut down"
+    message = f"the second copy takes the name {name} over, and {down}: ROS allows each name once"
+    base = name.strip("/")
+    hint = f"write rospy.init_node('{base}', anonymous=True): then each copy has a name of its own"
+    return partial(params.taken_over_score, message, hint=hint, measured=f"one name for two copies: {name}")
+
+
+def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | None:
+    """Ended for another reason: both, as the script does alone too, or one of them only."""
+    gone = [(word, one) for word, one in zip(("first", "second"), trio[:2], strict=True) if one.ended_early]
+    if not gone:
+        return None
+    word, one = gone[-1]
+    end = explain_end(one, run, package)
+    cited = end.citations or (
+        EvidenceCitation(
+            evidence=run.evidence, topic="/grader/process", from_ns=one.start_ns, to_ns=one.end_ns
+        ),
+    )
+    if len(gone) > 1:
+        message = f"both copies ended by themselves: {end.cause}"
+        return unjudged(message, hint=end.hint, citations=cited)
+    message = (
+        f"the {word} copy ended by itself after {ended_after(one)}, while the other lived on: {end.cause}"
+    )
+    return failed(message, hint=end.hint, citations=cited)
+
+
+def _unnamed(run: Run, trio: Trio) -> Verdict | None:
+    if trio.first_nodes and trio.second_nodes:
+        return None
+    if run.student_nodes() and not are_noted(run):
+        message = "the recording does not say which node belongs to which copy"
+        return inconclusive(message, hint="grade again")
+    which = "second" if trio.first_nodes else "first" if trio.second_nodes else ""
+    if not which:
+        message = "neither copy registers as a node"
+        return unjudged(message, hint="call rospy.init_node(…) before anything that waits")
+    message = f"the {which} copy never registers as a node beside the other"
+    return failed(message, hint="call rospy.init_node('…', anonymous=True) before anything that waits")
+
+
+def _listener_gone(package: PackageFacts, run: Run, trio: Trio) -> Verdict | None:
+    if not trio.listener.ended_early:
+        return None
+    end = explain_end(trio.listener, run, package)
+    message = f"both copies live, but {trio.listener.name} ended before it could hear both: {end.cause}"
+    return unjudged(message, hint=end.hint, citations=end.citations)
+
+
+def _heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) -> Verdict:
+    """Messages of both that came while both were sending, by what the listener printed."""
+    copies = (trio.first_nodes, trio.second_nodes)
+    from_ns = both_from_ns(run, params.topic, *copies)
+    if from_ns is None:
+        silent = next(nodes for nodes in copies if not sent_by(run, params.topic, nodes).texts)
+        message = f"both copies live, but {listed(silent)} sends no text on {params.topic}"
+        return unjudged(message, hint=f"publish on {params.topic} in the loop, as a copy alone does")
+    first, second = (sent_by(run, params.topic, nodes, from_ns) for nodes in copies)
+    texts = {**first.texts, **second.texts}
+    said, known = (printed_times(run, trio.listener.name, texts, form) for form in (params.template, VALUE))
+    return (
+        _judged(first, second, said, trio, params)
+        or _listener_gone(package, run, trio)
+        or (_judged(first, second, known, trio, params) and _other_words(params))
+        or _unheard(first, second, known, trio, params)
+    )
+
+
+def _other_words(params: CopiesParams) -> Verdict:
+    wanted = in_words(params.template)
+    message = f"{params.listener} prints what both copies send, but not as '{wanted}'"
+    return unjudged(message, hint=f"print '{wanted}', with the handout's own words")
+
+
+def _judged(
+    first: Sent, second: Sent, printed: Counter[str], trio: Trio, params: CopiesParams
+) -> Verdict | None:
+    """A pass where both were heard."""
+    counts = heard_of(first, second, printed), heard_of(second, first, printed)
+    if not all(counts):
+        return None
+    names = f"{trio.first_nodes[0]} and {trio.second_nodes[0]}"
+    heard = f"{counts[0]} of {plural(first.total, 'message')} and {counts[1]} of {second.total}"
+    return passed(
+        f"{names} live at once, and {params.listener} prints messages of both",
+        measured=f"{names}; printed: {heard}",
+    )
+
+
+def _unheard(first: Sent, second: Sent, printed: Counter[str], trio: Trio, params: CopiesParams) -> Verdict:
+    """The listener hears one copy, or none at all: then the listener's own criterion says why."""
+    names = (trio.first_nodes[0], trio.second_nodes[0])
+    if min(first.total, second.total) < FEW:
+        message = "the two copies were watched too briefly to see their messages printed"
+        return inconclusive(message, hint="grade again")
+    if not printed:
+        message = f"both copies live, but {params.listener} prints nothing of what they send"
+        return unjudged(message, hint="first make the listener print what it hears")
+    counts = heard_of(first, second, printed), heard_of(second, first, printed)
+    if not any(counts):
+        message = f"{names[0]} and {names[1]} send the same texts, and not all of them are printed twice"
+        return unjudged(message, hint="let each message tell the time: rospy.get_time()")
+    lost = names[0] if counts[1] else names[1]
+    message = f"{names[0]} and {names[1]} live at once, but {params.listener} prints nothing of {lost}"
+    hint = "subscribe with a callback and rospy.spin(); a subscriber hears every publisher of its topic"
+    return failed(message, hint=hint)
