@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
@@ -31,11 +32,6 @@ class Mutant(Step):
     also: tuple[Step, ...] = ()
     costs: Annotated[dict[str, Cost], Field(min_length=1)]
 
-    @property
-    def label(self) -> str:
-        """How the mutant is called: `bit-removed: src/talker.py`."""
-        return " + ".join(label(s.operator, s.at, s.parameters) for s in (self, *self.also))
-
 
 class MutantsFile(Record):
     """The mutants of one lab's reference solution."""
@@ -45,8 +41,8 @@ class MutantsFile(Record):
     mutants: Annotated[tuple[Mutant, ...], Field(min_length=1)]
 
 
-def label(operator: str, at: dict[str, str | int], parameters: dict[str, Any]) -> str:
-    """Operator, place and parameters in one line."""
+def label(operator: str, at: Mapping[str, str | int], parameters: Mapping[str, Any]) -> str:
+    """How a mutant is called: `other-rate: src/talker.py (factor 0.5)`."""
     place = ", ".join(str(value) for value in at.values())
     given = ", ".join(f"{name} {value}" for name, value in parameters.items())
     return operator + (f": {place}" if place else "") + (f" ({given})" if given else "")

@@ -16,6 +16,7 @@ from grader.mutation.tree import Tree
 from grader.rubric.faults import did_you_mean
 
 SHOWN_PLACES = 6
+Place = Mapping[str, str | int]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,11 +45,13 @@ def plan_declared(loaded: LoadedMutants, solution: Solution) -> tuple[list[Plann
     faults: list[str] = []
     for index, mutant in enumerate(loaded.mutants):
         try:
-            tree = mutated(solution, mutant)
+            places, tree = mutated(solution, mutant)
         except DoesNotFitError as error:
             faults.append(loaded.source.fault(("mutants", index), str(error)))
             continue
-        planned.append(Planned(name="", label=mutant.label, step=mutant, tree=tree, costs=dict(mutant.costs)))
+        steps = zip((mutant, *mutant.also), places, strict=True)
+        words = " + ".join(label(step.operator, at, step.parameters) for step, at in steps)
+        planned.append(Planned(name="", label=words, step=mutant, tree=tree, costs=dict(mutant.costs)))
     return _named(planned), faults
 
 
@@ -59,16 +62,19 @@ def plan_all(solution: Solution) -> list[Planned]:
         for site in operator.sites(solution):
             step = Step.model_validate({"operator": operator.name, "at": site.at})
             planned.append(
-                Planned(name="", label=label(operator.name, dict(site.at), {}), step=step, tree=site.tree)
+                Planned(name="", label=label(operator.name, site.at, {}), step=step, tree=site.tree)
             )
     return _named(planned)
 
 
-def mutated(solution: Solution, mutant: Mutant) -> Tree:
-    """The tree with all of the mutant's mistakes. Raises DoesNotFitError."""
+def mutated(solution: Solution, mutant: Mutant) -> tuple[list[Place], Tree]:
+    """Where each of the mutant's mistakes is, and the tree with all of them. Raises DoesNotFitError."""
+    places = []
     for step in (mutant, *mutant.also):
-        solution = solution.then(_site(solution, step).tree)
-    return solution.tree
+        site = _site(solution, step)
+        places.append(site.at)
+        solution = solution.then(site.tree)
+    return places, solution.tree
 
 
 def _site(solution: Solution, step: Step) -> Site:
@@ -85,7 +91,7 @@ def _site(solution: Solution, step: Step) -> Site:
     raise DoesNotFitError(f"{step.operator} fits in {len(chosen)} places: say in `at` which: {where}")
 
 
-def _place(at: Mapping[str, str | int]) -> str:
+def _place(at: Place) -> str:
     return "{" + ", ".join(f"{key}: {value}" for key, value in at.items()) + "}"
 
 
