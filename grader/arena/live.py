@@ -45,6 +45,7 @@ class Live:
     unheard: dict[str, re.Pattern[str]] = field(default_factory=dict)
     last_sent_s: float = 0.0
     graph_changed_s: float = 0.0
+    graph_picture: object = None
     graphs: int = 0
     last_line_s: float = 0.0
 
@@ -61,9 +62,17 @@ class Live:
         """Something of the student's happened."""
         self.activity_s = now_s
 
-    def graph(self, nodes: Iterable[str], processes: Mapping[str, str], now_s: float) -> None:
-        """The master's nodes of the student's, and the processes that nodes belong to."""
-        self.graph_changed_s = now_s
+    def graph(
+        self, nodes: Iterable[str], processes: Mapping[str, str], now_s: float, *, picture: object = None
+    ) -> None:
+        """The master's nodes of the student's, and the processes that nodes belong to.
+
+        `picture` is all that counts as a change, the nodes alone where it is None.
+        """
+        nodes = frozenset(nodes)
+        picture = nodes if picture is None else picture
+        if picture != self.graph_picture:
+            self.graph_changed_s, self.graph_picture = now_s, picture
         self.registered |= set(processes.values())
         self.helper_nodes |= {n for n in nodes if processes.get(n) in self.helpers}
         own = {n for n in nodes if n not in self.helper_nodes}
@@ -142,7 +151,8 @@ def next_look_s(live: Live, until: Until, now_s: float) -> float:
             seen.last_s + until.silent_s,
             seen.first_s + until.silent_s,
         ]
-    looks += [live.graph_changed_s + until.silent_s, max(live.last_line_s, live.last_sent_s) + HEARD_S]
+    looks += [live.graph_changed_s + max(until.silent_s, until.first_message_s)]
+    looks += [max(live.last_line_s, live.last_sent_s) + HEARD_S]
     looks += [live.activity_s + (until.quiet_s or 0), live.activity_s + until.silent_s]
     looks += [live.first_node_s + (until.alive_s or 0)]
     ahead = [look - now_s for look in looks if look > now_s]
@@ -159,10 +169,16 @@ def _window(live: Live, until: Until, now_s: float) -> bool:
     topics = until.topics or tuple(live.topics)
     seen = _seen(live, topics)
     if not seen:
-        return False
+        return _talks_elsewhere(live, until, now_s)
     if len(seen) == len(topics):
         return now_s >= max(s.first_s for s in seen) + until.window_s
     return now_s >= max(s.first_s for s in seen) + max(until.window_s, until.silent_s)
+
+
+def _talks_elsewhere(live: Live, until: Until, now_s: float) -> bool:
+    """The nodes have talked for so long on topics that nobody waits for: no more will come of them."""
+    first_s = min((seen.first_s for seen in live.topics.values() if seen.count), default=now_s)
+    return now_s > first_s + max(until.window_s or 0, until.silent_s)
 
 
 def _messages(live: Live, until: Until) -> bool:
@@ -203,8 +219,9 @@ def _silent(live: Live, until: Until, now_s: float) -> str:
         last_s = live.topics[topic].last_s or min(s.first_s for s in seen)
         if live.topics[topic].count < count and now_s > last_s + until.silent_s:
             return f"no message on {topic} for {until.silent_s:g} s"
-    if until.connected and live.graph_changed_s and now_s > live.graph_changed_s + until.silent_s:
-        return f"the graph has not changed for {until.silent_s:g} s"
+    patience_s = max(until.silent_s, until.first_message_s)
+    if until.connected and live.graph_changed_s and now_s > live.graph_changed_s + patience_s:
+        return f"the graph has not changed for {patience_s:g} s"
     return _standstill(live, until, now_s)
 
 

@@ -180,7 +180,8 @@ class ArenaSession:
         if topic == "/grader/graph":
             self.rosout_up = self.rosout_up or "/rosout" in record["nodes"]
             nodes = [n for n in record["nodes"] if not is_grader_node(n)]
-            self.live.graph(nodes, record["processes"], time.monotonic())
+            picture = {key: value for key, value in record.items() if key != "connections"}
+            self.live.graph(nodes, record["processes"], time.monotonic(), picture=picture)
             self.live.services = set(record["services"])
         elif topic == "/grader/console":
             if record["process"] not in self.live.helpers:

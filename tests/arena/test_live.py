@@ -30,6 +30,8 @@ COUNT = Until(messages={"/a": 10}, silent_s=5, limit_s=60)
         (WINDOW, _live(a=(5, 1.0, 2.0), b=(5, 3.0, 3.5)), 9.0, "complete"),
         (WINDOW, _live(a=(5, 1.0, 2.0)), 6.9, None),
         (WINDOW, _live(a=(5, 1.0, 2.0)), 7.0, "complete"),
+        (WINDOW, _live(c=(5, 1.0, 2.0)), 7.0, None),
+        (WINDOW, _live(c=(5, 1.0, 2.0)), 7.1, "complete"),
         (COUNT, _live(a=(9, 1.0, 2.0)), 6.9, None),
         (COUNT, _live(a=(10, 1.0, 2.0)), 2.0, "complete"),
         (COUNT, _live(a=(9, 1.0, 2.0)), 7.1, "silent"),
@@ -67,6 +69,16 @@ def test_heard_waits_only_so_long_after_the_last_line() -> None:
     live.printed("nothing of it", 1.5)
     assert settled(live, until, 3.4) is None
     assert settled(live, until, 3.6) == ("complete", "")
+
+
+def test_looking_at_the_graph_is_no_change_of_it() -> None:
+    live, until = _live(), Until(connected=("/a",), silent_s=6, first_message_s=20)
+    for now_s in (1.0, 2.0, 20.9):
+        live.graph(["/talker"], {}, now_s, picture={"publishers": {"/a": ["/talker"]}})
+    assert settled(live, until, 20.9) is None
+    assert settled(live, until, 21.1) == ("silent", "the graph has not changed for 20 s")
+    live.graph(["/talker"], {}, 21.1, picture={"publishers": {"/b": ["/talker"]}})
+    assert settled(live, until, 21.2) is None
 
 
 def test_waiting_is_said_in_words() -> None:
