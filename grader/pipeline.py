@@ -40,7 +40,6 @@ from grader.model.verdict import Status
 from grader.recordings import keep_recording, keep_scenarios
 from grader.report.files import write_reports
 from grader.rubric.load import LoadedRubric
-from grader.rubric.model import Rubric
 from grader.rubric.needs import needs_package, started
 
 RETRIES = 2
@@ -129,18 +128,18 @@ def _opened(
     progress.step("intake", "running", source)
     with tempfile.TemporaryDirectory(prefix="grader-source-", ignore_cleanup_errors=True) as folder:
         recorded = open_recording(source, submission_id=options.submission_id)
-        submission = recorded or _opened_tree(source, rubric.rubric, Path(folder), options)
+        submission = recorded or _opened_tree(source, rubric, Path(folder), options)
         progress.step("intake", "done", submission.id)
         yield submission
 
 
 def _opened_tree(
-    source: str, rubric: Rubric, workdir: Path, options: GradeOptions
+    source: str, rubric: LoadedRubric, workdir: Path, options: GradeOptions
 ) -> Submission | RecordedSubmission:
     if not needs_package(rubric):
         return open_recorded(source, workdir=workdir, submission_id=options.submission_id)
     return open_submission(
-        source, package=rubric.package, workdir=workdir, submission_id=options.submission_id
+        source, package=rubric.rubric.package, workdir=workdir, submission_id=options.submission_id
     )
 
 
@@ -151,7 +150,7 @@ def _kept_and_judged(
         keep_scenarios(rubric.rubric, submission, evidence, progress)
     else:
         keep_recording(submission.file, evidence)
-    return judge(rubric.rubric, load_evidence([evidence]))
+    return judge(rubric.rubric, load_evidence([evidence]), rubric.checks)
 
 
 @contextmanager
@@ -198,13 +197,13 @@ def _recorded_and_judged(
     with _recorder(submission, rubric, evidence, options, progress) as recorder:
         recorder.record_all()
         keep_scenarios(rubric.rubric, submission, evidence, progress)
-        criteria = judge(rubric.rubric, load_evidence([evidence]))
+        criteria = judge(rubric.rubric, load_evidence([evidence]), rubric.checks)
         for _ in range(RETRIES):
             again = _inconclusive_scenarios(criteria, recorder.recording)
             if not again:
                 break
             recorder.record_again(again)
-            criteria = judge(rubric.rubric, load_evidence([evidence]))
+            criteria = judge(rubric.rubric, load_evidence([evidence]), rubric.checks)
     return recorder.recording, criteria
 
 

@@ -25,7 +25,8 @@ ALLOWED = {
     "package": BASE,
     "intake": BASE | {"files"},
     "checks": BASE | {"evidence"},
-    "rubric": BASE | {"checks", "evidence"},
+    "instructor": BASE | {"checks"},
+    "rubric": BASE | {"checks", "evidence", "instructor"},
     "judge": BASE | {"checks", "evidence", "rubric"},
     "report": BASE | {"files", "rubric.model"},
     "arena": BASE | {"evidence", "files", "package", "rubric.model"},
@@ -37,7 +38,8 @@ ALLOWED = {
         *BASE, "checks", "evidence", "intake", "package", "pipeline", "rubric"
     },
     "cli": {
-        *BASE, "arena", "authoring", "checks", "evidence", "files", "intake", "judge", "package", "pipeline", "report", "rubric"
+        *BASE, "arena", "authoring", "checks", "evidence", "files", "instructor", "intake", "judge", "package",
+        "pipeline", "report", "rubric"
     },
     "__main__": {"cli"},
 }  # fmt: skip

@@ -17,10 +17,17 @@ class NotRecorded(Exception):
         self.verdict = verdict
 
 
+class NoSuchScenario(KeyError):
+    """A scenario was asked for that the rubric does not have: a slip of whoever wrote the check."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
 class Evidence(Mapping[str, Run]):
     """The runs by scenario, and `package`, the run of the build. Iterating gives those that were recorded.
 
-    A scenario that was not recorded raises NotRecorded, one that the rubric does not have KeyError.
+    A scenario that was not recorded raises NotRecorded, one that the rubric does not have NoSuchScenario.
     """
 
     def __init__(
@@ -32,11 +39,14 @@ class Evidence(Mapping[str, Run]):
 
     def __getitem__(self, scenario: str) -> Run:
         if scenario not in self._found:
-            raise KeyError(f"there is no scenario {scenario!r}, only {', '.join(self._found)}")
+            raise NoSuchScenario(f"there is no scenario {scenario!r}, only {', '.join(self._found)}")
         found = self._found[scenario]
         if isinstance(found, Verdict):
             raise NotRecorded(found)
         return found
+
+    def __contains__(self, scenario: object) -> bool:
+        return isinstance(self._found.get(str(scenario)), Run)
 
     def __iter__(self) -> Iterator[str]:
         return (name for name, run in self._found.items() if isinstance(run, Run))
@@ -46,9 +56,9 @@ class Evidence(Mapping[str, Run]):
 
     @property
     def run(self) -> Run:
-        """The run of the criterion's own scenario. Raises LookupError where it names none."""
+        """The run of the criterion's own scenario. Raises NoSuchScenario where it names none."""
         if self._scenario is None:
-            raise LookupError("the criterion names no scenario, so there is no run: add scenario: to it")
+            raise NoSuchScenario("the criterion names no scenario, so there is no run: add scenario: to it")
         return self[self._scenario]
 
     @property

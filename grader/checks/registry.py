@@ -92,7 +92,7 @@ def check(
             line = getattr(getattr(function, "__code__", None), "co_firstlineno", 1)
             own.faults += [(line, f'check "{name}": {problem}') for problem in problems]
             return function
-        title, sections = _parts(inspect.getdoc(function) or "")
+        title, sections = parts(inspect.getdoc(function) or "")
         (own.checks if own else CHECKS)[name] = Check(
             name=name,
             function=function,
@@ -130,7 +130,7 @@ def _own_problems(
         yield "params must be a class derived from Record"
 
 
-def _parts(docstring: str) -> tuple[str, dict[str, str]]:
+def parts(docstring: str) -> tuple[str, dict[str, str]]:
     """The title line, and the text under each heading with its lines joined into paragraphs."""
     title, *rest = docstring.splitlines() or [""]
     sections: dict[str, list[str]] = {}

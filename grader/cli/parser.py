@@ -132,6 +132,7 @@ def _authoring(add: _Adder) -> None:
     _json(add("labs", "list the rubrics that come with the grader"))
     explain = add("explain", "explain a check or a criterion: what, why, how it is measured, how to fix")
     explain.add_argument("name", metavar="NAME", help="a check, a criterion, or LAB/criterion")
+    _rubric(explain, required=False)
     _json(add("doctor", "say what this machine can and cannot do, and what mends it"))
 
     rubric = add("rubric", "work on rubrics")
@@ -139,7 +140,8 @@ def _authoring(add: _Adder) -> None:
     inner = _Adder(parts, add.common)
     validate = inner("validate", "check rubric files; every fault is named", "rubric_validate")
     validate.add_argument("files", metavar="FILE", nargs="+")
-    inner("schema", "print the JSON Schema of rubrics, for editors", "rubric_schema")
+    schema = inner("schema", "print the JSON Schema of rubrics, for editors", "rubric_schema")
+    _rubric(schema, required=False)
     new = inner("new", "write a first rubric from a run of a correct package", "rubric_new")
     new.add_argument(
         "--from", metavar="SOLUTION", dest="solution", required=True, help="a folder, archive or git URL"

@@ -6,22 +6,37 @@ import hashlib
 import json
 from pathlib import Path
 
-from grader.checks import CHECKS
+from grader.checks import Check
 from grader.errors import RubricError, UsageError
+from grader.instructor.known import known_checks
+from grader.instructor.own import run_checks_file
 from grader.model.record import Record
 from grader.rubric.cross import cross_faults
 from grader.rubric.faults import model_faults
 from grader.rubric.find import locate, rubric_ids, rubrics_folder
+from grader.rubric.instructor import Beside, read_instructor
 from grader.rubric.model import Rubric
 from grader.rubric.source import Source, read_source
 
 
 class LoadedRubric(Record):
-    """A rubric and where it came from; `digest` is the sha256 of the file's bytes."""
+    """A rubric and where it came from; `digest` is the sha256 of the file's bytes, and of the instructor's files.
+
+    `own` is the text of the instructor's file of checks: another process, to which this record is sent, runs it anew.
+    """
 
     rubric: Rubric
     path: Path
     digest: str
+    own: bytes | None = None
+
+    @property
+    def checks(self) -> dict[str, Check]:
+        """Every check that the rubric may name: the grader's, `pytest`, and the instructor's own."""
+        folder = self.path.parent
+        if self.own is None or self.rubric.checks is None:
+            return known_checks(folder, {})
+        return known_checks(folder, run_checks_file(folder.resolve() / self.rubric.checks, self.own).checks)
 
 
 def load_rubric(name_or_path: str) -> LoadedRubric:
@@ -31,11 +46,21 @@ def load_rubric(name_or_path: str) -> LoadedRubric:
     """
     path, name = locate(name_or_path)
     source = read_source(path, name)
-    faults = _faults(source)
+    beside = read_instructor(source.data, path.parent)
+    faults = _faults(source, beside)
     if faults:
         raise RubricError(faults)
     rubric = Rubric.model_validate_json(json.dumps(source.data), strict=True)
-    return LoadedRubric(rubric=rubric, path=path, digest=hashlib.sha256(source.raw).hexdigest())
+    own = beside.files[rubric.checks] if rubric.checks is not None else None
+    return LoadedRubric(rubric=rubric, path=path, digest=_digest(source.raw, beside), own=own)
+
+
+def _digest(raw: bytes, beside: Beside) -> str:
+    """Of the rubric alone where nothing else belongs to it."""
+    digest = hashlib.sha256(raw)
+    for name, content in sorted(beside.files.items()):
+        digest.update(f"\0{name}\0{hashlib.sha256(content).hexdigest()}".encode())
+    return digest.hexdigest()
 
 
 def all_rubrics() -> tuple[LoadedRubric, ...]:
@@ -54,7 +79,7 @@ def find_rubric_for_package(name: str) -> str | None:
     return found[0] if found else None
 
 
-def _faults(source: Source) -> list[str]:
+def _faults(source: Source, beside: Beside) -> list[str]:
     if not isinstance(source.data, dict):
         return [
             source.fault((), "a rubric is a map of keys and values, beginning with schema: grader.rubric/1")
@@ -62,7 +87,10 @@ def _faults(source: Source) -> list[str]:
     found = [
         *source.faults,
         *model_faults(Rubric, source.data),
-        *cross_faults(source.data, CHECKS),
+        *cross_faults(source.data, beside.known, complete=beside.own.complete),
+        *beside.faults,
     ]
     unique = dict.fromkeys(found)
-    return [source.fault(*fault) for fault in sorted(unique, key=lambda fault: source.line(fault[0]))]
+    told = [source.fault(*fault) for fault in sorted(unique, key=lambda fault: source.line(fault[0]))]
+    file = Path(source.name).parent / str(source.data.get("checks"))
+    return [*told, *(f"{file}:{line}: {message}" for line, message in beside.own.faults)]

@@ -88,7 +88,8 @@ class Until(Record):
     open something. `ended`: these processes have ended. `quiet_s`: for so long, nothing was printed, published,
     registered or set, and something was before.
     A run gives up when no message came within `first_message_s`, when all that is waited for has been silent for
-    `silent_s`, or after `limit_s`. With no condition at all it is watched for `limit_s`.
+    `silent_s`, when nothing in the graph has changed for the longer of the two while a connection is waited for, or
+    after `limit_s`. With no condition at all it is watched for `limit_s`.
     """
 
     window_s: Seconds | None = None
@@ -145,7 +146,8 @@ class Criterion(Record):
 class Rubric(Record):
     """A lab. `pass_mark` in points; without one, every visible criterion must be reached.
 
-    `digits` is how many decimals points keep.
+    `digits` is how many decimals points keep. `checks` is a Python file beside the rubric with checks of the
+    instructor's own.
     """
 
     schema_: Annotated[Literal["grader.rubric/1"], Field(alias="schema")]
@@ -156,6 +158,7 @@ class Rubric(Record):
     handout: str = ""
     pass_mark: Annotated[float, Field(ge=0)] | None = None
     digits: Annotated[int, Field(ge=0, le=3)] = 1
+    checks: str | None = None
     scenarios: dict[Name, Scenario]
     criteria: Annotated[tuple[Criterion, ...], Field(min_length=1)]
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from grader.checks import CHECKS
+from collections.abc import Mapping
+
+from grader.checks import Check
+from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Criterion, Rubric
 
 
@@ -12,11 +15,12 @@ def started(rubric: Rubric) -> Rubric:
     return rubric.model_copy(update={"scenarios": scenarios})
 
 
-def needs_package(rubric: Rubric) -> bool:
+def needs_package(loaded: LoadedRubric) -> bool:
     """Whether there is anything to run, or any check that looks at the package's files."""
-    return bool(started(rubric).scenarios) or any(_looks_at_files(c) for c in rubric.criteria)
+    rubric, checks = loaded.rubric, loaded.checks
+    return bool(started(rubric).scenarios) or any(_looks_at_files(c, checks) for c in rubric.criteria)
 
 
-def _looks_at_files(criterion: Criterion) -> bool:
-    check = CHECKS.get(criterion.check)
+def _looks_at_files(criterion: Criterion, checks: Mapping[str, Check]) -> bool:
+    check = checks.get(criterion.check)
     return check is not None and not check.messages_only and bool({"package", "build"} & set(check.facts))

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import reduce
 from operator import or_
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, create_model
 
-from grader.checks import CHECKS, HEADINGS, Check
+from grader.checks import HEADINGS, Check
 from grader.checks.registry import NoParams
+from grader.instructor.known import known_checks
 from grader.rubric.cross import MANUAL
 from grader.rubric.model import Criterion, Rubric
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def rubric_schema() -> dict[str, Any]:
-    """The schema; criteria are a union told apart by `check`."""
-    members: Any = reduce(or_, [_manual(), *(_criterion(CHECKS[name]) for name in sorted(CHECKS))])
+def rubric_schema(checks: Mapping[str, Check] | None = None) -> dict[str, Any]:
+    """The schema; criteria are a union told apart by `check`. `checks` are those of a rubric, its own among them."""
+    known = known_checks(Path(), {}) if checks is None else checks
+    members: Any = reduce(or_, [_manual(), *(_criterion(known[name]) for name in sorted(known))])
     member = Annotated[members, Field(discriminator="check")]
     criteria = Annotated[tuple[member, ...], Field(min_length=1)]
     model = create_model("Rubric", __base__=Rubric, __doc__=Rubric.__doc__, criteria=(criteria, ...))

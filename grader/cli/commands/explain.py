@@ -3,37 +3,46 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 from rich.padding import Padding
 from rich.text import Text
 
-from grader.checks import CHECKS, HEADINGS, Check
+from grader.checks import HEADINGS, Check
 from grader.errors import ExitCode, UsageError
+from grader.instructor.known import known_checks
 from grader.report.terminal import emit, open_console
 from grader.report.text import number, visible
 from grader.rubric.faults import did_you_mean
 from grader.rubric.find import rubric_ids
-from grader.rubric.load import all_rubrics, load_rubric
-from grader.rubric.model import Criterion, Rubric
+from grader.rubric.load import LoadedRubric, all_rubrics, load_rubric
+from grader.rubric.model import Criterion
 
 
-def run(*, name: str) -> ExitCode:
-    """Print what, why, how measured and how to fix. Raises UsageError for a name that nobody has."""
-    lab, slash, criterion = name.rpartition("/")
-    rubrics = [load_rubric(lab).rubric] if slash else [loaded.rubric for loaded in all_rubrics()]
-    found = [(r, c) for r in rubrics for c in r.criteria if c.id == criterion and c.visibility == "visible"]
-    if not slash and name in CHECKS:
-        _print(_check_lines(CHECKS[name]))
-    for rubric, item in found:
-        _print(_criterion_lines(rubric, item))
-    if not found and (slash or name not in CHECKS):
-        raise _unknown(name, rubrics)
+def run(*, name: str, rubric: str | None = None) -> ExitCode:
+    """Print what, why, how measured and how to fix. Raises UsageError for a name that nobody has.
+
+    `rubric` is where to look for the name, beside the grader's own checks; `LAB/criterion` says the same.
+    """
+    lab, slash, criterion = ("", "", name) if rubric is not None else name.rpartition("/")
+    loaded = [load_rubric(rubric or lab)] if rubric is not None or slash else list(all_rubrics())
+    found = [
+        (r, c) for r in loaded for c in r.rubric.criteria if c.id == criterion and c.visibility == "visible"
+    ]
+    known = loaded[0].checks if rubric is not None else known_checks(Path(), {})
+    is_check = not slash and name in known
+    if is_check:
+        _print(_check_lines(known[name]))
+    for each, item in found:
+        _print(_criterion_lines(each, item))
+    if not found and not is_check:
+        raise _unknown(name, loaded, known)
     return ExitCode.PASSED
 
 
-def _unknown(name: str, rubrics: list[Rubric]) -> UsageError:
-    known = [*CHECKS, *(c.id for r in rubrics for c in r.criteria), *(f"{i}/" for i in rubric_ids())]
+def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]) -> UsageError:
+    known = [*checks, *(c.id for r in rubrics for c in r.rubric.criteria), *(f"{i}/" for i in rubric_ids())]
     near = did_you_mean(name.rpartition("/")[2], known)
     return UsageError(
         f'there is no check and no criterion "{name}"{near}',
@@ -44,7 +53,8 @@ def _unknown(name: str, rubrics: list[Rubric]) -> UsageError:
 Line = tuple[str, int]
 
 
-def _criterion_lines(rubric: Rubric, criterion: Criterion) -> Iterator[Line]:
+def _criterion_lines(loaded: LoadedRubric, criterion: Criterion) -> Iterator[Line]:
+    rubric, checks = loaded.rubric, loaded.checks
     yield f"{rubric.id}/{criterion.id}: {criterion.title}", 0
     points = f"{number(criterion.points)} of {number(rubric.max_points)} points"
     yield f"{points}, judged by the check {criterion.check}", 2
@@ -53,8 +63,8 @@ def _criterion_lines(rubric: Rubric, criterion: Criterion) -> Iterator[Line]:
     if criterion.reproduce:
         yield f"see it yourself: {criterion.reproduce}", 2
     yield "", 0
-    if criterion.check in CHECKS:
-        yield from _check_lines(CHECKS[criterion.check])
+    if criterion.check in checks:
+        yield from _check_lines(checks[criterion.check])
 
 
 def _check_lines(check: Check) -> Iterator[Line]:

@@ -17,7 +17,7 @@ from grader.rubric.load import load_rubric
 def run(*, evidence: list[Path], rubric: str, out: str = "-") -> ExitCode:
     """Judge and write the criteria as JSON to the file `out`, or to stdout."""
     loaded = load_rubric(rubric)
-    criteria = judge(loaded.rubric, load_evidence(evidence))
+    criteria = judge(loaded.rubric, load_evidence(evidence), loaded.checks)
     data = criteria_bytes(criteria)
     if out == "-":
         sys.stdout.write(data.decode())
