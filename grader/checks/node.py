@@ -100,7 +100,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
 
 
 @check("node-name", params=NodeNameParams)
-def node_name(run: Run, params: NodeNameParams) -> Verdict:
+def node_name(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdict:
     """The node has the name of the handout.
 
     What it checks
@@ -121,13 +121,23 @@ def node_name(run: Run, params: NodeNameParams) -> Verdict:
     nodes = nodes_of(run, params.process)
     expected = wanted_names(params.names, params.anonymous)
     if not nodes:
-        message, hint = "no node was registered, so there is no name", "call rospy.init_node(…)"
-        return unjudged(message, expected=expected, measured="no node", hint=hint)
+        return _nameless(package, run, params).model_copy(update={"expected": expected})
     cite = (EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),)
     measured = listed(nodes)
     wrong = _misnamed(nodes, params)
     verdict = wrong or passed(f"the node is {_fitting(nodes, params)[0]}")
     return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": cite})
+
+
+def _nameless(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdict:
+    """No node was registered: why, where its process ended by itself."""
+    message, hint = "no node was registered, so there is no name", "call rospy.init_node(…)"
+    one = life(run, params.process)
+    if one is None or not one.ended_early:
+        return unjudged(message, measured="no node", hint=hint)
+    end = explain_end(one, run, package)
+    message = f"{message}: {_script(one)} ended by itself after {ended_after(one)}: {end.cause}"
+    return unjudged(message, measured="no node", hint=end.hint, citations=end.citations)
 
 
 def _fitting(nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams) -> list[str]:
