@@ -11,7 +11,7 @@ from grader.authoring.observe import INTEGER_TYPES, Observed
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.rubric.load import LoadedRubric
-from grader.rubric.model import Criterion, Probe, Rubric, Scenario, Start, Until
+from grader.rubric.model import Criterion, Param, Probe, Rubric, Scenario, Start, Until
 
 SOURCE_BYTES_MAX = 1 << 20
 WATCH_S = 6.0
@@ -23,10 +23,17 @@ STRING = "std_msgs/String"
 
 
 class Parts(Record):
-    """What can be run. `nodes` maps a start's name to its script or program, `launches` to its launch file."""
+    """What can be run. `nodes` maps a start's name to its script or program, `launches` to its launch file; `configs`
+    are the YAML files that may hold parameters."""
 
     nodes: dict[str, str]
     launches: dict[str, str]
+    configs: tuple[str, ...] = ()
+
+    @property
+    def params(self) -> tuple[Param, ...]:
+        """Every parameter of the package's own files, with made-up values."""
+        return tuple(Param(file=path) for path in self.configs)
 
 
 def find_parts(folder: Path, facts: PackageFacts) -> Parts:
@@ -37,7 +44,11 @@ def find_parts(folder: Path, facts: PackageFacts) -> Parts:
     launches = [f.path for f in facts.launch_files if f.fault is None and f.path.endswith(".launch")]
     taken: set[str] = set()
     nodes = {_name(path, taken): path for path in [*scripts, *programs]}
-    return Parts(nodes=nodes, launches={_name(path, taken): PurePosixPath(path).name for path in launches})
+    configs = [
+        f.path for f in facts.files if f.path.endswith((".yaml", ".yml")) and _holds_parameters(f.path)
+    ]
+    launch_names = {_name(path, taken): PurePosixPath(path).name for path in launches}
+    return Parts(nodes=nodes, launches=launch_names, configs=tuple(configs))
 
 
 def first_look(package: str, parts: Parts) -> LoadedRubric:
@@ -45,6 +56,7 @@ def first_look(package: str, parts: Parts) -> LoadedRubric:
     scenarios = {
         name: Scenario(
             title=f"{PurePosixPath(script).name} in real time",
+            params=parts.params,
             start=(Start(name=name, script=script),),
             until=Until(alive_s=WATCH_S, messages={}),
         )
@@ -64,6 +76,7 @@ def second_look(package: str, parts: Parts, seen: Mapping[str, Observed]) -> Loa
         if probes:
             scenarios[f"{name}-hears"] = Scenario(
                 title=f"{PurePosixPath(script).name}, with messages made up for this run",
+                params=parts.params,
                 start=(Start(name=name, script=script),),
                 probes=probes,
                 until=Until(heard=True, messages={}),
@@ -75,6 +88,7 @@ def second_look(package: str, parts: Parts, seen: Mapping[str, Observed]) -> Loa
             scenarios[f"{name}-fast"] = Scenario(
                 title=f"{PurePosixPath(script).name} with a fast clock",
                 clock="warped",
+                params=parts.params,
                 start=(Start(name=name, script=script),),
                 until=Until(messages=counting),
             )
@@ -111,6 +125,11 @@ def _is_node(path: Path) -> bool:
         return False
     calls = (node.func for node in ast.walk(tree) if isinstance(node, ast.Call))
     return "init_node" in {_last_name(function) for function in calls}
+
+
+def _holds_parameters(path: str) -> bool:
+    """By its folder: other YAML files are somebody else's, a CI's for instance."""
+    return {"config", "cfg", "param", "params", "yaml"} & set(PurePosixPath(path).parts[:-1]) != set()
 
 
 def _last_name(function: ast.expr) -> str:

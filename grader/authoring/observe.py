@@ -18,6 +18,7 @@ SYSTEM_SERVICES = ("/get_loggers", "/set_logger_level")
 INTEGER_TYPES = frozenset(f"std_msgs/{u}Int{bits}" for u in ("", "U") for bits in (8, 16, 32, 64))
 ANONYMOUS = re.compile(r"_\d+_\d{9,}$")
 MESSAGES_MIN = 5
+INFO = 2
 PERIODIC_SHARE = 0.9
 NICE_HZ = (
     0.1,
@@ -71,7 +72,8 @@ class Observed(Record):
     """One run. `nodes` are base names without slash, `anonymous` whether they carry rospy's numbers.
 
     `listens` maps topics to types, `services` names to types, `connected` are topics over which two of its nodes are
-    connected, `ended` tells that the process ended by itself, `failed` why, where it ended with an error.
+    connected, `logged` are the lines without numbers that it logs at INFO, `read` the names of the parameters whose
+    made-up values it prints. `ended` tells that the process ended by itself, `failed` why, where that was an error.
     """
 
     nodes: tuple[str, ...]
@@ -82,6 +84,8 @@ class Observed(Record):
     connected: tuple[str, ...]
     ended: bool
     failed: str = ""
+    logged: tuple[str, ...] = ()
+    read: tuple[str, ...] = ()
 
 
 def observe(run: Run) -> Observed:
@@ -98,6 +102,8 @@ def observe(run: Run) -> Observed:
         connected=_connected(run),
         ended=bool(early),
         failed=_last_words(run) if bad else "",
+        logged=_logged(run),
+        read=_read(run),
     )
 
 
@@ -193,6 +199,20 @@ def _connected(run: Run) -> tuple[str, ...]:
         and run.is_student_node(c.subscriber)
     )
     return tuple(dict.fromkeys(found))
+
+
+def _logged(run: Run) -> tuple[str, ...]:
+    values = (v for c in run.student_channels("/rosout") for v in c.values if isinstance(v, dict))
+    made_up = {str(e.value) for _, e in run.actors if e.action == "param"}
+    texts = [str(v.get("msg", "")).strip() for v in values if v.get("level") == INFO]
+    plain = (t for t in texts if t and not re.search(r"\d", t) and not any(m in t for m in made_up))
+    return tuple(dict.fromkeys(plain))
+
+
+def _read(run: Run) -> tuple[str, ...]:
+    text = "\n".join(line.text for line in printed_lines(run))
+    set_ = [(str(e.topic), e.value) for _, e in run.actors if e.action == "param"]
+    return tuple(name for name, value in set_ if not isinstance(value, bool | list) and str(value) in text)
 
 
 def _last_words(run: Run) -> str:

@@ -116,7 +116,25 @@ class Proposal:
                     scenario=name,
                     requires=[node],
                 )
+        for text in seen.logged[:1] if not seen.topics else ():
+            title = f"{file} logs {text!r}"
+            self._add(f"{name}-logs", title, "logs", {"text": text}, scenario=name, requires=[node])
+        if seen.read:
+            title = f"{file} shows the parameters"
+            self._add(
+                f"{name}-reads",
+                title,
+                "params-read",
+                {"names": list(seen.read)},
+                scenario=name,
+                requires=[node],
+            )
         self._hearing(name, script, seen, requires)
+
+    def _with_params(self, scenario: Entry) -> Entry:
+        """The scenario, with the package's own parameters set before it starts."""
+        params = {"params": [{"file": path} for path in self._parts.configs]} if self._parts.configs else {}
+        return {"title": scenario["title"], **params, **scenario}
 
     def _scenario(self, name: str, script: str, seen: Observed) -> None:
         periodic = [t.name for t in seen.topics if t.rate_hz]
@@ -124,7 +142,8 @@ class Proposal:
         if seen.ended:
             until = {"quiet_s": 2}
         title = f"{PurePosixPath(script).name} in real time"
-        self.scenarios[name] = {"title": title, "start": [{"name": name, "script": script}], "until": until}
+        start = [{"name": name, "script": script}]
+        self.scenarios[name] = self._with_params({"title": title, "start": start, "until": until})
 
     def _life(self, name: str, script: str, seen: Observed, requires: list[str]) -> str:
         anonymous = "required" if seen.anonymous else "allowed"
@@ -181,12 +200,14 @@ class Proposal:
         if wrap:
             last, first = wrap
             script = self._parts.nodes[name]
-            self.scenarios[f"{name}-fast"] = {
-                "title": f"{PurePosixPath(script).name} with a fast clock, {WRAPS} times around",
-                "clock": "warped",
-                "start": [{"name": name, "script": script}],
-                "until": {"messages": {topic.name: WRAPS * (last - first + 1) + 2}},
-            }
+            self.scenarios[f"{name}-fast"] = self._with_params(
+                {
+                    "title": f"{PurePosixPath(script).name} with a fast clock, {WRAPS} times around",
+                    "clock": "warped",
+                    "start": [{"name": name, "script": script}],
+                    "until": {"messages": {topic.name: WRAPS * (last - first + 1) + 2}},
+                }
+            )
             needs["scenario"] = f"{name}-fast"
         start = {**about, "start": topic.counts_from}
         self._add(
@@ -217,12 +238,14 @@ class Proposal:
         if not heard:
             return
         scenario = f"{name}-hears"
-        self.scenarios[scenario] = {
-            "title": f"{PurePosixPath(script).name}, with messages made up for this run",
-            "start": [{"name": name, "script": script}],
-            "probes": [_probe(topic, found[topic]) for topic in heard],
-            "until": {"heard": True},
-        }
+        self.scenarios[scenario] = self._with_params(
+            {
+                "title": f"{PurePosixPath(script).name}, with messages made up for this run",
+                "start": [{"name": name, "script": script}],
+                "probes": [_probe(topic, found[topic]) for topic in heard],
+                "until": {"heard": True},
+            }
+        )
         for topic, template in heard.items():
             parameters = {"topic": topic} | ({"template": template} if template != "{value}" else {})
             title = f"{PurePosixPath(script).name} prints what it hears on {topic}"
@@ -232,32 +255,36 @@ class Proposal:
 
     def _launch(self, name: str, launch: str, seen: Observed) -> None:
         file = next(f for f in self._facts.launch_files if PurePosixPath(f.path).name == launch)
-        types = {n.type for n in file.nodes if n.pkg == self._facts.name}
-        scripts = [s for s in self._parts.nodes.values() if PurePosixPath(s).name in types]
-        others = {
-            str(n.name): str(n.pkg) for n in file.nodes if n.pkg != self._facts.name and n.name and n.pkg
-        }
-        if not scripts:
-            self.notes.append(f"{launch} starts no script of the package: not covered")
+        own = {n.type for n in file.nodes if n.pkg == self._facts.name}
+        others = [n for n in file.nodes if n.pkg != self._facts.name and n.pkg and n.type and n.name]
+        wanted: Entry = {"launch": launch}
+        wanted |= _given(scripts=[s for s in self._parts.nodes.values() if PurePosixPath(s).name in own])
+        programs = _given(programs=[f"{n.pkg}/{n.type}" for n in others])
+        if not seen.nodes:
+            self.notes.append(
+                f"{launch} brought up no node ({seen.failed or 'none registered'}): not covered"
+            )
             return
         xml = self._add(
-            f"{name}-xml", f"{launch} is well-formed and names its nodes", "launch-xml",
-            {"launch": launch, "scripts": scripts},
-        )  # fmt: skip
+            f"{name}-xml", f"{launch} is well-formed and names its nodes", "launch-xml", wanted | programs
+        )
+        until: Entry = {"nodes": len(seen.nodes), "alive_s": 1}
         self.scenarios[name] = {
             "title": f"roslaunch {launch}",
             "start": [{"name": name, "launch": launch}],
-            "until": {"connected": list(seen.connected[:1])}
-            if seen.connected
-            else {"nodes": len(seen.nodes), "alive_s": 1},
+            "until": {"connected": list(seen.connected[:1])} if seen.connected else until,
         }
-        parameters: Entry = {"launch": launch, "scripts": scripts}
-        parameters |= {"topic": seen.connected[0]} if seen.connected else {}
-        parameters |= {"nodes": others} if others else {}
+        named = {"nodes": {str(n.name): str(n.pkg) for n in others}} if others else {}
+        parameters = wanted | ({"topic": seen.connected[0]} if seen.connected else {}) | named
         self._add(
             f"{name}-runs", f"roslaunch brings up the nodes of {launch}", "launch-runs", parameters,
             scenario=name, requires=[xml], reproduce=f"roslaunch {self._facts.name} {launch}",
         )  # fmt: skip
+
+
+def _given(**lists: list[str]) -> Entry:
+    """Those that hold something."""
+    return {name: items for name, items in lists.items() if items}
 
 
 def _probe(topic: str, kind: str) -> Entry:
