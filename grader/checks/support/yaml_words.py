@@ -1,0 +1,48 @@
+"""What `rosparam load` said of a YAML file, in plain words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+_PLACE = re.compile(r"line (\d+), column (\d+)")
+_INDENT = "indent with spaces alone, two for each level"
+
+# what is printed, what it means ({line}: where), and what to do
+_CAUSES = (
+    (r"found character '\\t'", "line {line} is indented with a tab, which YAML does not take", _INDENT),
+    (r"cannot marshal None", "a name has no value: nothing is indented below it",
+     "indent what belongs to a name by two spaces more, as in the handout's picture"),
+    (r"mapping values are not allowed here",
+     "in line {line} or above it, the space behind a `:` is missing, or a `:` is part of a value",
+     'write `name: value` with a space, and a value that holds a `:` in "quotes"'),
+    (r"scanning a quoted scalar|found unexpected end of stream", "a closing quote is missing near line {line}",
+     'close every " on its own line'),
+    (r"expected <block end>|unindent does not match|expected ',' or '[\]}}]'|could not find expected ':'",
+     "line {line} does not fit those above it: names of one level begin in the same column", _INDENT),
+    (r"cannot start any token", "line {line} has a character that needs quotes", 'write the value in "quotes"'),
+    (r"can only be set to a dictionary", "it holds no `name: value`", "write `details:` and its values below it"),
+    (r"UnicodeDecodeError|codec can't decode|special characters are not allowed", "it is not saved as UTF-8",
+     "save it as UTF-8"),
+    (r"is not iterable|NoneType", "it is empty, or a part of it is", "write `details:` and its values below it"),
+)  # fmt: skip
+
+
+class Words(NamedTuple):
+    """Why the file cannot be loaded, what to do, and the line if one is named."""
+
+    why: str
+    hint: str
+    line: int | None
+
+
+def explain_yaml(lines: Sequence[str]) -> Words | None:
+    """The cause among the lines that were printed; None where none is known."""
+    text = "\n".join(lines)
+    places = _PLACE.findall(text)
+    line = int(places[-1][0]) if places else None
+    for pattern, why, hint in _CAUSES:
+        if re.search(pattern, text):
+            return Words(why.format(line=line or "?"), hint, line)
+    return None
