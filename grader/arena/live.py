@@ -163,6 +163,11 @@ def _seen(live: Live, topics: Iterable[str]) -> list[TopicSeen]:
     return [live.topics[t] for t in topics if live.topics[t].count]
 
 
+def _talking(live: Live) -> list[TopicSeen]:
+    """Topics with messages; what is logged says nothing of what else may come."""
+    return [seen for topic, seen in live.topics.items() if seen.count and topic != "/rosout"]
+
+
 def _window(live: Live, until: Until, now_s: float) -> bool:
     if until.window_s is None:
         return True
@@ -177,7 +182,7 @@ def _window(live: Live, until: Until, now_s: float) -> bool:
 
 def _talks_elsewhere(live: Live, until: Until, now_s: float) -> bool:
     """The nodes have talked for so long on topics that nobody waits for: no more will come of them."""
-    first_s = min((seen.first_s for seen in live.topics.values() if seen.count), default=now_s)
+    first_s = min((seen.first_s for seen in _talking(live)), default=now_s)
     return now_s > first_s + max(until.window_s or 0, until.silent_s)
 
 
@@ -208,7 +213,7 @@ def _heard(live: Live, until: Until, now_s: float) -> bool:
 
 def _silent(live: Live, until: Until, now_s: float) -> str:
     waited = (*until.topics, *until.messages)
-    seen = [s for s in live.topics.values() if s.count]
+    seen = _talking(live)
     if waited and not seen:
         return (
             f"no message within {until.first_message_s:g} s"

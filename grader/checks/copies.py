@@ -149,7 +149,8 @@ def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | No
     message = (
         f"the {word} copy ended by itself after {ended_after(one)}, while the other lived on: {end.cause}"
     )
-    return failed(message, hint=end.hint, citations=cited)
+    verdict = failed if word == "second" else unjudged  # the first would have ended alone too
+    return verdict(message, hint=end.hint, citations=cited)
 
 
 def _unnamed(run: Run, trio: Trio) -> Verdict | None:

@@ -30,6 +30,8 @@ COUNT = Until(messages={"/a": 10}, silent_s=5, limit_s=60)
         (WINDOW, _live(a=(5, 1.0, 2.0), b=(5, 3.0, 3.5)), 9.0, "complete"),
         (WINDOW, _live(a=(5, 1.0, 2.0)), 6.9, None),
         (WINDOW, _live(a=(5, 1.0, 2.0)), 7.0, "complete"),
+        (WINDOW, _live(rosout=(5, 1.0, 2.0)), 19.9, None),
+        (WINDOW, _live(rosout=(5, 1.0, 2.0)), 20.1, "silent"),
         (WINDOW, _live(c=(5, 1.0, 2.0)), 7.0, None),
         (WINDOW, _live(c=(5, 1.0, 2.0)), 7.1, "complete"),
         (COUNT, _live(a=(9, 1.0, 2.0)), 6.9, None),
