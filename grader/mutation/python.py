@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import re
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import TypeVar
@@ -81,13 +80,8 @@ class Script:
     @cached_property
     def unit(self) -> str:
         """One step of indentation, as this file has it."""
-        found = re.search(r"^([ \t]+)\S", self.text, re.MULTILINE)
-        indents = {
-            self.indentation(node.body[0])
-            for node in self.of(ast.FunctionDef)
-            if self.has_lines(node.body[0])
-        }
-        return min((i for i in indents if i), key=len, default=found[1] if found else "    ")
+        indents = {self.indentation(s) for s in self.of(ast.stmt) if self.has_lines(s)}
+        return min(indents - {""}, key=len, default="    ")
 
     def has_lines(self, statement: ast.stmt) -> bool:
         """Whether its lines hold nothing else: no `;`, no `if x: y`. A comment after it counts as its own."""

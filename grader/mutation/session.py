@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.arena.sandbox import Mode
 from grader.errors import HostError
 from grader.model.progress import Progress
 from grader.model.result import GradingResult, RubricInfo
@@ -19,7 +18,7 @@ from grader.mutation.operators import OPERATORS
 from grader.mutation.plan import Planned
 from grader.mutation.solution import Solution
 from grader.mutation.tree import Tree, unified_diff, write_tree
-from grader.mutation.workers import Graded, Job, grade_all
+from grader.mutation.workers import Graded, Job, Sandbox, grade_all
 from grader.rubric.load import LoadedRubric
 
 REFERENCE = "reference"
@@ -42,7 +41,7 @@ class Plan:
     jobs: int
     out: Path
     keep_all: bool
-    sandbox: Mode = "auto"
+    sandbox: Sandbox = "auto"
 
 
 def run_test(plan: Plan, progress: Progress) -> RubricTest:

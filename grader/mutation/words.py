@@ -6,10 +6,8 @@ import ast
 import re
 from collections.abc import Iterator
 
-from grader.mutation.python import Script
-
 OPENING = re.compile(r"""^[a-zA-Z]{0,2}(?:'''|\"\"\"|'|")""")
-WORD = re.compile(r"\{[^{}]*\}|%\(\w+\)\w|%[-+ #0-9.]*[a-z]|\\.|([A-Za-z]{3,})")
+WORD = re.compile(r"\{[^{}]*\}|%\(\w+\)\w|%[-+ #0-9.]*[a-z]|\\.|([^\W\d_]{3,})")
 
 
 def misspelt_name(name: str) -> str:
@@ -27,11 +25,13 @@ def misspelt_literal(source: str) -> str:
     return source
 
 
-def texts_in(script: Script, node: ast.AST) -> Iterator[ast.Constant | ast.JoinedStr]:
-    """The texts of an expression, an f-string as one."""
-    for found in ast.walk(node):
-        in_pattern = isinstance(script.parents.get(found), ast.JoinedStr | ast.FormattedValue)
-        if isinstance(found, ast.JoinedStr) or (
-            isinstance(found, ast.Constant) and isinstance(found.value, str) and not in_pattern
-        ):
-            yield found
+def texts_in(node: ast.AST) -> Iterator[ast.Constant | ast.JoinedStr]:
+    """The texts of an expression, an f-string as one; none that only names something (`get_param('x')`, `d['x']`)."""
+    if isinstance(node, ast.JoinedStr) or (isinstance(node, ast.Constant) and isinstance(node.value, str)):
+        yield node
+        return
+    if isinstance(node, ast.Subscript):
+        return
+    named = isinstance(node, ast.Call) and ast.unparse(node.func).rpartition(".")[2].startswith("get_")
+    for child in ast.iter_child_nodes(node) if not named else ():
+        yield from texts_in(child)

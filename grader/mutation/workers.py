@@ -13,14 +13,15 @@ from dataclasses import dataclass
 from multiprocessing import connection
 from pathlib import Path
 from types import FrameType
+from typing import Literal
 
-from grader.arena.sandbox import Mode
 from grader.errors import GraderError
 from grader.model.progress import Silence
 from grader.model.result import GradingResult
 from grader.pipeline import GradeOptions, grade
 from grader.rubric.load import load_rubric
 
+Sandbox = Literal["auto", "require", "none"]
 LEAVE_S = 30.0  # to end its grading, once the process that started it is gone
 
 
@@ -32,7 +33,7 @@ class Job:
     source: Path
     rubric: Path
     out: Path
-    sandbox: Mode = "auto"
+    sandbox: Sandbox = "auto"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,7 +37,7 @@ def _site(solution: Solution, script: Script, call: ast.Call, node: ast.AST, tex
 
 def _said(script: Script, call: ast.Call) -> str:
     """The first words of what is logged, as they stand in the source."""
-    for text in (t for a in call.args for t in texts_in(script, a)):
+    for text in (t for a in call.args for t in texts_in(a)):
         words = str(text.value) if isinstance(text, ast.Constant) else script.source(text)
         return " ".join(words.split())[:TEXT_LIMIT].rstrip()
     return script.source(call.args[0])[:TEXT_LIMIT]
@@ -62,7 +62,7 @@ def log_text(solution: Solution, _params: NoParams) -> Iterator[Site]:
     Fits every line that prints or logs a text.
     """
     for script, _, call in _spoken(solution):
-        for text in [t for a in call.args for t in texts_in(script, a)][:1]:
+        for text in [t for a in call.args for t in texts_in(a)][:1]:
             yield _site(solution, script, call, text, misspelt_literal(script.source(text)))
 
 

@@ -41,9 +41,7 @@ def message_altered(solution: Solution, _params: NoParams) -> Iterator[Site]:
     """
     for script, publisher, _ in _fed(solution):
         for value in sources(script, publisher):
-            texts = [
-                t for t in texts_in(script, value) if misspelt_literal(script.source(t)) != script.source(t)
-            ]
+            texts = [t for t in texts_in(value) if misspelt_literal(script.source(t)) != script.source(t)]
             if texts:
                 edit = script.replace(texts[0], misspelt_literal(script.source(texts[0])))
                 yield from _site(solution, script, publisher, [edit])

@@ -41,7 +41,7 @@ def python2_print(solution: Solution, _params: NoParams) -> Iterator[Site]:
 def tabs_and_spaces(solution: Solution, _params: NoParams) -> Iterator[Site]:
     """Mixes tabs and spaces.
 
-    Fits every Python script with a block of two lines that are indented by spaces.
+    Fits every Python script with a block of two lines.
     """
     for script in solution.scripts:
         found = (site for s in script.of(ast.stmt) for site in _tabbed(solution, script, s))
@@ -50,12 +50,14 @@ def tabs_and_spaces(solution: Solution, _params: NoParams) -> Iterator[Site]:
 
 def _tabbed(solution: Solution, script: Script, statement: ast.stmt) -> Iterator[Site]:
     indentation = script.indentation(statement)
-    if not indentation or "\t" in indentation or not script.has_lines(statement):
-        return
-    if statement is script.block(statement)[0]:
+    first = statement is script.block(statement)[0]
+    if not indentation or first or not script.has_lines(statement):
         return
     start = script.starts[statement.lineno - 1]
-    edit = Edit(start, start + min(len(indentation), 8), "\t")
+    if "\t" in indentation:
+        edit = Edit(start, start + len(indentation), indentation.expandtabs(8))
+    else:
+        edit = Edit(start, start + min(len(indentation), 8), "\t")
     yield from _broken(solution, script, [edit], statement.lineno)
 
 

@@ -113,11 +113,17 @@ def _turns(script: Script) -> Iterator[list[ast.stmt]]:
     bodies = [loop.body for loop in loops(script)]
     bodies += [f.body for f in script.of(ast.FunctionDef) if f.name in names]
     for body in bodies:
-        kept = [s for s in body if not _sleeps(s) and not isinstance(s, ast.Global | ast.Nonlocal)]
+        kept = [s for s in body if not (_sleeps(s) or _declares(s))]
         together = body[body.index(kept[0]) : body.index(kept[-1]) + 1] == kept if kept else False
         publishes = any(last_name(c.func) == "publish" for c in _calls_in(script, kept))
         if together and publishes and script.can_wrap(kept):
             yield kept
+
+
+def _declares(statement: ast.stmt) -> bool:
+    """A docstring, or names of variables from outside."""
+    text = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+    return text or isinstance(statement, ast.Global | ast.Nonlocal)
 
 
 def _sleeps(statement: ast.stmt) -> bool:

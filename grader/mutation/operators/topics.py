@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from grader.model.record import Record
 from grader.mutation.counter import counted_names
-from grader.mutation.data import Assignment, targets
+from grader.mutation.data import Assignment, sources, targets
 from grader.mutation.every_second import every_second_time
 from grader.mutation.python import Script
 from grader.mutation.registry import NoParams, operator
@@ -138,8 +138,8 @@ def _retyped(script: Script, endpoint: Endpoint, to: str) -> list[Edit]:
     edits: list[Edit] = []
     if publishes and endpoint.type_name == "String":
         edits += _numbers_for_texts(script, endpoint)
-    elif publishes and not _shared(script, endpoint):
-        uses = [n for n in script.of(ast.expr) if last_name(n) == endpoint.type_name]
+    elif publishes:
+        uses += _made(script, endpoint)
     for use in uses:
         name = f"{script.source(use.value)}.{to}" if isinstance(use, ast.Attribute) else to
         edits.append(script.replace(use, name))
@@ -147,9 +147,10 @@ def _retyped(script: Script, endpoint: Endpoint, to: str) -> list[Edit]:
     return [*edits, *imported] if imported is not None else []
 
 
-def _shared(script: Script, endpoint: Endpoint) -> bool:
-    others = [*publishers(script), *subscribers(script)]
-    return sum(other.type_name == endpoint.type_name for other in others) > 1
+def _made(script: Script, publisher: Endpoint) -> list[ast.expr]:
+    """The type where the published messages are made: `Int8` of `Int8(5)`."""
+    made = [n for value in sources(script, publisher) for n in ast.walk(value) if isinstance(n, ast.Call)]
+    return [call.func for call in dict.fromkeys(made) if last_name(call.func) == publisher.type_name]
 
 
 def _numbers_for_texts(script: Script, publisher: Endpoint) -> list[Edit]:

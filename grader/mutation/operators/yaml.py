@@ -34,10 +34,22 @@ def _leaves(node: yaml.Node, path: str) -> Iterator[Leaf]:
             yield from _leaves(value, name)
 
 
+def own_lines(text: str) -> list[Leaf]:
+    """Those that have a line for themselves, in block style."""
+    return [leaf for leaf in leaves(text) if _has_line(text, *leaf[1:])]
+
+
+def _has_line(text: str, key: yaml.ScalarNode, value: yaml.ScalarNode) -> bool:
+    start = key.start_mark.index - key.start_mark.column
+    end = text.find("\n", value.end_mark.index)
+    after = text[value.end_mark.index : end if end >= 0 else len(text)].strip()
+    return not text[start : key.start_mark.index].strip() and (not after or after.startswith("#"))
+
+
 def _files(solution: Solution) -> Iterator[tuple[str, str]]:
     """The YAML files in plain ASCII or UTF-8 without a byte order mark, whose marks are places of the text."""
     for path in solution.files:
-        if path.endswith((".yaml", ".yml")) and leaves(solution.text(path)):
+        if path.endswith((".yaml", ".yml")) and own_lines(solution.text(path)):
             yield path, solution.text(path)
 
 
@@ -45,10 +57,10 @@ def _files(solution: Solution) -> Iterator[tuple[str, str]]:
 def yaml_tabs(solution: Solution, _params: NoParams) -> Iterator[Site]:
     """Indents the YAML file with a tab.
 
-    Fits every YAML file with an indented key.
+    Fits every YAML file with an indented key in a line of its own.
     """
     for path, text in _files(solution):
-        for name, key, _ in leaves(text):
+        for name, key, _ in own_lines(text):
             start = key.start_mark.index - key.start_mark.column
             if "/" in name and key.start_mark.column:
                 edit = Edit(start, key.start_mark.index, "\t")
@@ -62,10 +74,10 @@ def yaml_tabs(solution: Solution, _params: NoParams) -> Iterator[Site]:
 def yaml_malformed(solution: Solution, _params: NoParams) -> Iterator[Site]:
     """Leaves a quotation mark open in the YAML file.
 
-    Fits every YAML file with a value.
+    Fits every YAML file with a value in a line of its own.
     """
     for path, text in _files(solution):
-        for _, _, value in leaves(text)[:1]:
+        for _, _, value in own_lines(text)[:1]:
             start, end = value.start_mark.index, value.end_mark.index
             edit = Edit(start, end, f'"{value.value}')
             line = value.start_mark.line + 1
@@ -76,10 +88,10 @@ def yaml_malformed(solution: Solution, _params: NoParams) -> Iterator[Site]:
 def yaml_key_missing(solution: Solution, _params: NoParams) -> Iterator[Site]:
     """Forgets a key of the YAML file.
 
-    Fits every value of a YAML file.
+    Fits every value of a YAML file that has a line of its own.
     """
     for path, text in _files(solution):
-        for name, key, value in leaves(text):
+        for name, key, value in own_lines(text):
             line_end = text.find("\n", value.end_mark.index)
             end = len(text) if line_end < 0 else line_end
             edit = Edit(*whole_lines(text, key.start_mark.index, end), "")
@@ -94,10 +106,10 @@ def yaml_key_missing(solution: Solution, _params: NoParams) -> Iterator[Site]:
 def yaml_key_misspelt(solution: Solution, _params: NoParams) -> Iterator[Site]:
     """Misspells a key of the YAML file.
 
-    Fits every value of a YAML file.
+    Fits every value of a YAML file that has a line of its own.
     """
     for path, text in _files(solution):
-        for name, key, _ in leaves(text):
+        for name, key, _ in own_lines(text):
             edit = Edit(key.start_mark.index, key.end_mark.index, misspelt_name(str(key.value)))
             yield Site(
                 at={"file": path, "key": name},

@@ -1,0 +1,158 @@
+"""What each operator makes of the reference solutions and of a package that is written quite differently.
+
+`GRADER_REGENERATE=1 pytest tests/mutation` writes golden/<operator>.diff anew.
+"""
+
+from __future__ import annotations
+
+import ast
+import os
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+import yaml
+
+from grader.mutation.operators import OPERATORS
+from grader.mutation.registry import Operator, operator
+from grader.mutation.solution import Site, Solution
+from grader.mutation.tree import Tree, unified_diff
+from tests.mutation.samples import LABS, other_solution, reference_solution, tree_of
+
+GOLDEN = Path(__file__).parent / "golden"
+BREAK_PYTHON = {n for n, o in OPERATORS.items() if o.family == "syntax"} - {
+    "missing-module",
+    "asks-for-input",
+}
+BREAK_XML = {"launch-malformed", "manifest-malformed"}
+BREAK_YAML = {"yaml-tabs", "yaml-malformed"}
+NO_PYTHON_3 = ("broken.py", "empty.py")
+
+
+@pytest.fixture(scope="module")
+def solutions() -> dict[str, Solution]:
+    return {"other": other_solution(), **{lab: reference_solution(lab) for lab in LABS}}
+
+
+def changed(solution: Solution, site: Site) -> Tree:
+    """The files that are new or other."""
+    return {path: e for path, e in site.tree.items() if solution.tree.get(path) != e}
+
+
+def golden_text(tried: Operator, solutions: dict[str, Solution]) -> str:
+    """The diffs on the other package, and on the first reference solution that the operator fits."""
+    fitting = [name for name, solution in solutions.items() if tried.sites(solution)]
+    references = [name for name in fitting if name != "other"][:1]
+    parts = []
+    for name in [*(n for n in fitting if n == "other"), *references]:
+        for site in tried.sites(solutions[name]):
+            at = ", ".join(f"{key}: {value}" for key, value in site.at.items())
+            parts.append(f"=== {name} {{{at}}}\n{unified_diff(solutions[name].tree, site.tree)}")
+    return "\n".join(parts)
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+def test_edit_is_as_kept(name, solutions):
+    made, kept = golden_text(OPERATORS[name], solutions), GOLDEN / f"{name}.diff"
+    if os.environ.get("GRADER_REGENERATE"):
+        GOLDEN.mkdir(exist_ok=True)
+        kept.write_text(made, encoding="utf-8")
+    assert made
+    assert made == kept.read_text(encoding="utf-8")
+
+
+def test_no_golden_file_is_left_over():
+    assert {path.stem for path in GOLDEN.glob("*")} == set(OPERATORS)
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+def test_files_stay_sound_but_for_the_mistake(name, solutions):
+    """A mutant has the one mistake that its operator makes, and no syntax error besides."""
+    for solution in solutions.values():
+        for site in OPERATORS[name].sites(solution):
+            for path, entry in changed(solution, site).items():
+                sound = not path.endswith(NO_PYTHON_3)
+                if path.endswith(".py") and sound and name != "byte-order-mark":
+                    assert compiles(entry.data) is (name not in BREAK_PYTHON), (path, site.at)
+                if path.endswith((".launch", ".xml")):
+                    assert is_xml(entry.data) is (name not in BREAK_XML), (path, site.at)
+                if path.endswith(".yaml"):
+                    assert is_yaml(entry.data) is (name not in BREAK_YAML), (path, site.at)
+
+
+def compiles(data: bytes) -> bool:
+    try:
+        ast.parse(data)
+    except SyntaxError:
+        return False
+    return True
+
+
+def is_xml(data: bytes) -> bool:
+    try:
+        ET.fromstring(data)  # noqa: S314 - made by ourselves
+    except ET.ParseError:
+        return False
+    return True
+
+
+def is_yaml(data: bytes) -> bool:
+    try:
+        yaml.safe_load(data)
+    except yaml.YAMLError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+def test_places_can_be_told_apart(name, solutions):
+    for solution in solutions.values():
+        places = [tuple(site.at.items()) for site in OPERATORS[name].sites(solution)]
+        assert len(set(places)) == len(places)
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+def test_the_solution_itself_stays_as_it_is(name, solutions):
+    before = dict(solutions["other"].tree)
+    sites = OPERATORS[name].sites(solutions["other"])
+    assert solutions["other"].tree == before
+    assert all(site.tree != before for site in sites)
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+def test_nothing_fits_a_package_without_content(name):
+    files = {
+        "package.xml": "<package",
+        "CMakeLists.txt": "project(",
+        "a.launch": "",
+        "b.py": "def",
+        "c.yaml": "{",
+        "d.sh": "",
+    }
+    by_file = {"file-missing", "file-misnamed", "build-file-missing"}
+    empty = Solution(tree=tree_of(files), folder="", name="lab")
+    assert bool(OPERATORS[name].sites(empty)) == (name in by_file)
+
+
+def test_at_least_15_operators_fit_each_lab(solutions):
+    for lab in LABS:
+        assert sum(bool(o.sites(solutions[lab])) for o in OPERATORS.values()) >= 15
+
+
+def silent(solution, params):
+    """Only the mistake."""
+    return iter(())
+
+
+def test_an_operator_has_to_say_what_it_does():
+    with pytest.raises(ValueError, match="twice"):
+        operator("bit-removed")(silent)
+    with pytest.raises(ValueError, match="says too little"):
+        operator("new-one")(silent)
+    assert "new-one" not in OPERATORS
+
+
+def test_built_files_are_nobodys_mistake():
+    tree = tree_of({"scripts/a.py": "#!/usr/bin/env python\n", "devel/lib/a.py": "#!/usr/bin/env python\n"})
+    sites = OPERATORS["bit-removed"].sites(Solution(tree=tree, folder="", name="lab"))
+    assert [site.at for site in sites] == [{"script": "scripts/a.py"}]
