@@ -1,11 +1,12 @@
 # Each target does the set-up that it needs. `make` alone lists them.
 LAB := leeds-comp3631-lab1
+LABS := $(basename $(notdir $(wildcard rubrics/mutants/*.yaml)))
 BIN := .venv/bin
 TIMES ?= 10
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test lint test-pure test-ros stress bench fixtures fmt clean
+.PHONY: help setup demo test lint test-pure test-ros stress bench fixtures mutants fmt clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -40,6 +41,9 @@ bench: setup ## the figures of benchmarks/README.md, measured here
 
 fixtures: setup ## write fixtures/<lab>/ anew from fixtures/<lab>.yaml
 	@$(BIN)/python fixtures/make.py
+
+mutants: setup ## test the rubrics: every mutant of every lab has to lose what it must
+	@status=0; for lab in $(LABS); do $(BIN)/grader rubric test $$lab || status=1; done; exit $$status
 
 fmt: setup ## bring the code into shape
 	@$(BIN)/ruff check --fix . fixtures/make.py
