@@ -5,22 +5,24 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import sys
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import lru_cache
+from collections.abc import Callable, Mapping
+from contextlib import redirect_stdout
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, wraps
 from importlib.abc import ExecutionLoader
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from traceback import extract_tb
 
-from grader.checks.registry import Check, Collection, collecting
+from grader.checks.registry import Check, collecting
+from grader.model.verdict import Verdict
 
 LineFault = tuple[int, str]
 
 
 @dataclass(frozen=True, kw_only=True)
 class OwnChecks:
-    """`complete` is false where the file could not be run to its end: it may mean more checks than are here."""
+    """`complete` is false where the file has a fault: then it may mean more checks than are here."""
 
     checks: Mapping[str, Check] = field(default_factory=dict)
     faults: tuple[LineFault, ...] = ()
@@ -35,11 +37,22 @@ def run_checks_file(path: Path, raw: bytes) -> OwnChecks:
     faults = [*collection.faults, *([fault] if fault else [])]
     if not faults and not collection.checks:
         faults.append((1, "registers no check: decorate functions with @check(…), from grader.checks"))
-    return OwnChecks(checks=_checks(collection), faults=tuple(sorted(faults)), complete=fault is None)
+    checks = {name: replace(c, function=_contained(c.function)) for name, c in collection.checks.items()}
+    return OwnChecks(checks=checks, faults=tuple(sorted(faults)), complete=not faults)
 
 
-def _checks(collection: Collection) -> dict[str, Check]:
-    return dict(collection.checks)
+def _contained(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
+    """What it prints goes to stderr, as stdout may be JSON, and it does not end the grader."""
+
+    @wraps(function)
+    def contained(**facts: object) -> Verdict:
+        try:
+            with redirect_stdout(sys.stderr):
+                return function(**facts)
+        except SystemExit as error:
+            raise RuntimeError("it called sys.exit") from error
+
+    return contained
 
 
 def _run(path: Path, raw: bytes) -> LineFault | None:
@@ -50,7 +63,8 @@ def _run(path: Path, raw: bytes) -> LineFault | None:
     try:
         assert module.__spec__ is not None  # noqa: S101 - made two lines above
         assert module.__spec__.loader is not None  # noqa: S101 - as above
-        module.__spec__.loader.exec_module(module)
+        with redirect_stdout(sys.stderr):
+            module.__spec__.loader.exec_module(module)
     except SyntaxError as error:
         own = error.filename in {str(path), None}
         return (error.lineno or 1) if own else _line(path, error), f"{error.msg}"

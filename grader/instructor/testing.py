@@ -27,7 +27,9 @@ from grader.model.verdict import Status
 HINTS = 4
 SHOWN_TESTS = 20
 TAIL_BYTES = 8192
-ALL_RUN = {0, 1}  # pytest's own exit codes: every test was run, some may have failed
+# pytest's own exit codes: every test was run, some may have failed; an error of pytest's own, or a wrong -k
+ALL_RUN = {0, 1}
+NOT_RUN = {3, 4}
 
 
 class PytestParams(Record):
@@ -93,6 +95,8 @@ def _session(path: Path, evidence: Evidence, params: PytestParams) -> SessionOut
             outcome = SessionOutcome.model_validate_json((folder / "outcome").read_bytes())
         except (OSError, ValidationError) as error:
             raise TestsBroken(_last_words(folder, code)) from error
+        if code in NOT_RUN and not outcome.faults:
+            raise TestsBroken(_last_words(folder, code))
     if outcome.faults:
         raise TestsBroken(outcome.faults[0])
     if not outcome.tests:
@@ -183,7 +187,7 @@ def _scored(counted: list[TestOutcome], score: float, fields: dict[str, str]) ->
         hint += f"; and {len(lost) - HINTS} more"
     if not lost:
         return passed(passing, **fields)
-    message = f"{passing}; not {lost[0].title.rstrip('.') or lost[0].name}: {lost[0].message}"
+    message = f"{passing}; failed: {lost[0].title.rstrip('.') or lost[0].name} ({lost[0].message})"
     if score >= 1:
         return passed(passing, hint=hint, **fields)
     return (

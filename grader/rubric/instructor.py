@@ -35,7 +35,7 @@ def read_instructor(data: object, folder: Path) -> Beside:
     ]
     files: dict[str, bytes] = {}
     faults: list[Fault] = []
-    own = OwnChecks(complete="checks" not in rubric)
+    own = OwnChecks(complete=rubric.get("checks") is None)
     for path, name in named:
         if not isinstance(name, str):
             continue
