@@ -74,11 +74,11 @@ async def build(
 
 
 def _catkin_make(place: Place) -> list[str]:
-    cmakelists = f"{place.package_folder}/CMakeLists.txt"
+    """With a trace of every `CMakeLists.txt`: the package's own, and those of its folders, are picked from it."""
     return [
         "catkin_make", "-C", place.inside_workspace, "-j2", "--no-color", "--cmake-args",
         f"-DPYTHON_EXECUTABLE={place.ros.python}", "--trace-expand", "--trace-format=json-v1",
-        f"--trace-source={cmakelists}", f"--trace-redirect={place.output}/{TRACE}",
+        "--trace-source=CMakeLists.txt", f"--trace-redirect={place.output}/{TRACE}",
     ]  # fmt: skip
 
 
