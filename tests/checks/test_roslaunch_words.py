@@ -1,0 +1,109 @@
+"""roslaunch's own words, as version 1.15 prints them, and what the checks make of them."""
+
+from __future__ import annotations
+
+import pytest
+
+from grader.checks.support.roslaunch import died, finished, is_exact, name_pattern, refusal
+from grader.checks.support.yaml_words import explain_yaml
+from grader.evidence.run import Run
+from grader.evidence.timeline import build_runs
+from grader.model.package import LaunchNode
+
+RED = "\x1b[31m{}\x1b[0m"
+
+
+def printed(*lines: str) -> Run:
+    console = [{"process": "roslaunch", "stream": "stderr", "line": line} for line in lines]
+    return build_runs({"processes": [{"name": "roslaunch"}], "console": console})["run"]
+
+
+def node(name: str, namespace: str = "/") -> LaunchNode:
+    given = dict.fromkeys(("pkg", "type", "ns", "output", "launch_prefix", "args"))
+    return LaunchNode(**given, name=name, namespace=namespace, remaps=(), line=1)
+
+
+@pytest.mark.parametrize(
+    ("said", "why"),
+    [
+        (["RLException: roslaunch file contains multiple nodes named [/a]."], "two nodes are named /a"),
+        (["RLException: Invalid <node> tag: node name cannot contain a namespace. "], "slash in it"),
+        (["RLException: <node> tag is missing required attribute: 'name'. Node xml is <node/>"], "no name"),
+        (
+            ["RLException: error loading <rosparam> tag: ", "\tfile does not exist [/w/config/cc.yaml]"],
+            "cc.yaml",
+        ),
+        (["Resource not found: pubsub_exampl", "ROS path [0]=/tmp"], "no package pubsub_exampl"),
+        (["RLException: [/w/launch/arg.launch] requires the 'nm' arg to be set"], 'name="nm"'),
+        (["RLException: Invalid <node> tag: output must be one of 'log', 'screen'. "], "small letters"),
+        (
+            ["RLException: Unable to launch [ns-10]. ", "If it is a script, you may be missing a '#!'"],
+            "of ns",
+        ),
+        (["RLException: multiple files named [a.launch] in package [p]:"], "two launch files"),
+        (["RLException: Unknown substitution command [findpkg p]. Valid commands are"], "findpkg p"),
+        (["RLException: Invalid roslaunch XML syntax: mismatched tag: line 3, column 2"], "not well-formed"),
+    ],
+)
+def test_refusals(said: list[str], why: str) -> None:
+    found = refusal(printed(*(RED.format(line) for line in said)))
+    assert found is not None
+    assert why in found.why
+    assert found.hint
+    assert not found.of_script
+
+
+def test_no_refusal() -> None:
+    assert (
+        refusal(
+            printed(
+                "started roslaunch server http://127.0.0.1:43899/", "[fin-8] process has finished cleanly"
+            )
+        )
+        is None
+    )
+
+
+def test_ends_of_nodes() -> None:
+    run = printed(
+        "\x1b[31m[robot/dies-6] process has died [pid 2, exit code -11, cmd /w/dies.py __name:=dies].",
+        "\x1b[1m[fin_vm_23746_5988648383355795529-8] process has finished cleanly",
+        "REQUIRED process [pub_node-2] has died!",
+    )
+    assert died(run, node("dies", "/robot/")) == -11
+    assert died(run, node("dies")) is None
+    assert died(run, node("pub_node")) == 1
+    assert finished(run, node("$(anon fin)"))
+    assert not finished(run, node("fin"))
+
+
+@pytest.mark.parametrize(
+    ("written", "name", "fits"),
+    [
+        ("talker", "/talker", True),
+        ("talker", "/talker_1", False),
+        ("t.lker", "/talker", False),
+        ("$(anon talker)", "/talker_vm_23746_5988648383355795529", True),
+        ("$(anon talker)", "/listener_vm_23746_5988648383355795529", False),
+        ("a_$(eval 1+1)_b", "/a_2_b", True),
+        ("a_$(eval 1+1)_b", "/a_2_c", False),
+    ],
+)
+def test_names(written: str, name: str, *, fits: bool) -> None:
+    assert bool(name_pattern(node(written)).fullmatch(name)) is fits
+    assert is_exact(node(written)) is ("$(" not in written)
+
+
+def test_yaml_words_name_the_last_line() -> None:
+    words = explain_yaml(
+        [
+            "while parsing a block mapping",
+            '  in "<u>", line 2, column 3:',
+            "expected <block end>,",
+            '  in "<u>", line 4, column 4:',
+        ]
+    )
+    assert words is not None
+    assert words.line == 4
+    assert "line 4" in words.why
+    assert explain_yaml(["something else"]) is None
