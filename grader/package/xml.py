@@ -54,7 +54,7 @@ def parse_xml(
     try:
         element = etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
-        return None, _fault(error, data, file, root)
+        return None, _fault(error, parser, data, file, root)
     dtd = element.getroottree().docinfo.internalDTD
     if dtd is not None and dtd.entities():  # type: ignore[union-attr] # lxml-stubs lack it
         cause = "`<!ENTITY ...>` is not read: delete the `<!DOCTYPE ...>` block and write the text out"
@@ -82,10 +82,11 @@ def line_of(element: etree._Element) -> int | None:
     return line if isinstance(line, int) else None
 
 
-def _fault(error: etree.XMLSyntaxError, data: bytes, file: str, root: str) -> Fault:
+def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, file: str, root: str) -> Fault:
     line, column = error.position
     message = re.sub(r", line \d+, column \d+$", "", (error.msg or "not well-formed").strip()).strip()
-    log = [str(entry.message) for entry in error.error_log]  # type: ignore[attr-defined] # lxml-stubs lack it
+    # the error's own log holds what went wrong with other files before, too
+    log = [str(entry.message) for entry in parser.error_log]
     return Fault(
         file=file,
         line=line or None,

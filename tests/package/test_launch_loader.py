@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.model.package import LaunchFile
-from grader.package.launch import read_launch_files
+from grader.package.launch import parse_launch, read_launch_files
 
 
 def loaded(folder: Path, files: dict[str, str], name: str = "launch/a.launch") -> LaunchFile:
@@ -176,3 +176,10 @@ def test_remaps_reach_included_nodes(tmp_path: Path) -> None:
         "launch/b.launch": '<launch><node name="n"><remap from="a" to="b"/></node></launch>',
     }
     assert loaded(tmp_path, files).brings[0].remaps == (("chatter", "talk"), ("a", "b"))
+
+
+def test_one_broken_file_does_not_speak_for_the_next() -> None:
+    parse_launch("<launch>\n<node name=“x”/></launch>".encode(), "a.launch")
+    fault = parse_launch(b'<launch\n<node pkg="a"/></launch>', "b.launch").fault
+    assert fault is not None
+    assert fault.cause.startswith("the tag `<launch` is not finished")
