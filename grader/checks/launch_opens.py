@@ -121,8 +121,14 @@ def _script(package: PackageFacts, build: Run, file: LaunchFile, params: OpensPa
         source = find_script(package, node.type or "")
         path = source.path if source else node.type or ""
         verdict = executable(package, build, ExecutableParams(path=path))
-        verdicts.append(verdict.model_copy(update={"hint": verdict.hint.replace(RIGHT_SHEBANG, SHELL)}))
+        verdicts.append(_of_shell(verdict))
     return None if any(v.status is Status.PASS for v in verdicts) else verdicts[0]
+
+
+def _of_shell(verdict: Verdict) -> Verdict:
+    """The executable check's words with the shell's first line."""
+    words = {name: getattr(verdict, name).replace(RIGHT_SHEBANG, SHELL) for name in ("message", "hint")}
+    return verdict.model_copy(update=words)
 
 
 def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> Verdict:

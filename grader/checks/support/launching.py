@@ -133,10 +133,12 @@ def _no_program(package: PackageFacts, node: LaunchNode) -> Slip:
         return _slip(node, f"{why}: type is the file's name without its folder", f'write type="{plain}"')
     if found := find_script(package, f"{plain}.py"):
         return _slip(node, f'{why}: type="{name}" lacks the .py of {found.path}', f'write type="{plain}.py"')
-    near = near_names(plain, [n for n in _program_names(package) if n != name])
+    suffix = PurePosixPath(plain).suffix
+    names = [n for n in _program_names(package) if n != name]
+    near = near_names(plain, names) or [n for n in names if suffix and suffix != ".py" and n.endswith(suffix)]
     if near:
         return _slip(node, f"{why}; there is {listed(near)}", f'write type="{near[0]}"')
-    return _slip(node, why, "type is the script's file name, with .py")
+    return _slip(node, why, "type is the script's whole file name, with its ending")
 
 
 def _program_names(package: PackageFacts) -> list[str]:
