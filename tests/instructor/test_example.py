@@ -1,0 +1,58 @@
+"""The worked example of docs/own-checks.md, judged on recordings that are kept for ever."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from grader import checks
+from grader.checks import CHECKS, registry
+from grader.evidence.reader import load_evidence
+from grader.judge import judge
+from grader.judge.summary import total_points
+from grader.model.result import CriterionResult
+from grader.model.verdict import Status
+from grader.rubric.load import load_rubric
+
+ROOT = Path(__file__).parent.parent.parent
+EXAMPLE = ROOT / "rubrics" / "examples" / "own-checks"
+PAGE = (ROOT / "docs" / "own-checks.md").read_text(encoding="utf-8")
+
+
+def judged(recording: str) -> tuple[dict[str, CriterionResult], float]:
+    loaded = load_rubric(str(EXAMPLE / "own-checks.yaml"))
+    runs = load_evidence([ROOT / "tests" / "data" / "recordings" / recording])
+    found = judge(loaded.rubric, runs, loaded.checks)
+    return {c.id: c for c in found}, total_points(loaded.rubric, found)
+
+
+@pytest.mark.parametrize("name", ["own-checks.yaml", "my_checks.py", "test_counting.py"])
+def test_the_page_shows_the_files(name):
+    assert f"\n{(EXAMPLE / name).read_text(encoding='utf-8')}```\n" in PAGE
+
+
+def test_a_correct_package_gets_everything():
+    found, points = judged("correct")
+    assert {c.status for c in found.values()} == {Status.PASS}
+    assert points == 100
+
+
+def test_one_that_dies_at_128_loses_what_the_page_says():
+    found, points = judged("dies-at-128")
+    counting = found["counting"]
+    assert (found["in-step"].status, points) == (Status.PASS, 80)
+    shown = [
+        f"counting: {counting.points:g}/{counting.max_points:g}, {counting.status.value}",
+        counting.message,
+        f"measured: {counting.measured}",
+        f"hint: {counting.hint}",
+    ]
+    assert "```\n" + "\n".join(shown) + "\n```\n" in PAGE
+
+
+def test_the_page_names_the_facts_and_what_can_be_imported():
+    assert all(f"| `{fact}` |" in PAGE for fact in registry.FACTS)
+    names = set(checks.__all__) - {"CHECKS", "FAMILIES", "HEADINGS", "Check"}
+    assert all(f"`{name}" in PAGE for name in names)
+    assert "in-step" not in CHECKS
