@@ -16,6 +16,7 @@ SOURCES = Path(__file__).resolve().parents[1] / "standins"
 SHEBANG = b"#!"
 SHARE = "share"
 LIBRARY = "python"
+CMAKE = "cmake"
 
 
 def known_packages() -> tuple[str, ...]:
@@ -33,12 +34,10 @@ def copy_standins(folder: Path, ros: RosInstallation) -> None:
     """Write what this ROS lacks into `folder`, an install space: `share/<package>`, programs executable whatever an
     archive made of their bits."""
     (folder / SHARE).mkdir(parents=True)
-    ignored = shutil.ignore_patterns("__pycache__")
-    for name in (f"{SHARE}/{package}" for package in missing_packages(ros)):
-        shutil.copytree(
-            SOURCES / Path(name).name, folder / name, ignore=ignored, copy_function=shutil.copyfile
-        )
-    shutil.copytree(SOURCES / LIBRARY, folder / LIBRARY, ignore=ignored, copy_function=shutil.copyfile)
+    for name in (LIBRARY, CMAKE):
+        _copy(SOURCES / name, folder / name)
+    for name in missing_packages(ros):
+        _copy(SOURCES / name, folder / SHARE / name)
     for path in (folder, *folder.rglob("*")):
         path.chmod(0o755 if path.is_dir() or _is_program(path) else 0o644)
 
@@ -52,6 +51,11 @@ def with_standins(env: Mapping[str, str], copied: Path, inside: str) -> dict[str
     python = [f"{inside}/{LIBRARY}", *(f"{inside}/{SHARE}/{name}/{LIBRARY}" for name in packages)]
     added = {"ROS_PACKAGE_PATH": [f"{inside}/{SHARE}"], "PYTHONPATH": python, "CMAKE_PREFIX_PATH": [inside]}
     return {**env, **{name: _append(env.get(name, ""), entries) for name, entries in added.items()}}
+
+
+def _copy(source: Path, target: Path) -> None:
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(source, target, ignore=ignored, copy_function=shutil.copyfile)
 
 
 def _append(path: str, entries: list[str]) -> str:

@@ -1,0 +1,141 @@
+"""The stand-in for browsers: what it tells, and that nothing can stop it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from xmlrpc.server import SimpleXMLRPCServer
+
+import pytest
+
+from grader.arena.ros_env import require_ros
+from grader.arena.sandbox import BROWSERS, OPENER
+from grader.arena.session import ARENA
+
+URL = "https://www.e-yantra.org/"
+NOTE = """
+import json, sys
+from master import ARGUMENT_CHARS, ARGUMENTS_MAX, OPENED_MAX, RecordingMaster
+events = []
+class Wire:
+    def event(self, topic, record): events.append((topic, record))
+master = RecordingMaster(None, Wire(), None, "/grader", lambda address: None)
+print(ARGUMENT_CHARS, ARGUMENTS_MAX, OPENED_MAX, file=sys.stderr)
+for number in range(OPENED_MAX + 5):
+    answer = master.noteOpened("/firefox", "firefox", ["x" * 9999] * 99)
+print(json.dumps([answer, len(events), len(events[0][1]["value"]), len(events[0][1]["value"][0]), events[0][0]]))
+"""
+
+
+@pytest.fixture
+def shims(tmp_path: Path) -> Path:
+    """A folder as the sandbox's `bin/` is."""
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    (folder / "grader-open").write_bytes(OPENER[0].read_bytes())
+    (folder / "grader-open").chmod(0o755)
+    (folder / "grader-open.py").write_bytes(OPENER[1].read_bytes())
+    (folder / "python3").symlink_to(sys.executable)
+    for name in BROWSERS:
+        (folder / name).symlink_to("grader-open")
+    return folder
+
+
+@pytest.fixture
+def master() -> Iterator[tuple[str, list[tuple[str, str, list[str]]]]]:
+    """A server's address and what it was told."""
+    told: list[tuple[str, str, list[str]]] = []
+
+    def note(*arguments: object) -> tuple[int, str, int]:
+        told.append(arguments)  # type: ignore[arg-type]
+        return 1, "", 0
+
+    with SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False) as server:
+        server.register_function(note, "noteOpened")
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        yield f"http://127.0.0.1:{server.server_address[1]}", told
+        server.shutdown()
+        thread.join()
+
+
+def _open(shims: Path, name: str, *arguments: str | bytes, **env: str) -> tuple[int, bytes]:
+    path = f"{shims}:/usr/bin:/bin"
+    done = subprocess.run(
+        [str(shims / name), *arguments],
+        env={"PATH": path, **env},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        check=False,
+        timeout=20,
+    )
+    return done.returncode, done.stdout
+
+
+@pytest.mark.parametrize("name", BROWSERS)
+def test_it_tells_by_what_name_it_was_called(
+    shims: Path, master: tuple[str, list[tuple[str, str, list[str]]]], name: str
+) -> None:
+    uri, told = master
+    assert _open(shims, name, "-new-window", URL, ROS_MASTER_URI=uri) == (0, b"")
+    assert told == [("/" + name, name, ["-new-window", URL])]
+
+
+def test_it_carries_whatever_it_is_given(
+    shims: Path, master: tuple[str, list[tuple[str, str, list[str]]]]
+) -> None:
+    uri, told = master
+    given = ("", "<a&b>", "é", b"\xff\x01", "a\tb")
+    assert _open(shims, "firefox", *given, ROS_MASTER_URI=uri)[0] == 0
+    assert told[0][2] == ["", "<a&b>", "é", "��", "a\tb"]
+
+
+@pytest.mark.parametrize("uri", ["", "http://127.0.0.1:1", "nonsense", "http://", "http://no such host:1"])
+def test_without_a_master_it_does_nothing(shims: Path, uri: str) -> None:
+    assert _open(shims, "firefox", URL, ROS_MASTER_URI=uri) == (0, b"")
+
+
+def test_a_master_that_knows_nothing_of_it_is_let_be(shims: Path) -> None:
+    with SimpleXMLRPCServer(("127.0.0.1", 0), logRequests=False) as server:
+        thread = threading.Thread(target=server.handle_request)
+        thread.start()
+        uri = f"http://127.0.0.1:{server.server_address[1]}"
+        assert _open(shims, "firefox", URL, ROS_MASTER_URI=uri) == (0, b"")
+        thread.join()
+
+
+def test_a_real_one_takes_over_where_there_is_a_screen(shims: Path, tmp_path: Path) -> None:
+    real = tmp_path / "real" / "firefox"
+    real.parent.mkdir()
+    real.write_text('#!/bin/sh\necho "real $*"\n')
+    real.chmod(0o755)
+    path = f"{shims}:{real.parent}:/usr/bin:/bin"
+    assert _open(shims, "firefox", URL, PATH=path, DISPLAY=":0") == (0, f"real {URL}\n".encode())
+    assert _open(shims, "firefox", URL, PATH=path) == (0, b"")
+    assert _open(shims, "opera", URL, PATH=path, DISPLAY=":0") == (0, b"")
+
+
+def test_it_is_quick(shims: Path) -> None:
+    began_s = time.monotonic()
+    for _ in range(5):
+        _open(shims, "firefox", URL)
+    assert time.monotonic() - began_s < 5
+
+
+@pytest.mark.ros
+def test_the_master_notes_within_limits() -> None:
+    done = subprocess.run(
+        [require_ros().python, "-c", NOTE],
+        env={**require_ros().env, "PYTHONPATH": str(ARENA)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=30,
+    )
+    characters, arguments, opened = map(int, done.stderr.split())
+    assert json.loads(done.stdout) == [[1, "noted", 0], opened, arguments, characters, "/grader/actor"]
