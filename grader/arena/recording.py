@@ -32,6 +32,8 @@ from grader.package import python_paths, read_package, read_syntax_report, with_
 from grader.rubric.model import Rubric, Scenario
 
 PACKAGE = "package"
+LONG_S = 3.0
+RATE = "rate"
 ATTACHED_BYTES_MAX = 256 << 10
 ATTACHED_FILES_MAX = 60
 ATTACHED_SUFFIXES = (
@@ -121,13 +123,10 @@ class Recorder:
             for name in self._rubric.scenarios:
                 self._progress.step(name, "skipped", self._not_run)
             return
-        measuring, others = lanes(self._rubric.scenarios)
-        for names in (measuring, others):
-            for before, name in pairwise(names):
-                self._progress.step(
-                    name, "waiting", f"for {before}", expected_s(self._rubric.scenarios[name])
-                )
-        await side_by_side(self._lane(self._place, measuring), self._lane(self._place, others))
+        chosen = lanes(self._rubric)
+        for before, name in (pair for names in chosen for pair in pairwise(names)):
+            self._progress.step(name, "waiting", f"for {before}", expected_s(self._rubric.scenarios[name]))
+        await side_by_side(*(self._lane(self._place, names) for names in chosen))
 
     async def _lane(self, place: Place | None, names: tuple[str, ...]) -> None:
         for name in names:
@@ -238,10 +237,30 @@ class Recorder:
         }
 
 
-def lanes(scenarios: Mapping[str, Scenario]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of the runs that measure rates in real time, and of the others."""
-    measuring = tuple(n for n, s in scenarios.items() if s.clock == "real" and (s.until.window_s or 0) >= 3)
-    return measuring, tuple(n for n in scenarios if n not in measuring)
+def lanes(rubric: Rubric) -> tuple[tuple[str, ...], ...]:
+    """Names of the runs that go one after the other; the lanes go side by side.
+
+    Runs whose rates are judged have a lane of their own, and so have long ones that only watch. The others have one lane
+    beside a rate that is measured, else two of about the same length: starting processes takes CPU.
+    """
+    scenarios = rubric.scenarios
+    rated = {c.scenario for c in rubric.criteria if c.check == RATE}
+    measuring = tuple(n for n, s in scenarios.items() if n in rated and s.clock == "real")
+    watching = tuple(n for n, s in scenarios.items() if n not in measuring and _watches(s))
+    others = [n for n in scenarios if n not in measuring and n not in watching]
+    if measuring:
+        return tuple(lane for lane in (measuring, watching, tuple(others)) if lane)
+    first: list[str] = []
+    second: list[str] = []
+    for name in others:
+        shorter = min(first, second, key=lambda lane: sum(expected_s(scenarios[n]) for n in lane))
+        shorter.append(name)
+    return tuple(lane for lane in (watching, tuple(first), tuple(second)) if lane)
+
+
+def _watches(scenario: Scenario) -> bool:
+    until = scenario.until
+    return scenario.clock == "real" and max(until.window_s or 0, until.alive_s or 0) >= LONG_S
 
 
 def _needs_answer(facts: PackageFacts, path: str) -> bool:
