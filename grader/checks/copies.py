@@ -184,7 +184,7 @@ def _heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) ->
         message = f"both copies live, but {listed(silent)} sends no text on {params.topic}"
         return unjudged(message, hint=f"publish on {params.topic} in the loop, as a copy alone does")
     first, second = (sent_by(run, params.topic, nodes, from_ns) for nodes in copies)
-    texts = {**first.texts, **second.texts}
+    texts = {**first.looked_at, **second.looked_at}
     said, known = (printed_times(run, trio.listener.name, texts, form) for form in (params.template, VALUE))
     return (
         _judged(first, second, said, trio, params)
