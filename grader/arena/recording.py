@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -240,8 +240,8 @@ class Recorder:
 def lanes(rubric: Rubric) -> tuple[tuple[str, ...], ...]:
     """Names of the runs that go one after the other; the lanes go side by side.
 
-    Runs whose rates are judged have a lane of their own, and so have long ones that only watch. The others have one lane
-    beside a rate that is measured, else two of about the same length: starting processes takes CPU.
+    Runs whose rates are judged have a lane of their own, and so have long ones that only watch. The others share one
+    where a rate is measured beside them, else two of about the same length: starting processes takes CPU.
     """
     scenarios = rubric.scenarios
     rated = {c.scenario for c in rubric.criteria if c.check == RATE}
