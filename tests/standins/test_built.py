@@ -35,6 +35,26 @@ import os
 from turtlesim.msg import Pose
 print(Pose._md5sum, os.environ["ROS_PACKAGE_PATH"].split(":")[-1])
 """
+CPP_CMAKE = """cmake_minimum_required(VERSION 3.0.2)
+project(lab)
+find_package(catkin REQUIRED COMPONENTS roscpp turtlesim std_srvs)
+catkin_package()
+include_directories(${catkin_INCLUDE_DIRS})
+add_executable(follow src/follow.cpp)
+add_dependencies(follow ${catkin_EXPORTED_TARGETS} turtlesim_gencpp)
+target_link_libraries(follow ${catkin_LIBRARIES})
+"""
+CPP = """
+#include <ros/ros.h>
+#include <std_srvs/Empty.h>
+#include <turtlesim/Pose.h>
+#include <turtlesim/Spawn.h>
+int main() {
+  std_srvs::Empty empty;
+  printf("%s\\n", ros::message_traits::MD5Sum<turtlesim::Pose>::value());
+  printf("%s\\n", ros::service_traits::MD5Sum<turtlesim::Spawn>::value());
+}
+"""
 OWN = "from turtlesim.msg import Mine\nprint('imported', Mine)\n"
 
 
@@ -68,6 +88,19 @@ def test_a_package_that_depends_on_stand_ins_builds_and_runs(tmp_path: Path, san
         assert built.env["CMAKE_PREFIX_PATH"].split(":")[0].endswith("/devel")
         seen = _run(built, tmp_path, Start(name="node", script="src/node.py"))
     assert printed(seen, "node") == [f"863b248d5016ca62ea2e895ae5265cf9 {place.standins}/share"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    not Path("/usr/share/gencpp").is_dir(), reason="gencpp, which makes C++ headers, is not installed"
+)
+def test_a_cpp_node_includes_the_headers(tmp_path: Path) -> None:
+    depends = "".join(f"<depend>{name}</depend>" for name in ("roscpp", "turtlesim", "std_srvs"))
+    manifest = MANIFEST.replace("</package>", f"{depends}</package>")
+    files = {"package.xml": manifest, "CMakeLists.txt": CPP_CMAKE, "src/follow.cpp": CPP}
+    with make_place(files) as place:
+        seen = _run(_built(place, tmp_path), tmp_path, Start(name="follow", script="follow"))
+    assert printed(seen, "follow") == ["863b248d5016ca62ea2e895ae5265cf9", "0b2d2e872a8e2887d5ed626f2bf2c561"]
 
 
 def test_a_students_own_package_of_that_name_wins(tmp_path: Path) -> None:

@@ -7,12 +7,13 @@ from turtlesim.msg import Pose
 
 def main():
     rospy.init_node("turtle_mimic")
-    publisher = rospy.Publisher("output/cmd_vel", Twist, queue_size=10)
+    given, wanted = rospy.resolve_name("input"), rospy.resolve_name("output")  # launch files remap these two
+    publisher = rospy.Publisher(wanted + "/cmd_vel", Twist, queue_size=10)
 
     def follow(pose):
         twist = Twist()
         twist.linear.x, twist.angular.z = pose.linear_velocity, pose.angular_velocity
         publisher.publish(twist)
 
-    rospy.Subscriber("input/pose", Pose, follow, queue_size=1)
+    rospy.Subscriber(given + "/pose", Pose, follow, queue_size=1)
     rospy.spin()

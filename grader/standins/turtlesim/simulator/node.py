@@ -33,6 +33,7 @@ class Endpoints:
     def __init__(self, name, turtle, lock):
         self.turtle = turtle
         self._lock = lock
+        name = rospy.resolve_name(name)
         self.pose = rospy.Publisher(name + "/pose", Pose, queue_size=QUEUE)
         self.color = rospy.Publisher(name + "/color_sensor", Color, queue_size=QUEUE)
         self._command = rospy.Subscriber(name + "/cmd_vel", Twist, self._on_command, queue_size=1)
