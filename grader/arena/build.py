@@ -19,6 +19,7 @@ BUILD_S = 120.0
 BUILD_EXPECTED_S = 2.0
 STEP_S = 20.0
 ROSRUN_S = 4.0
+INCLUDED_MAX = 20
 TRACE = "cmake-trace.json"
 SYNTAX = "syntax.jsonl"
 ENVIRONMENT = "environment"
@@ -74,11 +75,15 @@ async def build(
 
 
 def _catkin_make(place: Place) -> list[str]:
-    """With a trace of every `CMakeLists.txt`: the package's own, and those of its folders, are picked from it."""
+    """With a trace of every `CMakeLists.txt` and of the package's own `.cmake` files; those in its folder are picked
+    from it."""
+    package = place.workspace.repaired / place.workspace.folder
+    included = sorted(p.relative_to(package).as_posix() for p in package.rglob("*.cmake"))[:INCLUDED_MAX]
     return [
         "catkin_make", "-C", place.inside_workspace, "-j2", "--no-color", "--cmake-args",
         f"-DPYTHON_EXECUTABLE={place.ros.python}", "--trace-expand", "--trace-format=json-v1",
-        "--trace-source=CMakeLists.txt", f"--trace-redirect={place.output}/{TRACE}",
+        *(f"--trace-source={name}" for name in ("CMakeLists.txt", *included)),
+        f"--trace-redirect={place.output}/{TRACE}",
     ]  # fmt: skip
 
 

@@ -33,6 +33,7 @@ macro(nodes)
 endmacro()
 nodes(scripts/macro.py)
 add_subdirectory(scripts)
+include(cmake/own.cmake)
 # catkin_install_python(PROGRAMS scripts/comment.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 if(FALSE)
   catkin_install_python(PROGRAMS scripts/never.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
@@ -42,7 +43,10 @@ catkin_install_python(PROGRAMS scripts/share.py DESTINATION ${CATKIN_PACKAGE_SHA
 catkin_install_python(PROGRAMS scripts/nowhere.py DESTINATION ${NO_SUCH_VARIABLE})
 """
 BELOW = "catkin_install_python(PROGRAMS below.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})\n"
-GOOD = ("plain", "beside", "listed", "glob", "looped", "macro", "below")
+INCLUDED = (
+    "catkin_install_python(PROGRAMS scripts/included.py DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})\n"
+)
+GOOD = ("included", "plain", "beside", "listed", "glob", "looped", "macro", "below")
 BAD = {
     "comment": "does not name scripts/comment.py",
     "never": "does not name scripts/never.py",
@@ -56,7 +60,12 @@ BAD = {
 def facts(tmp_path_factory: pytest.TempPathFactory) -> PackageFacts:
     folder = tmp_path_factory.mktemp("installing") / "lab"
     scripts = {f"scripts/{name}.py": SCRIPT for name in (*GOOD, *BAD)}
-    files = {"CMakeLists.txt": CMAKE + CALLS, "scripts/CMakeLists.txt": BELOW, **scripts}
+    files = {
+        "CMakeLists.txt": CMAKE + CALLS,
+        "scripts/CMakeLists.txt": BELOW,
+        "cmake/own.cmake": INCLUDED,
+        **scripts,
+    }
     with make_place(files, folder=folder) as place:
 
         async def work() -> tuple[Path | None, str]:
