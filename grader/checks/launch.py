@@ -144,7 +144,17 @@ def over_another_topic(run: Run, topic: str, quoted: str = "") -> Verdict:
         return failed(message + quoted, hint="do both use the same message type?")
     lacking = "publishes on" if not publishers else "subscribes to"
     message = f"{listed(run.student_nodes())} are not connected: none {lacking} {topic}"
-    return failed(message + quoted, hint="launch a talker and a listener")
+    seen = _topics_of(run, "publishers" if not publishers else "subscribers")
+    there = f"; one {lacking} {listed(seen)}" if seen else ""
+    hint = f"launch a talker and a listener that use {topic}; look for a <remap> or a namespace"
+    return failed(message + there + quoted, hint=hint)
+
+
+def _topics_of(run: Run, end: str) -> tuple[str, ...]:
+    """The topics that the student's nodes have at this end."""
+    ends = [event.publishers if end == "publishers" else event.subscribers for _, event in run.graph]
+    found = (topic for topics in ends for topic in topics if topic != "/rosout")
+    return tuple(topic for topic in dict.fromkeys(found) if _nodes_on(run, topic, end))
 
 
 def _nodes_on(run: Run, topic: str, end: str) -> tuple[str, ...]:

@@ -33,12 +33,11 @@ def _of_node(run: Run, file: LaunchFile, node: str, wanted: Wanted) -> Verdict |
     late = any(
         all(_fits(later.get(place + name), value) for name, value in wanted.items()) for place in places
     )
-    reads = f"{node} reads {places[0]}{next(iter(wanted))}"
     if late:
         message = f"{listed(wanted)} are set only after {node} has started, and it reads them as it starts"
         verdict = failed(message, hint="set them with <param> inside the <node>: roslaunch does that first")
     else:
-        verdict = _wrong_value(before, places, wanted) or _elsewhere(before, places, wanted, reads)
+        verdict = _wrong_value(before, places, wanted) or _elsewhere(before, node, wanted)
     return verdict.model_copy(update={"citations": (*_lines(file, wanted), _evidence(run))})
 
 
@@ -65,16 +64,18 @@ def _wrong_value(before: Mapping[str, Any], places: tuple[str, str], wanted: Wan
     return failed(message, hint=f"{listed(wanted)} have to be {right}")
 
 
-def _elsewhere(before: Mapping[str, Any], places: tuple[str, str], wanted: Wanted, reads: str) -> Verdict:
+def _elsewhere(before: Mapping[str, Any], node: str, wanted: Wanted) -> Verdict:
     """Somewhere else on the server, or nowhere."""
     first = next(iter(wanted))
     hint = f'write <param name="{first}" value="{wanted[first]}"/> inside the <node> itself, and the others'
-    found = [name for name in before if name.rpartition("/")[2] in wanted]
-    if found:
-        return failed(f"{found[0]} is on the parameter server, but {reads}", hint=hint)
-    near = [name for name in before if name.startswith(places[0])]
-    seen = f"; under {places[0]} there is {listed(near)}" if near else ""
-    return failed(f"{listed(wanted)} are not on the parameter server{seen}: {reads}", hint=hint)
+    found = next((name for name in before if name.rpartition("/")[2] in wanted), None)
+    if found is not None:
+        message = f"{found} is on the parameter server, but {node} reads {node}/{found.rpartition('/')[2]}"
+        return failed(message, hint=hint)
+    near = [name for name in before if name.startswith(f"{node}/")]
+    seen = f"; under {node}/ there is {listed(near)}" if near else ""
+    message = f"{listed(wanted)} are not on the parameter server{seen}: {node} reads {node}/{first}"
+    return failed(message, hint=hint)
 
 
 def _fits(found: object, wanted: float | str) -> bool:
