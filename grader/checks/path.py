@@ -13,7 +13,7 @@ from grader.checks.support.absence import no_message
 from grader.checks.support.gaps import lateness_ms
 from grader.checks.support.geometry import followed, relative
 from grader.checks.support.names import GlobalName
-from grader.checks.support.straying import Way, measured, metres, spot, what_is_wrong
+from grader.checks.support.straying import Way, measured, metres, spot, stands, what_is_wrong
 from grader.checks.support.text import listed, number
 from grader.checks.support.tracks import Track, run_seconds, track
 from grader.evidence.run import Run
@@ -112,6 +112,9 @@ def _judged(found: Track, run: Run, params: PathParams) -> Verdict:
     if course.done:
         count = f"{len(params.points)} points" if len(params.points) > 1 else "its point"
         return passed(f"the path passes {count} within {number(params.tolerance_m)} m", measured=figures)
+    if stands(taken):
+        hint = "publish a velocity that is not 0, again and again while it has to drive"
+        return unjudged("it never moves", measured=figures, hint=hint)
     words = what_is_wrong(taken, params.way, course, mirror=params.relative)
     nearly = followed(taken, params.way.points, 2 * params.tolerance_m).done
     verdict = failed(words.message, hint=words.hint, measured=figures)

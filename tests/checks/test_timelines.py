@@ -54,7 +54,8 @@ def test_check_has_a_passing_and_a_failing_timeline(name: str) -> None:
 
 @pytest.mark.parametrize("name", CHECKS)
 def test_check_has_a_place_in_a_rubric(name: str) -> None:
-    rubrics = [yaml.safe_load(p.read_text()) for p in (REPOSITORY / "rubrics").glob("*.yaml")]
+    folders = (REPOSITORY / "rubrics", REPOSITORY / "rubrics" / "examples")
+    rubrics = [yaml.safe_load(p.read_text()) for folder in folders for p in folder.glob("*.yaml")]
     assert any(c["check"] == name for r in rubrics for c in r["criteria"])
 
 

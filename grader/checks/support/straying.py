@@ -41,6 +41,11 @@ def metres(distance_m: float) -> str:
     return f"{distance_m:.2f} m"
 
 
+def stands(path: Sequence[Pose]) -> bool:
+    """Whether it never left its place."""
+    return all(math.dist(p.point, path[0].point) <= MOVED_M for p in path)
+
+
 def what_is_wrong(path: Sequence[Pose], way: Way, course: Course, *, mirror: bool) -> Words:
     """The likeliest cause; `mirror` where the way is seen from the path's own start."""
     if max(math.dist(p.point, path[0].point) for p in path) <= MOVED_M:
