@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import pytest
+
+from grader.errors import RubricError, UsageError
+from grader.mutation.load import LoadedMutants
+from grader.mutation.model import Mutant
+from grader.mutation.operators import OPERATORS
+from grader.mutation.plan import chosen, plan_all, plan_declared, refuse_unfit
+from grader.mutation.solution import Solution
+from grader.mutation.tree import unified_diff
+from grader.rubric.source import Source
+from tests.mutation.samples import other_solution, tree_of
+
+NODE = "#!/usr/bin/env python\nimport rospy\nrospy.init_node('a')\nrospy.spin()\n"
+
+
+def two_nodes() -> Solution:
+    return Solution(tree=tree_of({"src/a.py": NODE, "src/b.py": NODE}), folder="", name="lab")
+
+
+def declared(*mutants: dict[str, object]) -> LoadedMutants:
+    records = tuple(Mutant.model_validate({"costs": {"x": "fail"}, **mutant}) for mutant in mutants)
+    lines = {("mutants", index): 10 * (index + 1) for index in range(len(records))}
+    return LoadedMutants(mutants=records, source=Source(name="m.yaml", raw=b"", data=None, lines=lines))
+
+
+def test_one_place_needs_no_at():
+    planned, faults = plan_declared(declared({"operator": "yaml-key-misspelt"}), other_solution())
+    assert faults == []
+    assert planned[0].label == "yaml-key-misspelt: config/room.yaml, plain/key"
+    assert planned[0].costs == {"x": "fail"}
+
+
+def test_a_part_of_the_place_is_enough():
+    planned, _ = plan_declared(
+        declared({"operator": "launch-name-changed", "at": {"node": "ear"}}), other_solution()
+    )
+    assert 'name="my_ear"' in unified_diff(other_solution().tree, planned[0].tree)
+
+
+def test_several_places_have_to_be_told_apart():
+    _, faults = plan_declared(declared({"operator": "crlf"}), two_nodes())
+    assert faults == [
+        "m.yaml:10: mutants[0]: crlf fits in 2 places: say in `at` which: {script: src/a.py}; {script: src/b.py}"
+    ]
+
+
+def test_a_place_where_it_does_not_fit():
+    mutant = {"operator": "crlf", "at": {"script": "src/c.py"}}
+    _, faults = plan_declared(declared(mutant, {"operator": "burst"}), two_nodes())
+    both = "{script: src/a.py}; {script: src/b.py}"
+    assert faults == [
+        f"m.yaml:10: mutants[0]: crlf does not fit at {{script: src/c.py}}; it fits at {both}",
+        f"m.yaml:20: mutants[1]: burst fits nowhere in this package; it fits {OPERATORS['burst'].fits}",
+    ]
+    with pytest.raises(RubricError, match="fits nowhere"):
+        refuse_unfit(faults)
+    refuse_unfit([])
+
+
+@pytest.mark.parametrize("name", OPERATORS)
+def test_every_operator_says_where_it_would_fit(name):
+    bare = Solution(tree=tree_of({"README": "nothing"}), folder="", name="lab")
+    planned, faults = plan_declared(declared({"operator": name}), bare)
+    assert planned == []
+    both = "{script: src/a.py}; {script: src/b.py}"
+    assert faults == [
+        f"m.yaml:10: mutants[0]: {name} fits nowhere in this package; it fits {OPERATORS[name].fits}"
+    ]
+
+
+def test_two_mistakes_in_one_mutant():
+    mutant = {
+        "operator": "bit-removed",
+        "at": {"script": "src/a.py"},
+        "also": [{"operator": "no-shebang", "at": {"script": "src/b.py"}}],
+    }
+    (planned,), _ = plan_declared(declared(mutant), two_nodes())
+    assert planned.label == "bit-removed: src/a.py + no-shebang: src/b.py"
+    assert not planned.tree["src/a.py"].executable
+    assert planned.tree["src/b.py"].data.startswith(b"import rospy")
+
+
+def test_lines_tell_apart_what_nothing_else_does():
+    script = "import rospy\nr = rospy.Rate(10)\nwhile True:\n    rospy.sleep(0.1)\n    r.sleep()\n"
+    solution = Solution(tree=tree_of({"a.py": script}), folder="", name="lab")
+    sites = OPERATORS["other-rate"].sites(solution)
+    assert [site.at for site in sites] == [{"script": "a.py", "line": 2}, {"script": "a.py", "line": 4}]
+    planned, faults = plan_declared(declared({"operator": "other-rate", "at": {"line": 4}}), solution)
+    assert faults == []
+    assert b"rospy.sleep(0.2)" in planned[0].tree["a.py"].data
+
+
+def test_all_operators_are_tried_with_names_of_their_own():
+    planned = plan_all(other_solution())
+    assert len({mutant.name for mutant in planned}) == len(planned)
+    assert {mutant.step.operator for mutant in planned} >= {"crlf", "burst", "yaml-key-missing"}
+    assert all(mutant.name.strip("-.") and "/" not in mutant.name for mutant in planned)
+
+
+def test_some_mutants_are_chosen_by_name_by_operator_and_by_pattern():
+    planned = plan_all(two_nodes())
+    assert [m.label for m in chosen(planned, ["crlf"])] == ["crlf: src/a.py", "crlf: src/b.py"]
+    assert [m.label for m in chosen(planned, ["crlf-src-b.py"])] == ["crlf: src/b.py"]
+    assert {m.step.operator for m in chosen(planned, ["shebang-*"])} == {
+        "shebang-typo", "shebang-commented", "shebang-python2"
+    }  # fmt: skip
+    assert chosen(planned, []) == planned
+    with pytest.raises(UsageError, match="did you mean"):
+        chosen(planned, ["clrf"])

@@ -1,0 +1,39 @@
+from __future__ import annotations
+
+from grader.mutation.load import load_mutants
+from grader.mutation.model import LostCriterion, MutantResult
+from grader.mutation.plan import plan_all
+from grader.mutation.write import mutants_text
+from grader.rubric.load import load_rubric
+from tests.mutation.samples import other_solution
+from tests.rubric.samples import spoiled
+
+
+def lost(name: str, status: str) -> LostCriterion:
+    return LostCriterion(id=name, status=status, message="")
+
+
+def test_a_written_file_declares_what_was_lost(tmp_path):
+    planned = plan_all(other_solution())
+    results = [
+        MutantResult(
+            name=mutant.name,
+            label=mutant.label,
+            operator=mutant.step.operator,
+            mistake="",
+            state=("survived", "killed", "inconclusive")[index % 3],
+            expected=None,
+            lost=(lost("chatter-rate", "fail"), lost("talker-node", "blocked")) if index % 3 == 1 else (),
+            diff="",
+            wall_s=1,
+        )
+        for index, mutant in enumerate(planned)
+    ]
+    text = mutants_text("sample", planned, results)
+    path = tmp_path / "m.yaml"
+    path.write_text(text, encoding="utf-8")
+    loaded = load_mutants(path, load_rubric(str(spoiled(tmp_path))).rubric)
+    assert len(loaded.mutants) == sum(result.state == "killed" for result in results)
+    assert [m.at for m in loaded.mutants] == [p.step.at for i, p in enumerate(planned) if i % 3 == 1]
+    assert all(m.costs == {"chatter-rate": "fail", "talker-node": "blocked"} for m in loaded.mutants)
+    assert text.count("# costs nothing: the rubric does not see this mistake") == len(planned[::3])
