@@ -54,7 +54,10 @@ def names_script(one: Installed, path: str) -> bool:
         text = text.removeprefix(here + "/")
     if text.startswith("/"):
         return posixpath.normpath(text).endswith("/" + path)
-    return posixpath.normpath(posixpath.join(posixpath.dirname(one.call.file), text)) == path
+    file = one.call.file
+    included = not file.endswith("CMakeLists.txt")  # then paths count from where it is included, mostly the package
+    folder = "" if included else posixpath.dirname(file)
+    return posixpath.normpath(posixpath.join(folder, text)) == path
 
 
 def is_bin(destination: str, package: PackageFacts) -> bool:
