@@ -176,6 +176,14 @@ def test_a_recording_that_cannot_be_read_is_one_line(tmp_path, rubric, capsys, c
     assert not (tmp_path / "out").exists()
 
 
+def test_a_recording_that_is_too_large_is_refused_unread(tmp_path, rubric, capsys):
+    with (tmp_path / "lab.bag").open("wb") as file:
+        file.truncate((1 << 30) + 1)
+    for command in ("check", "judge"):
+        assert grader([command, str(tmp_path / "lab.bag"), "--rubric", str(rubric)]) == 3
+        assert "larger than 1024 MiB" in capsys.readouterr().err
+
+
 def test_evidence_of_the_grader_is_no_submission(tmp_path, rubric, capsys):
     argv = ["grade", str(CORRECT / "talker.mcap"), "--rubric", str(rubric), "--out", str(tmp_path / "out")]
     assert grader(argv) == 3
@@ -255,7 +263,9 @@ GOAL = Topic("/goal", "std_msgs/String", ["there"], latching=True)
 
 @pytest.fixture
 def general(tmp_path: Path) -> Path:
-    (tmp_path / "general.yaml").write_text(RUBRIC.split("criteria:\n", maxsplit=1)[0] + "criteria:\n" + GENERAL)
+    (tmp_path / "general.yaml").write_text(
+        RUBRIC.split("criteria:\n", maxsplit=1)[0] + "criteria:\n" + GENERAL
+    )
     return tmp_path / "general.yaml"
 
 

@@ -97,17 +97,20 @@ def _load(name: str, data: bytes, *, shown: str = "") -> Run:
     except ContainerError as error:
         raise EvidenceError(f"{shown}: not sound MCAP: {error}") from error
     except _DAMAGE as error:
-        raise EvidenceError(f"{shown}: {_damage(data)}", hint="record it again, or copy it again") from error
+        wrong, hint = _damage(data)
+        raise EvidenceError(f"{shown}: {wrong}", hint=hint) from error
 
 
-def _damage(data: bytes) -> str:
+def _damage(data: bytes) -> tuple[str, str]:
+    """What is wrong, and what to do."""
     if data.startswith(b"version https://git-lfs"):
-        return "only a pointer of Git LFS, the recording itself is not here"
+        return "only a pointer of Git LFS, the recording itself is not here", "`git lfs pull` fetches it"
     if data.startswith(b"SQLite format 3"):
-        return "a bag of ROS 2, and this grader reads those of ROS 1"
+        return "a bag of ROS 2, and this grader reads those of ROS 1", "record with ROS 1: `rosbag record`"
+    again = "record it again, or copy it again"
     if not data.startswith(b"\x89MCAP"):
-        return "not an MCAP file and not a bag"
-    return "damaged" if data.endswith(b"\x89MCAP0\r\n") else "cut short: it has no end"
+        return "not an MCAP file and not a bag", again
+    return ("damaged" if data.endswith(b"\x89MCAP0\r\n") else "cut short: it has no end"), again
 
 
 def _first(error: ValidationError) -> str:

@@ -7,8 +7,10 @@ import re
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+from grader.errors import SubmissionError
 from grader.intake.digest import tree_digest
 from grader.intake.git import Git
+from grader.intake.limits import Limits
 from grader.intake.modes import head_commit
 from grader.intake.names import safe_name
 from grader.intake.open import Opened
@@ -34,7 +36,13 @@ def is_recording(path: Path) -> bool:
 
 
 def single(source: Source, path: Path) -> RecordedSubmission:
-    """The submission that is one recording. Raises OSError where it cannot be read."""
+    """The submission that is one recording. Raises OSError where it cannot be read, SubmissionError for its size."""
+    limit_bytes = Limits().total_bytes
+    if path.stat().st_size > limit_bytes:
+        raise SubmissionError(
+            f"{source.given} is larger than {limit_bytes >> 20} MiB",
+            hint="Record the lab's topics only: `rosbag record /topic …`, or cut it with `rosbag filter`.",
+        )
     return RecordedSubmission(
         id=safe_name(_SUFFIX.sub("", path.name)),
         source=source.given,
@@ -67,14 +75,14 @@ def find_recordings(root: Path, pattern: str) -> list[Path]:
     A pattern without a slash is for a file's name in any folder; capitals make no difference.
     """
     wanted = pattern.casefold().removeprefix("./")
-    found: dict[str, Path] = {}
+    found: list[Path] = []
     for folder in walk(root, tolerant=True):
         folder.folders[:] = [n for n in folder.folders if n not in NO_CONTENT and not n.startswith(".")]
-        for entry in folder.others:
-            if entry.is_file(follow_symlinks=False) and _fits(folder.inside(entry.name), wanted):
-                path = root / folder.inside(entry.name)
-                found.setdefault(_sha256(path), path)
-    return list(found.values())
+        names = [entry.name for entry in folder.others if entry.is_file(follow_symlinks=False)]
+        found += [root / path for path in map(folder.inside, names) if _fits(path, wanted)]
+    if len(found) < 2:
+        return found
+    return list({_sha256(path): path for path in reversed(found)}.values())[::-1]
 
 
 def _fits(path: str, wanted: str) -> bool:
