@@ -2,65 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import PurePosixPath
-from typing import Any
 
 from grader.authoring.discover import INTEGER_PROBES, STRING, TEXT_PROBES, Parts, probe_for
 from grader.authoring.observe import Observed, Topic, heard_template, wraps_of
+from grader.authoring.sheet import Entry, Sheet, given, label_of, plain, share_out
 from grader.checks.manifest import RUNTIME_KINDS
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
-from grader.rubric.cross import TOTAL_POINTS
 
 WINDOW_S = 6
 WRAPS = 2
 LIVES_S = 5
-WEIGHTS = {
-    "manifest": 1, "cmake": 1, "build": 1, "executable": 1, "node-lives": 1, "node-name": 1, "topic-type": 2, "rate": 3,
-    "counter-start": 1, "counter-step": 1, "counter-wrap": 3, "message": 1, "hears": 2, "service": 2, "latched": 1,
-    "cmake-install": 2, "launch-xml": 2, "launch-runs": 2,
-}  # fmt: skip
-
-Entry = dict[str, Any]
 
 
-class Proposal:
-    """Collects the parts of a rubric. `notes` are for the author: what was seen and is not covered."""
+class Proposal(Sheet):
+    """The rubric that asks for what a correct package was seen to do."""
 
     def __init__(
         self, facts: PackageFacts, parts: Parts, seen: Mapping[str, Observed], runs: Mapping[str, Run]
     ) -> None:
-        self.notes: list[str] = []
-        self.scenarios: dict[str, Entry] = {}
-        self.criteria: list[Entry] = []
+        super().__init__()
         self._facts, self._parts, self._seen, self._runs = facts, parts, seen, runs
         self._files()
         for name, script in parts.nodes.items():
             self._node(name, script, seen[name])
         for name, launch in parts.launches.items():
             self._launch(name, launch, seen[name])
-        _share_out(self.criteria)
-
-    def _add(self, id_: str, title: str, check: str, parameters: Entry, **more: object) -> str:
-        taken = {c["id"] for c in self.criteria}
-        name = next(n for n in (id_, *(f"{id_}-{i}" for i in range(2, 100))) if n not in taken)
-        entry = {"id": name, "title": title, "points": 0, "check": check}
-        self.criteria.append(
-            entry | ({"with": parameters} if parameters else {}) | {k: v for k, v in more.items() if v}
-        )
-        return name
+        share_out(self.criteria)
 
     def _files(self) -> None:
         facts = self._facts
         declared = facts.manifest.dependencies if facts.manifest else ()
         names = list(dict.fromkeys(d.name for d in declared if d.kind in RUNTIME_KINDS))
         package = {"name": facts.name}
-        self._add(
+        self.add(
             "manifest", "The manifest names the package and what it needs", "manifest",
             package | ({"dependencies": names} if names else {}), reproduce="cat package.xml",
         )  # fmt: skip
-        self._add(
+        self.add(
             "cmake",
             "CMakeLists.txt makes it a catkin package",
             "cmake",
@@ -70,10 +51,10 @@ class Proposal:
         installed = self._installed()
         if installed:
             parameters: Entry = {"scripts": installed}
-            self._add(
+            self.add(
                 "cmake-install", "CMake installs the scripts", "cmake-install", parameters, requires=["cmake"]
             )
-        self._add(
+        self.add(
             "build",
             "The package builds",
             "build",
@@ -92,7 +73,7 @@ class Proposal:
         requires: list[str] = []
         if script.endswith(".py"):
             requires = [
-                self._add(
+                self.add(
                     f"{name}-executable", f"{file} can be run", "executable", {"path": script},
                     reproduce=f"ls -lF {PurePosixPath(script).parent}",
                 )
@@ -105,31 +86,28 @@ class Proposal:
         node = self._life(name, script, seen, requires)
         for topic in seen.topics:
             self._topic(name, topic, node, self._runs.get(f"{name}-fast"))
+        self._words(name, file, seen, node)
         for service, kind in seen.services.items():
             if kind:
                 parameters = {"service": service, "type": kind}
-                self._add(
-                    f"service-{_id(service)}",
+                self.add(
+                    f"service-{label_of(service)}",
                     f"{service} is offered",
                     "service",
                     parameters,
                     scenario=name,
                     requires=[node],
                 )
-        for text in seen.logged[:1] if not seen.topics else ():
-            title = f"{file} logs {text!r}"
-            self._add(f"{name}-logs", title, "logs", {"text": text}, scenario=name, requires=[node])
-        if seen.read:
-            title = f"{file} shows the parameters"
-            self._add(
-                f"{name}-reads",
-                title,
-                "params-read",
-                {"names": list(seen.read)},
-                scenario=name,
-                requires=[node],
-            )
         self._hearing(name, script, seen, requires)
+
+    def _words(self, name: str, file: str, seen: Observed, node: str) -> None:
+        """What it logs and which parameters it shows."""
+        needs: Entry = {"scenario": name, "requires": [node]}
+        for text in seen.logged[:1] if not seen.topics else ():
+            self.add(f"{name}-logs", f"{file} logs {text!r}", "logs", {"text": text}, **needs)
+        if seen.read:
+            names = {"names": list(seen.read)}
+            self.add(f"{name}-reads", f"{file} shows the parameters", "params-read", names, **needs)
 
     def _with_params(self, scenario: Entry) -> Entry:
         """The scenario, with the package's own parameters set before it starts."""
@@ -151,33 +129,33 @@ class Proposal:
         run = f"rosrun {self._facts.name} {PurePosixPath(script).name}"
         if seen.ended:
             title = f"The node is /{seen.nodes[0]}"
-            return self._add(
+            return self.add(
                 f"{name}-node", title, "node-name", named, scenario=name, requires=requires, reproduce=run
             )
         title = f"/{seen.nodes[0]} stays alive and ends on Ctrl-C"
         parameters = {"process": name, "min_s": LIVES_S, **named}
-        return self._add(
+        return self.add(
             f"{name}-node", title, "node-lives", parameters, scenario=name, requires=requires, reproduce=run
         )
 
     def _topic(self, name: str, topic: Topic, node: str, fast: Run | None) -> None:
         label = self._label(name, topic)
-        kind = self._add(
+        kind = self.add(
             label, f"{topic.name} carries {topic.type}", "topic-type", {"topic": topic.name, "type": topic.type},
             scenario=name, requires=[node], reproduce=f"rostopic info {topic.name}",
         )  # fmt: skip
         needs: Entry = {"scenario": name, "requires": [kind, node]}
         if topic.rate_hz:
-            parameters: Entry = {"topic": topic.name, "rate_hz": _plain(topic.rate_hz)}
+            parameters: Entry = {"topic": topic.name, "rate_hz": plain(topic.rate_hz)}
             hz = f"{topic.name} has {topic.rate_hz:g} Hz"
-            self._add(f"{label}-rate", hz, "rate", parameters, **needs, reproduce=f"rostopic hz {topic.name}")
+            self.add(f"{label}-rate", hz, "rate", parameters, **needs, reproduce=f"rostopic hz {topic.name}")
         if topic.latched:
-            self._add(
+            self.add(
                 f"{label}-latched", f"{topic.name} is latched", "latched", {"topic": topic.name}, **needs
             )
         if topic.template:
             parameters = {"topic": topic.name, "template": topic.template}
-            self._add(
+            self.add(
                 f"{label}-message",
                 f"The messages on {topic.name} tell the time",
                 "message",
@@ -190,12 +168,12 @@ class Proposal:
     def _label(self, name: str, topic: Topic) -> str:
         """By the topic, and by the node too where several publish on it."""
         publishers = [n for n in self._parts.nodes if topic.name in {t.name for t in self._seen[n].topics}]
-        return _id(topic.name) if len(publishers) == 1 else f"{name}-{_id(topic.name)}"
+        return label_of(topic.name) if len(publishers) == 1 else f"{name}-{label_of(topic.name)}"
 
     def _counter(self, name: str, topic: Topic, requires: list[str], fast: Run | None) -> None:
         label, about = self._label(name, topic), {"topic": topic.name}
         wrap = wraps_of(fast, topic.name) if fast else None
-        rate: Entry = {"rate_hz": _plain(topic.rate_hz)} if topic.rate_hz else {}
+        rate: Entry = {"rate_hz": plain(topic.rate_hz)} if topic.rate_hz else {}
         needs: Entry = {"scenario": name, "requires": requires}
         if wrap:
             last, first = wrap
@@ -210,11 +188,11 @@ class Proposal:
             )
             needs["scenario"] = f"{name}-fast"
         start = {**about, "start": topic.counts_from}
-        self._add(
+        self.add(
             f"{label}-start", f"The counter begins with {topic.counts_from}", "counter-start", start, **needs
         )
         maximum = {"maximum": wrap[0]} if wrap else {"maximum": 2**31 - 1}
-        self._add(
+        self.add(
             f"{label}-step",
             "The counter goes up by one",
             "counter-step",
@@ -224,7 +202,7 @@ class Proposal:
         if wrap:
             parameters = {**about, "minimum": wrap[1], "maximum": wrap[0], "wraps": WRAPS, **rate}
             title = f"After {wrap[0]} comes {wrap[1]}"
-            self._add(f"{label}-wrap", title, "counter-wrap", parameters, **needs)
+            self.add(f"{label}-wrap", title, "counter-wrap", parameters, **needs)
 
     def _hearing(self, name: str, script: str, seen: Observed, requires: list[str]) -> None:
         run = self._runs.get(f"{name}-hears")
@@ -249,8 +227,13 @@ class Proposal:
         for topic, template in heard.items():
             parameters = {"topic": topic} | ({"template": template} if template != "{value}" else {})
             title = f"{PurePosixPath(script).name} prints what it hears on {topic}"
-            self._add(
-                f"{name}-hears-{_id(topic)}", title, "hears", parameters, scenario=scenario, requires=requires
+            self.add(
+                f"{name}-hears-{label_of(topic)}",
+                title,
+                "hears",
+                parameters,
+                scenario=scenario,
+                requires=requires,
             )
 
     def _launch(self, name: str, launch: str, seen: Observed) -> None:
@@ -258,14 +241,14 @@ class Proposal:
         own = {n.type for n in file.nodes if n.pkg == self._facts.name}
         others = [n for n in file.nodes if n.pkg != self._facts.name and n.pkg and n.type and n.name]
         wanted: Entry = {"launch": launch}
-        wanted |= _given(scripts=[s for s in self._parts.nodes.values() if PurePosixPath(s).name in own])
-        programs = _given(programs=[f"{n.pkg}/{n.type}" for n in others])
+        wanted |= given(scripts=[s for s in self._parts.nodes.values() if PurePosixPath(s).name in own])
+        programs = given(programs=[f"{n.pkg}/{n.type}" for n in others])
         if not seen.nodes:
             self.notes.append(
                 f"{launch} brought up no node ({seen.failed or 'none registered'}): not covered"
             )
             return
-        xml = self._add(
+        xml = self.add(
             f"{name}-xml", f"{launch} is well-formed and names its nodes", "launch-xml", wanted | programs
         )
         until: Entry = {"nodes": len(seen.nodes), "alive_s": 1}
@@ -276,39 +259,12 @@ class Proposal:
         }
         named = {"nodes": {str(n.name): str(n.pkg) for n in others}} if others else {}
         parameters = wanted | ({"topic": seen.connected[0]} if seen.connected else {}) | named
-        self._add(
+        self.add(
             f"{name}-runs", f"roslaunch brings up the nodes of {launch}", "launch-runs", parameters,
             scenario=name, requires=[xml], reproduce=f"roslaunch {self._facts.name} {launch}",
         )  # fmt: skip
 
 
-def _given(**lists: list[str]) -> Entry:
-    """Those that hold something."""
-    return {name: items for name, items in lists.items() if items}
-
-
 def _probe(topic: str, kind: str) -> Entry:
     made_up = {"text": TEXT_PROBES} if kind == STRING else {"integers": INTEGER_PROBES, "among": [0]}
     return {"topic": topic, "type": kind, **made_up}
-
-
-def _share_out(criteria: list[Entry]) -> None:
-    """Points by weight, whole numbers, the largest remainders rounded up: together 100."""
-    weights = [WEIGHTS.get(c["check"], 1) for c in criteria]
-    exact = [TOTAL_POINTS * w / sum(weights) for w in weights]
-    for criterion, points in zip(criteria, exact, strict=True):
-        criterion["points"] = int(points)
-    order = sorted(range(len(exact)), key=lambda i: (int(exact[i]) - exact[i], i))
-    for index in order[: TOTAL_POINTS - sum(c["points"] for c in criteria)]:
-        criteria[index]["points"] += 1
-
-
-def _plain(number: float) -> float | int:
-    return int(number) if number == int(number) else number
-
-
-def _id(name: str) -> str:
-    """A criterion's id from a topic or service: letters, digits and hyphens."""
-    letters: Iterator[str] = (c if c.isalnum() and c.isascii() else "-" for c in name.lower())
-    label = "-".join(part for part in "".join(letters).split("-") if part)
-    return label if label[:1].isalpha() else f"t-{label}"

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from grader.authoring.discover import Parts, find_parts, second_look
 from grader.authoring.observe import heard_template, nice_rate, observe, wraps_of
-from grader.authoring.propose import Proposal, _share_out
+from grader.authoring.propose import Proposal
+from grader.authoring.sheet import share_out
 from grader.authoring.text import rubric_text
 from grader.evidence.reader import package_facts
 from grader.evidence.run import Run
@@ -145,6 +146,6 @@ def test_nodes_are_found_by_reading_alone(tmp_path):
 )
 def test_points_are_whole_and_add_up(checks):
     criteria = [{"check": name} for name in checks]
-    _share_out(criteria)
+    share_out(criteria)
     assert sum(c["points"] for c in criteria) == 100
     assert all(isinstance(c["points"], int) and c["points"] >= 0 for c in criteria)
