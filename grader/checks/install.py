@@ -26,11 +26,15 @@ class CMakeInstallParams(Record):
 
 
 class Lack(NamedTuple):
-    """Why a script is not installed, how to mend that, and the line. `unsure` where only CMake could tell."""
+    """Why a script is not installed, how to mend that, and the line; `{}` in both stands for the scripts.
+
+    `path` is where the script lies. `unsure` where only CMake could tell.
+    """
 
     why: str
     mend: str
     line: FileCitation | None
+    path: str = ""
     unsure: bool = False
 
 
@@ -77,7 +81,7 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
         f"{facts.file}: {'; '.join(_reasons(lacks))}",
         expected=expected,
         measured=measured,
-        hint="; ".join(dict.fromkeys(lack.mend for lack in lacks.values())),
+        hint="; ".join(_mends(lacks)),
         citations=cited or (FileCitation(file=facts.file),),
     )
 
@@ -87,6 +91,12 @@ def _reasons(lacks: dict[str, Lack]) -> Iterator[str]:
     for why in dict.fromkeys(lack.why for lack in lacks.values()):
         scripts = [name for name, lack in lacks.items() if lack.why == why]
         yield why.replace("{}", listed(scripts))
+
+
+def _mends(lacks: dict[str, Lack]) -> Iterator[str]:
+    """Each repair once, as one line for all scripts that it is true of."""
+    for mend in dict.fromkeys(lack.mend for lack in lacks.values()):
+        yield mend.replace("{}", " ".join(lack.path for lack in lacks.values() if lack.mend == mend))
 
 
 def _lack(package: PackageFacts, all_named: Sequence[Installed], script: str) -> Lack | None:
@@ -119,7 +129,6 @@ def _misplaced(one: Installed) -> Lack:
 
 def _unnamed(all_named: Sequence[Installed], hits: Sequence[Installed], path: str, script: str) -> Lack:
     """Another command names it, a slip of its name or place is named, or nothing is."""
-    mend = f"write catkin_install_python(PROGRAMS {path} DESTINATION {BIN}), without # before it"
     if hits:
         other = f"install({hits[0].kind} …)"
         why = f"line {hits[0].call.line}: {other} names {{}}, where catkin_install_python(PROGRAMS …) should"
@@ -128,7 +137,9 @@ def _unnamed(all_named: Sequence[Installed], hits: Sequence[Installed], path: st
         )
     of_python = [one for one in all_named if one.call.name == PYTHON]
     if not of_python:
-        return Lack("no catkin_install_python(…) is called, so nothing installs {}", mend, None)
+        why = "no catkin_install_python(…) is called, so nothing installs {}"
+        mend = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN}), without # before it"
+        return Lack(why, mend, None, path)
     names = {PurePosixPath(one.path).name: one for one in of_python}
     wanted = PurePosixPath(script).name
     near = [wanted] if wanted in names else list(near_names(wanted, names))
@@ -136,7 +147,7 @@ def _unnamed(all_named: Sequence[Installed], hits: Sequence[Installed], path: st
         one = names[near[0]]
         why = f"line {one.call.line}: {shown(one.path)} is named, which is not there; the script is {path}"
         return Lack(why, f"write {path}", _line(one))
-    return Lack("catkin_install_python(…) does not name {}", mend, None)
+    return Lack("catkin_install_python(…) does not name {}", "write {} into it, behind PROGRAMS", None, path)
 
 
 def _line(one: Installed) -> FileCitation:

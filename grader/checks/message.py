@@ -11,6 +11,7 @@ from grader.checks.registry import check
 from grader.checks.support.clocks import clocks_at
 from grader.checks.support.ending import explain_end
 from grader.checks.support.growth import GET_TIME, WATCHED_S, wrong_growth
+from grader.checks.support.lockup import is_flood
 from grader.checks.support.process import early_end, observed_until_ns
 from grader.checks.support.text import plural, shown
 from grader.checks.support.wording import NUMBER, SECONDS, in_words, message_pattern
@@ -131,7 +132,7 @@ def _wrong_time(
         if not clocks:
             message = "the time in the messages cannot be judged: the run's /clock was not recorded"
             return inconclusive(message, hint="grade again")
-        wrong = wrong_growth(told, clocks)
+        wrong = wrong_growth(told, clocks, flooded=is_flood(run))
         if wrong is not None:
             ended = early_end(run) if wrong.status.value == "inconclusive" else None
             return _too_few(package, run, heard, params) if ended else wrong

@@ -6,36 +6,43 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from grader.checks.support.clocks import Seconds
-from grader.checks.support.text import number, plural
+from grader.checks.support.text import plural
 from grader.model.verdict import Verdict, failed, inconclusive
 
 SLACK_S = 1.5
 SLACK_SHARE = 0.05
 WATCHED_S = 3.0
+FLOODED_S = 1.1
+WHOLE_S = 1.05
 UNITS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
 GET_TIME = "rospy.get_time() gives the time in seconds; ask it again for every message"
 
 
-def wrong_growth(told: Sequence[float], clocks: Sequence[Seconds]) -> Verdict | None:
+def wrong_growth(
+    told: Sequence[float], clocks: Sequence[Seconds], *, flooded: bool = False
+) -> Verdict | None:
     """None where the numbers told go along with one of the clocks, from wherever they start.
 
-    Whole seconds may repeat. The first clock is the one that a message speaks of.
+    Whole seconds may repeat. The first clock is the one that a message speaks of. A recording that was `flooded` is
+    short by the node's own doing, and so full that less of it tells as much.
     """
     span_s = clocks[0][-1]
+    enough_s = FLOODED_S if flooded else WATCHED_S
     if told[0] == told[-1] == max(told) == min(told):
-        message = f"the time in the messages stays at {number(told[0])} for {span_s:.1f} s"
-        return failed(message, hint=GET_TIME) if span_s >= WATCHED_S else _too_short(span_s)
+        message = f"the time in the messages stays at {_plain(told[0])} for {span_s:.1f} s"
+        return failed(message, hint=GET_TIME) if span_s >= enough_s else _too_short(span_s)
     back = next(((a, b) for a, b in pairwise(told) if b < a), None)
     if back is not None:
         return _falls_back(*back)
-    along = [clock[-1] for clock in clocks if _go_along(told, clock)]
+    slack_s = WHOLE_S if flooded else SLACK_S
+    along = [clock[-1] for clock in clocks if _go_along(told, clock, slack_s)]
     if along:
-        return None if max(along) >= WATCHED_S else _too_short(max(along))
+        return None if max(along) >= enough_s else _too_short(max(along))
     return _other_pace(told, span_s)
 
 
-def _go_along(told: Sequence[float], clock: Seconds) -> bool:
-    slack_s = SLACK_S + SLACK_SHARE * clock[-1]
+def _go_along(told: Sequence[float], clock: Seconds, slack_s: float) -> bool:
+    slack_s += SLACK_SHARE * clock[-1]
     return all(abs(value - told[0] - at_s) <= slack_s for value, at_s in zip(told, clock, strict=True))
 
 
