@@ -254,10 +254,12 @@ GENERAL = """\
      with: {topic: /cmd_vel, field: linear.x, min: 0, max: 1}}
   - {id: way, title: p, points: 30, check: path, scenario: mine,
      with: {topic: /cmd_vel, points: [[2, 0]], tolerance_m: 0.2}}
-  - {id: latched, title: l, points: 30, check: latched, scenario: mine, with: {topic: /goal}}
+  - {id: log, title: g, points: 10, check: logs, scenario: mine, with: {text: ready}}
+  - {id: latched, title: l, points: 20, check: latched, scenario: mine, with: {topic: /goal}}
 """
 DRIVE = [{"linear": {"x": 1.0}}] * 20 + [{}] * 5
 HELLO = Topic("/hello", "std_msgs/String", [f"hello world {100 + n / 10}" for n in range(60)])
+LOG = Topic("/rosout", "rosgraph_msgs/Log", [{"level": 2, "name": "/talker", "msg": "ready"}])
 GOAL = Topic("/goal", "std_msgs/String", ["there"], latching=True)
 
 
@@ -271,8 +273,8 @@ def general(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("callerid", ["/talker", None])
 def test_the_general_checks_judge_a_bag(tmp_path, general, callerid):
-    topics = [HELLO, Topic("/cmd_vel", "geometry_msgs/Twist", DRIVE), GOAL._replace(callerid="/goal")]
-    bag = write_bag(tmp_path / "lab.bag", *(t._replace(callerid=callerid) for t in topics[:2]), topics[2])
+    topics = [HELLO, Topic("/cmd_vel", "geometry_msgs/Twist", DRIVE), LOG, GOAL._replace(callerid="/goal")]
+    bag = write_bag(tmp_path / "lab.bag", *(t._replace(callerid=callerid) for t in topics[:3]), topics[3])
     code, result, _ = graded(tmp_path, bag, general)
     assert (code, result["points"]) == (0, 100)
 
@@ -280,6 +282,10 @@ def test_the_general_checks_judge_a_bag(tmp_path, general, callerid):
 def test_the_general_checks_find_faults_in_a_bag(tmp_path, general):
     fast = Topic("/cmd_vel", "geometry_msgs/Twist", [{"linear": {"x": 3.0}}] * 20 + [{}] * 5)
     still = HELLO._replace(values=["hello world 100"] * 60)
-    bag = write_bag(tmp_path / "lab.bag", still, fast, GOAL._replace(latching=False))
+    warn = LOG._replace(values=[{"level": 4, "name": "/talker", "msg": "ready"}])
+    bag = write_bag(tmp_path / "lab.bag", still, fast, warn, GOAL._replace(latching=False))
     _, result, _ = graded(tmp_path, bag, general)
-    assert statuses(result) == {"words": "fail", "bounds": "fail", "way": "fail", "latched": "inconclusive"}
+    assert statuses(result) == {
+        "words": "fail", "bounds": "fail", "way": "fail", "log": "fail", "latched": "inconclusive"
+    }  # fmt: skip
+    assert message(result, "log") == "/talker logs 'ready' at level WARN, not INFO"

@@ -30,7 +30,7 @@ class LogsParams(Record):
     process: str = ""
 
 
-@check("logs", params=LogsParams)
+@check("logs", params=LogsParams, messages_only=True)
 def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
     """The node logs the line.
 
@@ -132,6 +132,9 @@ def _nothing(
     package: PackageFacts, run: Run, nodes: tuple[str, ...], lines: tuple[Logged, ...], params: LogsParams
 ) -> Verdict:
     """Nothing like it came: no process, a dead one, no node, or a node that logs other things or nothing."""
+    if run.foreign:
+        hint = "record /rosout too, from before the node starts: rosbag record -a"
+        return unjudged(f"nothing in {run.evidence} logs {params.text!r}", hint=hint)
     asked = life(run, params.process) if params.process else next(iter(lives(run)), None)
     if asked is None:
         message = "the node was not started: there is no script to run"

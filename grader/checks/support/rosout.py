@@ -25,11 +25,16 @@ class Logged(NamedTuple):
 
 
 def logged_by(run: Run, nodes: Collection[str]) -> tuple[Logged, ...]:
-    """The log messages of these nodes, by time."""
+    """The log messages of these nodes, by time; of all nodes in another tool's recording, which knows no graph."""
     found = [
-        Logged(t, channel.callerid, LEVELS.get(value.get("level", 0)), str(value.get("msg", "")))
+        Logged(
+            t,
+            channel.callerid or str(value.get("name", "")),
+            LEVELS.get(value.get("level", 0)),
+            str(value.get("msg", "")),
+        )
         for channel in run.student_channels("/rosout")
-        if channel.callerid in nodes
+        if run.foreign or channel.callerid in nodes
         for t, value in zip(channel.times_ns, channel.values, strict=True)
         if isinstance(value, dict)
     ]
