@@ -21,7 +21,7 @@ from grader.model.record import Record
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.pipeline import GradeOptions, grade
-from grader.rubric.load import load_rubric
+from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.model import Rubric
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -49,9 +49,15 @@ def labs() -> list[str]:
     return sorted(path.stem for path in (ROOT / "fixtures").glob("*.yaml"))
 
 
+def loaded(lab: str) -> LoadedRubric:
+    """The lab's rubric, or the example of that name."""
+    example = ROOT / "rubrics" / "examples" / f"{lab}.yaml"
+    return load_rubric(str(example) if example.is_file() else lab)
+
+
 @cache
 def rubric_of(lab: str) -> Rubric:
-    return load_rubric(lab).rubric
+    return loaded(lab).rubric
 
 
 def fixture_names(lab: str) -> list[str]:
@@ -78,7 +84,7 @@ def grade_fixture(lab: str, name: str, out: Path) -> GradingResult:
         if links:
             source = _repository(source, Path(folder) / name, links)
         options = GradeOptions(submission_id=name)
-        return grade(str(source), load_rubric(lab), out / lab, options, Silence())
+        return grade(str(source), loaded(lab), out / lab, options, Silence())
 
 
 def _repository(source: Path, folder: Path, links: tuple[str, ...]) -> Path:

@@ -109,7 +109,7 @@ def _misnamed(run: Run, end: End, params: ConnectedParams) -> Verdict | None:
     if not wanted or not there or any(is_called(n, wanted) for n in there):
         return None
     near = near_names(f"/{wanted.lstrip('/')}", there)
-    seen = listed(near or there)
+    seen = listed(near or run.student_nodes() or there)
     hint = f"the node's name is what rospy.init_node(…) or the launch file gives it: {wanted.lstrip('/')}"
     return failed(f"there is no node /{wanted.lstrip('/')}; there is {seen}", hint=hint)
 
