@@ -37,9 +37,10 @@ ALLOWED = {
     "authoring": {
         *BASE, "checks", "evidence", "intake", "package", "pipeline", "rubric"
     },
+    "mutation": BASE | {"pipeline", "rubric"},
     "cli": {
-        *BASE, "arena", "authoring", "checks", "evidence", "files", "instructor", "intake", "judge", "package",
-        "pipeline", "report", "rubric"
+        *BASE, "arena", "authoring", "checks", "evidence", "files", "instructor", "intake", "judge", "mutation",
+        "package", "pipeline", "report", "rubric"
     },
     "__main__": {"cli"},
 }  # fmt: skip

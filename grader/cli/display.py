@@ -96,11 +96,19 @@ class PlainSteps(Steps):
 
 
 class LiveSteps(Steps):
-    """The steps as a table that rich draws again and again; it asks, nobody is held up by it."""
+    """The steps as a table that rich draws again and again; it asks, nobody is held up by it.
+
+    It has at most `rows` lines: of more steps, those that run are shown, and the last that came to an end.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic, *, rows: int = 100) -> None:
+        super().__init__(clock)
+        self.rows = max(rows, 3)
 
     def __rich__(self) -> Table:
         now_s = self.clock()
-        steps = self.snapshot()
+        every = self.snapshot()
+        steps = _fitting(every, self.rows - 1)
         table = Table.grid(padding=(0, 2, 0, 0), expand=True)
         for _ in range(3):
             table.add_column(no_wrap=True)
@@ -111,7 +119,7 @@ class LiveSteps(Steps):
             detail = Text(_shown(step.detail), "dim")
             table.add_row(name, Text(step.state, style), Text(_times(step, now_s)), detail)
         table.add_row(
-            Text("total", "bold"), Text(), Text(f"{now_s - self.begun_s:.1f} s"), Text(_left(steps, now_s))
+            Text("total", "bold"), Text(), Text(f"{now_s - self.begun_s:.1f} s"), Text(_left(every, now_s))
         )
         return table
 
@@ -123,7 +131,7 @@ def open_progress() -> Iterator[Progress]:
     if not console.is_terminal or console.is_dumb_terminal or console.encoding != "utf-8":
         yield PlainSteps(sys.stderr)
         return
-    steps = LiveSteps()
+    steps = LiveSteps(rows=console.height - 1)
     with Live(
         steps,
         console=console,
@@ -133,6 +141,13 @@ def open_progress() -> Iterator[Progress]:
         redirect_stderr=False,
     ):
         yield steps
+
+
+def _fitting(steps: tuple[Step, ...], rows: int) -> tuple[Step, ...]:
+    """As many of the steps as there are rows, in their order: what ended first is left out first."""
+    ended = sorted((s for s in steps if s.state in ENDED), key=lambda step: step.ended_s or 0.0)
+    dropped = {step.name for step in ended[: max(len(steps) - rows, 0)]}
+    return tuple(step for step in steps if step.name not in dropped)[:rows]
 
 
 def _times(step: Step, now_s: float) -> str:

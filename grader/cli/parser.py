@@ -19,6 +19,15 @@ EXIT_CODES = """exit codes:
 """
 
 
+MUTANTS_EXIT_CODES = """exit codes:
+  0    the correct package got everything, and every mutant lost what it must, and no more
+  1    it did not, or a mutant was not killed, or a criterion is worth points and costs no mutant anything
+  2    the command line, the rubric or the mutants file is wrong
+  3    nothing could be graded here
+  130  interrupted
+"""
+
+
 class Parser(argparse.ArgumentParser):
     """argparse, with its errors as ours: one line and exit code 2."""
 
@@ -154,6 +163,7 @@ def _authoring(add: _Adder) -> None:
     new.add_argument("--force", action="store_true", help="write over a file that exists")
     _sandbox(new)
     test = inner("test", "grade a correct package, then mutants of it that must lose marks", "rubric_test")
+    test.epilog = MUTANTS_EXIT_CODES
     _mutants(test)
 
 

@@ -44,6 +44,20 @@ def test_live_shows_what_runs_what_it_waits_for_and_how_long():
     assert lines[2].endswith("about 7 s to go")
 
 
+def test_live_keeps_to_its_rows_and_leaves_out_what_ended_first():
+    clock = Clock()
+    steps = LiveSteps(clock, rows=4)
+    for index in range(6):
+        clock.now_s = float(index)
+        steps.step(f"s{index}", "running")
+        if index in {1, 3, 4}:
+            steps.step(f"s{index}", "done")
+    assert [line.split()[1] for line in drawn(steps)[:-1]] == ["s0", "s2", "s5"]
+    steps.step("s0", "done")
+    steps.step("s2", "done")
+    assert [line.split()[1] for line in drawn(steps)[:-1]] == ["s0", "s2", "s5"]
+
+
 def test_plain_lines_only_at_a_change_of_state():
     out = io.StringIO()
     clock = Clock()

@@ -64,7 +64,6 @@ def test_every_operator_says_where_it_would_fit(name):
     bare = Solution(tree=tree_of({"README": "nothing"}), folder="", name="lab")
     planned, faults = plan_declared(declared({"operator": name}), bare)
     assert planned == []
-    both = "{script: src/a.py}; {script: src/b.py}"
     assert faults == [
         f"m.yaml:10: mutants[0]: {name} fits nowhere in this package; it fits {OPERATORS[name].fits}"
     ]

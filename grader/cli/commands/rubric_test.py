@@ -41,6 +41,7 @@ def run(
     reference = given_reference(solution) if solution else find_reference(loaded)
     correct = load_solution(reference, loaded.rubric.package)
     mutants, unfit = _planned(loaded, correct, own=solution is not None, everything=write is not None)
+    picked = chosen(mutants, only)
     for place in filter(None, (out, write and write.absolute().parent)):
         check_writable(place)
     folder = out or Path(tempfile.mkdtemp(prefix="grader-mutants-"))
@@ -48,7 +49,7 @@ def run(
         rubric=loaded,
         solution=correct,
         given=str(reference.folder),
-        mutants=chosen(mutants, only),
+        mutants=picked,
         unfit=unfit,
         partial=bool(only),
         jobs=jobs,

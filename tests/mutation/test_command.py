@@ -1,0 +1,211 @@
+"""`grader rubric test` with gradings that are made up."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from grader.cli.main import run
+from grader.mutation import session
+from grader.mutation.workers import Graded
+from grader.rubric.load import load_rubric
+from tests.mutation.samples import ROOT
+from tests.report.hostile import criterion, result
+
+LAB = "leeds-comp3631-lab1"
+
+
+class Judge:
+    """Gives each mutant the statuses that its mutants file declares, but for what a test says."""
+
+    def __init__(self, folder: Path) -> None:
+        self.instead: dict[str, dict[str, str]] = {}
+        self.folder = folder
+        self.declared: dict[str, dict[str, str]] = {}
+        self.rubric = load_rubric(LAB).rubric
+
+    def grade_all(self, jobs, side_by_side, begun):
+        assert side_by_side in {1, 4}
+        for job in jobs:
+            begun(job.name)
+            lost = self.instead.get(job.name, self.declared.get(job.name, {}))
+            yield Graded(name=job.name, result=result(criteria=self.criteria(lost), points=100))
+
+    def criteria(self, lost: dict[str, str]):
+        return tuple(
+            criterion(c.id, lost.get(c.id, "pass"), 0, c.points, message=f"about {c.id} \x1b[2J")
+            for c in self.rubric.criteria
+        )
+
+
+@pytest.fixture
+def judge(tmp_path, monkeypatch):
+    made = Judge(tmp_path)
+    monkeypatch.setattr(session, "grade_all", made.grade_all)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
+    (tmp_path / "tmp").mkdir()
+    original = session.run_test
+
+    def noting(plan, progress):
+        made.declared = {m.name: dict(m.costs or {}) for m in plan.mutants}
+        return original(plan, progress)
+
+    monkeypatch.setattr("grader.cli.commands.rubric_test.run_test", noting)
+    return made
+
+
+def left(judge: Judge) -> list[Path]:
+    return list((judge.folder / "tmp").iterdir())
+
+
+def test_all_killed(judge, capsys):
+    assert run(["rubric", "test", LAB]) == 0
+    out, err = capsys.readouterr()
+    assert f"{LAB}: 40 of 40 mutants killed" in out
+    assert "✓ killed" in out
+    assert max(len(line) for line in out.splitlines()) <= 80
+    assert "bit-removed: src/numeric_talker.py  done" in err
+    assert left(judge) == []
+
+
+def test_a_survivor_is_shown_with_its_diff_and_its_evidence(judge, capsys):
+    judge.instead = {"bit-removed-src-numeric-talker.py": {}}
+    assert run(["rubric", "test", LAB]) == 1
+    out, _ = capsys.readouterr()
+    text = " ".join(out.split())
+    assert "survived: bit-removed: src/numeric_talker.py" in text
+    assert "the student never makes the script executable" in text
+    assert "should cost, and does not: talker-executable" in text
+    assert "old mode 100755" in text
+    assert "39 of 40 mutants killed" in text
+    (folder,) = left(judge)
+    assert [path.name for path in folder.iterdir()] == ["bit-removed-src-numeric-talker.py"]
+
+
+def test_what_costs_too_much_is_shown_with_the_reports_words(judge, capsys):
+    judge.instead = {
+        "never-reset-src-numeric-talker.py-numeric-chatter": {"counter-wrap": "blocked", "launch": "fail"}
+    }
+    assert run(["rubric", "test", LAB]) == 1
+    out, _ = capsys.readouterr()
+    text = " ".join(out.split())
+    assert "should not cost, and does: launch" in text
+    assert "has another status: counter-wrap is blocked, not fail" in text
+    assert "launch fail: about launch \\x1b[2J" in text
+    assert "- if counter > 127:" in text
+
+
+def test_json(judge, capsys):
+    judge.instead = {"no-catkin-package": {"cmake": "fail", "build": "fail"}}
+    assert run(["rubric", "test", LAB, "--json", "--out", str(judge.folder / "kept")]) == 1
+    data = json.loads(capsys.readouterr().out)
+    assert data["schema"] == "grader.rubric-test/1"
+    assert (data["passed"], data["uncosted"], len(data["mutants"])) == (False, [], 40)
+    (differs,) = [m for m in data["mutants"] if m["state"] != "killed"]
+    assert (differs["state"], differs["surplus"], differs["expected"]) == (
+        "differs",
+        ["build"],
+        {"cmake": "fail"},
+    )
+    assert differs["evidence"] == str(judge.folder / "kept" / "no-catkin-package")
+    assert (judge.folder / "kept" / "crlf-src-numeric-talker.py" / "mutant.diff").is_file()
+
+
+def test_some_mutants_only(judge, capsys):
+    assert run(["rubric", "test", LAB, "--only", "crlf", "reset-*", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert {m["operator"] for m in data["mutants"]} == {"crlf", "reset-early", "reset-late", "reset-to-one"}
+    assert data["uncosted"] is None
+
+
+def test_a_criterion_that_nothing_costs_is_named(judge, capsys):
+    judge.instead = {
+        "other-rate-src-numeric-talker.py-factor-0.92": {"chatter-rate": "fail"},
+        "burst-src-numeric-talker.py": {"chatter-rate": "fail"},
+        "sleep-without-brackets-src-numeric-talker.py": {"chatter-rate": "fail"},
+        "publish-half-src-numeric-talker.py-numeric-chatter": {},
+    }
+    assert run(["rubric", "test", LAB]) == 1
+    assert "No mutant costs numeric-rate" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_criterion_taken_out_fails_the_test(judge, capsys, tmp_path):
+    text = (ROOT / "rubrics" / f"{LAB}.yaml").read_text(encoding="utf-8")
+    start, end = text.index("  - id: counter-wrap"), text.index("  - id: listener-chatter")
+    path = tmp_path / "mine.yaml"
+    path.write_text(text[:start] + text[end:].replace("points: 5", "points: 20", 1), encoding="utf-8")
+    judge.rubric = load_rubric(str(path)).rubric
+    judge.instead = {}
+    assert run(["rubric", "test", str(path), "--only", "reset-*"]) == 1
+    text = " ".join(capsys.readouterr().out.split())
+    assert "should cost, and does not: counter-wrap (the rubric has no such criterion)" in text
+    assert "0 of 3 mutants killed" in text
+
+
+def test_the_reference_solution_has_to_get_everything(judge, capsys):
+    judge.instead = {"reference": {"launch": "fail", "talker-name": "fail"}}
+    assert run(["rubric", "test", LAB]) == 1
+    text = " ".join(capsys.readouterr().out.split())
+    assert "The reference solution does not get everything" in text
+    assert "launch fail: about launch" in text
+    assert "talker-name" not in text
+    assert [p.name for p in left(judge)[0].iterdir()] == ["reference"]
+
+
+def test_without_a_mutants_file_every_operator_is_tried_and_written(judge, capsys, tmp_path):
+    written = tmp_path / "mutants.yaml"
+    assert run(["rubric", "test", LAB, "--write", str(written), "--only", "crlf", "burst", "--json"]) == 1
+    data = json.loads(capsys.readouterr().out)
+    assert {m["state"] for m in data["mutants"]} == {"survived"}
+    assert {m["expected"] for m in data["mutants"]} == {None}
+    assert written.read_text().count("# costs nothing") == len(data["mutants"]) == 6
+
+
+def test_a_solution_of_ones_own_may_lack_places(judge, capsys, tmp_path):
+    package = tmp_path / "mine" / "lab1"
+    package.mkdir(parents=True)
+    for name in ("package.xml", "CMakeLists.txt"):
+        (package / name).write_bytes((ROOT / "reference_solutions" / LAB / "lab1" / name).read_bytes())
+    assert run(["rubric", "test", LAB, "--solution", str(tmp_path / "mine"), "--json"]) == 1
+    data = json.loads(capsys.readouterr().out)
+    assert len(data["mutants"]) == 6
+    assert len(data["unfit"]) == 34
+    assert "fits nowhere in this package" in data["unfit"][0]
+    assert "listener-numeric" in data["uncosted"]
+
+
+@pytest.mark.parametrize(
+    ("argv", "message"),
+    [
+        (["no-such-lab"], 'there is no rubric "no-such-lab"'),
+        ([LAB, "--only", "crfl"], 'there is no mutant "crfl" (did you mean "crlf"?)'),
+        ([LAB, "--jobs", "0"], "argument --jobs: '0' is not a number from 1 to 64"),
+        ([LAB, "--jobs", "many"], "argument --jobs: 'many' is not a number from 1 to 64"),
+        ([LAB, "--solution", "/nowhere"], "/nowhere is not a folder"),
+        ([LAB, "--solution", str(ROOT / "rubrics")], "there is no package lab1 in"),
+        ([LAB, "--out", "/proc/x"], "cannot write /proc/x"),
+        ([LAB, "--write", "/proc/x/m.yaml"], "cannot write /proc/x"),
+        ([], "the following arguments are required: LAB|FILE"),
+    ],
+)
+def test_a_wrong_command_line(argv, message, judge, capsys):
+    assert run(["rubric", "test", *argv]) == 2
+    assert capsys.readouterr().err.startswith(f"grader: error: {message}")
+    assert left(judge) == []
+
+
+def test_a_mutants_file_that_does_not_fit_its_solution_is_an_error(judge, capsys, tmp_path):
+    rubrics = tmp_path / "course" / "rubrics"
+    (rubrics / "mutants").mkdir(parents=True)
+    for name in (f"{LAB}.yaml", f"mutants/{LAB}.yaml"):
+        (rubrics / name).write_bytes((ROOT / "rubrics" / name).read_bytes())
+    lab1 = tmp_path / "course" / "reference_solutions" / LAB / "lab1"
+    lab1.mkdir(parents=True)
+    (lab1 / "package.xml").write_text("<package><name>lab1</name></package>")
+    assert run(["rubric", "test", str(rubrics / f"{LAB}.yaml")]) == 2
+    err = capsys.readouterr().err
+    assert f"mutants/{LAB}.yaml:12: mutants[1]: manifest-malformed fits nowhere in this package" in err
+    assert err.count("error") == 39
