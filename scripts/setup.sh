@@ -12,7 +12,7 @@ ros_packages=(
   python3-rosgraph-msgs python3-std-msgs python3-std-srvs
   python3-geometry-msgs python3-nav-msgs python3-sensor-msgs
 )
-# Students' packages may name these in find_package(): installed along with the others where apt has them.
+# Students' packages may name these in find_package(): installed where apt has them and root is to be had.
 ros_extras=(ros-message-generation libnav-msgs-dev libsensor-msgs-dev libstd-srvs-dev)
 # Program to find on PATH, and the package that has it.
 tools=(bwrap:bubblewrap git:git cmake:cmake make:make g++:g++)
@@ -86,11 +86,34 @@ apt_install() {
   [ "${#unknown[@]}" -eq 0 ] ||
     die "apt knows no ${unknown[*]}: Debian 12 and Ubuntu 22.04 have ROS 1; elsewhere install it and name its setup.bash in GRADER_ROS_SETUP"
   if [[ " $* " == *" python3-rospy "* ]]; then
-    for package in "${ros_extras[@]}"; do
-      if apt-cache show "$package" >/dev/null 2>&1; then wanted+=("$package"); fi
-    done
+    mapfile -t -O "${#wanted[@]}" wanted < <(known_to_apt "${ros_extras[@]}")
   fi
   "${apt[@]}" install --no-install-recommends "${wanted[@]}" </dev/null || die "apt-get could not install $*"
+}
+
+# Those of the named packages that apt can install, one a line.
+known_to_apt() {
+  local package
+  for package in "$@"; do
+    if apt-cache show "$package" >/dev/null 2>&1; then printf '%s\n' "$package"; fi
+  done
+}
+
+# On a machine that had ROS before, the extras may be missing. Tried once for each set of names.
+install_extras() {
+  local wanted known tried=.venv/setup-extras
+  if ros_elsewhere; then return; fi
+  mapfile -t wanted < <(not_installed "${ros_extras[@]}")
+  if [ "${#wanted[@]}" -eq 0 ] || [ "$(cat "$tried" 2>/dev/null)" = "${wanted[*]}" ]; then return; fi
+  if ! command -v apt-get >/dev/null || ! find_root; then return; fi
+  mapfile -t known < <(known_to_apt "${wanted[@]}")
+  if [ "${#known[@]}" -gt 0 ]; then
+    say "installing ${known[*]}"
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -y -o DPkg::Lock::Timeout=300 \
+      install --no-install-recommends "${known[@]}" </dev/null ||
+      say "going on without them: packages that name them in find_package() will not build here"
+  fi
+  printf '%s' "${wanted[*]}" >"$tried"
 }
 
 fits() { # Python 3.10 or newer that can make virtual environments
@@ -137,3 +160,4 @@ stamp="$(cksum <pyproject.toml) $PWD"
 if ! ready "$stamp"; then
   make_venv "$stamp"
 fi
+install_extras
