@@ -1,0 +1,94 @@
+"""The rubric of the Manchester lab: its fixed ids and points, and whole submissions as evidence."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tests.judge.two_nodes import Lab, assert_sound
+
+POINTS = {
+    "manifest": 5,
+    "cmake": 5,
+    "cmake-install": 10,
+    "build": 5,
+    "talker-executable": 5,
+    "listener-executable": 5,
+    "talker-node": 5,
+    "listener-node": 5,
+    "chatter": 5,
+    "chatter-rate": 15,
+    "message": 5,
+    "listener-hears": 10,
+    "launch-xml": 10,
+    "launch-runs": 10,
+}
+LAB = Lab(
+    id="mcr2-basic-comms",
+    package="basic_comms",
+    talker="scripts/talker.py",
+    listener="scripts/listener.py",
+    talker_node="/talker",
+    listener_node="/listener",
+    launch="launch/activity1.launch",
+    text="hello world {time_s}",
+    heard="[INFO] [1669664767.068386]: I heard %s",
+)
+UP: dict[str, Any] = {
+    "topics": [{"topic": "/chatter", "callerid": "/talker"}],
+    "subscribers": {"/chatter": ["/listener"]},
+}
+SRC = ("src/talker.py", "src/listener.py")
+
+
+def test_ids_and_points() -> None:
+    assert_sound(LAB.rubric, POINTS)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"channel": {"values": {"text": "hello World {time_s:.0f}"}}},
+        {"heard": "i heard %s"},
+        {"files": SRC, "calls": LAB.calls(*SRC)},
+    ],
+)
+def test_full_marks(changes: dict[str, Any]) -> None:
+    assert LAB.lost(launched=UP, **changes) == {}
+
+
+@pytest.mark.parametrize(
+    ("changes", "lost"),
+    [
+        ({"depends": ("std_msgs",)}, {"manifest": "fail"}),
+        ({"calls": LAB.calls("scripts/talker.py")}, {"cmake-install": "fail"}),
+        ({"channel": {"callerid": "/talker_4711_1700000000000"}}, {"talker-node": "fail"}),
+        ({"listener_node": "/listener_4711_1700000000000"}, {"listener-node": "fail"}),
+        ({"channel": {"rate_hz": 5, "count": 40}}, {"chatter-rate": "fail"}),
+        ({"channel": {"values": ["hello world"]}}, {"message": "fail"}),
+        ({"channel": {"values": ["hello world 1700000000.5"]}}, {"message": "fail"}),
+        ({"channel": {"values": {"text": "hello world {i}"}}}, {"message": "fail"}),
+        ({"channel": {"type": "std_msgs/Int8", "values": [1]}}, {"chatter": "fail", "message": "blocked"}),
+        (
+            {"channel": {"topic": "/chat"}},
+            {"chatter": "fail", "chatter-rate": "blocked", "message": "blocked"},
+        ),
+        ({"heard": "%s"}, {"listener-hears": "fail"}),
+    ],
+)
+def test_one_fault_costs_its_own_criterion(changes: dict[str, Any], lost: dict[str, str]) -> None:
+    assert LAB.lost(launched=UP, **changes) == lost
+
+
+def test_apart_by_a_namespace() -> None:
+    apart = LAB.launch_text.replace('name="listener"', 'name="listener" ns="ears"')
+    up = {**UP, "subscribers": {"/ears/chatter": ["/ears/listener"]}}
+    assert LAB.lost(launch=apart, launched=up) == {"launch-runs": "fail"}
+
+
+def test_a_node_without_a_name() -> None:
+    nameless = LAB.launch_text.replace('name="listener" ', "")
+    up = {"processes": [{"name": "roslaunch", "exit_code": 1, "exit_s": 1}]}
+    assert LAB.lost(launch=nameless, launched=up) == {"launch-xml": "fail", "launch-runs": "blocked"}
