@@ -14,6 +14,7 @@ from grader.rubric.runs import scenario_faults
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
 
 TOTAL_POINTS = 100
+ANSWERS = "service-answers"
 MANUAL = "manual"  # a person gives the points, no check does
 
 
@@ -31,6 +32,7 @@ def cross_faults(data: object, checks: Mapping[str, Check], *, complete: bool = 
         path = ("criteria", index)
         faults += _check(path, criterion, checks, complete=complete)
         faults += _place(path, criterion, scenarios, checks)
+        faults += _uncalled(path, criterion, scenarios)
     faults += _names(criteria)
     faults += _circles(criteria)
     faults += _points(rubric, criteria)
@@ -69,6 +71,18 @@ def _place(
         recorded = as_map(scenarios[scenario]).get("recording") is not None
         if recorded and checks[check].needs_run and not checks[check].messages_only:
             yield (*path, "check"), f'"{check}" judges more than messages, and a recording holds no more'
+
+
+def _uncalled(path: KeyPath, criterion: dict[str, Any], scenarios: dict[str, Any]) -> Iterator[Fault]:
+    """Answers can only be judged to calls that the scenario makes."""
+    given, scenario = as_map(criterion.get("with")), criterion.get("scenario")
+    expect, service = given.get("expect"), given.get("service")
+    if criterion.get("check") != ANSWERS or not isinstance(expect, list) or scenario not in scenarios:
+        return
+    calls = [c for _, c in as_maps(as_map(scenarios[scenario]).get("calls")) if c.get("service") == service]
+    if len(calls) < len(expect):
+        made = f"{len(calls)} of them" if calls else "none"
+        yield (*path, "with", "expect"), f"asks for {len(expect)} calls of {service}; {scenario} makes {made}"
 
 
 def _names(criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:

@@ -93,6 +93,7 @@ def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str
         "extra_forbidden": lambda: "is not known here" + did_you_mean(str(path[-1]), _keys(model, path[:-1])),
         "string_pattern_mismatch": lambda: f"{_pattern(context['pattern'])}, not {shown(value)}",
         "literal_error": lambda: _literal(value, context["expected"]),
+        "too_long": lambda: f"has at most {context['max_length']}, not {context['actual_length']}",
         "too_short": lambda: f"needs at least {context['min_length']}, has {context['actual_length']}",
     }
     if kind in words:

@@ -6,12 +6,19 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import AfterValidator
 
-STEP = r"[A-Za-z]\w*(?:\[(?:\d+|\*)\])*"
+_STEP = r"[A-Za-z]\w*(?:\[(?:\d+|\*)\])*"
 _PARTS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
 
-FieldPath = Annotated[str, Field(pattern=rf"^{STEP}(?:\.{STEP})*$")]
+
+def _sound(path: str) -> str:
+    if not re.fullmatch(rf"{_STEP}(?:\.{_STEP})*", path):
+        raise ValueError(f'must be a field like linear.x, ranges[0] or ranges[*], not "{path}"')
+    return path
+
+
+FieldPath = Annotated[str, AfterValidator(_sound)]
 
 
 class NoField(LookupError):
