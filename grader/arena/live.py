@@ -40,6 +40,7 @@ class Live:
     services: set[str] = field(default_factory=set)
     opened: set[str] = field(default_factory=set)
     activity_s: float = 0.0
+    news_s: float = 0.0
     subscribed: set[str] = field(default_factory=set)
     connected: set[str] = field(default_factory=set)
     unheard: dict[str, re.Pattern[str]] = field(default_factory=dict)
@@ -56,11 +57,11 @@ class Live:
         seen.last_s = now_s
         seen.count += count
         if active:
-            self.active(now_s)
+            self.activity_s = now_s
 
     def active(self, now_s: float) -> None:
-        """Something of the student's happened."""
-        self.activity_s = now_s
+        """Something of the student's happened, besides messages."""
+        self.activity_s = self.news_s = now_s
 
     def graph(
         self, nodes: Iterable[str], processes: Mapping[str, str], now_s: float, *, picture: object = None
@@ -153,7 +154,7 @@ def next_look_s(live: Live, until: Until, now_s: float) -> float:
         ]
     looks += [live.graph_changed_s + max(until.silent_s, until.first_message_s)]
     looks += [max(live.last_line_s, live.last_sent_s) + HEARD_S]
-    looks += [live.activity_s + (until.quiet_s or 0), live.activity_s + until.silent_s]
+    looks += [live.activity_s + (until.quiet_s or 0), live.news_s + until.silent_s]
     looks += [live.first_node_s + (until.alive_s or 0)]
     ahead = [look - now_s for look in looks if look > now_s]
     return min([*ahead, 1.0]) + 0.001
@@ -232,9 +233,10 @@ def _silent(live: Live, until: Until, now_s: float) -> str:
 
 def _standstill(live: Live, until: Until, now_s: float) -> str:
     """Nothing happens any more, though more nodes, programs or ends were waited for."""
-    if _nodes(live, until, now_s) or (until.alive_s is not None and live.nodes):
+    growing_up = live.nodes and now_s < live.first_node_s + (until.alive_s or 0)
+    if growing_up or _nodes(live, until, now_s):
         return ""
     patience_s = until.silent_s if live.nodes else max(until.silent_s, until.first_message_s)
-    if now_s > max(live.activity_s, live.started_s) + patience_s:
+    if now_s > max(live.news_s, live.started_s) + patience_s:
         return f"nothing happened for {patience_s:g} s"
     return ""

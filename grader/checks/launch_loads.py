@@ -82,7 +82,11 @@ def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchLoa
     missing = [name for name in map(absolute, params.names) if name not in before]
     if missing:
         return _not_loaded(package, file, run, params, missing)
-    if not any(_is_of(load, params) for load in file.loads) and not _by_node(file, params):
+    if not (
+        any(_is_of(load, params) for load in file.loads)
+        or _by_node(file, params)
+        or _of_another_name(package, file, params)
+    ):
         message = f"{file.path} sets the parameters, but does not load {params.file}"
         return failed(message, hint=OUTSIDE.format(params.file))
     return _not_running(package, run, node)
@@ -149,6 +153,12 @@ def _is_of(load: LaunchLoad, params: LaunchLoadsParams) -> bool:
     return load.command == "load" and (PurePosixPath(source).name == name or "$(env" in source)
 
 
+def _of_another_name(package: PackageFacts, file: LaunchFile, params: LaunchLoadsParams) -> bool:
+    """The package has no file of that name, and the launch file loads one: how it is called is judged elsewhere."""
+    loads = any(load.command == "load" and load.source for load in file.loads)
+    return loads and find_script(package, params.file) is None
+
+
 def _by_node(file: LaunchFile, params: LaunchLoadsParams) -> bool:
     """A `rosparam load` that the launch file runs as a node."""
     name = PurePosixPath(params.file).name
@@ -156,4 +166,6 @@ def _by_node(file: LaunchFile, params: LaunchLoadsParams) -> bool:
 
 
 def _line(file: LaunchFile, params: LaunchLoadsParams) -> int:
-    return next((load.line for load in file.loads if _is_of(load, params) and load.file == file.path), 1)
+    here = [load for load in file.loads if load.file == file.path]
+    named = [load for load in here if _is_of(load, params)]
+    return (named or here)[0].line if here else 1

@@ -49,7 +49,8 @@ def _wrong_value(before: Mapping[str, Any], places: tuple[str, str], wanted: Wan
     missing = [name for name in wanted if place + name not in before]
     if missing:
         known = [place + name for name in wanted if place + name in before]
-        message = f"{listed(place + name for name in missing)} is not set, only {listed(known)}"
+        verb = "is" if len(missing) == 1 else "are"
+        message = f"{listed(place + name for name in missing)} {verb} not set, only {listed(known)}"
         return failed(
             message, hint="write one <param> for each inside the <node>, the names letter by letter"
         )

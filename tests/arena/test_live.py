@@ -83,6 +83,16 @@ def test_looking_at_the_graph_is_no_change_of_it() -> None:
     assert settled(live, until, 21.2) is None
 
 
+def test_messages_are_no_news_of_a_node_that_is_missing() -> None:
+    live, until = _live(), Until(nodes=2, alive_s=1, silent_s=6)
+    live.graph(["/turtlesim"], {}, 1.0, picture={})
+    live.message("/turtle1/pose", 1, 6.9)
+    assert settled(live, until, 6.9) is None
+    assert settled(live, until, 7.1) == ("silent", "nothing happened for 6 s")
+    live.graph(["/turtlesim", "/teleop"], {}, 7.1, picture={})
+    assert settled(live, until, 7.2) == ("complete", "")
+
+
 def test_waiting_is_said_in_words() -> None:
     assert waiting_for(_live(), WINDOW) == "waiting for the first message on /a"
     assert waiting_for(_live(a=(3, 1.0, 2.0)), COUNT) == "3 of 10 messages on /a"
