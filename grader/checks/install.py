@@ -28,7 +28,8 @@ class CMakeInstallParams(Record):
 class Lack(NamedTuple):
     """Why a script is not installed, how to mend that, and the line; `{}` in both stands for the scripts.
 
-    `path` is where the script lies. `unsure` where only CMake could tell.
+    `path` is where the script lies. `unsure` where only CMake could tell; `follows` where it follows from a missing
+    `catkin_package()`, which gives the destination its value.
     """
 
     why: str
@@ -36,6 +37,7 @@ class Lack(NamedTuple):
     line: FileCitation | None
     path: str = ""
     unsure: bool = False
+    follows: bool = False
 
 
 @check("cmake-install", params=CMakeInstallParams)
@@ -77,7 +79,8 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
         return passed(message, expected=expected, measured=measured, citations=cited)
     cited = tuple(dict.fromkeys([*(lack.line for lack in lacks.values() if lack.line), *calls]))
     verdict = inconclusive if any(lack.unsure for lack in lacks.values()) else failed
-    return (unjudged if facts.fault else verdict)(
+    follows = all(lack.follows for lack in lacks.values())
+    return (unjudged if facts.fault or follows else verdict)(
         f"{facts.file}: {'; '.join(_reasons(lacks))}",
         expected=expected,
         measured=measured,
@@ -107,7 +110,7 @@ def _lack(package: PackageFacts, all_named: Sequence[Installed], script: str) ->
     if any(one.kind == "PROGRAMS" and is_bin(one.destination or "", package) for one in by_python):
         return None
     if by_python:
-        return _misplaced(by_python[0])
+        return _misplaced(package, by_python[0])
     blurred = next((o for o in all_named if o.call.name == PYTHON and not o.known), None)
     if blurred is not None:
         why = f"which scripts {blurred.path} holds, only CMake can tell, and it was not run to its end"
@@ -115,11 +118,14 @@ def _lack(package: PackageFacts, all_named: Sequence[Installed], script: str) ->
     return _unnamed(all_named, hits, paths[0], script)
 
 
-def _misplaced(one: Installed) -> Lack:
+def _misplaced(package: PackageFacts, one: Installed) -> Lack:
     where = f"line {one.call.line}"
     if one.kind != "PROGRAMS":
         why = f"{where}: catkin_install_python(…) does not begin with the word PROGRAMS"
         return Lack(why, f"write catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(one))
+    if "DESTINATION" in one.call.args and not one.destination and not _called(package, "catkin_package"):
+        why = f"{where}: {BIN} has no value, for catkin_package() is not called before it"
+        return Lack(why, "call catkin_package() above catkin_install_python(…)", _line(one), follows=True)
     if not one.destination:
         why = f"{where}: catkin_install_python(…) gives {{}} no DESTINATION"
     else:
@@ -148,6 +154,10 @@ def _unnamed(all_named: Sequence[Installed], hits: Sequence[Installed], path: st
         why = f"line {one.call.line}: {shown(one.path)} is named, which is not there; the script is {path}"
         return Lack(why, f"write {path}", _line(one))
     return Lack("catkin_install_python(…) does not name {}", "write {} into it, behind PROGRAMS", None, path)
+
+
+def _called(package: PackageFacts, name: str) -> bool:
+    return package.cmake is not None and any(call.name == name for call in package.cmake.calls)
 
 
 def _line(one: Installed) -> FileCitation:
