@@ -13,7 +13,10 @@ ros_packages=(
   python3-geometry-msgs python3-nav-msgs python3-sensor-msgs
 )
 # Students' packages may name these in find_package(): installed where apt has them and root is to be had.
-ros_extras=(ros-message-generation libnav-msgs-dev libsensor-msgs-dev libstd-srvs-dev)
+ros_extras=(
+  ros-message-generation libnav-msgs-dev libsensor-msgs-dev libstd-srvs-dev
+  ros-std-msgs ros-std-srvs ros-geometry-msgs ros-nav-msgs ros-sensor-msgs
+)
 # Program to find on PATH, and the package that has it.
 tools=(bwrap:bubblewrap git:git cmake:cmake make:make g++:g++)
 

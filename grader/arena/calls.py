@@ -24,6 +24,7 @@ async def call_services(scenario: Scenario, arena: ArenaSession, tell: Tell) -> 
     for call in scenario.calls:
         tell(f"waiting for the service {call.service}")
         if await _offered(call.service, arena, scenario.until.first_message_s):
+            await arena.wait(lambda: not arena.live.running, call.delay_s)
             tell(f"calling {call.service}")
             await _call(call, arena)
 

@@ -20,7 +20,7 @@ from grader.arena.sandbox import (
     Limits,
     Sandbox,
 )
-from grader.arena.standins import with_standins
+from grader.arena.standins import SOURCES, with_standins
 from grader.arena.workspace import Workspace
 
 LOOPBACK = "127.0.0.1"
@@ -100,7 +100,7 @@ class Place:
         """Folders that hold installed packages side by side, the stand-ins' last."""
         known = [Path(p) / "share" for p in self.ros.prefixes]
         known += [Path(p) for p in self.ros.env.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p]
-        return (*known, self.folder / "standins" / "share")
+        return (*known, self.folder / "standins" / "share", SOURCES)
 
     def package_file(self, file: str) -> Path | None:
         """Where a file of the package is on disk, found as `script_path` finds it."""

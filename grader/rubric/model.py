@@ -70,11 +70,15 @@ class Probe(Record):
 
 
 class Call(Record):
-    """A service that the grader calls once it is offered, after the probes. Fields that `request` lacks are zero."""
+    """A service that the grader calls `delay_s` after it is offered, after the probes and the calls before it.
+
+    Fields that `request` lacks are zero.
+    """
 
     service: str
     type: Annotated[str, Field(pattern=TYPE_PATTERN)]
     request: Annotated[dict[str, Any], Field(default_factory=dict)]
+    delay_s: Seconds = 0.0
 
 
 class Until(Record):

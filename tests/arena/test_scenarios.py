@@ -197,6 +197,33 @@ def test_services_are_called_and_answer(tmp_path: Path) -> None:
     assert seen.outcome.outcome == "complete"
 
 
+WAITER = (
+    NODE
+    + "from std_msgs.msg import String\nrospy.init_node('waiter')\n"
+    + "pub = rospy.Publisher('data', String, queue_size=1)\nwait = rospy.Rate(1000)\n"
+    + "while pub.get_num_connections() == 0:\n    wait.sleep()\npub.publish('first')\nrospy.spin()\n"
+)
+HEARER = (
+    NODE
+    + "from std_msgs.msg import String\nrospy.init_node('hearer')\n"
+    + "rospy.Subscriber('data', String, lambda m: print('heard', m.data))\nrospy.spin()\n"
+)
+
+
+def test_a_publisher_that_waits_for_its_subscriber(tmp_path: Path) -> None:
+    """The recorder's own connection must not be taken for the one that it waits for."""
+    files = {"scripts/hearer.py": HEARER, "scripts/waiter.py": WAITER}
+    starts = (
+        Start(name="hearer", script="hearer.py"),
+        Start(name="waiter", script="waiter.py", after="hearer"),
+    )
+    scenario = Scenario(title="two", start=starts, until=Until(messages={"/data": 1}, quiet_s=0.5))
+    for attempt in range(3):
+        folder = tmp_path / str(attempt)
+        folder.mkdir()
+        assert printed(_run(folder, files, scenario), "hearer") == ["heard first"]
+
+
 def test_a_service_that_is_never_offered(tmp_path: Path) -> None:
     scenario = Scenario(
         title="services",

@@ -1,6 +1,7 @@
 """The ROS master of one arena: ros_comm's own, with the recorder inside and its graph told to the grader."""
 
 import threading
+import time
 
 import rosmaster.master_api
 import services
@@ -11,6 +12,8 @@ GRAPH_QUIET_S = 0.02
 BUS_INFO_S = 0.5
 OPENED_MAX, ARGUMENTS_MAX, ARGUMENT_CHARS = 200, 50, 2000
 PROBE_S = 0.5
+SUBSCRIBED_S = 0.3
+LOOK_S = 0.01
 EVERY_NODE_HAS = ("/get_loggers", "/set_logger_level")
 
 
@@ -43,9 +46,25 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         answer = super().registerPublisher(caller_id, topic, topic_type, caller_api)
         self._owner(caller_api)
         if answer[0] == 1 and not caller_id.startswith(self._own_prefix):
-            self._recorder.connect(topic, caller_id, caller_api)
+            held = self._recorder.connect(topic, caller_id, caller_api)
+            if held:
+                self._await_subscribers(topic, caller_id, caller_api)
         self._graph_changed()
         return answer
+
+    def _await_subscribers(self, topic, caller_id, caller_api):
+        """Those that are there already shall not miss the first message because the publisher counts the recorder
+        as one of them (`while pub.get_num_connections() == 0`)."""
+        with self.ps_lock:
+            there = {name for name, _ in self.subscribers.map.get(topic, ())}
+        wanted = {n for n in there if n != caller_id and not n.startswith(self._own_prefix)}
+        deadline = time.monotonic() + SUBSCRIBED_S
+        pause = threading.Event()
+        while wanted and time.monotonic() < deadline:
+            found = {c["subscriber"] for c in self._connections(caller_id, caller_api) if c["topic"] == topic}
+            if wanted <= found:
+                return
+            pause.wait(LOOK_S)
 
     def unregisterPublisher(self, caller_id, topic, caller_api):
         return self._after(super().unregisterPublisher(caller_id, topic, caller_api))
@@ -61,6 +80,8 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         if str(service).endswith("/get_loggers"):
             self._recorder.gate(caller_id)
         self._owner(caller_api)
+        if not str(service).endswith(EVERY_NODE_HAS):
+            threading.Thread(target=self._learn_type, args=(service, service_api), daemon=True).start()
         return self._after(super().registerService(caller_id, service, service_api, caller_api))
 
     def getParam(self, caller_id, key):
@@ -115,8 +136,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
             "services": dict(offered),
             "processes": {name: owner for name, api in apis.items() if (owner := self._owner(api))},
         }
-        if connections:
-            record["service_types"] = self._types_of(service_apis)
+        record["service_types"] = self._types_of(service_apis)
         if connections:
             publishing = {node for _, nodes in publishers for node in nodes}
             record["connections"] = [
@@ -133,15 +153,27 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
             return self.services.get_service_api(service)
 
     def _types_of(self, apis):
-        """What the services themselves say they are; each is asked once."""
-        for name, api in sorted(apis.items()):
-            if (name, api) not in self._service_types and api and not name.endswith(EVERY_NODE_HAS):
-                try:
-                    self._service_types[name, api] = services.probe(name, api, self._own_prefix, PROBE_S)
-                except ProtocolError:
-                    self._service_types[name, api] = ""
+        """What the services themselves said they are."""
         found = {name: self._service_types.get((name, api)) for name, api in apis.items()}
         return {name: type_ for name, type_ in found.items() if type_}
+
+    def _learn_type(self, service, api):
+        """Ask a service what it is, as soon as its node can answer."""
+        deadline = time.monotonic() + PROBE_S
+        pause = threading.Event()
+        while time.monotonic() < deadline:
+            found = self._type_of(service, api)
+            if found:
+                self._service_types[service, api] = found
+                self._graph_changed()
+                return
+            pause.wait(LOOK_S)
+
+    def _type_of(self, service, api):
+        try:
+            return services.probe(service, api, self._own_prefix, PROBE_S)
+        except ProtocolError:
+            return ""
 
     def _connections(self, node, api):
         """The node's outgoing connections, as the node itself reports them."""

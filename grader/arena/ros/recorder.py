@@ -36,7 +36,7 @@ class Recorder:
         self._lock = threading.Lock()
 
     def connect(self, topic, caller_id, caller_api):
-        """Connect to a publisher, beside the caller; hold the caller if the publisher is able to answer."""
+        """Connect to a publisher, beside the caller; hold the caller, and say so, if the publisher can answer."""
         connected = threading.Event()
         with self._lock:
             self._pending.setdefault(caller_id, []).append(connected)
@@ -46,6 +46,7 @@ class Recorder:
         ).start()
         if serving:
             connected.wait(HOLD_S)
+        return serving
 
     def gate(self, caller_id):
         """Hold a node that is about to leave `init_node` until its publishers are recorded."""
