@@ -15,7 +15,15 @@ from grader.checks.support.ending import (
     process_tracebacks,
 )
 from grader.checks.support.lockup import fell_silent, is_flood, was_talking
-from grader.checks.support.nodes import Anonymous, are_noted, is_named, name_hint, nodes_of, wanted_names
+from grader.checks.support.nodes import (
+    Anonymous,
+    are_noted,
+    is_named,
+    name_hint,
+    nodes_of,
+    wanted_names,
+    wrong_name,
+)
 from grader.checks.support.process import Life, life, lives
 from grader.checks.support.text import listed, plural, seconds
 from grader.evidence.run import Run
@@ -136,7 +144,7 @@ def _nameless(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
     if one is None or not one.ended_early:
         return unjudged(message, measured="no node", hint=hint)
     end = explain_end(one, run, package)
-    message = f"{message}: {_script(one)} ended by itself after {ended_after(one)}: {end.cause}"
+    message = f"{_script(one)} ended by itself after {ended_after(one)}, before it was a node: {end.cause}"
     return unjudged(message, measured="no node", hint=end.hint, citations=end.citations)
 
 
@@ -149,7 +157,7 @@ def _misnamed(nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams) 
     if not params.names or _fitting(nodes, params):
         return None
     return failed(
-        f"the node is named {listed(nodes)}, not {wanted_names(params.names, params.anonymous)}",
+        wrong_name(params.names, nodes, params.anonymous),
         hint=name_hint(params.names, nodes, params.anonymous),
     )
 

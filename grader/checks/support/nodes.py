@@ -41,6 +41,15 @@ def wanted_names(names: Iterable[str], anonymous: Anonymous) -> str:
     return f"{listed(_bases(names), 'or')}, {_KINDS[anonymous]}"
 
 
+def wrong_name(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous) -> str:
+    """How the names of the nodes differ from those that are wanted: in themselves, or in their ending alone."""
+    there = tuple(nodes)
+    if {base_name(n) for n in there}.isdisjoint(_bases(names)):
+        return f"the node is named {listed(there)}, not {listed(_bases(names), 'or')}"
+    how = "without" if anonymous == "required" else "with"
+    return f"the node is named {listed(there)}, {how} the numbers that anonymous=True puts behind the name"
+
+
 def name_hint(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous) -> str:
     """What to write into `init_node`."""
     flag = ", anonymous=True" if anonymous == "required" else ""
