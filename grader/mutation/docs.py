@@ -15,12 +15,33 @@ from grader.mutation.operators import OPERATORS
 from grader.mutation.registry import Operator
 from grader.rubric.load import LoadedRubric, all_rubrics
 
-INTRODUCTION = """# Mutation operators
+EXAMPLE = """\
+schema: grader.mutants/1
+rubric: my-lab
+mutants:
+  - operator: other-rate
+    at: {script: scripts/talker.py}
+    with: {factor: 0.92}
+    costs: {chatter-rate: fail}
+  - operator: bit-removed
+    at: {script: scripts/talker.py}
+    also:
+      - {operator: install-dropped, at: {script: scripts/talker.py}}
+    costs: {cmake-install: fail, talker-executable: fail}
+"""
+INTRODUCTION = f"""# Mutation operators
 
 `grader rubric test LAB` grades a lab's reference solution, which must get everything, and then mutants of it: each
 with a mistake that students make, by one of the operators below. `rubrics/mutants/<lab>.yaml` says which criteria each
 mutant must cost; it is killed when it costs these, with these statuses, and no others.
 `grader rubric test LAB --write FILE` tries every operator and writes what each mutant cost as a first mutants file.
+
+```yaml
+{EXAMPLE}```
+
+`at` says where, as far as an operator fits in more than one place: any part of the place that tells it from the others
+will do (`script`, `topic`, `file`, `node`, `line`, …). `with` are the operator's parameters. `also` makes further
+mistakes in the same mutant. `costs` names criteria with their statuses: `fail`, `partial` or `blocked`.
 
 In the table, a number is how many of the lab's mutants the operator makes; a dot stands where the operator fits the
 lab's reference solution and its mutants file does not use it. This page is made from the operators and the mutants

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -94,7 +96,7 @@ def _reference_result(plan: Plan, result: GradingResult, progress: Progress) -> 
         points=result.points,
         max_points=result.max_points,
         lost=lost,
-        evidence=_kept(plan, REFERENCE, wanted=bool(lost)),
+        evidence=_kept(plan, REFERENCE, plan.solution.tree, wanted=bool(lost)),
     )
 
 
@@ -120,11 +122,12 @@ def _mutants(
             begun_s[name] = time.monotonic()
             progress.step(named[name].label, "running", expected_s=expected_s)
 
-        for graded in _graded(plan, {n: m.tree for n, m in named.items()}, jobs, begun):
-            took_s = time.monotonic() - begun_s[graded.name]
-            result = _mutant_result(plan, named[graded.name], graded, ignored, took_s)
-            results[graded.name] = result
-            progress.step(result.label, "done" if result.state == "killed" else "failed", _said(result))
+        with closing(_graded(plan, {n: m.tree for n, m in named.items()}, jobs, begun)) as gradings:
+            for graded in gradings:
+                took_s = time.monotonic() - begun_s[graded.name]
+                result = _mutant_result(plan, named[graded.name], graded, ignored, took_s)
+                results[graded.name] = result
+                progress.step(result.label, "done" if result.state == "killed" else "failed", _said(result))
 
     run(sorted(plan.mutants, key=_waits_least), plan.jobs)
     for mutant in plan.mutants:
@@ -148,9 +151,6 @@ def _mutant_result(
 ) -> MutantResult:
     criteria = graded.result.criteria if graded.result else ()
     compared = compare(mutant.costs, criteria, ignored) if graded.result else Comparison(state="error")
-    diff = unified_diff(plan.solution.tree, mutant.tree)
-    if (folder := plan.out / mutant.name).is_dir():
-        (folder / DIFF).write_text(diff, encoding="utf-8")
     return MutantResult(
         name=mutant.name,
         label=mutant.label,
@@ -162,8 +162,8 @@ def _mutant_result(
         missing=compared.missing,
         surplus=compared.surplus,
         differing=compared.differing,
-        diff=diff,
-        evidence=_kept(plan, mutant.name, wanted=compared.state != "killed"),
+        diff=unified_diff(plan.solution.tree, mutant.tree),
+        evidence=_kept(plan, mutant.name, mutant.tree, wanted=compared.state != "killed"),
         error=graded.error,
         wall_s=round(took_s, 3),
     )
@@ -181,22 +181,26 @@ def _uncosted(plan: Plan, results: Sequence[MutantResult]) -> tuple[str, ...]:
 
 def _graded(
     plan: Plan, trees: Mapping[str, Tree], jobs: int, begun: Callable[[str], None]
-) -> Iterator[Graded]:
-    """Each tree's grading in `out/<name>/`, its files in `source/` there."""
-    work = []
-    for name, tree in trees.items():
-        source = plan.out / name / SOURCE
-        write_tree(tree, source)
-        work.append(
-            Job(name=name, source=source, rubric=plan.rubric.path, out=plan.out, sandbox=plan.sandbox)
-        )
-    return grade_all(work, jobs, begun)
+) -> Generator[Graded, None, None]:
+    """Each tree's grading in `out/<name>/`. The trees are written where no repository of the user's is around them,
+    for a repository would know their modes better than the disk."""
+    with tempfile.TemporaryDirectory(prefix="grader-mutants-source-", ignore_cleanup_errors=True) as folder:
+        work = []
+        for name, tree in trees.items():
+            source = Path(folder) / name
+            write_tree(tree, source)
+            work.append(
+                Job(name=name, source=source, rubric=plan.rubric.path, out=plan.out, sandbox=plan.sandbox)
+            )
+        yield from grade_all(work, jobs, begun)
 
 
-def _kept(plan: Plan, name: str, *, wanted: bool) -> str | None:
-    """The grading's folder, where it is to be kept."""
+def _kept(plan: Plan, name: str, tree: Tree, *, wanted: bool) -> str | None:
+    """The grading's folder with the graded files in `source/`, where it is to be kept."""
     folder = plan.out / name
-    if plan.keep_all or wanted:
-        return str(folder)
-    shutil.rmtree(folder, ignore_errors=True)
-    return None
+    if not (plan.keep_all or wanted):
+        shutil.rmtree(folder, ignore_errors=True)
+        return None
+    write_tree(tree, folder / SOURCE)
+    (folder / DIFF).write_text(unified_diff(plan.solution.tree, tree), encoding="utf-8")
+    return str(folder)

@@ -51,7 +51,8 @@ class Lab:
             begun(job.name)
             self.calls.append((job.name, side_by_side))
             assert (job.source / "lab1/src/talker.py").is_file()
-            (job.out / job.name / "evidence").mkdir(exist_ok=True)
+            assert self.folder not in job.source.parents
+            (job.out / job.name / "evidence").mkdir(exist_ok=True, parents=True)
             yield self.graded(job)
 
     def graded(self, job: Job) -> Graded:
@@ -103,6 +104,7 @@ def test_a_survivor_is_kept_with_its_diff(lab):
     assert mutant.evidence == str(plan.out / mutant.name)
     assert (plan.out / mutant.name / "mutant.diff").read_text() == mutant.diff
     assert "old mode 100755" in mutant.diff
+    assert (plan.out / mutant.name / "source/lab1/src/talker.py").read_text() == SCRIPT
     assert not test.passed
     assert not (plan.out / "reference").exists()
 
