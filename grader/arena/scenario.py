@@ -23,6 +23,7 @@ CLOCK_STEP_S = 0.05
 UNFOLLOWED_S = 2.0
 UNFOLLOWED_HZ = 15.0
 SUBSCRIBE_S = 6.0
+REGISTERED_S = 1.0
 HEARD_SETTLE_S = 0.3
 GRAPH_EVERY_S = 0.25
 STARTING_S = 1.5
@@ -97,12 +98,20 @@ async def _run(
 
 
 async def _await_node(process: str, scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:
-    """Until a node of that process is registered, or it has ended, or never will be."""
-    live = arena.live
+    """Until a node of that process is registered with all that it has, or it has ended, or never will be.
+
+    A node whose name is taken over while it is still registering takes it back: then both are shut down.
+    """
+    live, until_s = arena.live, time.monotonic() + scenario.until.first_message_s
     tell(f"waiting for {process}")
     await arena.wait(
         lambda: process in live.registered or process in live.ended, scenario.until.first_message_s
     )
+    while process not in live.ended:
+        left_s = min(live.graph_changed_s + REGISTERED_S, until_s) - time.monotonic()
+        if left_s <= 0:
+            return
+        await arena.wait(lambda: process in live.ended, left_s)
 
 
 async def _send_probes(scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:

@@ -120,11 +120,13 @@ def _not_started(package: PackageFacts, run: Run, params: CopiesParams) -> Verdi
 def _taken_over(run: Run, trio: Trio, params: CopiesParams) -> Verdict | None:
     """One name for both: the master has the copy that had it first shut down."""
     shared = [n for n in trio.first_nodes if n in trio.second_nodes]
-    told = any(SAME_NAME in c.line for one in trio[:2] for _, c in run.lines(one.name))
-    if trio.second.ended_early or not (shared or told):
+    told = [one for one in trio[:2] if any(SAME_NAME in c.line for _, c in run.lines(one.name))]
+    if not (shared or told) or (trio.second.ended_early and len(told) < len(trio[:2])):
         return None
     name = shared[0] if shared else next(iter((*trio.second_nodes, *trio.first_nodes)), "its name")
     down = "the first copy is shut down" if trio.first.ended_early else "the first copy is told to shut down"
+    if trio.second.ended_early:
+        down = "the first takes it back, and both are shut down"
     message = f"the second copy takes the name {name} over, and {down}: ROS allows each name once"
     base = name.strip("/")
     hint = f"write rospy.init_node('{base}', anonymous=True): then each copy has a name of its own"
