@@ -108,6 +108,10 @@ def _other_words(
     seen = f": it prints {shown(said[0])!r}" if said else ""
     wanted = in_words(params.template)
     message = f"{_how_many(missing, probes)} printed, but not as '{wanted}'{seen}"
+    blank = params.template.removesuffix(VALUE).endswith(" ")
+    glued = params.template.replace(f" {VALUE}", VALUE)
+    if blank and said and all(text_places(missing, lines, glued)):
+        return failed(message, hint=f"put a blank between the words and the message: '{wanted}'")
     return failed(message, hint=f"print '{wanted}', with the handout's own words")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -106,6 +107,8 @@ def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdic
     form = params.template.replace(SECONDS, "%s")
     if any(mark in text for mark in UNFILLED):
         message = f"a message reads {shown(text)!r}: its placeholder was never filled in"
+    elif more := _behind(part):
+        message = f"a message has {more!r} behind the time: {shown(text)!r}, not '{wanted}'"
     elif part:
         message = (
             f"a message says {part!r} where the time in seconds belongs: {shown(text)!r}, not '{wanted}'"
@@ -115,6 +118,12 @@ def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdic
     cited = EvidenceCitation(evidence=run.evidence, topic=params.topic, from_ns=at_ns, to_ns=at_ns)
     value = " % rospy.get_time()" if SECONDS in params.template else ""
     return failed(message, hint=f'publish "{form}"{value}', citations=(cited,))
+
+
+def _behind(part: str) -> str:
+    """What stands behind the number where more than a number is found."""
+    found = re.match(rf"{NUMBER}\s+([^\W\d].*)", part)
+    return found[1] if found else ""
 
 
 def _wrong_time(
