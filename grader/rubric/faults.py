@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 import types
 from collections.abc import Callable, Iterable, Iterator
 from typing import Annotated, Union, get_args, get_origin
@@ -19,6 +20,8 @@ PATTERN_RULES = {
     TYPE_PATTERN: "must be a type like std_msgs/String",
     PROGRAM_PATTERN: "must be a program like turtlesim/turtlesim_node",
 }
+UNITS = {"hz": "Hz", "s": "seconds", "m": "metres"}
+_NUMBER_AND_UNIT = re.compile(r"\s*(-?\d+(?:\.\d+)?)\s*([A-Za-z%]*)\s*")
 MUST_BE = {
     "string_type": "text",
     "float_type": "a number",
@@ -99,12 +102,22 @@ def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str
     if kind in words:
         return words[kind]()
     if kind in MUST_BE:
-        quotes = ": put it in quotes" if kind == "string_type" and isinstance(value, int | float) else ""
-        return f"must be {MUST_BE[kind]}, not {shown(value)}{quotes}"
+        return f"must be {MUST_BE[kind]}, not {shown(value)}{_remedy(path, kind, value)}"
     if kind in BOUNDS:
         key, bound = BOUNDS[kind]
         return f"must be {bound} {context[key]:g}, not {shown(value)}"
     return str(context.get("error", detail["msg"])).removeprefix("Value error, ")
+
+
+def _remedy(path: KeyPath, kind: str, value: object) -> str:
+    """How to write what was meant."""
+    if kind == "string_type" and isinstance(value, int | float):
+        return ": put it in quotes"
+    number = _NUMBER_AND_UNIT.fullmatch(value) if isinstance(value, str) else None
+    if number and MUST_BE[kind].endswith("number"):
+        unit = UNITS.get(str(path[-1]).rpartition("_")[2], "") if path else ""
+        return f": write {number[1]}" + (f", the key says {unit}" if unit and number[2] else "")
+    return ""
 
 
 def _pattern(pattern: str) -> str:
