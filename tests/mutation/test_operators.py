@@ -13,11 +13,13 @@ from pathlib import Path
 import pytest
 import yaml
 
+from grader.mutation.find import Reference, load_solution
 from grader.mutation.operators import OPERATORS
 from grader.mutation.registry import Operator, operator
 from grader.mutation.solution import Site, Solution
 from grader.mutation.tree import Tree, unified_diff
-from tests.mutation.samples import LABS, other_solution, reference_solution, tree_of
+from grader.rubric.load import load_rubric
+from tests.mutation.samples import LABS, ROOT, other_solution, reference_solution, tree_of
 
 GOLDEN = Path(__file__).parent / "golden"
 BREAK_PYTHON = {n for n, o in OPERATORS.items() if o.family == "syntax"} - {
@@ -26,6 +28,7 @@ BREAK_PYTHON = {n for n, o in OPERATORS.items() if o.family == "syntax"} - {
 }
 BREAK_XML = {"launch-malformed", "manifest-malformed"}
 BREAK_YAML = {"yaml-tabs", "yaml-malformed"}
+WRITTEN_OTHERWISE = sorted(p for lab in LABS for p in (ROOT / "fixtures" / lab).glob("ok-*") if p.is_dir())
 NO_PYTHON_3 = ("broken.py", "empty.py")
 
 
@@ -102,6 +105,19 @@ def is_yaml(data: bytes) -> bool:
     except yaml.YAMLError:
         return False
     return True
+
+
+@pytest.mark.parametrize(
+    "folder", WRITTEN_OTHERWISE, ids=lambda folder: f"{folder.parent.name}/{folder.name}"
+)
+def test_correct_packages_of_every_kind_stay_sound_python(folder):
+    """Classes, timers, callbacks, one-liners: whatever is edited still compiles."""
+    solution = load_solution(Reference(folder=folder), load_rubric(folder.parent.name).rubric.package)
+    sound = {path for path, e in solution.tree.items() if path.endswith(".py") and compiles(e.data)}
+    tried = [o for name, o in OPERATORS.items() if name not in BREAK_PYTHON and name != "byte-order-mark"]
+    for site in (site for one in tried for site in one.sites(solution)):
+        changes = changed(solution, site)
+        assert [path for path in sound & changes.keys() if not compiles(changes[path].data)] == [], site.at
 
 
 @pytest.mark.parametrize("name", OPERATORS)

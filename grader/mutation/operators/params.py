@@ -66,7 +66,8 @@ def parameter_not_read(solution: Solution, _params: NoParams) -> Iterator[Site]:
     }
     for script in solution.scripts:
         for node in script.of(ast.expr):
-            name = param_path(script, node) if _is_deeper(node) else ""
+            reads = _is_deeper(node) and not isinstance(getattr(node, "ctx", None), ast.Store | ast.Del)
+            name = param_path(script, node) if reads else ""
             if name in values:
                 value = yaml.safe_load(yaml.serialize(values[name]))
                 yield _site(solution, script, node, script.replace(node, repr(value)), name)
