@@ -110,6 +110,8 @@ def _other_words(
     message = f"{_how_many(missing, probes)} printed, but not as '{wanted}'{seen}"
     blank = params.template.removesuffix(VALUE).endswith(" ")
     glued = params.template.replace(f" {VALUE}", VALUE)
+    if any(f'data: "{missing[0].value}"' in line for line in said):
+        return failed(message, hint="print data.data, which is the text: data is the whole message around it")
     if blank and said and all(text_places(missing, lines, glued)):
         return failed(message, hint=f"put a blank between the words and the message: '{wanted}'")
     return failed(message, hint=f"print '{wanted}', with the handout's own words")

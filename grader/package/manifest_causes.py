@@ -14,6 +14,7 @@ _CAUSES = (
     (r'exactly one "(\w+)" tag', "{0}", "there must be exactly one `<{0}>` tag"),
     (r'not contain more than one "(\w+)"', "{0}", "there may be only one `<{0}>` tag"),
     (r'"(\w+)" tag must have the attribute "(\w+)"', "{0}", '`<{0}>` needs {1}="..."'),
+    (r'Invalid email ""', "maintainer", '`<maintainer>` needs email="name@place.org"'),
     (r'Invalid email "(.*?)"', "maintainer", "`{0}` is no e-mail address: write name@place.org"),
     (r"must have an email", "maintainer", '`<maintainer>` needs email="name@place.org"'),
     (r"name must not be empty", "name", "`<name>` is empty"),

@@ -58,6 +58,7 @@ def test_what_catkin_warns_of_is_advice(old, new, advice, capfd):
         ("0.0.0", "1.0", 4, "`1.0` is no version"),
         ("The lab1 package", "", 5, "`<description>` is empty"),
         ("ada@example.org", "ada", 6, "`ada` is no e-mail address"),
+        ('"ada@example.org"', '""', 6, '`<maintainer>` needs email="name@place.org"'),
         (' email="ada@example.org"', "", 6, '`<maintainer>` needs email="..."'),
         ("<license>MIT</license>", "", 2, "`<license>` is missing"),
         ("<depend>rospy</depend>", "<run_depend>rospy</run_depend>", 9, "`<exec_depend>`"),

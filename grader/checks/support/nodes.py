@@ -52,8 +52,13 @@ def wrong_name(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymou
 
 def name_hint(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous) -> str:
     """What to write into `init_node`."""
+    there = tuple(nodes)
+    counted = [n for n in there if any(re.fullmatch(rf"{re.escape(b)}_*\d+", n) for b in _bases(names))]
+    if counted and anonymous == "allowed":
+        name = names[0].lstrip("/")
+        return f"write rospy.init_node('{name}', anonymous=True): that adds numbers by itself"
     flag = ", anonymous=True" if anonymous == "required" else ""
-    spare = anonymous == "forbidden" and not {base_name(n) for n in nodes}.isdisjoint(_bases(names))
+    spare = anonymous == "forbidden" and not {base_name(n) for n in there}.isdisjoint(_bases(names))
     return (
         f"write rospy.init_node('{names[0].lstrip('/')}'{flag}){' without anonymous=True' if spare else ''}"
     )
