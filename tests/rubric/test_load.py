@@ -71,7 +71,7 @@ def test_three_faults_are_all_named_with_file_and_line(tmp_path):
         ("points: 60", "points: 50", "12: criteria: the points add up to 90, not to 100"),
         ("points: 60", "points: .nan", "21: criteria[1].points: must be finite, not .nan"),
         ("points: 60", "points: true", "21: criteria[1].points: must be a number, not true"),
-        ("points: 60", 'points: "60"', '21: criteria[1].points: must be a number, not "60"'),
+        ("points: 60", 'points: "60"', '21: criteria[1].points: must be a number, not "60": write 60'),
         ("points: 60", "points: -60", "21: criteria[1].points: must be at least 0, not -60"),
         (
             "id: chatter-rate",
@@ -210,6 +210,12 @@ def test_probes_that_make_no_sense(probe, fault, tmp_path):
             "script: a.py, after: talker",
             '.start[0].after: there is no earlier start "talker"',
         ),
+        (
+            "window_s: 5",
+            'window_s: "5 s"',
+            '.until.window_s: must be a number, not "5 s": write 5, the key says seconds',
+        ),
+        ("window_s: 5", "window_s: soon", '.until.window_s: must be a number, not "soon"'),
         (
             "window_s: 5",
             "ended: [taker]",
