@@ -44,7 +44,7 @@ def layout(package: PackageFacts, params: LayoutParams) -> Verdict:
 
     What it checks
         That the folders and files of the handout are there under one package folder, under exactly these
-        names, and that each script lies in the folder where the handout puts it.
+        names, and that each script lies in the folder where the handout puts it, or below that.
 
     Why it matters on a robot
         People and programs find things in a package by the customs of its folders; whoever repairs the
@@ -90,10 +90,16 @@ def _slips(package: PackageFacts, params: LayoutParams) -> Iterator[Slip]:
     moved = tuple(slip.place for slip in lost if slip.place)
     for script in params.scripts:
         found = find_script(package, script)
-        if found is None or package.file(script) is not None or found.path.startswith(moved):
+        if found is None or _is_below(found.path, script) or found.path.startswith(moved):
             continue
         what = f"{PurePosixPath(script).name} lies at {found.path}, not at {script}"
         yield Slip(what, f"git mv {found.path} {script}", found.path)
+
+
+def _is_below(path: str, script: str) -> bool:
+    """`src/nodes/a.py` for `src/a.py`: `rosrun` finds both, and both are in `src/`."""
+    folder = PurePosixPath(script).parent
+    return path == script or (folder.name != "" and folder in PurePosixPath(path).parents)
 
 
 def _plain(folder: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 from typing import NamedTuple
 
@@ -47,6 +48,9 @@ CAUSES = {
     "IndentationError": ("", "indent every line with four spaces"),
     "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
 }
+_ILLEGAL_NAME = re.compile(
+    r"register (publication|subscription|service)(?: topic)? \[([^\]]*)\] with master: .*illegal chars"
+)
 
 
 class Ending(NamedTuple):
@@ -58,7 +62,9 @@ class Ending(NamedTuple):
 
 
 def explain_end(life: Life, run: Run, package: PackageFacts) -> Ending:
-    """Why a process ended: its last traceback, a limit, a signal, or its last words."""
+    """Why a process ended: a name that ROS refuses, its last traceback, a limit, a signal, or its last words."""
+    if refused := _refused_name(life, run):
+        return refused
     found = process_tracebacks(run, life.name)
     code = life.end.exit_code if life.end else None
     if found and code != 0:
@@ -74,6 +80,20 @@ def explain_end(life: Life, run: Run, package: PackageFacts) -> Ending:
     last = next((line.line for _, line in reversed(list(run.lines(life.name))) if line.line.strip()), "")
     words = f"; its last words: {shown(last)}" if last else ""
     return Ending(f"it exited with code {code}{words}", RUN_IT, ())
+
+
+def _refused_name(life: Life, run: Run) -> Ending | None:
+    """rospy shuts a node down whose topic has a name that the master does not take."""
+    found = (_ILLEGAL_NAME.search(c.line) for _, c in run.lines(life.name))
+    match = next(filter(None, found), None)
+    if match is None:
+        return None
+    kind, name = "service" if match[1] == "service" else "topic", match[2]
+    what = "has a blank in it" if re.search(r"\s", name) else "is no name that ROS takes"
+    hint = (
+        f"a {kind}'s name is made of letters, digits, _ and /: no blanks, also none before the closing quote"
+    )
+    return Ending(f"ROS shuts it down, for the name of its {kind} {name!r} {what}", hint, ())
 
 
 def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
