@@ -16,6 +16,8 @@ from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed
 
 RIGHT_SHEBANG = "#!/usr/bin/env python3"
+# a script without its first line is run by the shell, which knows no `import`
+TELLING = ("Couldn't find", "import: command not found", "No such file or directory")
 NODE_FOLDERS = ("scripts", "src", "nodes", "bin")
 
 
@@ -156,8 +158,9 @@ def _rosrun_answer(build: Run, path: str) -> str:
     """The line that tells of what `rosrun` said to the file as handed in, where the build's recording has it."""
     names = {f"rosrun {path}", f"rosrun {PurePosixPath(path).name}"}
     lines = [c.line for _, c in build.console if c.process in names and c.line.strip()]
-    telling = [line for line in lines if "Couldn't find" in line] or lines[-1:]
-    return f"; rosrun answers: {shown(telling[0])}" if telling else ""
+    telling = (line for words in TELLING for line in lines if words in line)
+    answer = next(telling, lines[-1] if lines else "")
+    return f"; rosrun answers: {shown(answer)}" if answer else ""
 
 
 def _mode(file: SourceFile) -> str:

@@ -10,6 +10,7 @@ from grader.checks.support.launching import (
     Slip,
     find_launch,
     has_program,
+    illegal_name,
     node_slip,
     nodes_of_program,
     nodes_of_script,
@@ -148,8 +149,10 @@ def _exists(package: PackageFacts, name: str) -> bool:
 
 
 def _advice(package: PackageFacts, file: LaunchFile) -> str:
-    """Another node that roslaunch cannot start costs nothing."""
+    """Another node that roslaunch cannot start costs nothing, nor does a name at which it only warns."""
     slip = next(filter(None, (node_slip(package, node) for node in file.brings)), None)
+    if slip is None:
+        slip = next(filter(None, map(illegal_name, file.brings)), None)
     return f"{slip.file}, line {slip.line}: {slip.why}; {slip.mend}" if slip else ""
 
 

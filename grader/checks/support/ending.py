@@ -48,6 +48,21 @@ CAUSES = {
     "IndentationError": ("", "indent every line with four spaces"),
     "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
 }
+# what rospy says of a slip that its exception's class does not tell of
+SLIPS = {
+    "namespaces are not allowed in node names": (
+        "the name in `rospy.init_node(…)` has a slash in it",
+        "write the node's name without a slash",
+    ),
+    "init_node() has already been called with different arguments": (
+        "`rospy.init_node(…)` is called a second time",
+        "one script is one node: call `rospy.init_node(…)` once",
+    ),
+    "Invalid number of arguments, args should be": (
+        "the message is given another number of values than it has fields",
+        'one value for each field; numbers get into a text by `%`: `publish("… %s" % value)`, not by a comma',
+    ),
+}
 _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\]]*)\] with master: .*illegal chars"
 )
@@ -99,7 +114,8 @@ def _refused_name(life: Life, run: Run) -> Ending | None:
 def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     """One traceback, with the line of the student's own file where it names one."""
     place = _place(found, package)
-    cause, hint = CAUSES.get(found.kind, ("", "mend the line that is named"))
+    slip = next((known for said, known in SLIPS.items() if said in found.message), None)
+    cause, hint = slip or CAUSES.get(found.kind, ("", "mend the line that is named"))
     fault = (package.file(place.file) or _NO_FILE).python_fault if place else None
     if found.kind in SYNTAX and fault is not None:
         cause = fault.cause or cause

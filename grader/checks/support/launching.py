@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
@@ -85,6 +86,15 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
         # Where the launch file has the folder's name and the manifest another one, the manifest is at fault.
         return slip._replace(of_manifest=_folder(package) == pkg)
     return None
+
+
+def illegal_name(node: LaunchNode) -> Slip | None:
+    """A name at which roslaunch only warns, and which other tools stumble over."""
+    name = node.name or ""
+    if UNRESOLVED in name or re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
+        return None
+    why = f'name="{name}" is no legal name in ROS, and other tools stumble over it'
+    return _slip(node, why, "begin it with a letter, and use letters, digits and _ only")
 
 
 def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
