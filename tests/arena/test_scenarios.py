@@ -70,6 +70,15 @@ def test_a_name_that_is_taken_over(tmp_path: Path, sandbox: str) -> None:
     assert (ends["first"].stopped_by, ends["second"].stopped_by) == (None, "INT")
 
 
+def test_a_node_that_ends_at_once_is_seen(tmp_path: Path) -> None:
+    hasty = NODE + "import os\nrospy.init_node('hasty')\nrospy.signal_shutdown('done')\nos._exit(0)\n"
+    scenario = Scenario(
+        title="hasty", start=(Start(name="hasty", script="hasty.py"),), until=Until(ended=("hasty",))
+    )
+    seen = _run(tmp_path, {"scripts/hasty.py": hasty}, scenario)
+    assert seen.student_nodes("hasty") == ("/hasty",)
+
+
 def test_nodes_of_roslaunch_belong_to_it(tmp_path: Path) -> None:
     files = {
         "scripts/sender.py": SENDER.format(False),

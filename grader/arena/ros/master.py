@@ -33,6 +33,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self._recorder = recorder
         self._own_prefix = own_prefix
         self._graph_due = False
+        self._arrivals = False
         self._opened = 0
         self.listening = threading.Event()
         # Unset, every rospy.loginfo asks the master for it, and a SIGINT during that call locks the node up for ever.
@@ -49,8 +50,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
             held = self._recorder.connect(topic, caller_id, caller_api)
             if held:
                 self._await_subscribers(topic, caller_id, caller_api)
-        self._graph_changed()
-        return answer
+        return self._arrived(answer)
 
     def _await_subscribers(self, topic, caller_id, caller_api):
         """Those that are there already shall not miss the first message because the publisher counts the recorder
@@ -67,13 +67,15 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
             pause.wait(LOOK_S)
 
     def unregisterPublisher(self, caller_id, topic, caller_api):
+        self._before_leaving()
         return self._after(super().unregisterPublisher(caller_id, topic, caller_api))
 
     def registerSubscriber(self, caller_id, topic, topic_type, caller_api):
         self._owner(caller_api)
-        return self._after(super().registerSubscriber(caller_id, topic, topic_type, caller_api))
+        return self._arrived(super().registerSubscriber(caller_id, topic, topic_type, caller_api))
 
     def unregisterSubscriber(self, caller_id, topic, caller_api):
+        self._before_leaving()
         return self._after(super().unregisterSubscriber(caller_id, topic, caller_api))
 
     def registerService(self, caller_id, service, service_api, caller_api):
@@ -82,7 +84,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self._owner(caller_api)
         if not str(service).endswith(EVERY_NODE_HAS):
             threading.Thread(target=self._learn_type, args=(service, service_api), daemon=True).start()
-        return self._after(super().registerService(caller_id, service, service_api, caller_api))
+        return self._arrived(super().registerService(caller_id, service, service_api, caller_api))
 
     def getParam(self, caller_id, key):
         if key == "/use_sim_time":
@@ -90,6 +92,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         return super().getParam(caller_id, key)
 
     def unregisterService(self, caller_id, service, service_api):
+        self._before_leaving()
         return self._after(super().unregisterService(caller_id, service, service_api))
 
     def setParam(self, caller_id, key, value):
@@ -191,6 +194,16 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self._graph_changed()
         return answer
 
+    def _arrived(self, answer):
+        self._arrivals = True
+        return self._after(answer)
+
+    def _before_leaving(self):
+        """A node that comes and goes between two looks at the graph shall be seen all the same."""
+        if self._arrivals:
+            self._arrivals = False
+            self._wire.event("/grader/graph", self.graph())
+
     def _graph_changed(self):
         """Registrations come in bursts: tell the grader once they pause."""
         self._loop.call_soon(self._schedule_graph)
@@ -201,7 +214,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
             self._loop.call_later(GRAPH_QUIET_S, self._tell_graph)
 
     def _tell_graph(self):
-        self._graph_due = False
+        self._graph_due = self._arrivals = False
         self._wire.event("/grader/graph", self.graph())
 
     def _param(self, action, key, caller_id, value):
