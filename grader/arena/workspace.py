@@ -14,7 +14,7 @@ import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from grader.arena.sandbox import LARGE, SHIMS, Sandbox
+from grader.arena.sandbox import BROWSERS, LARGE, SHIMS, Sandbox
 from grader.model.package import PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.submission import SourcePackage, Submission
@@ -23,6 +23,9 @@ from grader.package.manifest import read_manifest
 IGNORED = {".git", "build", "devel", "install", "__pycache__"}
 SHEBANG = b"#!/usr/bin/env python3\n"
 ABSOLUTE_PYTHON = re.compile(r"/(\w+/)*python3?")
+BROWSER_PATH = re.compile(
+    rb"(?<![\w./-])/(?:usr/|usr/local/|snap/)?bin/(" + "|".join(BROWSERS).encode() + rb")(?![\w./-])"
+)
 LARGE_BYTES = 16 << 20
 READ_MAX = 8 << 20
 MANIFEST = """<package format="2"><name>{}</name><version>0.0.0</version><description>A repair</description>
@@ -65,6 +68,7 @@ def make_workspace(
     repairs = {path: tuple(_repair(package_copy / path, facts.file(path))) for path in scripts}
     for file in facts.files:
         _give_python(package_copy / file.path, file, SHIMS if sandbox.bubblewrap else str(place / "bin"))
+        _give_browsers(package_copy / file.path, file)
     if facts.manifest is None:
         _replace_manifest(package_copy / "package.xml", workspace.folder)
     for path in (workspace.built, workspace.output, place / "home"):
@@ -187,6 +191,16 @@ def _give_python(path: Path, facts: SourceFile, shims: str) -> None:
     if first.startswith(b"#!"):
         words[0] = f"{shims}/{Path(words[0]).name}"
         path.write_bytes(f"#!{' '.join(words)}".encode() + newline + rest)
+
+
+def _give_browsers(path: Path, facts: SourceFile) -> None:
+    """`/usr/bin/firefox` is as good as `firefox`: by its name alone it is the stand-in."""
+    if facts.binary or path.is_symlink() or not path.is_file() or not (facts.shebang or path.suffix == ".sh"):
+        return
+    data = path.read_bytes()
+    named = BROWSER_PATH.sub(rb"\1", data)
+    if named != data:
+        path.write_bytes(named)
 
 
 def _give_to(path: Path, uid: int | None) -> None:

@@ -107,6 +107,8 @@ def _shells(package: PackageFacts, file: LaunchFile) -> list[LaunchNode]:
 
 
 def _is_shell(source: SourceFile) -> bool:
+    if source.path.endswith(".sh"):
+        return not source.binary
     shell = source.shebang is not None and source.shebang.interpreter.endswith("sh")
     return not source.python and not source.binary and (shell or not source.path.endswith(".py"))
 
@@ -146,7 +148,7 @@ def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> V
 def _page(package: PackageFacts, file: LaunchFile, run: Run, params: OpensParams) -> Verdict | None:
     """The page was opened, in the program that was asked for."""
     pages = _pages(run)
-    mine = [p for p in pages if p.program == params.program]
+    mine = [p for p in pages if _is_program(p.program, params)]
     if _url(mine, params):
         return None
     cited = tuple(
@@ -187,6 +189,11 @@ def _beside(package: PackageFacts, file: LaunchFile, run: Run, params: OpensPara
     verdict = unjudged if absence.of_script else failed
     message = f"the page is opened, but {node.type} does not run beside it: {absence.why}"
     return verdict(message, hint=absence.hint, citations=absence.citations)
+
+
+def _is_program(name: str, params: OpensParams) -> bool:
+    """`firefox-esr` is Firefox, as Debian calls it."""
+    return name == params.program or name.startswith(f"{params.program}-")
 
 
 def _url(pages: list[Page] | tuple[Page, ...], params: OpensParams) -> str:

@@ -102,8 +102,20 @@ def _only_printed(run: Run, params: LogsParams) -> Verdict | None:
     if of_logger[0] != params.level:
         message = f"{params.text!r} is logged at level {of_logger[0].upper()}, not {params.level.upper()}"
         return failed(message, hint=_call(params))
+    if _is_late(run, params):
+        return passed(f"{shown(said[0].line)!r} is logged, so late that the node was being stopped")
     message = f"{shown(said[0].line)!r} was logged on the console, and did not arrive on /rosout"
     return inconclusive(message, hint="grade again")
+
+
+def _is_late(run: Run, params: LogsParams) -> bool:
+    """Logged behind Ctrl-C, when nothing is sent to /rosout any more: the node slept first."""
+    stops = {one.name: one.interrupt_ns for one in lives(run) if one.interrupt_ns is not None}
+    return any(
+        line.process in stops and t >= stops[line.process] and _has(line.line, params)
+        for t, line in run.console
+        if _is_asked(run, line.process, params)
+    )
 
 
 def _is_asked(run: Run, process: str, params: LogsParams) -> bool:
@@ -151,7 +163,8 @@ def _nothing(
     if lines:
         message = f"{listed(nodes)} logs {shown(lines[0].text)!r}, and not {params.text!r}"
         return failed(message, hint=_call(params))
-    return failed(f"{listed(nodes)} logs nothing", hint=_call(params))
+    hint = f"{_call(params)} below rospy.init_node(…): above it, nothing is sent"
+    return failed(f"{listed(nodes)} logs nothing", hint=hint)
 
 
 def _call(params: LogsParams) -> str:

@@ -55,7 +55,7 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
     others = f", {listed(params.unchanged)} as before" if params.unchanged else ""
     expected = f"{params.name} is {params.value}{others}" + (", and it is logged" if params.logged else "")
     verdict = (
-        (None if _is_value(got, params.value) else _not_set(package, run, after, params))
+        (None if _is_value(got, params.value) else _not_set(package, run, after, params, until_ns))
         or _clobbered(run, after, params)
         or _not_logged(run, params)
         or passed(f"sets {params.name} to {params.value}{' and logs it' if params.logged else ''}")
@@ -72,10 +72,14 @@ def _is_value(got: object, wanted: object) -> bool:
     )
 
 
-def _not_set(package: PackageFacts, run: Run, after: dict[str, Any], params: ParamsSetParams) -> Verdict:
+def _not_set(
+    package: PackageFacts, run: Run, after: dict[str, Any], params: ParamsSetParams, until_ns: int
+) -> Verdict:
     if not lives(run):
         return unjudged("the node was not started: there is no script to run", hint=HAND_IN)
-    mine = [e for _, e in run.params if e.action == "set" and run.is_student_node(e.caller_id)]
+    mine = [
+        e for t, e in run.params if e.action == "set" and t <= until_ns and run.is_student_node(e.caller_id)
+    ]
     last = next((e for e in reversed(mine) if absolute(e.name) == params.name), None)
     hint = f"write rospy.set_param('{params.name}', {params.value!r})"
     if last is not None and params.name in after:
@@ -88,6 +92,11 @@ def _not_set(package: PackageFacts, run: Run, after: dict[str, Any], params: Par
     if end := broken(package, run):
         message = f"{params.name} was never set: the node ended with {end.cause}"
         return unjudged(message, hint=end.hint, citations=end.citations)
+    if _is_value(tree(run).get(params.name), params.value):
+        message = (
+            f"{params.name} is set to {params.value} only after Ctrl-C: the node does nothing for too long"
+        )
+        return failed(message, hint="set it as soon as the values are read, without a long sleep before it")
     others = dict.fromkeys(absolute(e.name) for e in mine)
     instead = f"; the node sets {listed(others)}" if others else ""
     return failed(f"{params.name} is never set to {params.value}{instead}", hint=hint)

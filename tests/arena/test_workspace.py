@@ -59,6 +59,21 @@ def test_every_shebang_runs(tmp_path: Path, shebang: str, sandbox: str) -> None:
     assert _run_node(tmp_path, {"src/node.py": code}, sandbox=sandbox) == ["ran 3"]
 
 
+@pytest.mark.parametrize("sandbox", ["auto", "none"])
+@pytest.mark.parametrize("browser", ["firefox", "/usr/bin/firefox", "/snap/bin/firefox"])
+def test_a_browser_is_found_by_its_path_too(tmp_path: Path, browser: str, sandbox: str) -> None:
+    files = {
+        "launch/open.sh": f"#!/bin/sh\n{browser} http://wiki.ros.org/bin/firefox\n",
+        "src/node.py": SCRIPT
+        + "import os\nos.chdir(os.path.dirname(__file__))\nos.system('sh ../launch/open.sh')\n",
+    }
+    scenario = Scenario(title="t", start=(Start(name="node", script="src/node.py"),), until=Until(limit_s=10))
+    with make_place(files, sandbox=sandbox) as place:
+        seen = run(place, scenario, tmp_path / "run.mcap")
+    opened = [(e.actor, e.value) for _, e in seen.actors if e.action == "open"]
+    assert opened == [("firefox", ["http://wiki.ros.org/bin/firefox"])]
+
+
 def test_links_are_copied_as_links(tmp_path: Path) -> None:
     secret = tmp_path / "secret"
     secret.write_text("marks")

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
+PRINTED_INDENT = 4
 _PLACE = re.compile(r"line (\d+), column (\d+)")
+_IN_LINE = "line {line} has a tab behind a name or a value, which YAML does not take"
 _INDENT = "indent with spaces alone, two for each level"
 
 # what is printed, what it means ({line}: where), and what to do
@@ -42,7 +45,17 @@ def explain_yaml(lines: Sequence[str]) -> Words | None:
     text = "\n".join(lines)
     places = _PLACE.findall(text)
     line = int(places[-1][0]) if places else None
+    if "found character '\\t'" in text and _is_within(lines):
+        return Words(_IN_LINE.format(line=line), "write a space in the tab's place", line)
     for pattern, why, hint in _CAUSES:
         if re.search(pattern, text):
             return Words(why.format(line=line or "?"), hint, line)
     return None
+
+
+def _is_within(lines: Sequence[str]) -> bool:
+    """Whether the place that was named last has more than blanks before it, by the line that is printed below it."""
+    for line, below in reversed(list(pairwise(lines))):
+        if place := _PLACE.search(line):
+            return bool(below[PRINTED_INDENT : PRINTED_INDENT + int(place[2]) - 1].strip())
+    return False
