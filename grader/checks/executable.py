@@ -18,6 +18,7 @@ from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, pa
 RIGHT_SHEBANG = "#!/usr/bin/env python3"
 # a script without its first line is run by the shell, which knows no `import`
 TELLING = ("Couldn't find", "import: command not found", "No such file or directory")
+C_SOURCES = {".c", ".cc", ".cpp", ".cxx", ".h", ".hpp"}
 NODE_FOLDERS = ("scripts", "src", "nodes", "bin")
 
 
@@ -117,13 +118,16 @@ def _missing(package: PackageFacts, path: str, expected: str) -> Verdict:
     wanted = PurePosixPath(path)
     near = [names[n] for n in near_names(wanted.name, names)]
     near += [p for n, p in names.items() if n == wanted.stem and p not in near]
+    movable = [p for p in near if PurePosixPath(p).suffix not in C_SOURCES]
     scripts = [p for n, p in names.items() if n.endswith(".py")]
     seen = f"; there is {listed(near)}" if near else ""
     return failed(
         f"{path} is not in the package{seen}",
         expected=expected,
         measured=f"scripts: {listed(sorted(scripts))}" if scripts else "no Python script in the package",
-        hint=f"git mv {near[0]} {path}" if near else f"write {path}, then git add {path}, commit and push",
+        hint=f"git mv {movable[0]} {path}"
+        if movable
+        else f"write {path}, then git add {path}, commit and push",
         citations=tuple(FileCitation(file=p) for p in near[:3]),
     )
 

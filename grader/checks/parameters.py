@@ -109,12 +109,28 @@ def _missing(found: dict[str, object], missing: list[str], path: str) -> Verdict
     name = missing[0]
     if name in found:
         return failed(f"{name} has no value", hint=f"write a value behind `{name.rpartition('/')[2]}:`")
+    if slip := _in_its_place(found, name, path):
+        return slip
     more = f", and {len(missing) - 1} more names are missing" if len(missing) > 1 else ""
     above, _, last = name.rpartition("/")
     shallow = f"{above.rpartition('/')[0]}/{last}"
     moved = f"indent {last} by two spaces more, so that it is below {above.rpartition('/')[2]}"
     hint = moved if shallow in found else f"write it so that rosparam list shows {name}, letter by letter"
     return failed(f"{path} loads, but {instead(found, name)}{more}", hint=hint)
+
+
+def _in_its_place(found: dict[str, object], name: str, path: str) -> Verdict | None:
+    """A list, or a text that has the name in it, where the name's map belongs."""
+    last = name.rpartition("/")[2]
+    for above in (one for one in found if name.startswith(f"{one}/")):
+        value = found[above]
+        if isinstance(value, list):
+            why = f"{above} is a list, so there is no {name}"
+            return failed(f"{path} loads, but {why}", hint="take the `-` away: write names below each other")
+        if isinstance(value, str) and f"{last}:" in value:
+            why = f"{above} is the text {shown(value)!r}, so there is no {name}"
+            return failed(f"{path} loads, but {why}", hint=f"write a space behind each colon: `{last}: …`")
+    return None
 
 
 def _is_empty(found: dict[str, object], name: str) -> bool:

@@ -15,8 +15,10 @@ _INDENT = "indent with spaces alone, two for each level"
 # what is printed, what it means ({line}: where), and what to do
 _CAUSES = (
     (r"found character '\\t'", "line {line} is indented with a tab, which YAML does not take", _INDENT),
-    (r"cannot marshal None", "a name has no value: nothing is indented below it",
-     "indent what belongs to a name by two spaces more, as in the handout's picture"),
+    (r"cannot marshal None", "a name has no value: nothing stands behind it, and nothing is indented below it",
+     "write a value behind the name; what belongs to a name is indented by two spaces more than the name"),
+    (r"exceeds XML-RPC limits|Overflow Error", "a number is larger than 2147483647, the largest that ROS can hold",
+     'write a long number in quotes, as text: phone: "9876543210"'),
     (r"mapping values are not allowed here",
      "in line {line} or above it, the space behind a `:` is missing, or a `:` is part of a value",
      'write `name: value` with a space, and a value that holds a `:` in "quotes"'),
