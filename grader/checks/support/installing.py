@@ -55,8 +55,8 @@ def names_script(one: Installed, path: str) -> bool:
     if text.startswith("/"):
         return posixpath.normpath(text).endswith("/" + path)
     file = one.call.file
-    included = not file.endswith("CMakeLists.txt")  # then paths count from where it is included, mostly the package
-    folder = "" if included else posixpath.dirname(file)
+    # Paths in a file that is included count from the place that includes it, mostly the package.
+    folder = posixpath.dirname(file) if file.endswith("CMakeLists.txt") else ""
     return posixpath.normpath(posixpath.join(folder, text)) == path
 
 
