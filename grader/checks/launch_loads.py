@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from pathlib import PurePosixPath
+from typing import Any
 
 from grader.checks.executable import find_script
 from grader.checks.launch import not_run
 from grader.checks.launch_xml import missing_node
 from grader.checks.registry import check
 from grader.checks.support.launching import Slip, find_launch, nodes_of_script, refusals, unreadable
+from grader.checks.support.param_given import is_printed
 from grader.checks.support.param_tree import absolute, instead, own, tree
+from grader.checks.support.printed import printed_lines
 from grader.checks.support.roslaunch import Absence, finished, nodes_up, quoted, refusal, why_died, why_not_up
 from grader.checks.support.text import listed, shown
 from grader.evidence.run import Run
@@ -17,6 +22,7 @@ from grader.model.package import LaunchFile, LaunchLoad, LaunchNode, PackageFact
 from grader.model.record import Record
 from grader.model.verdict import Citation, EvidenceCitation, FileCitation, Verdict, failed, passed, unjudged
 
+SUMMARY = re.compile(r"\s*\*\s+/")  # roslaunch's list of parameters
 OUTSIDE = 'write <rosparam file="$(find <package>)/{}"/> outside the <node>, without ns'
 
 
@@ -43,7 +49,8 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
 
     How it is measured
         By every change of the parameter server up to the node's registration, and by what `roslaunch` says of
-        the node. `<rosparam>` may stand before or behind the `<node>`: `roslaunch` sets parameters first.
+        the node. `<rosparam>` may stand before or behind the `<node>`: `roslaunch` sets parameters first. In a
+        namespace, the file counts as loaded where the node prints all of its values from there.
 
     How to fix
         `<rosparam file="$(find <package>)/config/<file>.yaml"/>` beside the `<node>`, not inside it and without
@@ -80,7 +87,7 @@ def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchLoa
     start_ns = min((t for t, event in run.graph if set(up) & set(event.nodes)), default=run.end_ns)
     before = tree(run, until_ns=start_ns, by=lambda caller: caller not in up)
     missing = [name for name in map(absolute, params.names) if name not in before]
-    if missing:
+    if missing and not _read_where_loaded(file, run, params, before):
         return _not_loaded(package, file, run, params, missing)
     if not (
         any(_is_of(load, params) for load in file.loads)
@@ -90,6 +97,22 @@ def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchLoa
         message = f"{file.path} sets the parameters, but does not load {params.file}"
         return failed(message, hint=OUTSIDE.format(params.file))
     return _not_running(package, run, node)
+
+
+def _read_where_loaded(
+    file: LaunchFile, run: Run, params: LaunchLoadsParams, before: Mapping[str, Any]
+) -> bool:
+    """The file is loaded into a namespace, and the node reads it there: it prints all that is in it."""
+    lines = [line for line in printed_lines(run) if not SUMMARY.match(line.text)]
+    return any(
+        all(name in before and is_printed(before[name], lines) for name in _moved(load, params))
+        for load in file.loads
+        if _is_of(load, params)
+    )
+
+
+def _moved(load: LaunchLoad, params: LaunchLoadsParams) -> list[str]:
+    return [load.namespace.rstrip("/") + absolute(name) for name in params.names]
 
 
 def _not_running(package: PackageFacts, run: Run, node: LaunchNode) -> Verdict | None:
