@@ -130,7 +130,7 @@ def _unnamed(package: PackageFacts, file: LaunchFile, params: LaunchRunsParams) 
         if verdict := missing_node(package, file, script):
             return verdict.model_copy(update={"unjudged": True})
     for name, pkg in params.nodes.items():
-        if verdict := _wrong_name(file, name, pkg):
+        if verdict := _wrong_name(file, name, pkg) or _swapped(file, name, params):
             return verdict
     for program in params.programs:
         if not nodes_of_program(file, program):
@@ -153,6 +153,18 @@ def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
     seen = f"; it has {listed(near)}" if near else ""
     hint = f'write <node pkg="{pkg}" name="{name.lstrip("/")}" …/>'
     return failed(f"{file.path} has no node /{name.lstrip('/')}{seen}", hint=hint)
+
+
+def _swapped(file: LaunchFile, name: str, params: LaunchRunsParams) -> Verdict | None:
+    """The name of one node on the program of another: `/talker` runs listener.py."""
+    for node in _named(file, name):
+        program = PurePosixPath(node.type or "").stem
+        if program != name.lstrip("/") and program in {n.lstrip("/") for n in params.nodes}:
+            why = f"/{name.lstrip('/')} runs {node.type}, whose name is /{program}: the names are swapped"
+            return Slip(
+                node.file, node.line, why, f'write name="{program}" beside type="{node.type}"'
+            ).verdict()
+    return None
 
 
 def _named(file: LaunchFile, name: str) -> list[LaunchNode]:
