@@ -9,7 +9,7 @@ from grader.checks.build import judge_build
 from grader.checks.registry import NoParams, check
 from grader.checks.support.ending import explain_end
 from grader.checks.support.process import Life, lives
-from grader.checks.support.text import listed, shown
+from grader.checks.support.text import bare, listed, shown
 from grader.evidence.run import Run
 from grader.model.package import CMakeCall, PackageFacts
 from grader.model.verdict import EvidenceCitation, FileCitation, Status, Verdict, failed, inconclusive, passed
@@ -22,6 +22,8 @@ LOADER = (
     "cannot execute",
     "Exec format error",
 )
+TELLING = ("[FATAL]", "what():")
+ASTRAY = "run it with rosrun, and look for a pointer or an index that goes astray"
 SAME_NAME = "new node registered with same name"
 LINK = (
     "name every library in target_link_libraries(<program> ${catkin_LIBRARIES}), and every package in "
@@ -120,7 +122,8 @@ def _broken(package: PackageFacts, run: Run, programs: list[Life]) -> Iterator[B
         unloaded = next((mark for mark in LOADER if mark in words), None)
         if one.end.signal is not None or one.end.stopped_by is not None:
             end = explain_end(one, run, package)
-            hint = "run it with rosrun, and look for a pointer or an index that goes astray"
+            told = any(mark in words for mark in TELLING)
+            hint = "mend what its last words say" if told else ASTRAY
             yield Broken(_name(one), f"{end.cause}{quoted}", hint, one)
         elif unloaded or code in CANNOT_START:
             yield Broken(_name(one), f"it cannot be started (exit code {code}){quoted}", LINK, one)
@@ -132,10 +135,10 @@ def _gave_way(run: Run, one: Life) -> bool:
 
 
 def _last_words(run: Run, one: Life) -> str:
-    """The loader's complaint where there is one, or else the last line."""
+    """The loader's complaint, or ROS's, or that of an exception where there is one, or else the last line."""
     lines = [line.line for _, line in run.lines(one.name) if line.line.strip()]
-    complaints = [line for line in lines if any(mark in line for mark in LOADER)]
-    return shown((complaints or lines[-1:] or [""])[0])
+    complaints = [line for line in lines if any(mark in line for mark in (*LOADER, *TELLING))]
+    return shown(bare((complaints or lines[-1:] or [""])[0]))
 
 
 def _how_they_went(programs: list[Life]) -> str:
