@@ -6,13 +6,15 @@ import base64
 import random
 import string
 from collections.abc import Iterator, Mapping
-from itertools import zip_longest
+from itertools import pairwise, zip_longest
 from typing import Any, NamedTuple
 
 from grader.evidence.decode import definition, encode, md5sum
 from grader.rubric.model import Probe
 
 WORD_LETTERS = 6
+TEXTS_FOR_ONE_TWICE = 4
+PAUSE_BEFORE_SAME = 3
 RANGES = {
     f"std_msgs/{'U' * (not signed)}Int{bits}": (-(1 << bits - 1), (1 << bits - 1) - 1)
     if signed
@@ -42,13 +44,21 @@ class Shot(NamedTuple):
 
 
 def make_shots(probes: tuple[Probe, ...]) -> list[Shot]:
-    """All probes' messages in the order of sending: the topics take turns."""
+    """All probes' messages in the order of sending: the topics take turns.
+
+    Before a text comes a second time there is a longer pause, in which the first one can be printed.
+    """
     rows = zip_longest(*(list(_values(probe)) for probe in probes))
     shots: list[Shot] = []
     for row in rows:
         sent = [(p, v) for p, v in zip(probes, row, strict=True) if v is not None]
         shots += [Shot(p.topic, p.type, v, 1 / p.rate_hz / len(sent)) for p, v in sent]
-    return shots
+    return [*(_before(shot, following) for shot, following in pairwise(shots)), *shots[-1:]]
+
+
+def _before(shot: Shot, following: Shot) -> Shot:
+    same = (shot.topic, shot.value) == (following.topic, following.value) and isinstance(shot.value, str)
+    return shot._replace(pause_s=shot.pause_s * PAUSE_BEFORE_SAME) if same else shot
 
 
 def advertisement(probe: Probe) -> dict[str, Any]:
@@ -81,14 +91,24 @@ def fields_of(value: object) -> Mapping[str, Any]:
 
 
 def _values(probe: Probe) -> Iterator[Any]:
-    values: list[str | int] = [_text() for _ in range(probe.text)]
+    twice = probe.text >= TEXTS_FOR_ONE_TWICE
+    values: list[str | int] = [_text() for _ in range(probe.text - twice)]
     if probe.integers or probe.among:
         low, high = RANGES[probe.type]
         values += [*_integers(probe, low, high), *probe.among]
     _random.shuffle(values)
+    if twice:
+        _repeat_one(values)
     yield from values
     for _ in range(probe.times if probe.values else 0):
         yield from probe.values
+
+
+def _repeat_one(values: list[str | int]) -> None:
+    """One text comes twice running, neither first nor last: a listener may not leave out what it knows already."""
+    texts = [i for i, value in enumerate(values) if isinstance(value, str)]
+    at = _random.choice(texts[1:-1])
+    values.insert(at, values[at])
 
 
 def _integers(probe: Probe, low: int, high: int) -> Iterator[int]:

@@ -46,10 +46,10 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
         the robot those are the readings that matter.
 
     How it is measured
-        The grader publishes messages that it makes up for this run. Each has to be on stdout, on stderr or
-        on /rosout, at its time or later. Other words on the line do not matter; a number has to stand for
-        itself (`12` is not in `127`). Where the lab gives the line's own words (`I heard …`), they have to
-        stand before the message, in capitals or not.
+        The grader publishes messages that it makes up for this run, one text twice running. Each has to be
+        on stdout, on stderr or on /rosout, at its time or later. Other words on the line do not matter; a
+        number has to stand for itself (`12` is not in `127`). Where the lab gives the line's own words (`I
+        heard …`), they have to stand before the message, in capitals or not.
 
     How to fix
         Subscribe with `rospy.Subscriber('<topic>', <Type>, callback)`, print `data.data` in the callback

@@ -54,9 +54,10 @@ class Param(Record):
 class Probe(Record):
     """Messages that the grader publishes once the student's node has subscribed.
 
-    `type` is any message type of ROS's own packages. Made up for this run: `text` random strings, `integers` random
-    values of the type's range; they are shuffled together with the values of `among`. `values` are sent as they
-    stand and in their order, `times` times over: the field `data`, or a map of the message's fields.
+    `type` is any message type of ROS's own packages. Made up for this run: `text` random strings (of four and
+    more, one comes twice running), `integers` random values of the type's range; they are shuffled together with the
+    values of `among`. `values` are sent as they stand and in their order, `times` times over: the field `data`, or a
+    map of the message's fields.
     """
 
     topic: str

@@ -59,7 +59,10 @@ def not_printed(
 ) -> Verdict:
     """Some or all of what was sent was not printed: the likeliest reason that shows."""
     return (
-        _broken(package, run) or _some_numbers(probes, missing, lines) or _by_number(probes, missing, lines)
+        _broken(package, run)
+        or _some_numbers(probes, missing, lines)
+        or _only_again(probes, missing)
+        or _by_number(probes, missing, lines)
     )
 
 
@@ -101,6 +104,17 @@ def _some_numbers(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequ
     shape = f"as {values[0] + 256} and the like" if as_unsigned else "not at all"
     message = f"negative numbers are printed {shape}, {values[0]} for instance"
     return failed(message, hint="print data.data as it is: an Int8 goes from -128 to 127")
+
+
+def _only_again(probes: Sequence[Probe], missing: Sequence[Probe]) -> Verdict | None:
+    """All that is missing is what came a second time."""
+    printed = {str(p.value) for p in probes if p not in missing}
+    if not all(str(p.value) in printed for p in missing):
+        return None
+    message = f"{missing[0].value!r} came twice, and is printed once only"
+    return failed(
+        message, hint="print in the callback each time, also where the message is one that came before"
+    )
 
 
 def _by_number(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]) -> Verdict:
