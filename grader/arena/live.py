@@ -11,6 +11,7 @@ from grader.rubric.model import Until
 
 Outcome = tuple[str, str]
 HEARD_S = 2.0
+CONNECTED_S = 1.0
 """So long after the last probe and the last line, a value that is not printed will not be."""
 
 
@@ -42,7 +43,7 @@ class Live:
     activity_s: float = 0.0
     news_s: float = 0.0
     subscribed: set[str] = field(default_factory=set)
-    connected: set[str] = field(default_factory=set)
+    connected_s: dict[str, float] = field(default_factory=dict)
     unheard: dict[str, re.Pattern[str]] = field(default_factory=dict)
     last_sent_s: float = 0.0
     graph_changed_s: float = 0.0
@@ -82,6 +83,10 @@ class Live:
             self.active(now_s)
         self.nodes |= own
 
+    def connections(self, topics: Iterable[str], now_s: float) -> None:
+        """The topics over which nodes are connected now; since when is kept."""
+        self.connected_s = {topic: self.connected_s.get(topic, now_s) for topic in topics}
+
     def sent(self, value: str, now_s: float) -> None:
         """A probe went out: its value is to be printed, as a word of its own."""
         self.last_sent_s = now_s
@@ -101,7 +106,7 @@ def settled(live: Live, until: Until, now_s: float) -> Outcome | None:
     enough = (
         _window(live, until, now_s),
         _messages(live, until),
-        _connected(live, until),
+        _connected(live, until, now_s),
         _heard(live, until, now_s),
         _nodes(live, until, now_s),
         _quiet(live, until, now_s),
@@ -136,7 +141,7 @@ def waiting_for(live: Live, until: Until) -> str:
     for topic, wanted in until.messages.items():
         if live.topics[topic].count < wanted:
             return f"{live.topics[topic].count} of {wanted} messages on {topic}"
-    if not _connected(live, until):
+    if not set(until.connected) <= set(live.connected_s):
         return f"waiting for a connection over {', '.join(until.connected)}"
     if len(live.nodes) < until.nodes:
         return f"{len(live.nodes)} of {until.nodes} nodes are up"
@@ -191,8 +196,10 @@ def _messages(live: Live, until: Until) -> bool:
     return all(live.topics[topic].count >= count for topic, count in until.messages.items())
 
 
-def _connected(live: Live, until: Until) -> bool:
-    return set(until.connected) <= live.connected
+def _connected(live: Live, until: Until, now_s: float) -> bool:
+    """For so long that a node which dies as soon as it is up has done so."""
+    since = [live.connected_s.get(topic, now_s) for topic in until.connected]
+    return all(now_s >= one_s + CONNECTED_S for one_s in since)
 
 
 def _nodes(live: Live, until: Until, now_s: float) -> bool:

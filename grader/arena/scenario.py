@@ -171,5 +171,4 @@ async def _look_at_connections(arena: ArenaSession) -> None:
     looks = arena.live.graphs
     arena.send(do="graph")
     await arena.wait(lambda: arena.live.graphs > looks or not arena.live.running, 5.0)
-    if not arena.live.connected:
-        await arena.wait(lambda: not arena.live.running, GRAPH_EVERY_S)
+    await arena.wait(lambda: not arena.live.running, GRAPH_EVERY_S)

@@ -217,7 +217,7 @@ class ArenaSession:
             self._answers[fields["id"]] = fields
         elif status == "graph":
             pairs = [c for c in fields["connections"] if not is_grader_node(c["subscriber"])]
-            self.live.connected = {c["topic"] for c in pairs}
+            self.live.connections({c["topic"] for c in pairs}, time.monotonic())
             self.live.graphs += 1
         elif status == "spawn-failed":
             self._failure = f"{fields['name']} could not be started: {fields['detail']}"

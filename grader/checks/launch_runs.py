@@ -98,13 +98,15 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
 
 def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams) -> Verdict:
     """By what came up. The file names all that is wanted."""
-    wanted = list(_wanted(package, file, params))
+    wanted = list(_wanted(package, file, run, params))
     lacking = next((w for w in wanted if not nodes_up(run, w.node)), None)
     if lacking is not None:
         return _not_up(package, file, run, lacking)
     names = [name for w in wanted for name in nodes_up(run, w.node)]
     if params.topic and not _connected(run, params.topic, names):
         return _unconnected(package, run, wanted, params.topic)
+    if dead := _died(package, run, wanted, "came up, but then"):
+        return dead
     if params.programs and params.params:
         program = nodes_of_program(file, params.programs[0])[0]
         misplaced = params_misplaced(run, file, nodes_up(run, program), params.params)
@@ -114,14 +116,21 @@ def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRun
     return passed(f"roslaunch brings up {listed(dict.fromkeys(names))}{over}")
 
 
-def _wanted(package: PackageFacts, file: LaunchFile, params: LaunchRunsParams) -> Iterator[Wanted]:
+def _wanted(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams) -> Iterator[Wanted]:
     for script in params.scripts:
-        nodes = nodes_of_script(package, file, script)
-        yield from (Wanted(node, own=True) for node in [n for n in nodes if not n.uncertain] or nodes[:1])
+        yield from (Wanted(node, own=True) for node in _of_script(package, file, run, script))
     for name in params.nodes:
         yield from (Wanted(node, own=node.pkg == package.name) for node in _named(file, name)[:1])
     for program in params.programs:
         yield Wanted(nodes_of_program(file, program)[0], own=False)
+
+
+def _of_script(package: PackageFacts, file: LaunchFile, run: Run, script: str) -> list[LaunchNode]:
+    """All that surely run the script. Where an `if` that only roslaunch works out decides, those that came up do."""
+    found = nodes_of_script(package, file, script)
+    exact = [n for n in found if n.type == PurePosixPath(script).name] or list(found)
+    certain = [n for n in exact if not n.uncertain]
+    return certain or [n for n in exact if nodes_up(run, n)] or exact[:1]
 
 
 def _unnamed(package: PackageFacts, file: LaunchFile, params: LaunchRunsParams) -> Verdict | None:
@@ -192,13 +201,19 @@ def _connected(run: Run, topic: str, names: list[str]) -> bool:
     )
 
 
-def _unconnected(package: PackageFacts, run: Run, wanted: list[Wanted], topic: str) -> Verdict:
-    """A node that died, the launch file's remaps and namespaces, or the scripts' own topics."""
+def _died(package: PackageFacts, run: Run, wanted: list[Wanted], when: str) -> Verdict | None:
     for one in wanted:
         if absence := why_died(package, run, one.node):
             verdict = unjudged if one.own else failed
-            message = f"{one.node.full_name} came up, but before it was connected {absence.why}"
+            message = f"{one.node.full_name} {when} {absence.why}"
             return verdict(message, hint=absence.hint, citations=absence.citations)
+    return None
+
+
+def _unconnected(package: PackageFacts, run: Run, wanted: list[Wanted], topic: str) -> Verdict:
+    """A node that died, the launch file's remaps and namespaces, or the scripts' own topics."""
+    if dead := _died(package, run, wanted, "came up, but before it was connected"):
+        return dead
     other = over_another_topic(run, topic)
     moved = [w.node for w in wanted if w.node.remaps or w.node.namespace != "/"]
     if moved or not all(w.own for w in wanted):

@@ -73,6 +73,17 @@ def test_heard_waits_only_so_long_after_the_last_line() -> None:
     assert settled(live, until, 3.6) == ("complete", "")
 
 
+def test_a_connection_has_to_last() -> None:
+    live, until = _live(), Until(connected=("/a",))
+    live.connections({"/a"}, 1.0)
+    live.connections({"/a"}, 1.9)
+    assert settled(live, until, 1.9) is None
+    live.connections((), 1.95)
+    live.connections({"/a"}, 2.0)
+    assert settled(live, until, 2.5) is None
+    assert settled(live, until, 3.0) == ("complete", "")
+
+
 def test_looking_at_the_graph_is_no_change_of_it() -> None:
     live, until = _live(), Until(connected=("/a",), silent_s=6, first_message_s=20)
     for now_s in (1.0, 2.0, 20.9):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from grader.checks.executable import find_script
 from grader.checks.support.ending import CAUSES, explain_traceback, process_tracebacks
-from grader.checks.support.process import lives
+from grader.checks.support.process import lives, observed_until_ns
 from grader.checks.support.text import bare, listed, shown
 from grader.evidence.run import Run
 from grader.model.package import LaunchNode, PackageFacts
@@ -90,9 +90,11 @@ def refusal(run: Run) -> Absence | None:
 
 
 def died(run: Run, node: LaunchNode) -> int | None:
-    """The exit code with which roslaunch saw it die; None where it did not."""
-    codes = [int(m[2]) for line in _lines(run) if (m := _DIED.search(line)) and _is(node, m[1])]
-    required = any((m := _REQUIRED.search(line)) and _is(node, m[1]) for line in _lines(run))
+    """The exit code with which roslaunch saw it die before Ctrl-C; None where it did not."""
+    until_ns = observed_until_ns(run) or run.end_ns
+    lines = [bare(c.line) for t, c in run.console if t <= until_ns]
+    codes = [int(m[2]) for line in lines if (m := _DIED.search(line)) and _is(node, m[1])]
+    required = any((m := _REQUIRED.search(line)) and _is(node, m[1]) for line in lines)
     return codes[-1] if codes else 1 if required else None
 
 
