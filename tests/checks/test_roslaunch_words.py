@@ -68,11 +68,17 @@ def test_ends_of_nodes() -> None:
     run = printed(
         "\x1b[31m[robot/dies-6] process has died [pid 2, exit code -11, cmd /w/dies.py __name:=dies].",
         "\x1b[1m[fin_vm_23746_5988648383355795529-8] process has finished cleanly",
-        "REQUIRED process [pub_node-2] has died!",
+        "\x1b[31m=====REQUIRED process [pub_node-2] has died!",
+        "process has died [pid 7, exit code 1, cmd /w/pub.py __name:=pub_node].",
+        "\x1b[31m=====REQUIRED process [set_once-3] has died!",
+        "process has finished cleanly",
     )
     assert died(run, node("dies", "/robot/")) == -11
     assert died(run, node("dies")) is None
     assert died(run, node("pub_node")) == 1
+    assert died(run, node("set_once")) is None
+    assert finished(run, node("set_once"))
+    assert not finished(run, node("pub_node"))
     assert finished(run, node("$(anon fin)"))
     assert not finished(run, node("fin"))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
@@ -27,7 +28,7 @@ _SUBSTITUTION = re.compile(r"\\\$\\\(([^)]*)\\\)")
 _STARTED = re.compile(r"process\[(\S+)-\d+\]: started with pid")
 _DIED = re.compile(r"\[(\S+)-\d+\] process has died \[pid \d+, exit code (-?\d+)")
 _FINISHED = re.compile(r"\[(\S+)-\d+\] process has finished cleanly")
-_REQUIRED = re.compile(r"REQUIRED process \[(\S+)-\d+\] has died")
+_REQUIRED = re.compile(r"REQUIRED process (\[\S+-\d+\]) has died")
 
 # what roslaunch says when it starts nothing, what it means, and what to do ({0}: the pattern's group)
 _REFUSALS = (
@@ -92,15 +93,14 @@ def refusal(run: Run) -> Absence | None:
 def died(run: Run, node: LaunchNode) -> int | None:
     """The exit code with which roslaunch saw it die before Ctrl-C; None where it did not."""
     until_ns = observed_until_ns(run) or run.end_ns
-    lines = [bare(c.line) for t, c in run.console if t <= until_ns]
+    lines = _joined(bare(c.line) for t, c in run.console if t <= until_ns)
     codes = [int(m[2]) for line in lines if (m := _DIED.search(line)) and _is(node, m[1])]
-    required = any((m := _REQUIRED.search(line)) and _is(node, m[1]) for line in lines)
-    return codes[-1] if codes else 1 if required else None
+    return codes[-1] if codes else None
 
 
 def finished(run: Run, node: LaunchNode) -> bool:
     """Whether it ran to its own end without an error."""
-    return any((m := _FINISHED.search(line)) and _is(node, m[1]) for line in _lines(run))
+    return any((m := _FINISHED.search(line)) and _is(node, m[1]) for line in _joined(_lines(run)))
 
 
 def why_not_up(package: PackageFacts, run: Run, node: LaunchNode) -> Absence:
@@ -195,6 +195,19 @@ def _is(node: LaunchNode, process: str) -> bool:
 def _substituted(match: re.Match[str]) -> str:
     words = re.sub(r"\\(.)", r"\1", match[1]).split()
     return rf"{re.escape(words[1])}_.+" if len(words) == 2 and words[0] == "anon" else ".*"
+
+
+def _joined(lines: Iterable[str]) -> Iterator[str]:
+    """Of a node with required="true", roslaunch says in one line that it "died", and in the next one how it ended."""
+    name = ""
+    for line in lines:
+        if match := _REQUIRED.search(line):
+            name = match[1]
+        elif name and line.startswith("process has "):
+            yield f"{name} {line}"
+            name = ""
+        else:
+            yield line
 
 
 def _lines(run: Run) -> list[str]:
