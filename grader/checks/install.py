@@ -126,10 +126,12 @@ def _misplaced(package: PackageFacts, one: Installed) -> Lack:
     if "DESTINATION" in one.call.args and not one.destination and not _called(package, "catkin_package"):
         why = f"{where}: {BIN} has no value, for catkin_package() is not called before it"
         return Lack(why, "call catkin_package() above catkin_install_python(…)", _line(one), follows=True)
-    if not one.destination:
+    if one.destination is None:
         why = f"{where}: catkin_install_python(…) gives {{}} no DESTINATION"
+    elif not one.destination:
+        why = f"{where}: nothing stands behind DESTINATION, or a variable that has no value (its name misspelt?)"
     else:
-        why = f"{where}: the destination of {{}} is {shown(one.destination)}, which is no place for programs"
+        why = f"{where}: the destination of {{}} is {shown(one.destination)}, not {BIN} (lib/{package.name})"
     return Lack(why, f"write DESTINATION {BIN}, below find_package(catkin …)", _line(one))
 
 

@@ -141,10 +141,11 @@ def _wrong_time(
         if not clocks:
             message = "the time in the messages cannot be judged: the run's /clock was not recorded"
             return inconclusive(message, hint="grade again")
-        wrong = wrong_growth(told, clocks, flooded=is_flood(run))
+        ended = early_end(run) is not None
+        wrong = wrong_growth(told, clocks, short=ended or is_flood(run))
         if wrong is not None:
-            ended = early_end(run) if wrong.status.value == "inconclusive" else None
-            return _too_few(package, run, heard, params) if ended else wrong
+            too_few = ended and wrong.status.value == "inconclusive"
+            return _too_few(package, run, heard, params) if too_few else wrong
     return None
 
 

@@ -51,8 +51,8 @@ BAD = {
     "comment": "does not name scripts/comment.py",
     "never": "does not name scripts/never.py",
     "other": "install(PROGRAMS …) names scripts/other.py",
-    "share": "is share/lab, which is no place for programs",
-    "nowhere": "gives scripts/nowhere.py no DESTINATION",
+    "share": "is share/lab, not ${CATKIN_PACKAGE_BIN_DESTINATION} (lib/lab)",
+    "nowhere": "a variable that has no value",
 }
 
 

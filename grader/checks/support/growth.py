@@ -12,29 +12,29 @@ from grader.model.verdict import Verdict, failed, inconclusive
 SLACK_S = 1.5
 SLACK_SHARE = 0.05
 WATCHED_S = 3.0
-FLOODED_S = 1.1
+SHORT_S = 1.1
 WHOLE_S = 1.05
 UNITS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
 GET_TIME = "rospy.get_time() gives the time in seconds; ask it again for every message"
 
 
 def wrong_growth(
-    told: Sequence[float], clocks: Sequence[Seconds], *, flooded: bool = False
+    told: Sequence[float], clocks: Sequence[Seconds], *, short: bool = False
 ) -> Verdict | None:
     """None where the numbers told go along with one of the clocks, from wherever they start.
 
-    Whole seconds may repeat. The first clock is the one that a message speaks of. A recording that was `flooded` is
-    short by the node's own doing, and so full that less of it tells as much.
+    Whole seconds may repeat. The first clock is the one that a message speaks of. A recording that is `short` by
+    the node's own doing (a flood, its early end) is judged by less of it, and with less slack.
     """
     span_s = clocks[0][-1]
-    enough_s = FLOODED_S if flooded else WATCHED_S
+    enough_s = SHORT_S if short else WATCHED_S
     if told[0] == told[-1] == max(told) == min(told):
         message = f"the time in the messages stays at {_plain(told[0])} for {span_s:.1f} s"
         return failed(message, hint=GET_TIME) if span_s >= enough_s else _too_short(span_s)
     back = next(((a, b) for a, b in pairwise(told) if b < a), None)
     if back is not None:
         return _falls_back(*back)
-    slack_s = WHOLE_S if flooded else SLACK_S
+    slack_s = WHOLE_S if short else SLACK_S
     along = [clock[-1] for clock in clocks if _go_along(told, clock, slack_s)]
     if along:
         return None if max(along) >= enough_s else _too_short(max(along))
