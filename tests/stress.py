@@ -18,6 +18,7 @@ from tests.fixture_runs import (
     SIDE_BY_SIDE,
     fixture_names,
     grade_fixture,
+    in_turn,
     labs,
     read_fixture,
     rubric_of,
@@ -73,7 +74,7 @@ def _one_round(names: list[Named], folder: Path, jobs: int) -> dict[Named, list[
     """Surprises by fixture; those without any are left out."""
     found: dict[Named, list[str]] = {}
     with workers(jobs) as pool:
-        futures = {pool.submit(grade_fixture, *pair, folder): pair for pair in names}
+        futures = {pool.submit(grade_fixture, *pair, folder): pair for pair in in_turn(names)}
         for future in as_completed(futures):
             lab, name = futures[future]
             try:

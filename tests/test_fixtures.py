@@ -19,6 +19,7 @@ from tests.fixture_runs import (
     expected_points,
     fixture_names,
     grade_fixture,
+    in_turn,
     labs,
     read_fixture,
     rubric_of,
@@ -45,7 +46,7 @@ def graded(request, tmp_path_factory) -> Iterator[dict[tuple[str, str], Future[G
     chosen = [(params["lab"], params["graded_name"]) for params in every if "graded_name" in params]
     out = tmp_path_factory.mktemp("graded")
     with workers() as pool:
-        yield {(lab, name): pool.submit(grade_fixture, lab, name, out) for lab, name in dict.fromkeys(chosen)}
+        yield {pair: pool.submit(grade_fixture, *pair, out) for pair in in_turn(dict.fromkeys(chosen))}
 
 
 @each_lab
