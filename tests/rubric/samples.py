@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
+from grader.errors import RubricError
+from grader.rubric.load import load_rubric
+
 SOUND = """\
 schema: grader.rubric/1
 id: sample
@@ -44,3 +49,11 @@ def spoiled(folder: Path, *changes: tuple[str, str]) -> Path:
     path = folder / "lab.yaml"
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def faults(path: Path) -> list[str]:
+    """The faults of a file, without the folder that it lies in."""
+    with pytest.raises(RubricError) as caught:
+        load_rubric(str(path))
+    assert all("pydantic" not in fault and "\n" not in fault for fault in caught.value.faults)
+    return [fault.replace(f"{path.parent}/", "") for fault in caught.value.faults]

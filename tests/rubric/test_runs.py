@@ -1,0 +1,100 @@
+"""Faults of scenarios: what is started, set, sent and called, and when a run has seen enough."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.rubric.samples import faults, spoiled
+
+
+@pytest.mark.parametrize(
+    ("probe", "fault"),
+    [
+        ("{topic: /x, type: std_msgs/Int8}", ": sends nothing: give text, integers, among or values"),
+        ("{topic: x, type: std_msgs/String, text: 1}", '.topic: a topic begins with a slash: "/x"'),
+        ("{topic: /x, type: std_msgs/String, text: 1, integers: 1}", ".integers: is not for std_msgs/String"),
+        (
+            "{topic: /x, type: std_msgs/Int8, among: [0, 128]}",
+            ".among[1]: an Int8 holds -128 to 127, not 128",
+        ),
+        ("{topic: /x, type: std_msgs/UInt8, among: [-1]}", ".among[0]: an UInt8 holds 0 to 255, not -1"),
+        (
+            "{topic: /x, type: std_msgs/Strin, text: 1}",
+            ".type: ROS Noetic has no message type std_msgs/Strin",
+        ),
+        (
+            "{topic: /x, type: Int8, integers: 1}",
+            '.type: must be a type like std_msgs/String, not "Int8"',
+        ),
+        ("{topic: /x, type: std_msgs/String, text: 1, times: 2}", ".times: is for values"),
+        (
+            "{topic: /x, type: geometry_msgs/Twist, values: [{linear: {x: 1}}, {linear: {w: 1}}]}",
+            ".values[1]: geometry_msgs/msg/Vector3 has no field w",
+        ),
+        ("{topic: /x, type: std_msgs/Int8, values: [200]}", ".values[0]: 200 is out of range for int8"),
+        ("{topic: /x, type: geometry_msgs/Twist, integers: 2}", ".integers: is not for geometry_msgs/Twist"),
+    ],
+)
+def test_probes_that_make_no_sense(probe, fault, tmp_path):
+    path = spoiled(tmp_path, ("    until:", f"    probes: [{probe}]\n    until:"))
+    assert f"lab.yaml:11: scenarios.real.probes[0]{fault}" in faults(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        (
+            "script: src/talker.py",
+            "program: turtlesim",
+            ".start[0].program: must be a program like turtlesim/turtlesim_node",
+        ),
+        ("script: src/talker.py", "built: false", ".start[0]: give one of"),
+        (
+            "script: src/talker.py",
+            "script: a.py, after: talker",
+            '.start[0].after: there is no earlier start "talker"',
+        ),
+        (
+            "window_s: 5",
+            'window_s: "5 s"',
+            '.until.window_s: must be a number, not "5 s": write 5, the key says seconds',
+        ),
+        ("window_s: 5", "window_s: soon", '.until.window_s: must be a number, not "soon"'),
+        (
+            "window_s: 5",
+            "ended: [taker]",
+            '.until.ended[0]: there is no start "taker" (did you mean "talker"?)',
+        ),
+        ("window_s: 5", "quiet_s: 90", ".until.quiet_s: 90 s can never pass within limit_s, 60 s"),
+        ("window_s: 5", "alive_s: -1", ".until.alive_s: must be at least 0, not -1"),
+        (
+            "    start:",
+            "    params: [{value: 1}]\n    start:",
+            ".params[0]: give one of name and file, not neither",
+        ),
+        (
+            "    start:",
+            "    params: [{name: a, file: b}]\n    start:",
+            ".params[0]: give one of name and file, not both",
+        ),
+        ("    start:", "    params: [{name: a}]\n    start:", ".params[0]: give one of value and made_up"),
+        (
+            "    start:",
+            "    params: [{file: a, value: 1}]\n    start:",
+            ".params[0].value: is for a parameter with",
+        ),
+        (
+            "    start:",
+            "    params: [{name: a, value: 1, also: [b]}]\n    start:",
+            ".params[0].also: is for a file",
+        ),
+        (
+            "    start:",
+            "    calls: [{service: reset, type: std_srvs/Empty}]\n    start:",
+            '.calls[0].service: a service begins with a slash: "/reset"',
+        ),
+    ],
+)
+def test_what_a_run_does_makes_sense(old, new, fault, tmp_path):
+    found = faults(spoiled(tmp_path, (old, new)))
+    assert any(f": scenarios.real{fault}" in line for line in found), found
