@@ -141,12 +141,18 @@ def _wrong_time(
         if not clocks:
             message = "the time in the messages cannot be judged: the run's /clock was not recorded"
             return inconclusive(message, hint="grade again")
-        ended = early_end(run) is not None
-        wrong = wrong_growth(told, clocks, short=ended or is_flood(run))
+        own_doing = early_end(run) is not None or _watched_ns(run, heard) >= WATCHED_S * 1e9
+        short = is_flood(run) or (own_doing and clocks[0][-1] < WATCHED_S)
+        wrong = wrong_growth(told, clocks, short=short)
         if wrong is not None:
-            too_few = ended and wrong.status.value == "inconclusive"
+            too_few = own_doing and wrong.status.value == "inconclusive"
             return _too_few(package, run, heard, params) if too_few else wrong
     return None
+
+
+def _watched_ns(run: Run, heard: Sequence[Channel]) -> int:
+    """How long its messages could have come."""
+    return (observed_until_ns(run) or run.end_ns) - min(c.times_ns[0] for c in heard)
 
 
 def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict:
@@ -157,7 +163,6 @@ def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: 
         end = explain_end(ended, run, package)
         message = f"{few} before the node ended ({end.cause}): too few to see the time grow"
         return unjudged(message, hint=end.hint, citations=end.citations)
-    first_ns = min(c.times_ns[0] for c in heard)
-    if (observed_until_ns(run) or run.end_ns) - first_ns >= WATCHED_S * 1e9:
+    if _watched_ns(run, heard) >= WATCHED_S * 1e9:
         return unjudged(f"{few}: too few to see the time grow", hint=f"publish in the loop; {GET_TIME}")
     return inconclusive(f"{few} while it was watched: too few to see the time grow", hint="grade again")

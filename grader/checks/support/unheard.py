@@ -13,7 +13,9 @@ from grader.model.package import PackageFacts
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, unjudged
 
 HAND_IN = "add the script to the package, and push it"
-CALLBACK_HINT = "print data.data in the callback, without a condition, and end the script with rospy.spin()"
+CALLBACK_HINT = (
+    "print data.data in the callback, without a condition and nothing slow beside it; end with rospy.spin()"
+)
 
 
 def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
