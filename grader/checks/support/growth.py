@@ -18,9 +18,7 @@ UNITS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
 GET_TIME = "rospy.get_time() gives the time in seconds; ask it again for every message"
 
 
-def wrong_growth(
-    told: Sequence[float], clocks: Sequence[Seconds], *, short: bool = False
-) -> Verdict | None:
+def wrong_growth(told: Sequence[float], clocks: Sequence[Seconds], *, short: bool = False) -> Verdict | None:
     """None where the numbers told go along with one of the clocks, from wherever they start.
 
     Whole seconds may repeat. The first clock is the one that a message speaks of. A recording that is `short` by
