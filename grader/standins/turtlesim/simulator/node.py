@@ -90,12 +90,13 @@ class Simulator:
         self._background = Background(Params)
         self._world.canvas.fill(self._background.read())
         self._one_at_a_time = threading.Lock()
+        rospy.loginfo("Starting turtlesim with node name %s", rospy.get_name())
+        self._appear(self._world.reset())
+        # Not before the turtle is there: a reset that comes in meanwhile would make it a second time.
         self._offer("clear", Empty, self._on_clear)
         self._offer("reset", Empty, self._on_reset)
         self._offer("spawn", srv.Spawn, self._on_spawn)
         self._offer("kill", srv.Kill, self._on_kill)
-        rospy.loginfo("Starting turtlesim with node name %s", rospy.get_name())
-        self._appear(self._world.reset())
 
     def run(self):
         """Until the node is shut down."""
