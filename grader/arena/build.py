@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from grader.arena.place import Place
+from grader.arena.built import read_member
+from grader.arena.place import ARCHIVE, Place
 from grader.arena.ros_env import keep_ros_variables, parse_env
 from grader.arena.session import ArenaSession
-from grader.arena.workspace import read_untrusted, run_in_place
+from grader.arena.workspace import READ_MAX, read_untrusted, run_in_place
 from grader.evidence.events import ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.record import Record
@@ -47,8 +49,8 @@ async def build(
     (place.folder / "bin" / "python-files.json").write_text(json.dumps(list(python_files)))
     async with ArenaSession(place, writer, master=False) as arena:
         arena.course(ScenarioEvent(event="begin"))
-        arena.start(place.spec("catkin_make", _catkin_make(place), role="build", build=True))
-        arena.start(place.spec("syntax", _syntax(place), role="grader", build=True))
+        arena.start(place.spec("catkin_make", _catkin_make(place), role="build", build=True, collect=ARCHIVE))
+        arena.start(place.spec("syntax", _syntax(place), role="grader", as_handed_in=True, collect=SYNTAX))
         ended = await arena.wait(lambda: "catkin_make" in arena.exit_codes, BUILD_S)
         if not ended:
             await arena.interrupt("catkin_make", int_s=2.0, term_s=1.0)
@@ -66,9 +68,9 @@ async def build(
         run_in_place(place.workspace, place.sandbox)
     return built, BuildOutcome(
         ok=ok,
-        trace=_keep(place, TRACE),
+        trace=_trace(place),
         root=place.package_folder,
-        syntax=_keep(place, SYNTAX),
+        syntax=_kept(place, SYNTAX),
         cpu_s=arena.cpu_s,
         student_cpu_s=arena.student_cpu_s,
     )
@@ -89,37 +91,54 @@ def _catkin_make(place: Place) -> list[str]:
 
 def _syntax(place: Place) -> list[str]:
     """ROS's own Python compiles every script of the package, and runs none."""
-    script = 'python3 -I "$1/grader-syntax.py" "$2" < "$1/python-files.json" > "$3"'
-    return ["/bin/sh", "-c", script, "sh", place.shims, place.package_folder, f"{place.output}/{SYNTAX}"]
+    script = 'python3 -I "$1/grader-syntax.py" "$2" < "$1/python-files.json" >' + _target(place, SYNTAX)
+    return ["/bin/sh", "-c", script, "sh", place.shims, place.package_folder]
+
+
+def _target(place: Place, name: str) -> str:
+    """Where a shell's output goes, to be kept under that name."""
+    return "&{collect}" if place.sandbox.bubblewrap else shlex.quote(f"{place.output}/{name}")
 
 
 async def _with_setup(place: Place, arena: ArenaSession) -> Place:
     """The environment that `source devel/setup.bash` gives."""
-    script = 'source "$1/devel/setup.bash" && env -0 > "$2"'
-    argv = ["/bin/bash", "-c", script, "bash", place.inside_workspace, f"{place.output}/{ENVIRONMENT}"]
-    arena.start(place.spec("setup.bash", argv, role="build", build=True))
+    script = 'source "$1/devel/setup.bash" && env -0 >' + _target(place, ENVIRONMENT)
+    argv = ["/bin/bash", "-c", script, "bash", place.inside_workspace]
+    arena.start(place.spec("setup.bash", argv, role="build", as_handed_in=True, collect=ENVIRONMENT))
     await arena.wait(lambda: "setup.bash" in arena.exit_codes, STEP_S)
-    dump = read_untrusted(place.workspace.output / ENVIRONMENT)
-    if not dump or arena.exit_codes.get("setup.bash") != 0:
+    path = _kept(place, ENVIRONMENT)
+    if path is None or arena.exit_codes.get("setup.bash") != 0:
         return place.from_source()
-    return replace(place, env=keep_ros_variables(parse_env(dump)))
+    return replace(place, env=keep_ros_variables(parse_env(path.read_bytes())))
 
 
 async def _answer(place: Place, arena: ArenaSession, script: str) -> None:
     """What `rosrun` says to a script that is not as it should be, on the package as handed in."""
     file = Path(script).name
     name = f"rosrun {file}"
-    arena.start(place.spec(name, ["rosrun", place.package, file], role="student", build=True))
+    arena.start(place.spec(name, ["rosrun", place.package, file], as_handed_in=True))
     if not await arena.wait(lambda: name in arena.exit_codes, ROSRUN_S):
         await arena.interrupt(name, int_s=1.0, term_s=1.0)
 
 
-def _keep(place: Place, name: str) -> Path | None:
-    """Copy a file that the build left, as far as it is one."""
-    data = read_untrusted(place.workspace.output / name)
-    if data is None:
-        return None
-    kept = place.folder / "kept" / name
-    kept.parent.mkdir(exist_ok=True)
-    kept.write_bytes(data)
-    return kept
+def _trace(place: Place) -> Path | None:
+    """The trace that CMake left, out of what the build handed over."""
+    if not place.sandbox.bubblewrap:
+        return _kept(place, TRACE)
+    data = read_member(place.archive, f"./{TRACE}", READ_MAX)
+    return None if data is None else _written(place, TRACE, data)
+
+
+def _kept(place: Place, name: str) -> Path | None:
+    """What a step handed over under that name; without a sandbox, a copy of the file that it left."""
+    kept = place.workspace.kept / name
+    if place.sandbox.bubblewrap:
+        return kept if kept.is_file() and kept.stat().st_size else None
+    data = read_untrusted(Path(place.output) / name)
+    return None if data is None else _written(place, name, data)
+
+
+def _written(place: Place, name: str, data: bytes) -> Path:
+    path = place.workspace.kept / name
+    path.write_bytes(data)
+    return path

@@ -5,22 +5,17 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from grader.arena.built import Built, read_archive, read_folder
+from grader.arena.inside import BUILT, HOME, INSIDE_WORKSPACE, LARGE, OUTPUT, SHIMS, SOURCES, STANDINS
+from grader.arena.limits import Limits
 from grader.arena.ros_env import SYSTEM_PATH, RosInstallation
-from grader.arena.sandbox import (
-    BUILT_WORKSPACE,
-    HOME,
-    INSIDE_WORKSPACE,
-    LARGE,
-    OUTPUT,
-    SHIMS,
-    STANDINS,
-    Limits,
-    Sandbox,
-)
-from grader.arena.standins import SOURCES, with_standins
+from grader.arena.sandbox import Sandbox
+from grader.arena.standins import SOURCES as STANDIN_SOURCES
+from grader.arena.standins import with_standins
 from grader.arena.workspace import Workspace
 
 LOOPBACK = "127.0.0.1"
@@ -28,11 +23,29 @@ LOOPBACK = "127.0.0.1"
 LIBSTDBUF = Path("/usr/libexec/coreutils/libstdbuf.so")
 LIFELINE = "echo >&{lifeline} && read -r _ <&{lifeline} && exec {lifeline}>&- || exit 125; "
 """The first thing that runs says that it is there and waits for leave: an arena that has died gives none."""
-BUILD_STEP = 'cd "$HOME" && exec "$@"'
-RUN_STEP = (
-    f"mkdir {INSIDE_WORKSPACE} && cp -R --preserve=mode,links {BUILT_WORKSPACE}/* {INSIDE_WORKSPACE}/"
+PLAIN_STEP = 'cd "$HOME" && exec "$@"'
+COPY_STEP = (
+    f"mkdir {INSIDE_WORKSPACE} && cp -R --preserve=mode,links {SOURCES} {INSIDE_WORKSPACE}/"
+    f" && {{ [ ! -e {BUILT} ] || tar -xpf {BUILT} -C {INSIDE_WORKSPACE} devel 2>/dev/null || true; }}"
     ' && cd "$HOME" && exec "$@"'
 )
+"""Each process tree has a workspace of its own: the sources, and what the build made of them."""
+BUILD_STEP = (
+    f"mkdir {INSIDE_WORKSPACE} && cp -R --preserve=mode,links {SOURCES} {INSIDE_WORKSPACE}/"
+    ' && cd "$HOME" && { "$@" {collect}>&-; code=$?; }; '
+    f"tar -cf - -C {INSIDE_WORKSPACE} --ignore-failed-read devel -C {OUTPUT} . >&{{collect}} 2>/dev/null; exit $code"
+)
+"""What the build made is handed over through a pipe, whatever came of it."""
+ARCHIVE = "built.tar"
+OWN_VARIABLES = (
+    "ROS_MASTER_URI",
+    "ROS_IP",
+    "ROS_HOSTNAME",
+    "ROS_HOME",
+    "ROS_LOG_DIR",
+    "ROSCONSOLE_CONFIG_FILE",
+)
+"""The arena's to set: what a package's environment hooks say of them would lead its nodes elsewhere."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,14 +61,26 @@ class Place:
     env: dict[str, str] = field(default_factory=dict)
 
     @property
+    def archive(self) -> Path:
+        """What the build handed over, where it ran in a sandbox."""
+        return self.workspace.kept / ARCHIVE
+
+    @cached_property
+    def built(self) -> Built:
+        """What `rosrun` finds of the build. Asked only once the build is over."""
+        if self.sandbox.bubblewrap:
+            return read_archive(self.archive, self.package)
+        return read_folder(self.workspace.built / "devel", self.package)
+
+    @property
     def inside_workspace(self) -> str:
         """Where processes find the workspace."""
         return INSIDE_WORKSPACE if self.sandbox.bubblewrap else str(self.workspace.built)
 
     @property
     def output(self) -> str:
-        """Where processes may leave files for the grader."""
-        return OUTPUT if self.sandbox.bubblewrap else str(self.workspace.output)
+        """Where the build may leave files for the grader."""
+        return OUTPUT if self.sandbox.bubblewrap else str(self.folder / "home")
 
     @property
     def package_folder(self) -> str:
@@ -83,8 +108,7 @@ class Place:
         """
         name = Path(script).name
         found = self.script_path(script)
-        installed = self.workspace.built / "devel" / "lib" / self.package / name
-        if installed.is_file() and not installed.is_symlink() and os.access(installed, os.X_OK):
+        if name in self.built.programs:
             return f"{self.devel_programs}/{name}", found or script
         if found is None:
             return None
@@ -100,7 +124,7 @@ class Place:
         """Folders that hold installed packages side by side, the stand-ins' last."""
         known = [Path(p) / "share" for p in self.ros.prefixes]
         known += [Path(p) for p in self.ros.env.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p]
-        return (*known, self.folder / "standins" / "share", SOURCES)
+        return (*known, self.folder / "standins" / "share", STANDIN_SOURCES)
 
     def package_file(self, file: str) -> Path | None:
         """Where a file of the package is on disk, found as `script_path` finds it."""
@@ -126,19 +150,25 @@ class Place:
         *,
         role: str = "student",
         copy: bool = True,
+        as_handed_in: bool = False,
+        collect: str | None = None,
         build: bool = False,
         **more: Any,  # noqa: ANN401 - fields of the spec
     ) -> dict[str, Any]:
-        """What the arena needs to start a process. `build` gives it the workspace as handed in, writable; otherwise,
-        with `copy`, it gets a copy of its own with the repairs."""
-        step = RUN_STEP if copy and not build and self.sandbox.bubblewrap else BUILD_STEP
-        shell = ["/bin/bash", "-c", LIFELINE + step, "bash"]
+        """What the arena needs to start a process. With `copy` it gets a workspace of its own: the sources with the
+        repairs, or `as_handed_in`, and what the build made. `build` is the build itself. What the process writes to
+        `{collect}` becomes the file of that name in `workspace.kept`."""
+        boxed = self.sandbox.bubblewrap
+        step = (BUILD_STEP if build else COPY_STEP) if copy and boxed else PLAIN_STEP
+        words = LIFELINE + self.sandbox.first_words(self.limits) + step
+        kept = None if collect is None else str(self.workspace.kept / collect)
         inner = self.sandbox.inner(
-            [*shell, *argv],
+            ["/bin/bash", "-c", words, "bash", *argv],
             ros=self.ros,
             place=self.folder,
-            binds=self._binds(build=build, copy=copy),
-            net=not build,
+            limits=self._limits(copy=copy),
+            binds=self._binds(copy=copy, as_handed_in=as_handed_in or build, output=build),
+            net=not (build or as_handed_in),
             info=True,
         )
         return {
@@ -147,33 +177,28 @@ class Place:
             "argv": inner,
             "argv_shown": list(argv),
             "env": self._process_env(),
-            "cwd": "/" if self.sandbox.bubblewrap else str(self.folder / "home"),
-            "sandboxed": self.sandbox.bubblewrap,
+            "cwd": "/" if boxed else str(self.folder / "home"),
+            "sandboxed": boxed,
+            "collect": {"file": kept, "bytes": self.limits.built_bytes} if kept and boxed else None,
             "script": None,
             "repairs": [],
             **more,
         }
 
-    def _binds(self, *, build: bool, copy: bool) -> list[str]:
-        workspace = self.workspace
-        large = ["--ro-bind", str(workspace.large), LARGE]
-        if build:
-            written = [
-                "--bind",
-                str(workspace.built),
-                INSIDE_WORKSPACE,
-                "--bind",
-                str(workspace.output),
-                OUTPUT,
-            ]
-            return [*large, *written]
+    def _limits(self, *, copy: bool) -> Limits:
+        """A workspace of the size that was handed in has room beside what else may be written."""
+        room = self.limits.home_bytes + (2 * self.workspace.copied_bytes if copy else 0)
+        return self.limits.model_copy(update={"home_bytes": room})
+
+    def _binds(self, *, copy: bool, as_handed_in: bool, output: bool) -> list[str]:
         if not copy:
             return []
-        binds = [*large, "--ro-bind", str(workspace.repaired), f"{BUILT_WORKSPACE}/src"]
-        devel = workspace.built / "devel"
-        if devel.is_dir() and not devel.is_symlink():
-            binds += ["--ro-bind", str(devel), f"{BUILT_WORKSPACE}/devel"]
-        return binds
+        workspace = self.workspace
+        sources = workspace.built / "src" if as_handed_in else workspace.repaired
+        binds = ["--ro-bind", str(workspace.large), LARGE, "--ro-bind", str(sources), SOURCES]
+        if output:
+            return [*binds, "--size", str(self.limits.tmp_bytes), "--tmpfs", OUTPUT]
+        return [*binds, "--ro-bind", str(self.archive), BUILT] if self.archive.is_file() else binds
 
     def _process_env(self) -> dict[str, str]:
         home = HOME if self.sandbox.bubblewrap else str(self.folder / "home")
@@ -191,7 +216,8 @@ class Place:
         }
         if LIBSTDBUF.exists():
             base |= {"LD_PRELOAD": str(LIBSTDBUF), "_STDBUF_O": "L", "_STDBUF_E": "L"}
-        merged = with_standins({**base, **self.ros.env, **self.env}, self.folder / "standins", self.standins)
+        added = {name: value for name, value in self.env.items() if name not in OWN_VARIABLES}
+        merged = with_standins({**base, **self.ros.env, **added}, self.folder / "standins", self.standins)
         return {**merged, "PATH": _path(self.ros, merged.get("PATH", ""), self.shims)}
 
 

@@ -5,9 +5,11 @@ Runs that do not disturb each other go side by side: a run that measures a rate 
 
 from __future__ import annotations
 
+import os
 import tempfile
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -17,9 +19,11 @@ from typing_extensions import Self
 from grader import __version__
 from grader.arena.asynchronous import run_until_signal, side_by_side
 from grader.arena.build import BUILD_EXPECTED_S, BuildOutcome, build
+from grader.arena.inside import prepare
+from grader.arena.limits import Limits
 from grader.arena.place import Place
 from grader.arena.ros_env import RosInstallation, find_ros
-from grader.arena.sandbox import Limits, Mode, Sandbox, choose, prepare, temporary_base
+from grader.arena.sandbox import Mode, Sandbox, choose, temporary_base
 from grader.arena.scenario import ScenarioCost, expected_s, run_scenario
 from grader.arena.workspace import Workspace, make_workspace, read_untrusted
 from grader.errors import ArenaError
@@ -87,7 +91,7 @@ class Recorder:
         self._submission = submission
         self._rubric = rubric
         self._progress = progress
-        self._limits = Limits()
+        self._limits = Limits().shared_by(len(rubric.scenarios))
         ros = None if static_only else find_ros()
         self._not_run = STATIC_ONLY if static_only else "" if ros else NO_ROS
         progress.step("package", "running", "reading its files")
@@ -174,11 +178,11 @@ class Recorder:
 
     def _make_place(self, ros: RosInstallation, sandbox: Sandbox) -> Place:
         folder = Path(self._temporary.name)
-        prepare(folder, ros)
-        scripts = self._scripts()
-        workspace: Workspace = make_workspace(
-            folder, self._submission, self.recording.facts, scripts, sandbox
-        )
+        with _readable_by_all():
+            prepare(folder, ros)
+            workspace: Workspace = make_workspace(
+                folder, self._submission, self.recording.facts, self._scripts(), sandbox
+            )
         name = (
             self.recording.facts.manifest.name
             if self.recording.facts.manifest
@@ -256,6 +260,16 @@ def lanes(rubric: Rubric) -> tuple[tuple[str, ...], ...]:
         shorter = min(first, second, key=lambda lane: sum(expected_s(scenarios[n]) for n in lane))
         shorter.append(name)
     return tuple(lane for lane in (watching, tuple(first), tuple(second)) if lane)
+
+
+@contextmanager
+def _readable_by_all() -> Iterator[None]:
+    """Whatever the user's umask: root's student is somebody else. The folder around it has a name that nobody knows."""
+    before = os.umask(0o022)
+    try:
+        yield
+    finally:
+        os.umask(before)
 
 
 def _watches(scenario: Scenario) -> bool:

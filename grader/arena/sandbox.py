@@ -1,88 +1,66 @@
-"""Two layers of bubblewrap: an outer one with a network of its own for the arena, an inner one a student process tree.
+"""The wall around a student process tree: bubblewrap's command line, and whether it can be had here.
 
-Only command lines are made here; nothing is run but the probe that asks whether they work.
+Only command lines are made here; nothing is run but the probe that asks whether they work. The arena itself has a
+network of its own (`ros/network.py`).
 """
 
 from __future__ import annotations
 
 import os
+import platform
 import random
+import re
 import shutil
 import stat
 import subprocess
+import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
+from grader.arena.cgroups import Cgroups, find_cgroups
+from grader.arena.inside import HOME, SHIMS, STANDINS
+from grader.arena.limits import Limits
 from grader.arena.ros_env import RosInstallation
-from grader.arena.standins import copy_standins
 from grader.errors import HostError, SandboxMissing
 from grader.model.record import Record
 
 Mode = Literal["auto", "require", "none"]
 
-HOME = "/home/student"
-INSIDE_WORKSPACE = f"{HOME}/catkin_ws"
-OUTPUT = "/run/grader/out"
-BUILT_WORKSPACE = "/run/grader/ws"
-LARGE = "/run/grader/large"
-SHIMS = "/run/grader/bin"
-STANDINS = "/run/grader/standins"
 ETC = (
     "alternatives", "ld.so.cache", "ld.so.conf", "ld.so.conf.d", "localtime", "timezone", "nsswitch.conf",
     "os-release", "debian_version", "lsb-release", "python3", "python3.11", "mime.types", "catkin", "ros",
     "ssl/openssl.cnf",
 )  # fmt: skip
-SYNTAX = Path(__file__).parent / "ros" / "syntax.py"
-TERMINAL = Path(__file__).parent / "ros" / "terminal.sh"
-TERMINALS = (
-    "gnome-terminal", "konsole", "lxterminal", "mate-terminal", "rxvt", "terminator", "tilix", "urxvt",
-    "x-terminal-emulator", "xfce4-terminal", "xterm",
-)  # fmt: skip
-OPENER = (Path(__file__).parent / "ros" / "open.sh", Path(__file__).parent / "ros" / "opener.py")
-BROWSERS = (
-    "brave-browser", "chromium", "chromium-browser", "firefox", "firefox-esr", "google-chrome", "google-chrome-stable",
-    "opera", "sensible-browser", "www-browser", "x-www-browser", "xdg-open",
-)  # fmt: skip
-TMP_BYTES = 256 << 20
-FILE_BYTES = 64 << 20
-OPEN_FILES = 1024
-TASKS = 512
-ADDRESS_SPACE_BYTES = 8 << 30
+OWN_FOLDER = Path(__file__).resolve().parent.parent
+NETWORK = Path(__file__).parent / "ros" / "network.py"
+WALLS = ("--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try")
+NO_NESTING = "--disable-userns"
+COUNTS_BY_NAMESPACE = (5, 14)
+"""Since this kernel RLIMIT_NPROC counts the processes of a user namespace, before it all of the user's."""
 INSTALL_HINT = "apt-get install bubblewrap (in a container: allow user namespaces, or run it privileged)"
 
 
-class Limits(Record):
-    """Of one run. Bytes and counts are of one process tree, one channel or one console."""
-
-    memory_bytes: int = 1 << 30
-    processes: int = 200
-    output_lines: int = 20_000
-    output_bytes: int = 8 << 20
-    channel_messages: int = 20_000
-    channel_bytes: int = 64 << 20
-
-
 class Sandbox(Record):
-    """`bubblewrap` or nothing; `uid` is the student's where root has to become somebody else."""
+    """`bubblewrap` or nothing; `uid` is the student's where root has to become somebody else. `nesting` is true where
+    bubblewrap cannot keep a process from making user namespaces of its own."""
 
     bubblewrap: bool
     uid: int | None
     reason: str = ""
+    nesting: bool = False
+    cgroups: Cgroups = Cgroups()
 
     @property
     def label(self) -> str:
+        """What the report says."""
         if not self.bubblewrap:
-            return f"none ({self.reason})" + (", but for an unprivileged user" if self.uid else "")
-        return "bubblewrap, as root for an unprivileged user" if self.uid else "bubblewrap, unprivileged"
-
-    def outer(self, argv: Sequence[str]) -> list[str]:
-        """The arena's own layer: a network namespace with nothing but its loopback."""
-        if not self.bubblewrap:
-            return list(argv)
-        return ["bwrap", "--dev-bind", "/", "/", "--unshare-net", "--die-with-parent", "--", *argv]
+            who = ", but for an unprivileged user" if self.uid else ""
+            return f"none ({self.reason}){who}; memory held by {self.cgroups.label}"
+        who = "as root for an unprivileged user" if self.uid else "unprivileged"
+        return f"bubblewrap, {who}; memory held by {self.cgroups.label}"
 
     def inner(
         self,
@@ -90,34 +68,55 @@ class Sandbox(Record):
         *,
         ros: RosInstallation,
         place: Path,
+        limits: Limits,
         binds: Sequence[str],
         net: bool,
         info: bool,
     ) -> list[str]:
-        """One process tree's layer. `place` is the run's own folder (see `prepare`), `binds` bubblewrap arguments."""
-        limits = ["prlimit", f"--fsize={FILE_BYTES}", f"--nofile={OPEN_FILES}", "--core=0"]
-        limits += [f"--as={ADDRESS_SPACE_BYTES}", *([f"--nproc={TASKS}"] if self.uid else []), "--"]
+        """One process tree's layer. `place` is the run's own folder (see `inside.prepare`), `binds` bubblewrap
+        arguments. Only tmpfs of fixed size can be written, and what `binds` give."""
         drop = ["setpriv", f"--reuid={self.uid}", f"--regid={self.uid}", "--clear-groups"] if self.uid else []
+        drop += ["prlimit", *self._rlimits(limits), "--"]
         if not self.bubblewrap:
-            return [*drop, *limits, *argv]
+            return [*drop, *argv]
         return [
-            *drop, *limits, "bwrap", *_system(ros), "--proc", "/proc", "--dev", "/dev",
-            "--size", str(TMP_BYTES), "--tmpfs", "/tmp",  # noqa: S108 - the sandbox's own
-            "--size", str(TMP_BYTES), "--tmpfs", HOME,
+            *drop, "bwrap", *_system(ros), "--proc", "/proc",
+            "--dev", "/dev", *_tmpfs("/dev/shm", limits.shared_bytes), "--remount-ro", "/dev",  # noqa: S108 - its own
+            *_tmpfs("/tmp", limits.tmp_bytes), *_tmpfs(HOME, limits.home_bytes),  # noqa: S108 - its own
             "--ro-bind", str(place / "etc" / "passwd"), "/etc/passwd",
             "--ro-bind", str(place / "etc" / "group"), "/etc/group",
             "--ro-bind", str(place / "etc" / "hosts"), "/etc/hosts",
             "--ro-bind", str(place / "bin"), SHIMS, "--ro-bind", str(place / "standins"), STANDINS, *binds,
             "--remount-ro", "/", "--uid", "1000", "--gid", "1000", "--hostname", "localhost", "--chdir", HOME,
-            "--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try",
-            *([] if net else ["--unshare-net"]),
+            *WALLS, *([] if self.nesting else [NO_NESTING]), *([] if net else ["--unshare-net"]),
             "--cap-drop", "ALL", "--new-session", "--die-with-parent",
             *(["--info-fd", "{info_fd}"] if info else []), "--", *argv,
         ]  # fmt: skip
 
+    def first_words(self, limits: Limits) -> str:
+        """What a process tree's shell does before anything else: the number of its tasks, where it is counted apart."""
+        if not self.bubblewrap or self.uid or not _counts_by_namespace():
+            return ""
+        return f"ulimit -u {limits.tasks}; "
+
+    def _rlimits(self, limits: Limits) -> Iterator[str]:
+        yield f"--fsize={limits.file_bytes}"
+        yield f"--nofile={limits.open_files}"
+        yield f"--as={limits.address_space_bytes}"
+        yield f"--cpu={limits.cpu_s:.0f}:{limits.cpu_s + 10:.0f}"
+        yield "--core=0"
+        if self.uid:
+            yield f"--nproc={limits.tasks}"
+
+
+def _tmpfs(path: str, size_bytes: int) -> list[str]:
+    return ["--size", str(size_bytes), "--tmpfs", path]
+
 
 def _system(ros: RosInstallation) -> list[str]:
+    """The system's programs, and not the grader: where it lies among them, its folder is empty."""
     argv = ["--ro-bind", "/usr", "/usr"]
+    shown = [Path("/usr")]
     for name in ("bin", "sbin", "lib", "lib32", "lib64", "libx32"):
         path = Path("/") / name
         if path.is_symlink():
@@ -128,34 +127,16 @@ def _system(ros: RosInstallation) -> list[str]:
         argv += ["--ro-bind-try", f"/etc/{name}", f"/etc/{name}"]
     for prefix in ros.prefixes:
         argv += ["--ro-bind", prefix, prefix]
+        shown.append(Path(prefix).resolve())
+    if any(OWN_FOLDER.is_relative_to(folder) for folder in shown):
+        argv += _tmpfs(str(OWN_FOLDER), 4096)
     return argv
 
 
-def prepare(place: Path, ros: RosInstallation) -> None:
-    """Write what every inner layer binds: `etc/` with one user in it, `bin/` with `python` as ROS means it, stand-ins
-    for terminals, which launch files name as their `launch-prefix`, and for browsers, and `standins/` with the
-    packages that this ROS lacks."""
-    etc, shims = place / "etc", place / "bin"
-    for folder in (etc, shims, place / "home"):
-        folder.mkdir(parents=True)
-    (etc / "passwd").write_text(f"student:x:1000:1000:student:{HOME}:/bin/bash\n")
-    (etc / "group").write_text("student:x:1000:\n")
-    (etc / "hosts").write_text("127.0.0.1 localhost\n::1 localhost\n")
-    for name in ("python", "python3"):
-        (shims / name).symlink_to(ros.python)
-    shutil.copyfile(SYNTAX, shims / "grader-syntax.py")
-    _program(shims, TERMINAL, "grader-terminal", TERMINALS)
-    _program(shims, OPENER[0], "grader-open", BROWSERS)
-    shutil.copyfile(OPENER[1], shims / "grader-open.py")
-    copy_standins(place / "standins", ros)
-
-
-def _program(shims: Path, source: Path, name: str, called: Sequence[str]) -> None:
-    """One program under the names that it is called by."""
-    shutil.copyfile(source, shims / name)
-    (shims / name).chmod(0o755)
-    for other in called:
-        (shims / other).symlink_to(name)
+@lru_cache(maxsize=1)
+def _counts_by_namespace() -> bool:
+    version = re.match(r"(\d+)\.(\d+)", platform.release())
+    return version is not None and (int(version[1]), int(version[2])) >= COUNTS_BY_NAMESPACE
 
 
 def temporary_base(sandbox: Sandbox | None) -> Path:
@@ -181,27 +162,28 @@ def choose(mode: Mode) -> Sandbox:
         raise SandboxMissing(f"no sandbox on this machine: {reason}", hint=INSTALL_HINT)
     can_drop = os.geteuid() == 0 and shutil.which("setpriv") is not None
     uid = random.SystemRandom().randrange(30_000, 60_000) if can_drop else None
-    return Sandbox(bubblewrap=not reason, uid=uid, reason=reason)
+    nesting = not reason and _refusal(NO_NESTING) != ""
+    return Sandbox(bubblewrap=not reason, uid=uid, reason=reason, nesting=nesting, cgroups=find_cgroups())
 
 
 @lru_cache(maxsize=1)
 def why_not() -> str:
-    """Empty where both layers work, else the reason in one line."""
+    """Empty where the wall and the arena's own network work, else the reason in one line."""
     for program in ("bwrap", "setpriv", "prlimit"):
         if shutil.which(program) is None:
             return f"{program} is not installed"
-    inner = [
-        "bwrap",
-        "--ro-bind",
-        "/",
-        "/",
-        "--proc",
-        "/proc",
-        "--unshare-user",
-        "--unshare-pid",
-        "/bin/true",
-    ]
+    return "" if _refusal(NO_NESTING) == "" else _refusal()
+
+
+@lru_cache(maxsize=2)
+def _refusal(*more: str) -> str:
+    """What this machine says to a sandbox with these arguments; empty where it makes one."""
     drop = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"] if os.geteuid() == 0 else []
-    outer = ["bwrap", "--dev-bind", "/", "/", "--unshare-net", "--die-with-parent", "--"]
-    done = subprocess.run([*outer, *drop, *inner], capture_output=True, check=False, timeout=20)
-    return "" if done.returncode == 0 else done.stderr.decode(errors="replace").strip().splitlines()[-1][:200]
+    inner = ["bwrap", "--ro-bind", "/", "/", "--proc", "/proc", *WALLS, *more, "/bin/true"]
+    command = [sys.executable, "-I", str(NETWORK), *drop, *inner]
+    try:
+        done = subprocess.run(command, capture_output=True, check=False, timeout=20)
+    except subprocess.TimeoutExpired:
+        return "bubblewrap does not answer"
+    lines = done.stderr.decode(errors="replace").strip().splitlines()
+    return "" if done.returncode == 0 else (lines or [f"exit code {done.returncode}"])[-1][:200]

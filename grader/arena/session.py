@@ -6,6 +6,7 @@ import asyncio
 import secrets
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +55,7 @@ class ArenaSession:
         self._answers: dict[int, dict[str, Any]] = {}
 
     async def __aenter__(self) -> Self:
-        argv = self.place.sandbox.outer([self.place.ros.python, "-s", "-B", str(ARENA)])
+        argv = [self.place.ros.python, "-s", "-B", str(ARENA)]
         self._process = ArenaProcess(argv, self.place.arena_env(), self._read)
         try:
             self.send(**self._config())
@@ -129,6 +130,8 @@ class ArenaSession:
         self.rosout_up = rosout is None  # then nobody need wait for it
         return {
             "master": self._master,
+            "own_network": self.place.sandbox.bubblewrap,
+            "cgroups": self.place.sandbox.cgroups.model_dump(),
             "port": PORT if self.place.sandbox.bubblewrap else 0,
             "limits": self.place.limits.model_dump(),
             "suffix": "_" + secrets.token_hex(4),
@@ -140,7 +143,8 @@ class ArenaSession:
             for prefix in ("/", *self.place.ros.prefixes):
                 program = Path(prefix) / name
                 if program.exists():
-                    return self.place.spec("rosout", [*LOG_FOLDER, str(program)], role="grader", copy=False)
+                    bare = replace(self.place, env={})
+                    return bare.spec("rosout", [*LOG_FOLDER, str(program)], role="grader", copy=False)
         return None
 
     def _read(self, chunk: bytes) -> None:

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import os
-import stat
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, TypeAlias
 
 from grader.arena.parameters import settings
@@ -20,7 +17,6 @@ CTRL_C_S = 5.0
 LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
 TERM_S = 2.0
 BUILT_PROGRAMS_MAX = 20
-ELF = b"\x7fELF"
 
 Spec: TypeAlias = dict[str, Any]
 """What the arena needs to start a process (`Place.spec`)."""
@@ -59,21 +55,7 @@ def _loading(name: str, file: str, place: Place) -> Iterator[Spec]:
 
 def built_programs(place: Place) -> list[str]:
     """The names of what the compiler made for `rosrun` to find, in order."""
-    folder = place.workspace.built / "devel" / "lib" / place.package
-    if folder.is_symlink() or not folder.is_dir():
-        return []
-    return sorted(path.name for path in folder.iterdir() if _is_program(path))[:BUILT_PROGRAMS_MAX]
-
-
-def _is_program(path: Path) -> bool:
-    """Student code may have written it: no link is followed, no pipe waited for."""
-    try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
-    except OSError:
-        return False
-    with os.fdopen(descriptor, "rb") as file:
-        mode = os.fstat(file.fileno()).st_mode
-        return stat.S_ISREG(mode) and bool(mode & stat.S_IXUSR) and file.read(len(ELF)) == ELF
+    return sorted(place.built.compiled)[:BUILT_PROGRAMS_MAX]
 
 
 def set_params(params: tuple[Param, ...], arena: ArenaSession) -> None:

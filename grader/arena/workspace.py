@@ -1,7 +1,8 @@
 """Fresh workspaces on disk: one as handed in, to build; one source tree with the repairs, to run.
 
-Student code writes only into the first, and the grader never follows what it finds there. Both hold the lab's package
-and those packages of the same submission that it depends on, nothing else.
+In a sandbox both are only read: what is built there comes back as an archive. Without one, student code writes into
+the first, and the grader never follows what it finds there. Both hold the lab's package and those packages of the
+same submission that it depends on, nothing else.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from grader.arena.sandbox import BROWSERS, LARGE, SHIMS, Sandbox
+from grader.arena.inside import BROWSERS, LARGE, SHIMS
+from grader.arena.sandbox import Sandbox
 from grader.model.package import PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.submission import SourcePackage, Submission
@@ -26,7 +28,7 @@ ABSOLUTE_PYTHON = re.compile(r"/(\w+/)*python3?")
 BROWSER_PATH = re.compile(
     rb"(?<![\w./-])/(?:usr/|usr/local/|snap/)?bin/(" + "|".join(BROWSERS).encode() + rb")(?![\w./-])"
 )
-LARGE_BYTES = 16 << 20
+LARGE_BYTES = 4 << 20
 READ_MAX = 8 << 20
 MANIFEST = """<package format="2"><name>{}</name><version>0.0.0</version><description>A repair</description>
 <maintainer email="student@example.org">student</maintainer><license>TODO</license>
@@ -36,15 +38,17 @@ MANIFEST = """<package format="2"><name>{}</name><version>0.0.0</version><descri
 
 class Workspace(Record):
     """`built` is the catkin workspace to build (`src/` in it), `repaired` the `src/` that runs; `folder` is the
-    package's folder name in both, `repairs` what was mended, by path. Files of more than 16 MB are not copied into
-    each run: they lie in `large`, and links lead there."""
+    package's folder name in both, `repairs` what was mended, by path. `kept` is for what the build hands over. Files
+    of more than 4 MB are not copied into each run: they lie in `large`, and links lead there; `copied_bytes` is the
+    rest."""
 
     built: Path
     repaired: Path
     large: Path
-    output: Path
+    kept: Path
     folder: str
     repairs: dict[str, tuple[str, ...]]
+    copied_bytes: int = 0
 
 
 def make_workspace(
@@ -55,11 +59,11 @@ def make_workspace(
         built=place / "ws",
         repaired=place / "run" / "src",
         large=place / "run" / "large",
-        output=place / "out",
+        kept=place / "kept",
         folder=_folder_name(submission.package),
         repairs={},
     )
-    workspace.output.mkdir()
+    workspace.kept.mkdir()
     copier = _Copier(workspace.large, Path(LARGE) if sandbox.bubblewrap else workspace.large)
     for package in needed_packages(submission):
         for source_tree in (workspace.built / "src", workspace.repaired):
@@ -71,9 +75,10 @@ def make_workspace(
         _give_browsers(package_copy / file.path, file)
     if facts.manifest is None:
         _replace_manifest(package_copy / "package.xml", workspace.folder)
-    for path in (workspace.built, workspace.output, place / "home"):
-        _give_to(path, sandbox.uid)
-    return workspace.model_copy(update={"repairs": repairs})
+    if not sandbox.bubblewrap:
+        for path in (workspace.built, place / "home"):
+            _give_to(path, sandbox.uid)
+    return workspace.model_copy(update={"repairs": repairs, "copied_bytes": copier.copied_bytes})
 
 
 def run_in_place(workspace: Workspace, sandbox: Sandbox) -> None:
@@ -120,6 +125,7 @@ class _Copier:
     def __init__(self, large: Path, large_inside: Path) -> None:
         self._large = large
         self._large_inside = large_inside
+        self.copied_bytes = 0
         large.mkdir(parents=True)
 
     def copy(self, package: SourcePackage, target: Path) -> None:
@@ -143,6 +149,7 @@ class _Copier:
             target.symlink_to(self._large_inside / name)
         else:
             shutil.copyfile(source, target)
+            self.copied_bytes += target.stat().st_size
             executable = package.executable.get(source.relative_to(package.folder).as_posix())
             if executable is None:
                 executable = package.mode_source == "none" and _starts_as_script(source)

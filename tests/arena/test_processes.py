@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.sandbox import Limits, why_not
+from grader.arena.limits import Limits
+from grader.arena.sandbox import why_not
 from tests.arena.support import exit_of, printed, run_script
 
 pytestmark = pytest.mark.ros
@@ -120,7 +121,7 @@ def test_memory_is_limited(tmp_path: Path) -> None:
     code = "import time\nblocks = []\nwhile True:\n    blocks.append(bytearray(20 << 20))\n    time.sleep(0.02)\n"
     run = run_script(tmp_path, code, limit_s=20, limits=Limits(memory_bytes=200 << 20))
     assert exit_of(run).stopped_by == "KILL"
-    assert any("limit of memory" in e.detail for _, e in run.actors)
+    assert any("MB of memory" in e.detail for _, e in run.actors)
 
 
 @pytest.mark.parametrize("sandbox", SANDBOXES)

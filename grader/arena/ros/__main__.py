@@ -13,8 +13,10 @@ import resource
 import signal
 import threading
 
+from groups import Groups
 from host import Lateness
 from loop import Loop
+from network import enter_own_network
 from processes import Process, kill_orphans
 from wire import Wire
 
@@ -27,6 +29,7 @@ class Arena:
     def __init__(self, wire, config):
         self._wire = wire
         self._limits = config["limits"]
+        self._cgroups = config["cgroups"]
         self._processes = {}
         self._finishing = False
         self._clock = None
@@ -77,9 +80,12 @@ class Arena:
         self._spawn(command["spec"])
 
     def _spawn(self, spec):
-        spec["env"].setdefault("ROS_MASTER_URI", os.environ.get("ROS_MASTER_URI", "http://127.0.0.1:11311"))
+        spec["env"]["ROS_MASTER_URI"] = os.environ.get("ROS_MASTER_URI", "http://127.0.0.1:11311")
         try:
-            self._processes[spec["name"]] = Process(self.loop, self._wire, spec, self._limits, self._exited)
+            groups = Groups(self._cgroups, self._limits) if spec["role"] != "grader" else None
+            self._processes[spec["name"]] = Process(
+                self.loop, self._wire, spec, self._limits, self._exited, groups=groups
+            )
         except OSError as error:
             self._wire.status("spawn-failed", name=spec["name"], detail=str(error))
 
@@ -203,7 +209,12 @@ def main():
     wire = Wire(os.dup(1))
     os.dup2(2, 1)
     with open(0, "rb", buffering=0, closefd=False) as commands:
-        config = json.loads(commands.readline().decode())
+        line = commands.readline()
+    if not line:
+        return  # the grader was ended before it could say anything
+    config = json.loads(line.decode())
+    if config["own_network"]:
+        enter_own_network()
     arena = Arena(wire, config)
     arena.loop.run()
     kill_orphans()

@@ -7,16 +7,19 @@ import signal
 import socket
 import subprocess
 
-LINE_BYTES_MAX = 4096
-READ_BYTES = 65536
+from streams import Collected, Lines
+from tree import cpu_s, descendants, resident_bytes
+
 WATCH_S = 0.5
-PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
 class Process:
-    """One process tree. `spec`: name, role, argv, env, cwd, sandboxed, script, repairs."""
+    """One process tree. `spec`: name, role, argv, env, cwd, sandboxed, collect, script, repairs.
 
-    def __init__(self, loop, wire, spec, limits, on_exit):
+    `collect` names a file for what the process writes to `{collect}`, and how many bytes of it are taken.
+    """
+
+    def __init__(self, loop, wire, spec, limits, on_exit, *, groups=None):
         self.name = spec["name"]
         self.role = spec["role"]
         self.alive = True
@@ -32,6 +35,8 @@ class Process:
         self._inner_pid = None
         self._open_streams = 0
         self._status = None
+        self._groups = groups
+        self._collected = None
         self._spawn(spec)
         self._event("start", argv=spec["argv_shown"], script=spec["script"], repairs=spec["repairs"])
         loop.call_later(WATCH_S, self._watch)
@@ -91,7 +96,9 @@ class Process:
     def _spawn(self, spec):
         lifeline, theirs = socket.socketpair()
         info_r, info_w = os.pipe() if spec["sandboxed"] else (None, None)
-        numbers = {"{lifeline}": str(theirs.fileno()), "{info_fd}": str(info_w)}
+        collect_r, collect_w = os.pipe() if spec["collect"] else (None, None)
+        passed = {"{lifeline}": theirs.fileno(), "{info_fd}": info_w, "{collect}": collect_w}
+        numbers = {name: str(number) for name, number in passed.items() if number is not None}
         self._popen = subprocess.Popen(
             [_filled_in(argument, numbers) for argument in spec["argv"]],
             stdin=subprocess.DEVNULL,
@@ -99,18 +106,23 @@ class Process:
             stderr=subprocess.PIPE,
             env=spec["env"],
             cwd=spec["cwd"],
-            pass_fds=[theirs.fileno()] + ([info_w] if info_w is not None else []),
+            pass_fds=[number for number in passed.values() if number is not None],
             start_new_session=True,
         )
         self.pid = self._popen.pid
         theirs.close()
-        if info_w is not None:
-            os.close(info_w)
+        for number in (info_w, collect_w):
+            if number is not None:
+                os.close(number)
+        if info_r is not None:
             self._read_info(info_r)
         self._give_leave(lifeline)
         for name, pipe in (("stdout", self._popen.stdout), ("stderr", self._popen.stderr)):
             self._open_streams += 1
-            _Stream(self, name, pipe)
+            Lines(self, name, pipe)
+        if collect_r is not None:
+            self._open_streams += 1
+            self._collected = Collected(self, collect_r, **spec["collect"])
 
     def _give_leave(self, lifeline):
         """The process is in its sandbox, which ends with the arena, and only now runs what it is to run."""
@@ -119,6 +131,8 @@ class Process:
             self.loop.remove_reader(lifeline)
             with contextlib.suppress(OSError):  # it has ended already
                 if lifeline.recv(1):
+                    if self._groups is not None:
+                        self._groups.take(self.tree())
                     lifeline.sendall(b"\n")
             lifeline.close()
 
@@ -154,12 +168,12 @@ class Process:
 
     def _tree(self):
         """The student's own processes, without bubblewrap's two."""
-        tree = _descendants(self.pid)
+        tree = descendants(self.pid)
         return [pid for pid in tree if pid != self._inner_pid]
 
     def tree(self):
         """Ids of all its processes, bubblewrap's own too."""
-        return [self.pid, *_descendants(self.pid)]
+        return [self.pid, *descendants(self.pid)]
 
     def left_behind(self):
         """Process ids of the tree that still run."""
@@ -168,20 +182,35 @@ class Process:
     def _watch(self):
         if not self.alive:
             return
-        tree = self.tree()
-        size = sum(map(_resident_bytes, tree))
-        self._peak_bytes = max(self._peak_bytes, size)
-        if size > self._limits["memory_bytes"]:
-            self._limit("memory", "{} MB in {} processes".format(size >> 20, len(tree)))
-        elif len(tree) > self._limits["processes"]:
-            self._limit("processes", "{} processes".format(len(tree)))
-        else:
+        excess = self._excess(self.tree()) if self.role != "grader" else None
+        if excess is None:
             self.loop.call_later(WATCH_S, self._watch)
+        else:
+            self._limit(excess)
+            self.kill()
 
-    def _limit(self, what, detail):
-        note = "stopped by the grader: limit of {}: {}".format(what, detail)
-        self._wire.event("/grader/actor", {"action": "note", "actor": self.name, "detail": note})
-        self.kill()
+    def _excess(self, tree):
+        """What the tree has too much of, in words, or None."""
+        size = sum(map(resident_bytes, tree))
+        self._peak_bytes = max(self._peak_bytes, size)
+        used_s = sum(map(cpu_s, tree))
+        if self._groups is not None and self._groups.memory_kills():
+            return self._too_much_memory()
+        held = self._groups is not None and self._groups.holds_memory
+        if size > self._limits["memory_bytes"] and not held:
+            return self._too_much_memory()
+        if len(tree) > self._limits["processes"]:
+            return "more than {} processes".format(self._limits["processes"])
+        if used_s > self._limits["cpu_s"]:
+            return "more than {:g} s of CPU time".format(self._limits["cpu_s"])
+        return None
+
+    def _too_much_memory(self):
+        return "more than {} MB of memory".format(self._limits["memory_bytes"] >> 20)
+
+    def _limit(self, excess):
+        detail = "stopped by the grader: {}".format(excess)
+        self._wire.event("/grader/actor", {"action": "limit", "actor": self.name, "detail": detail})
 
     def line(self, stream, data, cut):
         """One line of output; past the limits, output is read and thrown away."""
@@ -202,6 +231,9 @@ class Process:
         record = {"process": self.name, "stream": stream, "line": text, "truncated": cut}
         self._wire.event("/grader/console", record)
 
+    def too_much_collected(self):
+        self._limit("what the build left is more than {} MB".format(self._limits["built_bytes"] >> 20))
+
     def stream_closed(self):
         self._open_streams -= 1
         self._finish_when_read()
@@ -214,6 +246,9 @@ class Process:
         if not self.alive:
             return
         self.alive = False
+        if self._collected is not None:
+            self._collected.close()
+        self._leave_groups()
         status = self._status
         code = os.WEXITSTATUS(status) if os.WIFEXITED(status) else None
         self._event(
@@ -226,42 +261,18 @@ class Process:
         )
         self._on_exit(self)
 
+    def _leave_groups(self):
+        if self._groups is None:
+            return
+        if self._groups.memory_kills() and self._stopped_by != "KILL":
+            self._stopped_by = "KILL"
+            self._limit(self._too_much_memory())
+        if not self._groups.remove():
+            self.loop.call_later(WATCH_S, self._groups.remove)
+
     def _event(self, event, **fields):
         fields.update(event=event, name=self.name, role=self.role)
         self._wire.event("/grader/process", fields)
-
-
-class _Stream:
-    def __init__(self, process, name, pipe):
-        self._process = process
-        self._name = name
-        self._pipe = pipe
-        self._rest = b""
-        os.set_blocking(pipe.fileno(), False)
-        process.loop.add_reader(pipe, self._readable)
-
-    def _readable(self):
-        try:
-            chunk = os.read(self._pipe.fileno(), READ_BYTES)
-        except BlockingIOError:
-            return
-        if not chunk:
-            if self._rest:
-                self._process.line(self._name, self._rest, False)
-            self._process.loop.remove_reader(self._pipe)
-            self._pipe.close()
-            self._process.stream_closed()
-            return
-        *lines, self._rest = (self._rest + chunk).split(b"\n")
-        for line in lines:
-            self._line(line)
-        if len(self._rest) > LINE_BYTES_MAX:
-            self._line(self._rest)
-            self._rest = b""
-
-    def _line(self, line):
-        cut = len(line) > LINE_BYTES_MAX
-        self._process.line(self._name, line[:LINE_BYTES_MAX].rstrip(b"\r"), cut)
 
 
 def _filled_in(argument, numbers):
@@ -272,7 +283,7 @@ def _filled_in(argument, numbers):
 
 def kill_orphans():
     """End whatever still descends from the arena: without a sandbox, a student's daemon is adopted by it."""
-    for pid in _descendants(os.getpid()):
+    for pid in descendants(os.getpid()):
         _kill(pid, signal.SIGKILL)
 
 
@@ -284,29 +295,3 @@ def _signal_of(code):
 def _kill(pid, number):
     with contextlib.suppress(ProcessLookupError, PermissionError):  # already over
         os.kill(pid, number)
-
-
-def _descendants(pid):
-    found = []
-    try:
-        threads = os.listdir("/proc/{}/task".format(pid))
-    except OSError:
-        return found
-    for thread in threads:
-        try:
-            with open("/proc/{}/task/{}/children".format(pid, thread)) as file:
-                children = [int(child) for child in file.read().split()]
-        except OSError:
-            continue
-        for child in children:
-            found.append(child)
-            found.extend(_descendants(child))
-    return found
-
-
-def _resident_bytes(pid):
-    try:
-        with open("/proc/{}/statm".format(pid)) as file:
-            return int(file.read().split()[1]) * PAGE_BYTES
-    except (OSError, IndexError, ValueError):
-        return 0

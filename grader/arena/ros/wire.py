@@ -69,6 +69,9 @@ class Wire:
 
     def _write(self, data):
         view = memoryview(data)
-        with self._lock:
+        with (
+            self._lock,
+            contextlib.suppress(BrokenPipeError),
+        ):  # nobody reads any more: the end of stdin says so too
             while view:
                 view = view[os.write(self._fd, view) :]

@@ -1,0 +1,112 @@
+"""Where this machine lets the grader make control groups: they hold the memory and the tasks of a whole process tree.
+
+Sources: the kernel's documentation, admin-guide/cgroup-v2 and admin-guide/cgroup-v1/memory.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal
+
+from grader.model.record import Record
+
+MOUNTINFO = Path("/proc/self/mountinfo")
+MEMBERSHIP = Path("/proc/self/cgroup")
+KEYS = {
+    ("memory", 1): "memory.limit_in_bytes",
+    ("memory", 2): "memory.max",
+    ("pids", 1): "pids.max",
+    ("pids", 2): "pids.max",
+}
+
+
+class Cgroup(Record):
+    """One controller: new groups are made below `folder`."""
+
+    version: Literal[1, 2]
+    folder: str
+
+
+class Cgroups(Record):
+    """The controllers that can be used, None for one that cannot."""
+
+    memory: Cgroup | None = None
+    pids: Cgroup | None = None
+
+    @property
+    def label(self) -> str:
+        return f"cgroup v{self.memory.version}" if self.memory else "a watchdog"
+
+
+@lru_cache(maxsize=1)
+def find_cgroups() -> Cgroups:
+    """What is there and works: a group is made, limited and removed to see it."""
+    return Cgroups(memory=_find("memory"), pids=_find("pids"))
+
+
+def describe() -> str:
+    """For `grader doctor`: what holds memory and tasks, and why it is no cgroup where it is none."""
+    found = find_cgroups()
+    memory = f"memory by {found.label}"
+    tasks = f"tasks by cgroup v{found.pids.version}" if found.pids else "tasks by rlimits and a watchdog"
+    why = "" if found.memory else "; no control group of this process can be written"
+    return f"{memory}, {tasks}{why}"
+
+
+def _find(controller: str) -> Cgroup | None:
+    for version, folder in _own_groups(controller):
+        if _usable(folder, KEYS[controller, version]):
+            return Cgroup(version=version, folder=str(folder))
+    return None
+
+
+def _own_groups(controller: str) -> list[tuple[Literal[1, 2], Path]]:
+    """The group that this process is in, as a folder, for each hierarchy that may have the controller."""
+    try:
+        mounts = [line.split() for line in MOUNTINFO.read_text().splitlines()]
+        groups = [line.split(":", 2) for line in MEMBERSHIP.read_text().splitlines()]
+    except OSError:
+        return []
+    found: list[tuple[Literal[1, 2], Path]] = []
+    for _, names, path in groups:
+        if names == "":
+            found += [(2, _below(m, path)) for m in mounts if _type(m) == "cgroup2"]
+        elif controller in names.split(","):
+            found += [
+                (1, _below(m, path))
+                for m in mounts
+                if _type(m) == "cgroup" and controller in m[-1].split(",")
+            ]
+    return found
+
+
+def _type(mount: list[str]) -> str:
+    """The file system of a line of mountinfo (man 5 proc_pid_mountinfo): the first field after the dash."""
+    return mount[mount.index("-") + 1] if "-" in mount else ""
+
+
+def _below(mount: list[str], path: str) -> Path:
+    """Where the group `path` is below a mount point, whose own root may be a group already."""
+    root, point = mount[3], Path(mount[4])
+    inside = os.path.relpath(path, root) if path.startswith(root) else "."
+    return point / inside
+
+
+def _usable(folder: Path, key: str) -> bool:
+    trial = folder / f"grader-trial-{secrets.token_hex(4)}"
+    try:
+        trial.mkdir()
+    except OSError:
+        return False
+    try:
+        (trial / key).write_text("1073741824" if key.startswith("memory") else "512")
+    except OSError:
+        return False
+    finally:
+        with suppress(OSError):  # an empty group of ours: it hurts nobody if it stays
+            trial.rmdir()
+    return True

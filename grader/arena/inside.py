@@ -1,0 +1,57 @@
+"""What every sandbox shows besides the system: paths inside of it, one user, `python`, stand-ins."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+from grader.arena.ros_env import RosInstallation
+from grader.arena.standins import copy_standins
+
+HOME = "/home/student"
+INSIDE_WORKSPACE = f"{HOME}/catkin_ws"
+OUTPUT = "/run/grader/out"
+SOURCES = "/run/grader/src"
+BUILT = "/run/grader/built.tar"
+LARGE = "/run/grader/large"
+SHIMS = "/run/grader/bin"
+STANDINS = "/run/grader/standins"
+SYNTAX = Path(__file__).parent / "ros" / "syntax.py"
+TERMINAL = Path(__file__).parent / "ros" / "terminal.sh"
+TERMINALS = (
+    "gnome-terminal", "konsole", "lxterminal", "mate-terminal", "rxvt", "terminator", "tilix", "urxvt",
+    "x-terminal-emulator", "xfce4-terminal", "xterm",
+)  # fmt: skip
+OPENER = (Path(__file__).parent / "ros" / "open.sh", Path(__file__).parent / "ros" / "opener.py")
+BROWSERS = (
+    "brave-browser", "chromium", "chromium-browser", "firefox", "firefox-esr", "google-chrome", "google-chrome-stable",
+    "opera", "sensible-browser", "www-browser", "x-www-browser", "xdg-open",
+)  # fmt: skip
+
+
+def prepare(place: Path, ros: RosInstallation) -> None:
+    """Write what every inner layer binds: `etc/` with one user in it, `bin/` with `python` as ROS means it, stand-ins
+    for terminals, which launch files name as their `launch-prefix`, and for browsers, and `standins/` with the
+    packages that this ROS lacks."""
+    etc, shims = place / "etc", place / "bin"
+    for folder in (etc, shims, place / "home"):
+        folder.mkdir(parents=True)
+    (etc / "passwd").write_text(f"student:x:1000:1000:student:{HOME}:/bin/bash\n")
+    (etc / "group").write_text("student:x:1000:\n")
+    (etc / "hosts").write_text("127.0.0.1 localhost\n::1 localhost\n")
+    for name in ("python", "python3"):
+        (shims / name).symlink_to(ros.python)
+    shutil.copyfile(SYNTAX, shims / "grader-syntax.py")
+    _program(shims, TERMINAL, "grader-terminal", TERMINALS)
+    _program(shims, OPENER[0], "grader-open", BROWSERS)
+    shutil.copyfile(OPENER[1], shims / "grader-open.py")
+    copy_standins(place / "standins", ros)
+
+
+def _program(shims: Path, source: Path, name: str, called: Sequence[str]) -> None:
+    """One program under the names that it is called by."""
+    shutil.copyfile(source, shims / name)
+    (shims / name).chmod(0o755)
+    for other in called:
+        (shims / other).symlink_to(name)

@@ -1,0 +1,41 @@
+"""How much one run, one process tree or one submission may use."""
+
+from __future__ import annotations
+
+from typing_extensions import Self
+
+from grader.model.record import Record
+
+SUBMISSION_MESSAGE_BYTES = 160 << 20
+LEAST_RUN_BYTES = 8 << 20
+
+
+class Limits(Record):
+    """Memory, processes, tasks (threads count), CPU seconds, output and `home_bytes` (what its home may hold besides
+    the workspace's own files) are of one process tree; messages and bytes of one channel, or of one run (`run_bytes`,
+    `channels`)."""
+
+    memory_bytes: int = 1 << 30
+    processes: int = 200
+    tasks: int = 512
+    cpu_s: float = 300.0
+    output_lines: int = 20_000
+    output_bytes: int = 8 << 20
+    home_bytes: int = 256 << 20
+    tmp_bytes: int = 128 << 20
+    shared_bytes: int = 64 << 20
+    file_bytes: int = 64 << 20
+    open_files: int = 1024
+    address_space_bytes: int = 8 << 30
+    built_bytes: int = 96 << 20
+    channel_messages: int = 20_000
+    channel_bytes: int = 64 << 20
+    run_bytes: int = 64 << 20
+    channels: int = 300
+
+    def shared_by(self, runs: int) -> Self:
+        """The limits of each of so many runs of one submission: together they record no more than one may."""
+        run_bytes = max(LEAST_RUN_BYTES, min(self.run_bytes, SUBMISSION_MESSAGE_BYTES // max(1, runs)))
+        return self.model_copy(
+            update={"run_bytes": run_bytes, "channel_bytes": min(self.channel_bytes, run_bytes)}
+        )

@@ -1,0 +1,74 @@
+"""Control groups of one process tree: memory and tasks are held by the kernel, for all of it together."""
+
+import contextlib
+import os
+import secrets
+
+KEYS = {
+    ("memory", 1): "memory.limit_in_bytes",
+    ("memory", 2): "memory.max",
+    ("pids", 1): "pids.max",
+    ("pids", 2): "pids.max",
+}
+SWAP = {1: "memory.memsw.limit_in_bytes", 2: "memory.swap.max"}
+KILLS = {1: "memory.oom_control", 2: "memory.events"}
+
+
+class Groups:
+    """`cgroups` maps `memory` and `pids` to {version, folder}, or to None (grader/arena/cgroups.py finds them)."""
+
+    def __init__(self, cgroups, limits):
+        self._made = {}
+        wanted = {"memory": limits["memory_bytes"], "pids": limits["tasks"]}
+        for controller, amount in wanted.items():
+            found = cgroups.get(controller)
+            if found:
+                self._make(controller, found["version"], found["folder"], amount)
+
+    def _make(self, controller, version, parent, amount):
+        folder = os.path.join(parent, "grader-{}-{}".format(os.getpid(), secrets.token_hex(6)))
+        try:
+            os.mkdir(folder)
+            _write(folder, KEYS[controller, version], amount)
+        except OSError:
+            return  # then the watchdog is alone
+        self._made[controller] = (version, folder)
+        if controller == "memory":
+            with contextlib.suppress(OSError):  # a kernel without swap accounting
+                _write(folder, SWAP[version], amount if version == 1 else 0)
+
+    @property
+    def holds_memory(self):
+        return "memory" in self._made
+
+    def take(self, pids):
+        """These processes, and all that they start from now on, belong to the groups."""
+        for _, folder in self._made.values():
+            for pid in pids:
+                with contextlib.suppress(OSError):  # it has ended
+                    _write(folder, "cgroup.procs", pid)
+
+    def memory_kills(self):
+        """How often the kernel killed a process because the tree had too much memory."""
+        if "memory" not in self._made:
+            return 0
+        version, folder = self._made["memory"]
+        try:
+            with open(os.path.join(folder, KILLS[version])) as file:
+                rows = [line.split() for line in file]
+        except OSError:
+            return 0
+        return sum(int(row[1]) for row in rows if row[0] == "oom_kill")
+
+    def remove(self):
+        """Once its processes have ended. Gives back whether nothing is left."""
+        for controller, (_, folder) in list(self._made.items()):
+            with contextlib.suppress(OSError):  # a process of it is still ending
+                os.rmdir(folder)
+                del self._made[controller]
+        return not self._made
+
+
+def _write(folder, name, value):
+    with open(os.path.join(folder, name), "w") as file:
+        file.write(str(value))

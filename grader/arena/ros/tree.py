@@ -1,0 +1,52 @@
+"""A tree of processes as /proc shows it (man 5 proc)."""
+
+import os
+
+TICKS_HZ = os.sysconf("SC_CLK_TCK")
+PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+PROCESSES_MAX = 5000
+
+
+def descendants(pid):
+    """Ids of all that runs below a process, of as many as a look may cost."""
+    found = []
+    waiting = [pid]
+    while waiting and len(found) < PROCESSES_MAX:
+        children = _children(waiting.pop())
+        found.extend(children)
+        waiting.extend(children)
+    return found
+
+
+def _children(pid):
+    try:
+        threads = os.listdir("/proc/{}/task".format(pid))
+    except OSError:
+        return []  # it has ended
+    return [child for thread in threads for child in _children_of_thread(pid, thread)]
+
+
+def _children_of_thread(pid, thread):
+    try:
+        with open("/proc/{}/task/{}/children".format(pid, thread)) as file:
+            return [int(child) for child in file.read().split()]
+    except OSError:
+        return []
+
+
+def cpu_s(pid):
+    """Of a process and of the children that it waited for."""
+    try:
+        with open("/proc/{}/stat".format(pid)) as file:
+            fields = file.read().rpartition(")")[2].split()
+        return sum(int(ticks) for ticks in fields[11:15]) / TICKS_HZ
+    except (OSError, IndexError, ValueError):
+        return 0.0
+
+
+def resident_bytes(pid):
+    try:
+        with open("/proc/{}/statm".format(pid)) as file:
+            return int(file.read().split()[1]) * PAGE_BYTES
+    except (OSError, IndexError, ValueError):
+        return 0
