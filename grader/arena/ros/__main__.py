@@ -15,6 +15,7 @@ import threading
 
 from groups import Groups
 from host import Lateness
+from keys import leave_keys_behind
 from loop import Loop
 from network import enter_own_network
 from processes import Process, kill_orphans
@@ -213,6 +214,7 @@ def main():
     if not line:
         return  # the grader was ended before it could say anything
     config = json.loads(line.decode())
+    leave_keys_behind()
     if config["own_network"]:
         enter_own_network()
     arena = Arena(wire, config)

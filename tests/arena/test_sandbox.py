@@ -1,0 +1,215 @@
+"""What a student's process can reach, write and use up."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+from pathlib import Path
+
+import pytest
+
+from grader.arena import cgroups, sandbox
+from grader.arena.build import build
+from grader.arena.cgroups import Cgroup, Cgroups
+from grader.arena.limits import SUBMISSION_MESSAGE_BYTES, Limits
+from grader.arena.sandbox import why_not
+from grader.evidence.reader import load_run
+from grader.evidence.run import Run
+from grader.evidence.writer import EvidenceWriter
+from tests.arena.support import CMAKE, SCRIPT, exit_of, make_place, printed, run_script
+
+pytestmark = pytest.mark.ros
+needs_sandbox = pytest.mark.skipif(bool(why_not()), reason=f"no sandbox here: {why_not()}")
+SMALL = Limits(home_bytes=6 << 20, tmp_bytes=4 << 20, shared_bytes=2 << 20)
+
+
+def limits_met(run: Run) -> list[str]:
+    return [event.detail for _, event in run.actors if event.action == "limit"]
+
+
+@needs_sandbox
+def test_only_memory_of_fixed_size_can_be_written(tmp_path: Path) -> None:
+    code = """
+import os
+for line in open("/proc/self/mountinfo"):
+    left, right = line.split(" - ")
+    point, kind = left.split()[4], right.split()[0]
+    try:
+        open(os.path.join(point, "grader-was-here"), "w").close()
+        print("wrote", point, kind)
+    except OSError:
+        pass
+for folder in ("/dev", "/", "/run", "/run/grader", "/home", "/etc", "/proc", "/sys", "/var", "/root"):
+    try:
+        os.mkdir(folder + "/grader-was-here")
+        print("wrote", folder, "folder")
+    except OSError:
+        pass
+def fill(folder):
+    size = 0
+    for number in range(64):
+        try:
+            with open("%s/block%d" % (folder, number), "wb", buffering=0) as file:
+                size += file.write(bytes(1 << 20))
+        except OSError as error:
+            return size, error.errno
+    return size, None
+for folder in ("/tmp", "/dev/shm", os.environ["HOME"]):
+    print("filled", folder, *fill(folder))
+"""
+    run = run_script(tmp_path, code, limit_s=20, limits=SMALL)
+    lines = printed(run)
+    wrote = {tuple(line.split()[1:]) for line in lines if line.startswith("wrote")}
+    assert wrote == {("/tmp", "tmpfs"), ("/dev/shm", "tmpfs"), ("/home/student", "tmpfs")}, lines
+    filled = {line.split()[1]: line.split()[2:] for line in lines if line.startswith("filled")}
+    assert set(filled) == {"/tmp", "/dev/shm", "/home/student"}
+    for folder, (size, number) in filled.items():
+        assert int(number) == errno.ENOSPC, folder
+        assert int(size) <= 6 << 20, folder
+
+
+@needs_sandbox
+def test_nothing_nests_and_nobody_gains_rights(tmp_path: Path) -> None:
+    code = """
+import ctypes, os
+libc = ctypes.CDLL(None, use_errno=True)
+for name, flag in (("user", 0x10000000), ("net", 0x40000000), ("mount", 0x00020000)):
+    print(name, libc.unshare(flag))
+print("mount", libc.mount(b"none", b"/tmp", b"tmpfs", 0, None))
+status = dict(line.split(":", 1) for line in open("/proc/self/status"))
+print("capabilities", int(status["CapEff"], 16), int(status["CapPrm"], 16), "new", status["NoNewPrivs"].strip())
+print("limits", open("/proc/self/limits").read().count("unlimited") >= 0)
+"""
+    lines = printed(run_script(tmp_path, code, limit_s=10))
+    assert {"user -1", "net -1", "mount -1", "capabilities 0 0 new 1"} <= set(lines), lines
+
+
+@needs_sandbox
+def test_the_grader_is_out_of_sight_wherever_it_is_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sandbox, "OWN_FOLDER", Path("/usr/share/doc"))
+    code = "import os\nprint('found', os.listdir('/usr/share/doc'))\nopen('/usr/share/doc/x', 'w')\n"
+    lines = printed(run_script(tmp_path, code, limit_s=10))
+    assert "found []" in lines
+
+
+@needs_sandbox
+def test_memory_is_that_of_the_whole_tree(tmp_path: Path) -> None:
+    """Eight children that stay small each, and files in memory."""
+    code = """
+import os, time
+for number in range(8):
+    if os.fork() == 0:
+        block = bytearray(os.urandom(1 << 20)) * 40
+        time.sleep(60)
+for number in range(4):
+    with open("/dev/shm/block%d" % number, "wb") as file:
+        file.write(bytes(8 << 20))
+time.sleep(60)
+"""
+    run = run_script(tmp_path, code, limit_s=20, limits=Limits(memory_bytes=200 << 20))
+    assert exit_of(run).stopped_by == "KILL"
+    assert limits_met(run) == ["stopped by the grader: more than 200 MB of memory"]
+
+
+@pytest.mark.parametrize("kind", ["auto", "none"])
+def test_without_cgroups_a_watchdog_holds_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    monkeypatch.setattr(sandbox, "find_cgroups", Cgroups)
+    code = "import time\nblocks = []\nwhile True:\n    blocks.append(bytearray(20 << 20))\n    time.sleep(0.05)\n"
+    run = run_script(tmp_path, code, limit_s=20, limits=Limits(memory_bytes=200 << 20), sandbox=kind)
+    assert exit_of(run).stopped_by == "KILL"
+    assert limits_met(run) == ["stopped by the grader: more than 200 MB of memory"]
+
+
+@needs_sandbox
+def test_a_fork_bomb_ends_in_its_own_sandbox(tmp_path: Path) -> None:
+    code = """
+import os
+while True:
+    try:
+        os.fork()
+    except OSError:
+        pass
+"""
+    run = run_script(tmp_path, code, limit_s=3, limits=Limits(tasks=100, processes=50))
+    assert exit_of(run).stopped_by == "KILL"
+    assert limits_met(run) in (["stopped by the grader: more than 50 processes"], [])
+
+
+def test_cpu_time_is_that_of_the_whole_tree(tmp_path: Path) -> None:
+    code = "import os\nfor _ in range(3): os.fork()\nwhile True: pass\n"
+    run = run_script(tmp_path, code, limit_s=20, limits=Limits(cpu_s=1.0))
+    assert limits_met(run) == ["stopped by the grader: more than 1 s of CPU time"]
+
+
+def test_runs_of_one_submission_share_what_may_be_recorded() -> None:
+    for runs in (1, 4, 10):
+        limits = Limits().shared_by(runs)
+        assert limits.run_bytes * runs <= SUBMISSION_MESSAGE_BYTES
+        assert limits.channel_bytes <= limits.run_bytes
+    assert Limits().shared_by(1000).run_bytes == 8 << 20
+
+
+@needs_sandbox
+def test_what_a_build_leaves_is_bounded(tmp_path: Path) -> None:
+    big = "execute_process(COMMAND dd if=/dev/zero of=${CATKIN_DEVEL_PREFIX}/big bs=1M count=40)\n"
+    with make_place(
+        {"CMakeLists.txt": CMAKE + big, "src/node.py": SCRIPT}, limits=Limits(built_bytes=16 << 20)
+    ) as place:
+        path = tmp_path / "package.mcap"
+        with EvidenceWriter(path, scenario="package", clock="real", warp=1.0, metadata={}) as writer:
+            asyncio.run(build(place, writer, [], []))
+        assert not place.archive.exists()
+        assert [path.name for path in place.workspace.kept.iterdir()] == ["syntax.jsonl"]
+        assert [path.name for path in place.workspace.built.iterdir()] == ["src"]
+    assert limits_met(load_run(path)) == ["what the build left is more than 16 MB"]
+
+
+@needs_sandbox
+def test_environment_hooks_lead_no_node_elsewhere(tmp_path: Path) -> None:
+    hook = "catkin_add_env_hooks(50.lab SHELLS sh DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/hooks)\n"
+    files = {
+        "CMakeLists.txt": CMAKE + hook,
+        "hooks/50.lab.sh": "export ROS_MASTER_URI=http://192.0.2.1:1 ROS_IP=192.0.2.1 ROS_LAB=mine\n",
+        "src/node.py": SCRIPT,
+    }
+    with make_place(files) as place:
+        path = tmp_path / "package.mcap"
+        with EvidenceWriter(path, scenario="package", clock="real", warp=1.0, metadata={}) as writer:
+            built, outcome = asyncio.run(build(place, writer, [], []))
+        env = built.spec("node", ["true"])["env"]
+    assert outcome.ok
+    assert (env["ROS_LAB"], env["ROS_IP"], env.get("ROS_MASTER_URI")) == ("mine", "127.0.0.1", None)
+
+
+V1 = "30 20 0:26 / /sys/fs/cgroup/memory rw,relatime shared:9 - cgroup cgroup rw,memory\n"
+V2 = "31 20 0:27 /docker/abc /sys/fs/cgroup rw,nosuid - cgroup2 cgroup rw,nsdelegate\n"
+
+
+@pytest.fixture
+def tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, Path]:
+    mounts, groups = tmp_path / "mountinfo", tmp_path / "cgroup"
+    monkeypatch.setattr(cgroups, "MOUNTINFO", mounts)
+    monkeypatch.setattr(cgroups, "MEMBERSHIP", groups)
+    return mounts, groups
+
+
+def test_control_groups_are_found_where_this_process_is(tables: tuple[Path, Path]) -> None:
+    mounts, groups = tables
+    mounts.write_text(V1 + V2)
+    groups.write_text("4:memory:/user/7\n0::/docker/abc/init\n")
+    found = cgroups._own_groups("memory")
+    assert found == [(1, Path("/sys/fs/cgroup/memory/user/7")), (2, Path("/sys/fs/cgroup/init"))]
+    groups.write_text("0::/../elsewhere\n")
+    assert cgroups._own_groups("memory") == [(2, Path("/sys/fs/cgroup"))]
+    mounts.unlink()
+    assert cgroups._own_groups("memory") == []
+
+
+def test_a_control_group_counts_only_if_it_can_be_limited(tmp_path: Path) -> None:
+    assert not cgroups._usable(tmp_path / "none", "memory.max")
+    assert cgroups.Cgroups().label == "a watchdog"
+    assert Cgroups(memory=Cgroup(version=2, folder="/x")).label == "cgroup v2"
