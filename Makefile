@@ -28,10 +28,10 @@ lint: setup ## style and types
 	@$(BIN)/mypy
 
 test-pure: setup ## the tests that need no ROS
-	@$(BIN)/python -m pytest -m "not ros"
+	@$(BIN)/python -m pytest -m "not ros" -n 2
 
 test-ros: setup ## the tests that run real nodes
-	@$(BIN)/python -m pytest -m ros
+	@$(BIN)/python -m pytest -m ros -n 2 --dist loadfile
 
 stress: setup ## the reference solution and every fixture, TIMES times each
 	@$(BIN)/python -m tests.stress --times $(TIMES)

@@ -16,6 +16,7 @@ from grader.model.verdict import FileCitation
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
 RACE = "publish() to a closed topic"
+LIMITS = ("limit", "note")  # evidence of earlier versions has it as a note
 CAUSES = {
     "EOFError": (
         "it asks for input (`input()`), and a node is given none",
@@ -80,13 +81,12 @@ def explain_end(life: Life, run: Run, package: PackageFacts) -> Ending:
     """Why a process ended: a name that ROS refuses, its last traceback, a limit, a signal, or its last words."""
     if refused := _refused_name(life, run):
         return refused
+    if limit := _limit(life, run):
+        return Ending(limit, "a node of this lab needs little memory, few processes and little time", ())
     found = process_tracebacks(run, life.name)
     code = life.end.exit_code if life.end else None
     if found and code != 0:
         return explain_traceback(found[-1], package)
-    limit = next((e.detail for _, e in run.actors if e.action == "note" and e.actor == life.name), "")
-    if limit:
-        return Ending(limit, "a node of this lab needs little memory and one process", ())
     if life.end is not None and life.end.signal is not None and life.end.stopped_by is None:
         return Ending(f"{_signal_name(life.end.signal)} ended it", RUN_IT, ())
     if code == 0:
@@ -95,6 +95,12 @@ def explain_end(life: Life, run: Run, package: PackageFacts) -> Ending:
     last = next((line.line for _, line in reversed(list(run.lines(life.name))) if line.line.strip()), "")
     words = f"; its last words: {shown(last)}" if last else ""
     return Ending(f"it exited with code {code}{words}", RUN_IT, ())
+
+
+def _limit(life: Life, run: Run) -> str:
+    """What it had too much of, so that it was stopped."""
+    met = (e.detail for _, e in run.actors if e.action in LIMITS and e.actor == life.name)
+    return next((detail for detail in met if detail.startswith("stopped by the grader")), "")
 
 
 def _refused_name(life: Life, run: Run) -> Ending | None:
