@@ -1,0 +1,167 @@
+"""The form of an attack (README.md), and where attacks are found."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import yaml
+from pydantic import AfterValidator, Field, model_validator
+from typing_extensions import Self
+
+from grader.model.record import Record
+from grader.model.verdict import Status
+
+HERE = Path(__file__).resolve().parent
+ATTACKS = HERE / "attacks"
+VICTIM = HERE / "victim"
+
+User = Literal["root", "ordinary"]
+Mode = Annotated[str, Field(pattern=r"^[0-7]{3,4}$")]
+
+
+def _compiles(pattern: str) -> str:
+    re.compile(pattern)
+    return pattern
+
+
+Pattern = Annotated[str, AfterValidator(_compiles)]
+Statuses = dict[str, Status | tuple[Status, ...]]
+
+
+class Bytes(Record):
+    """A file's content that is no text."""
+
+    base64: str
+
+
+class Entry(Record):
+    """One entry of an archive; `zeros` bytes of nothing where there is no other content."""
+
+    path: str = ""
+    raw_name: str | None = None
+    type: Literal["file", "folder", "link", "hardlink", "fifo", "device"] = "file"
+    text: str | None = None
+    base64: str | None = None
+    zeros: int = 0
+    target: str = ""
+    mode: Mode = "644"
+    encrypted: bool = False
+
+
+class Archive(Record):
+    format: Literal["zip", "tar", "tar.gz"]
+    victim: bool = True
+    entries: tuple[Entry, ...] = ()
+
+
+class Written(Record):
+    path: str
+    text: str
+    mode: Mode = "644"
+
+
+class Linked(Record):
+    path: str
+    target: str
+
+
+class Step(Record):
+    """One step of making a repository; exactly one of the keys."""
+
+    git: tuple[str, ...] = ()
+    write: Written | None = None
+    link: Linked | None = None
+    remove: str | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if sum(map(bool, (self.git, self.write, self.link, self.remove))) != 1:
+            raise ValueError("a step is one of git, write, link, remove")
+        return self
+
+
+class Generator(Record):
+    """A function of makers.py, and its arguments."""
+
+    make: str
+    arguments: dict[str, Any] = Field(default_factory=dict)
+
+
+class ExpectedError(Record):
+    kind: str | tuple[str, ...]
+    message: Pattern
+
+
+class Attack(Record):
+    """One attack or broken submission; README.md says what each key means."""
+
+    title: Annotated[str, Field(min_length=5, max_length=80)]
+    tries: Annotated[str, Field(min_length=10, pattern=r"\.$")]
+    attacker: str | None = None
+    builder: str | None = None
+    files: dict[str, str | Bytes] = Field(default_factory=dict)
+    remove: tuple[str, ...] = ()
+    modes: dict[str, Mode] = Field(default_factory=dict)
+    links: dict[str, str] = Field(default_factory=dict)
+    archive: Archive | None = None
+    repository: tuple[Step, ...] | None = None
+    generator: Generator | None = None
+    source: str = "{path}"
+    arguments: tuple[str, ...] = ()
+    env: dict[str, str] = Field(default_factory=dict)
+    rubric: str = "rubric.yaml"
+    expect: Statuses = Field(default_factory=dict)
+    error: ExpectedError | None = None
+    noticed: tuple[Pattern, ...] = ()
+    says: tuple[Pattern, ...] | None = None
+    never: tuple[Pattern, ...] = ()
+    shows: tuple[Pattern, ...] = ()
+    user: Literal["root", "ordinary", "both"] = "root"
+    after: Literal["static", "full"] = "static"
+    installed: bool = False
+    wall_s: Annotated[float, Field(gt=0, le=200)] = 45
+    finding: str | None = None
+
+    @property
+    def must_say(self) -> tuple[str, ...]:
+        """An attack that never ran proves nothing."""
+        return self.says if self.says is not None else (r"tried",) if self.attacker or self.builder else ()
+
+    @property
+    def users(self) -> tuple[User, ...]:
+        return ("root", "ordinary") if self.user == "both" else (self.user,)
+
+
+def attack_names() -> list[str]:
+    found = [path.stem for path in ATTACKS.glob("*.yaml")]
+    return sorted(found + [path.parent.name for path in ATTACKS.glob("*/attack.yaml")])
+
+
+@cache
+def load_attack(name: str) -> Attack:
+    return Attack.model_validate(yaml.safe_load(_declaration(name).read_text(encoding="utf-8")))
+
+
+def rubric_path(name: str) -> Path:
+    """Beside the attack in a folder of its own, or beside this file."""
+    attack = load_attack(name)
+    own = _declaration(name).parent / attack.rubric
+    return own if own.is_file() and own.parent != ATTACKS else HERE / attack.rubric
+
+
+def submission_job(name: str) -> Mapping[str, Any]:
+    """What the room needs in order to make the submission, as JSON."""
+    attack = load_attack(name)
+    beside = ATTACKS / name / "package"
+    fields = {"attacker", "builder", "files", "remove", "modes", "links", "archive", "repository", "generator"}
+    made = attack.model_dump(mode="json", include=fields)
+    return made | {"name": name, "beside": str(beside) if beside.is_dir() else None}
+
+
+def _declaration(name: str) -> Path:
+    single = ATTACKS / f"{name}.yaml"
+    return single if single.is_file() else ATTACKS / name / "attack.yaml"

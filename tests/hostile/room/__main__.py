@@ -1,0 +1,128 @@
+"""`python -m tests.hostile.room SCRATCH < job > report.tar`, as the first process of its namespaces."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import stat
+import sys
+import tarfile
+import time
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from tests.hostile.room import canaries, state, submission, world
+from tests.hostile.room.watch import Watched, reap, watch
+
+ROOT = Path(__file__).resolve().parents[3]
+LEFT_S = 2.0
+KEPT = ("PATH", "GRADER_ROS_SETUP", "CONDA_PREFIX")
+AFTER_WALL_S = 60.0
+
+
+def main() -> None:
+    job = json.load(sys.stdin)
+    room = Room(job, world.enter(Path(sys.argv[1])))
+    report = room.grade_attack()
+    report["after"] = asdict(room.grade_victim())
+    _send(report, room.results)
+
+
+class Room:
+    """One grading of a hostile submission, then one of the victim, by one user."""
+
+    def __init__(self, job: Mapping[str, Any], place: world.World) -> None:
+        self._job, self._world = job, place
+        for group in job["groups"]:
+            Path(group, "cgroup.procs").write_text("0", encoding="utf-8")
+        world.bring_up_loopback()
+        ordinary = job["user"] == "ordinary"
+        if ordinary:
+            world.add_user()
+        self._uid = world.ORDINARY_UID if ordinary else 0
+        self._home = Path("/home", world.ORDINARY_NAME) if ordinary else Path("/root")
+        self._python_path = world.install() if job["installed"] else ROOT
+        canaries.place(job["secret"], job["rubric"], self._home)
+        submission.give(self._home / ".ssh", self._uid)
+        self._path = submission.make(job["submission"], canaries.HANDED_IN, self._uid)
+        os.chown(canaries.RESULTS, self._uid, self._uid)
+        self.results = canaries.RESULTS / job["submission"]["name"]
+        self._services = canaries.Services(job["secret"])
+
+    def grade_attack(self) -> dict[str, Any]:
+        source = self._job["source"].replace("{path}", str(self._path))
+        argv = ["grade", source, "--rubric", str(canaries.RUBRIC), "--out", str(canaries.RESULTS)]
+        return self._observed([*argv, "--id", self.results.name, *self._job["arguments"]])
+
+    def grade_victim(self) -> Watched:
+        """In the place of what was handed in before, by the same student."""
+        folder = canaries.TOP / "again" / self.results.name
+        submission.victim(folder / "lab")
+        submission.give(folder, self._uid)
+        rubric = canaries.RUBRIC.with_name("after.yaml")
+        rubric.write_text(self._job["after_rubric"], encoding="utf-8")
+        command = ["grade", str(folder)] if self._job["after"] == "full" else ["check", str(folder), "--static"]
+        argv = [*command, "--rubric", str(rubric), "--out", str(canaries.RESULTS)]
+        return self._watch(argv, {}, AFTER_WALL_S)
+
+    def _observed(self, argv: list[str]) -> dict[str, Any]:
+        results = str(self.results).lstrip("/")
+        files, sockets, packets = state.files(self._world, results), state.sockets(), state.packets()
+        settings, groups = state.settings(), self._job["groups"]
+        scratch, shared = state.folder(canaries.SCRATCH), state.folder(Path("/dev/shm"))  # noqa: S108 - looked at
+        watched = self._watch(argv, self._job["env"], self._job["wall_s"])
+        left = self._processes_left()
+        return asdict(watched) | {
+            "processes": left,
+            "sockets": sorted(state.sockets() - sockets),
+            "groups": sorted(state.control_groups(groups)),
+            "packets": state.packets() - packets,
+            "asked": self._services.asked,
+            "settings": [name for name, value in state.settings().items() if value != settings[name]],
+            "scratch": sorted(set(state.folder(canaries.SCRATCH)) ^ set(scratch)),
+            "shared": sorted(set(state.folder(Path("/dev/shm"))) ^ set(shared)),  # noqa: S108 - looked at
+            "changed": state.changed(files, state.files(self._world, results)),
+            "odd": [str(path) for path in self.results.rglob("*") if not _plain(path)],
+        }
+
+    def _watch(self, argv: list[str], env: Mapping[str, str], wall_s: float) -> Watched:
+        secret = self._job["secret"]
+        env = {
+            **{name: os.environ[name] for name in KEPT if name in os.environ},
+            "HOME": str(self._home), "LANG": "C.UTF-8", "TMPDIR": str(canaries.SCRATCH),
+            "PYTHONPATH": str(self._python_path), "PYTHONDONTWRITEBYTECODE": "1",
+            "GITHUB_TOKEN": f"{secret}-environment", "ROS_MARKS_PASSWORD": f"{secret}-environment-ros",
+            **env,
+        }  # fmt: skip
+        return watch([sys.executable, "-m", "grader", *argv], env, self._uid, wall_s, self._world.used_bytes)
+
+    def _processes_left(self) -> list[str]:
+        """Those that are still there when the time is over in which they have to go."""
+        deadline = time.monotonic() + LEFT_S
+        reap()
+        while (left := state.processes(os.getpid())) and time.monotonic() < deadline:
+            os.sched_yield()
+            reap()
+        return left
+
+
+def _plain(path: Path) -> bool:
+    mode = path.lstat().st_mode
+    return stat.S_ISREG(mode) or stat.S_ISDIR(mode)
+
+
+def _send(report: dict[str, Any], results: Path) -> None:
+    data = json.dumps(report).encode()
+    with tarfile.open(fileobj=sys.stdout.buffer, mode="w|") as tar:
+        info = tarfile.TarInfo("report.json")
+        info.size = len(data)
+        tar.addfile(info, io.BytesIO(data))
+        for path in sorted(results.rglob("*")):
+            if path.is_file() and _plain(path):
+                tar.add(path, f"results/{path.relative_to(results)}")
+
+
+main()

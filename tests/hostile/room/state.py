@@ -1,0 +1,118 @@
+"""What is in the room at one moment: files that differ from the machine's, processes, sockets, settings of the kernel."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from tests.hostile.room.world import World
+
+Entry = tuple[object, ...]
+HASHED_BYTES_MAX = 32 << 20
+SETTINGS = ("kernel/core_pattern", "kernel/modprobe", "kernel/hostname", "vm/overcommit_memory", "kernel/sysrq")
+LISTENS, TIME_WAIT = "0A", "06"
+
+
+def files(world: World, without: str) -> dict[str, Entry]:
+    """Whatever differs from the machine's own files, by path; `without` is a folder that is left out."""
+    return dict(_walk(world, without))
+
+
+def _walk(world: World, without: str) -> Iterator[tuple[str, Entry]]:
+    for top, folders, names, descriptor in os.fwalk(".", dir_fd=world.changes):
+        here = top.removeprefix(".").lstrip("/")
+        folders[:] = [name for name in folders if _join(here, name) != without]
+        for name in (*folders, *names):
+            path = _join(here, name)
+            found = os.stat(name, dir_fd=descriptor, follow_symlinks=False)
+            owner = (stat.filemode(found.st_mode), found.st_uid, found.st_gid)
+            if stat.S_ISDIR(found.st_mode):
+                if not _same_folder(world, path, found):
+                    yield path, owner
+            else:
+                yield path, (*owner, found.st_size, found.st_mtime_ns, found.st_rdev, _content(name, descriptor, found))
+
+
+def _join(folder: str, name: str) -> str:
+    return f"{folder}/{name}" if folder else name
+
+
+def _same_folder(world: World, path: str, found: os.stat_result) -> bool:
+    """The overlay holds a folder as soon as something in it was touched."""
+    try:
+        before = os.stat(path, dir_fd=world.machine, follow_symlinks=False)
+    except OSError:
+        return False
+    return (before.st_mode, before.st_uid, before.st_gid) == (found.st_mode, found.st_uid, found.st_gid)
+
+
+def _content(name: str, descriptor: int, found: os.stat_result) -> str:
+    if stat.S_ISLNK(found.st_mode):
+        return os.readlink(name, dir_fd=descriptor)
+    if not stat.S_ISREG(found.st_mode) or found.st_size > HASHED_BYTES_MAX:
+        return ""
+    with os.fdopen(os.open(name, os.O_RDONLY | os.O_NOFOLLOW, dir_fd=descriptor), "rb") as file:
+        return hashlib.sha256(file.read()).hexdigest()
+
+
+def changed(before: dict[str, Entry], after: dict[str, Entry]) -> list[str]:
+    """A line for each path that is new, gone or different."""
+    lines = [f"{path}: {before[path]} became {after[path]}" for path in before if path in after and before[path] != after[path]]
+    lines += [f"{path}: gone" for path in before.keys() - after.keys()]
+    return sorted(lines + [f"{path}: new: {after[path]}" for path in after.keys() - before.keys()])
+
+
+def folder(path: Path) -> list[str]:
+    """Everything below it, whatever it is."""
+    return sorted(str(found.relative_to(path)) for found in path.rglob("*"))
+
+
+def processes(own: int) -> list[str]:
+    """What still runs beside this program, whose process id is `own`."""
+    found = []
+    for pid in filter(str.isdigit, os.listdir("/proc")):  # noqa: PTH208 - names alone
+        try:
+            state = Path("/proc", pid, "stat").read_bytes().rpartition(b")")[2].split()[0]
+            command = Path("/proc", pid, "cmdline").read_bytes()
+        except OSError:  # it has ended since
+            continue
+        if int(pid) != own and state not in {b"Z", b"X"}:
+            found.append(f"{pid} {state.decode()} {command.decode(errors='replace')[:120]!r}")
+    return found
+
+
+def sockets() -> set[str]:
+    """What listens or has a name, in this network namespace."""
+    found = set()
+    for protocol in ("tcp", "tcp6", "udp", "udp6", "raw"):
+        for fields in _rows(protocol):
+            if fields[3] != TIME_WAIT:
+                found.add(f"{protocol} {fields[1]} {'listens' if fields[3] == LISTENS else ''}".rstrip())
+    return found | {f"unix {fields[7]}" for fields in _rows("unix") if len(fields) > 7}
+
+
+def _rows(name: str) -> list[list[str]]:
+    path = Path("/proc/self/net", name)
+    return [line.split() for line in path.read_text().splitlines()[1:]] if path.is_file() else []
+
+
+def packets() -> int:
+    """Sent over the loopback, which is where everything would go."""
+    lines = Path("/proc/self/net/dev").read_text().splitlines()
+    return next(int(line.split(":")[1].split()[1]) for line in lines if line.strip().startswith("lo:"))
+
+
+def settings() -> dict[str, str]:
+    found = {}
+    for name in SETTINGS:
+        path = Path("/proc/sys", name)
+        found[name] = path.read_text() if path.is_file() else ""
+    return found
+
+
+def control_groups(own: Iterable[str]) -> set[str]:
+    """Below the room's own ones."""
+    return {str(path) for group in own for path in Path(group).rglob("*") if path.is_dir()}
