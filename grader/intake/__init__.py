@@ -13,7 +13,7 @@ from grader.errors import GraderError, OutputError, SubmissionError
 from grader.intake.find import enclosing_package, find_packages
 from grader.intake.git import Git
 from grader.intake.limits import Limits
-from grader.intake.names import printable, safe_name
+from grader.intake.names import brief, printable, safe_name
 from grader.intake.open import describe, locate, open_source
 from grader.intake.recordings import find_recordings, is_recording, several, single
 from grader.intake.source import Source, parse_source
@@ -53,9 +53,10 @@ def open_submission(
     with _base(workdir) as base:
         try:
             git = Git(base / "git-home", timeout_s=git_timeout_s)
-            opened = open_source(parsed, git, base, limits or Limits())
+            limits = limits or Limits()
+            opened = open_source(parsed, git, base, limits)
             located = locate(opened, package)
-            submission = describe(located, git)
+            submission = describe(located, git, limits)
         except OSError as error:
             raise _unreadable(parsed.given, error) from error
     if submission_id is None:
@@ -110,9 +111,10 @@ def _parsed(source: str) -> Source:
 def _unreadable(given: str, error: OSError) -> GraderError:
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return OutputError(f"{given}: the disk is full", hint="Free some room (`df -h`) and try again.")
-    where = f" at {printable(str(error.filename))}" if error.filename else ""
+    where = f" at {brief(str(error.filename))}" if error.filename else ""
     return SubmissionError(
-        f"{given} cannot be read: {error.strerror or error}{where}", hint="Check its permissions (`ls -l`)."
+        f"{given} cannot be read: {error.strerror or brief(str(error))}{where}",
+        hint="Check its permissions (`ls -l`).",
     )
 
 

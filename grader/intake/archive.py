@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.errors import SubmissionError
-from grader.intake.limits import Limits
-from grader.intake.names import is_archive_name, printable
+from grader.intake.limits import Limits, too_much
+from grader.intake.names import brief, is_archive_name
 from grader.intake.tars import is_packed, unpack_tar
 from grader.intake.unpack import Unpacker
 from grader.intake.zips import unpack_zip
@@ -52,11 +52,13 @@ def unpack(path: Path, into: Path, limits: Limits) -> Unpacked:
 
     Raises SubmissionError for what is no archive, is damaged, has a password, is too large or reaches out.
     """
-    name = printable(path.name)
+    name = brief(path.name)
     with path.open("rb") as stream:
         head = stream.read(_BLOCK)
+    if path.stat().st_size > limits.packed_bytes:
+        raise too_much(name, f"is larger than {limits.packed_bytes >> 20} MiB")
     into.mkdir(parents=True)
-    unpacker = Unpacker(into, name=name, limits=limits, packed_bytes=path.stat().st_size)
+    unpacker = Unpacker(into, name=name, limits=limits)
     try:
         if _looks_like_zip(path, head):
             unpack_zip(path, unpacker)
@@ -73,7 +75,7 @@ def unpack(path: Path, into: Path, limits: Limits) -> Unpacked:
         raise _damaged(name, error) from None
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:
-            raise SubmissionError(f"{name} holds a file whose name is too long", hint="Shorten it.") from None
+            raise SubmissionError(f"{name} holds a path that is too long", hint="Shorten it.") from None
         # gzip and bz2 report what is damaged in this way too, but without a number.
         if error.errno is not None:
             raise
@@ -101,7 +103,7 @@ def _looks_like_tar(head: bytes) -> bool:
 
 
 def _no_archive(path: Path, head: bytes) -> SubmissionError:
-    name = printable(path.name)
+    name = brief(path.name)
     if not head:
         return SubmissionError(f"{name} is empty", hint=_KINDS)
     foreign = next((what for magic, what in _FOREIGN.items() if head.startswith(magic)), None)
@@ -117,7 +119,7 @@ def _no_archive(path: Path, head: bytes) -> SubmissionError:
 def _damaged(name: str, error: Exception) -> SubmissionError:
     what = "a name stands for a file and a folder at once" if getattr(error, "errno", None) else str(error)
     return SubmissionError(
-        f"{name} is damaged or incomplete ({printable(what) or type(error).__name__})",
+        f"{name} is damaged or incomplete ({brief(what) or type(error).__name__})",
         hint="Download or pack it again.",
     )
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 from grader.errors import SubmissionError
-from grader.intake.git import GitFailed, GitMissing, GitTimeout
-from grader.intake.names import printable
+from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
+from grader.intake.names import brief
 from grader.intake.source import Source
 
 _PRIVATE = (
@@ -16,6 +16,11 @@ _NETWORK = "Check the address and the network, and try `git ls-remote URL`."
 _PAGE = "This looks like a page of the website: give the repository's own address, then @branch."
 # In this order: the first that fits what git said is the cause.
 _CAUSES: tuple[tuple[str, str, str], ...] = (
+    (
+        r"invalid path",
+        "it holds a path that git itself does not write (`.git`, `..`)",
+        "Take it out of the repository, commit and push.",
+    ),
     (
         r"Host key verification failed",
         "this machine does not know the server's ssh key",
@@ -80,6 +85,11 @@ def explained(failure: GitFailed, source: Source) -> SubmissionError:
             f"{source.given}: {failure.stderr}",
             hint="Check the network, or clone it by hand and give the folder.",
         )
+    if isinstance(failure, GitTooMuch):
+        return SubmissionError(
+            f"{source.given}: the repository is larger than a lab's submission may be",
+            hint="Hand in the package's folder alone, without recordings and data.",
+        )
     for pattern, cause, hint in _CAUSES:
         if re.search(pattern, failure.stderr):
             page = re.search(r"/(tree|blob)/|/-/", source.url)
@@ -92,4 +102,4 @@ def said(failure: GitFailed, source: Source) -> str:
     lines = [line.strip() for line in failure.stderr.splitlines() if line.strip()]
     fatal = [line for line in lines if line.startswith(("fatal:", "error:", "remote:"))]
     line = (fatal or lines or ["nothing"])[-1].removeprefix("fatal: ").removeprefix("error: ")
-    return printable(line.replace(source.url, source.given) if source.url else line)
+    return brief(line.replace(source.url, source.given) if source.url else line)

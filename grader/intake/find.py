@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,6 +57,21 @@ def find_candidates(root: Path, *, leave_out: Path | None = None) -> list[Candid
         if hidden:
             ignored.update({folder.inside(name): hidden for name in folder.folders})
     return found
+
+
+def linked_candidate(root: Path, wanted: str) -> Candidate | None:
+    """A package of that name behind a link of that name, if the link stays inside of `root`; catkin follows such."""
+    real_root = root.resolve()
+    for folder in walk(root, tolerant=True):
+        folder.folders[:] = [name for name in folder.folders if name not in NO_CONTENT]
+        for entry in folder.others:
+            if entry.name.casefold() == wanted.casefold() and entry.is_symlink():
+                place = Path(os.path.realpath(entry.path))
+                if place.is_relative_to(real_root) and is_file(place / MANIFEST):
+                    path = place.relative_to(real_root).as_posix()
+                    if manifest_name(place, root=real_root) == wanted:
+                        return Candidate(path=path, folder=place, manifest=wanted)
+    return None
 
 
 def find_packages(root: Path) -> list[tuple[str, Path]]:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import tempfile
 import time
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
@@ -26,12 +28,24 @@ _QUIET = {
     "protocol.ext.allow": "never",
     "gc.auto": "0",
     "maintenance.auto": "false",
+    "core.protectHFS": "true",
+    "core.protectNTFS": "true",
+    "core.bigFileThreshold": "16m",
+    "credential.guiPrompt": "false",
 }
+# Of each of git's processes: a pack (or a list of refs) is one file, and a delta can stand for any size.
+_FILE_BYTES = 180 << 20
+_MEMORY_BYTES = 2 << 30
 # What a hook or another git sets (GIT_DIR, GIT_INDEX_FILE, …) would lead us to another repository; what says
 # how to reach a server stays.
 _NETWORK_KEPT = re.compile(
     r"GIT_(SSH.*|SSL_.*|PROXY_.*|HTTP_.*|CONFIG_(GLOBAL|SYSTEM|NOSYSTEM|COUNT|(KEY|VALUE)_\d+)|EXEC_PATH)"
 )
+
+
+_ANSWER_BYTES = 16 << 20
+_SAID_BYTES = 64 << 10
+_TOO_MUCH = re.compile(r"File too large|signal 25\b|[Oo]ut of memory|cannot allocate|mmap failed")
 
 
 class GitFailed(Exception):
@@ -50,39 +64,59 @@ class GitTimeout(GitFailed):
     """git was stopped because its time was up."""
 
 
+class GitTooMuch(GitFailed):
+    """git was stopped because it wrote more than a submission may be."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Repository:
+    """Where git is to look, so that it never goes and finds a repository by itself: one may lie in any folder."""
+
+    git_dir: Path
+    top: Path
+
+
 class Git:
     """All calls together take at most `timeout_s`. `home` is a folder of ours for git's own settings."""
 
     def __init__(self, home: Path, *, timeout_s: float) -> None:
         self.timeout_s = timeout_s
         self._deadline = time.monotonic() + timeout_s
-        self._home = home
+        self.home = home
         self._ssh_command: str | None = None
         home.mkdir(parents=True, exist_ok=True)
         # Only a file of settings is heeded for this key by every git since 2.25, by `upload-pack` too.
         (home / ".gitconfig").write_text("[safe]\n\tdirectory = *\n", encoding="utf-8")
 
-    def run(self, *args: str, cwd: Path, remote: bool = False) -> bytes:
+    def run(self, *args: str, cwd: Path, repository: Repository | None = None, remote: bool = False) -> bytes:
         """What `git *args` prints in `cwd`. `remote` lets it use the network and the user's own settings.
 
         Raises GitFailed, GitMissing or GitTimeout.
         """
         with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-            with self._started(args, cwd, remote=remote, stdout=out, stderr=err) as process:
+            whole = (*_place(repository), *args)
+            with self._started(whole, cwd, remote=remote, stdout=out, stderr=err) as process:
                 try:
                     code = process.wait(max(0.0, self._deadline - time.monotonic()))
                 except subprocess.TimeoutExpired:
                     raise GitTimeout(f"no answer within {self.timeout_s:g} s") from None
             out.seek(0)
             err.seek(0)
+            if code in (-signal.SIGXFSZ, 128 + signal.SIGXFSZ):
+                raise GitTooMuch("larger than the limit")
             if code != 0:
-                raise GitFailed(err.read().decode("utf-8", "replace"))
-            return out.read()
+                said = err.read(_SAID_BYTES).decode("utf-8", "replace")
+                raise GitTooMuch(said) if _TOO_MUCH.search(said) else GitFailed(said)
+            answer = out.read(_ANSWER_BYTES + 1)
+        if len(answer) > _ANSWER_BYTES:
+            raise GitTooMuch(f"git {args[0]} has no end")
+        return answer
 
-    def records(self, *args: str, cwd: Path) -> Generator[bytes]:
+    def records(self, *args: str, cwd: Path, repository: Repository) -> Generator[bytes]:
         """The NUL-ended records that git prints, one by one, so that a caller can stop an endless listing."""
+        whole = (*_place(repository), *args)
         with self._started(
-            args, cwd, remote=False, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+            whole, cwd, remote=False, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
         ) as process:
             stream = process.stdout
             assert stream is not None  # noqa: S101 - opened with PIPE
@@ -91,8 +125,8 @@ class Git:
                 while block := stream.read(1 << 16):
                     if time.monotonic() > self._deadline:
                         raise GitTimeout(f"no end within {self.timeout_s:g} s")
-                    *whole, rest = (rest + block).split(b"\0")
-                    yield from whole
+                    *ended, rest = (rest + block).split(b"\0")
+                    yield from ended
             if process.wait() != 0:
                 raise GitFailed(f"git {args[0]} failed")
 
@@ -107,9 +141,11 @@ class Git:
         stderr: IO[bytes] | int,
     ) -> Iterator[subprocess.Popen[bytes]]:
         options = [part for key, value in _QUIET.items() for part in ("-c", f"{key}={value}")]
+        if shutil.which("git") is None:
+            raise GitMissing("git is not installed")
         try:
             process = subprocess.Popen(
-                ["git", *options, *args],  # noqa: S607 - the user's git, wherever it is
+                [*_limits(), "git", *options, *args],
                 cwd=cwd,
                 env=self._remote_environment(cwd) if remote else self._local_environment(),
                 stdin=subprocess.DEVNULL,
@@ -130,8 +166,8 @@ class Git:
         return {
             **kept,
             **_ASK_NOTHING,
-            "HOME": str(self._home),
-            "GIT_CONFIG_GLOBAL": str(self._home / ".gitconfig"),
+            "HOME": str(self.home),
+            "GIT_CONFIG_GLOBAL": str(self.home / ".gitconfig"),
             "GIT_CONFIG_NOSYSTEM": "1",
             "GIT_ALLOW_PROTOCOL": "file",
             "GIT_NO_LAZY_FETCH": "1",
@@ -176,6 +212,19 @@ _ASK_NOTHING = {
     "GIT_LFS_SKIP_SMUDGE": "1",
     "GIT_OPTIONAL_LOCKS": "0",
 }
+
+
+def _place(repository: Repository | None) -> tuple[str, ...]:
+    if repository is None:
+        return ()
+    return (f"--git-dir={repository.git_dir}", f"--work-tree={repository.top}")
+
+
+def _limits() -> tuple[str, ...]:
+    """For git and all that it starts. Where there is no `prlimit`, there is no ROS either, nor a sandbox."""
+    if shutil.which("prlimit") is None:
+        return ()
+    return ("prlimit", f"--fsize={_FILE_BYTES}", f"--as={_MEMORY_BYTES}", "--core=0", "--")
 
 
 def _configured_ssh(environment: dict[str, str], cwd: Path) -> str:

@@ -7,48 +7,70 @@ from dataclasses import dataclass
 from grader.errors import SubmissionError
 from grader.intake.tree import MAX_DEPTH, too_deep
 
+# A file takes whole blocks of a disk, however little is in it.
+_BLOCK_BYTES = 4096
+
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """`ratio` is unpacked to packed size; it counts above `ratio_floor_bytes`: an empty map packs well."""
+    """Of an archive: `packed_bytes` as it is handed in, `stream_bytes` that come out of a packed tar, kept or not.
 
-    total_bytes: int = 1 << 30
+    Of an archive or a commit: `entries`, and `total_bytes` on this machine's disk. A file of more than `file_bytes`
+    (`recording_bytes` for a bag or MCAP) is left out, and so are the largest of a package of more than
+    `package_bytes`, which is copied twice. `links` have a relative target: each is followed to see where it leads.
+    """
+
+    packed_bytes: int = 1 << 30
+    stream_bytes: int = 1 << 30
+    total_bytes: int = 100 << 20
+    file_bytes: int = 32 << 20
+    recording_bytes: int = 96 << 20
+    package_bytes: int = 48 << 20
     entries: int = 100_000
-    ratio: int = 200
-    ratio_floor_bytes: int = 100 << 20
+    package_files: int = 10_000
+    links: int = 2_000
+
+    def largest_bytes(self, path: str) -> int:
+        """How large the file of that name may be."""
+        return self.recording_bytes if path.lower().endswith((".bag", ".mcap")) else self.file_bytes
 
 
 class Meter:
-    """Counts what is taken from a source and refuses more than the limits, and `allowance_bytes`, allow."""
+    """Counts what is taken from a source and refuses more than the limits allow."""
 
-    def __init__(
-        self, limits: Limits, *, name: str, packed_bytes: int | None = None, allowance_bytes: int = 0
-    ) -> None:
+    def __init__(self, limits: Limits, *, name: str) -> None:
         self._limits = limits
         self._name = name
-        self._packed_bytes = packed_bytes
         self._entries = 0
-        self._bytes = -allowance_bytes
+        self._bytes = 0
+        self._folders: set[str] = set()
 
     def entry(self, path: str) -> None:
+        """Count an entry of any kind, by its path."""
         self._entries += 1
         if path.count("/") > MAX_DEPTH:
             raise too_deep(self._name)
         if self._entries > self._limits.entries:
-            self._refuse(f"holds more than {self._limits.entries} files")
+            raise too_much(self._name, f"holds more than {self._limits.entries} files")
+
+    def folders(self, path: str) -> None:
+        """Count the folders on the way to `path`, each once: they take room as well."""
+        above = path.rpartition("/")[0]
+        while above and above not in self._folders:
+            self._folders.add(above)
+            self.data(1)
+            above = above.rpartition("/")[0]
 
     def data(self, size_bytes: int) -> None:
-        self._bytes += size_bytes
+        """Count a file that is to be written."""
+        self._bytes += -(-size_bytes // _BLOCK_BYTES) * _BLOCK_BYTES
         if self._bytes > self._limits.total_bytes:
-            self._refuse(f"is larger than {self._limits.total_bytes >> 20} MiB when unpacked")
-        packed = self._packed_bytes
-        if packed is None or self._bytes <= self._limits.ratio_floor_bytes:
-            return
-        if self._bytes > self._limits.ratio * packed:
-            self._refuse(f"unpacks to more than {self._limits.ratio} times its size")
+            raise too_much(self._name, f"is larger than {self._limits.total_bytes >> 20} MiB when unpacked")
 
-    def _refuse(self, what: str) -> None:
-        raise SubmissionError(
-            f"{self._name} {what}, which is more than a lab's submission may be",
-            hint="Hand in the package alone, without build/, devel/ and recordings.",
-        )
+
+def too_much(name: str, what: str) -> SubmissionError:
+    """The error for a source that goes beyond the limits."""
+    return SubmissionError(
+        f"{name} {what}, which is more than a lab's submission may be",
+        hint="Hand in the package alone, without build/, devel/ and recordings.",
+    )

@@ -7,8 +7,11 @@ from pathlib import Path
 
 from lxml import etree
 
+from grader.intake.tree import read_file
+
 MANIFEST = "package.xml"
 _LARGEST_BYTES = 1 << 20
+_LONGEST_NAME = 255
 
 
 def manifest_name(folder: Path, *, root: Path) -> str | None:
@@ -22,11 +25,10 @@ def manifest_name(folder: Path, *, root: Path) -> str | None:
     if os.path.commonpath([real, os.path.realpath(root)]) != os.path.realpath(root):
         return None
     try:
-        with path.open("rb") as stream:
-            data = stream.read(_LARGEST_BYTES + 1)
+        data = read_file(path, _LARGEST_BYTES + 1)
     except OSError:
         return None
-    return None if len(data) > _LARGEST_BYTES else _name(data)
+    return None if data is None or len(data) > _LARGEST_BYTES else _name(data)
 
 
 def _name(data: bytes) -> str | None:
@@ -39,5 +41,6 @@ def _name(data: bytes) -> str | None:
     for child in root if root is not None else ():
         if isinstance(child.tag, str) and etree.QName(child).localname == "name":
             text = [child.text or "", *(part.tail or "" for part in child)]
-            return " ".join("".join(text).split()) or None
+            name = " ".join("".join(text).split())
+            return name if 0 < len(name) <= _LONGEST_NAME else None
     return None

@@ -5,16 +5,20 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterable, Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from grader.intake.find import BUILD_SPACES
-from grader.intake.git import Git, GitFailed, GitMissing
-from grader.intake.names import listing, printable
-from grader.intake.tree import Entry, is_there
+from grader.intake.git import Git, GitFailed, GitMissing, Repository
+from grader.intake.gitdir import Repositories, Unfit
+from grader.intake.names import brief, listing, printable
+from grader.intake.tree import Entry, read_file
 from grader.model.submission import ModeSource
 
 _SCRIPTS = (".py", ".sh", ".bash")
+_MAX_TRACKED = 200_000
+_DIFFERENCES_SHOWN = 50
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,10 +38,10 @@ def archive_modes(entries: Iterable[Entry], known: Mapping[str, bool | None], *,
     return Modes(source="archive" if carried else "none", executable=executable)
 
 
-def folder_modes(entries: Iterable[Entry], folder: Path, git: Git) -> Modes:
+def folder_modes(entries: Iterable[Entry], folder: Path, repositories: Repositories) -> Modes:
     """git's word where the folder has tracked files, the disk's for the rest and where there is no git."""
     on_disk = {entry.path: entry.executable for entry in entries if entry.kind == "file"}
-    index, hints = _index(folder, git)
+    index, hints = _index(folder, repositories)
     tracked = {path: bit for path, bit in index.items() if path in on_disk}
     if not tracked:
         return Modes(source="disk", executable=dict(on_disk), hints=hints)
@@ -45,23 +49,31 @@ def folder_modes(entries: Iterable[Entry], folder: Path, git: Git) -> Modes:
     return Modes(source="git", executable={**on_disk, **tracked}, hints=hints)
 
 
-def _index(folder: Path, git: Git) -> tuple[dict[str, bool], tuple[str, ...]]:
+def _index(folder: Path, repositories: Repositories) -> tuple[dict[str, bool], tuple[str, ...]]:
     """The tracked files below the folder with git's executable bit, and a hint where git cannot be asked."""
-    if not any(is_there(place / ".git") for place in (folder, *folder.parents)):
-        return {}, ()
     try:
-        listed = git.run("ls-files", "--stage", "-z", cwd=folder)
+        repository = repositories.around(folder)
+        return ({}, ()) if repository is None else (_tracked(folder, repository, repositories.git), ())
     except GitMissing:
         return {}, ("git is not installed here: executable bits were read from the disk",)
+    except Unfit as unfit:
+        said = str(unfit)
     except GitFailed as failure:
-        said = printable((failure.stderr.strip().splitlines() or [""])[-1])
-        return {}, (f"git cannot read this repository ({said}): executable bits were read from the disk",)
-    index = {}
-    for record in filter(None, listed.split(b"\0")):
-        meta, _, path = record.partition(b"\t")
-        if not meta.startswith(b"160000"):
-            index[os.fsdecode(path)] = meta.startswith(b"100755")
-    return index, ()
+        said = brief((failure.stderr.strip().splitlines() or [""])[-1])
+    return {}, (f"git cannot read this repository ({said}): executable bits were read from the disk",)
+
+
+def _tracked(folder: Path, repository: Repository, git: Git) -> dict[str, bool]:
+    index: dict[str, bool] = {}
+    listing_args = ("ls-files", "--stage", "-z")
+    with closing(git.records(*listing_args, cwd=folder, repository=repository)) as records:
+        for record in records:
+            meta, _, path = record.partition(b"\t")
+            if not meta.startswith(b"160000"):
+                index[os.fsdecode(path)] = meta.startswith(b"100755")
+            if len(index) > _MAX_TRACKED:
+                raise GitFailed(f"its index lists more than {_MAX_TRACKED} files")
+    return index
 
 
 def _is_script(folder: Path, path: str) -> bool:
@@ -71,16 +83,17 @@ def _is_script(folder: Path, path: str) -> bool:
     if path.endswith(_SCRIPTS):
         return True
     try:
-        with (folder / path).open("rb") as stream:
-            return stream.read(2) == b"#!"
+        return read_file(folder / path, 2) == b"#!"
     except OSError:
         return False
 
 
 def _differences(folder: Path, on_disk: Mapping[str, bool], tracked: Mapping[str, bool]) -> list[str]:
-    hints = []
+    hints: list[str] = []
     differing = (path for path, in_git in sorted(tracked.items()) if on_disk[path] != in_git)
     for path in differing:
+        if len(hints) == _DIFFERENCES_SHOWN:
+            break
         if not _is_script(folder, path):
             continue
         shown = printable(path)
@@ -99,13 +112,3 @@ def _untracked(folder: Path, on_disk: Mapping[str, bool], tracked: Mapping[str, 
     return (
         [f"not in git yet, so not handed in by a push: {listing(new)} (git add, git commit)"] if new else []
     )
-
-
-def head_commit(folder: Path, git: Git) -> str | None:
-    """The full hash that is checked out around `folder`; None where there is no repository or no commit."""
-    if not any(is_there(place / ".git") for place in (folder, *folder.parents)):
-        return None
-    try:
-        return git.run("rev-parse", "--verify", "--quiet", "HEAD^{commit}", cwd=folder).decode().strip()
-    except GitFailed:
-        return None

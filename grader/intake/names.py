@@ -13,6 +13,7 @@ _LETTERS = str.maketrans(
 )
 _ARCHIVE_SUFFIX = re.compile(r"\.(zip|tar|tar\.(gz|xz|bz2)|tgz|txz|tbz2?)$", re.IGNORECASE)
 _SHOWN_AT_MOST = 5
+_SHOWN_LETTERS = 120
 
 
 def safe_name(text: str) -> str:
@@ -37,6 +38,15 @@ def printable(text: str) -> str:
     return "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in shown)
 
 
+def brief(text: str) -> str:
+    """`text` as `printable` shows it, cut in the middle where it is too long for a message."""
+    shown = printable(
+        text[: _SHOWN_LETTERS * 2] + text[-_SHOWN_LETTERS:] if len(text) > 3 * _SHOWN_LETTERS else text
+    )
+    half = _SHOWN_LETTERS // 2
+    return shown if len(shown) <= _SHOWN_LETTERS else f"{shown[:half]}...{shown[-half:]}"
+
+
 def encodable(text: str) -> bool:
     """Whether `text` is UTF-8; a file's name on Linux need not be."""
     return not any("\ud800" <= char <= "\udfff" for char in text)
@@ -53,6 +63,6 @@ def is_archive_name(name: str) -> bool:
 
 def listing(names: list[str]) -> str:
     """The first few of `names` for a message, and how many more there are."""
-    shown = ", ".join(printable(name) for name in names[:_SHOWN_AT_MOST])
+    shown = ", ".join(brief(name) for name in names[:_SHOWN_AT_MOST])
     more = len(names) - _SHOWN_AT_MOST
     return f"{shown} and {more} more" if more > 0 else shown

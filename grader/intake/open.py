@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.errors import SubmissionError
 from grader.intake.archive import unpack
 from grader.intake.choose import Choice, choose, not_found
+from grader.intake.content import Content, package_content
 from grader.intake.digest import tree_digest
-from grader.intake.find import Candidate, enclosing_package, find_candidates
-from grader.intake.git import Git
+from grader.intake.find import Candidate, enclosing_package, find_candidates, linked_candidate
+from grader.intake.git import Git, Repository
+from grader.intake.gitdir import Repositories
 from grader.intake.limits import Limits
-from grader.intake.modes import Modes, archive_modes, folder_modes, head_commit
+from grader.intake.modes import Modes, archive_modes, folder_modes
 from grader.intake.names import encodable, printable, safe_name
+from grader.intake.remarks import remarks
 from grader.intake.repository import clone
 from grader.intake.source import Source
-from grader.intake.tree import Entry, is_there, list_entries
+from grader.intake.tree import Entry, is_there
 from grader.model.submission import SourcePackage, Submission
 
-_ODD_NAMES_SHOWN = 3
+_OTHERS_AT_MOST = 200
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +41,7 @@ class Opened:
     commit: str | None = None
     archive_sha256: str | None = None
     archive_modes: Mapping[str, bool | None] | None = None
+    repository: Repository | None = None
     git_links: tuple[str, ...] = ()
     hints: tuple[str, ...] = ()
 
@@ -58,7 +62,12 @@ def open_source(source: Source, git: Git, base: Path, limits: Limits) -> Opened:
     if source.kind == "repository":
         cloned = clone(source, git, into, limits)
         return replace(
-            opened, root=cloned.root, commit=cloned.commit, git_links=cloned.git_links, hints=cloned.hints
+            opened,
+            root=cloned.root,
+            commit=cloned.commit,
+            repository=cloned.repository,
+            git_links=cloned.git_links,
+            hints=cloned.hints,
         )
     path = source.path
     assert path is not None  # noqa: S101 - folders and archives have one
@@ -93,49 +102,62 @@ def locate(opened: Opened, wanted: str) -> Located:
 def _locate(opened: Opened, wanted: str) -> Located | None:
     candidates = find_candidates(opened.root, leave_out=opened.leave_out)
     choice = choose(candidates, wanted)
+    if choice is None and (linked := linked_candidate(opened.root, wanted)):
+        choice = Choice(package=linked, hints=(f"{wanted} is a link, followed to {printable(linked.path)}",))
     return Located(opened=opened, candidates=candidates, choice=choice) if choice else None
 
 
-def describe(located: Located, git: Git) -> Submission:
+def describe(located: Located, git: Git, limits: Limits) -> Submission:
     """The record that the next station reads. Raises OSError for a file that cannot be read."""
     opened, choice = located.opened, located.choice
     chosen = choice.package
-    entries = list_entries(chosen.folder, leave_out=opened.leave_out)
-    modes = _modes(opened, chosen, entries, git)
+    repositories = Repositories(git, opened.leave_out, root=opened.root, known=opened.repository)
+    content = package_content(chosen.folder, limits=limits, leave_out=opened.leave_out)
+    modes = _modes(opened, chosen, content.entries, repositories)
     others = [c for c in located.candidates if c.has_manifest and not c.ignored_by and c.name != chosen.name]
+    notes = remarks(chosen.folder, content.entries, content.left_out)
     return Submission(
         id=safe_name(opened.name),
         source=opened.source.given,
         root=opened.root,
-        commit=_commit(opened, chosen, modes, git),
+        commit=_commit(opened, chosen, modes, repositories),
         archive_sha256=opened.archive_sha256,
-        digest=tree_digest(chosen.folder, entries, modes.executable),
-        package=_package(chosen, modes),
-        packages=tuple(_other(opened, candidate, git) for candidate in others),
-        hints=(*opened.hints, *choice.hints, *modes.hints, *_odd_names(modes)),
+        digest=tree_digest(chosen.folder, content.entries, modes.executable, content.left_out),
+        package=_package(chosen, modes, content),
+        packages=tuple(_others(opened, others[:_OTHERS_AT_MOST], repositories, limits)),
+        hints=(*opened.hints, *choice.hints, *modes.hints, *content.hints, *notes),
     )
 
 
-def _commit(opened: Opened, chosen: Candidate, modes: Modes, git: Git) -> str | None:
+def _commit(opened: Opened, chosen: Candidate, modes: Modes, repositories: Repositories) -> str | None:
     """A folder that merely lies somewhere in a repository, untracked, is not of that repository's commit."""
     if not opened.in_place:
         return opened.commit
     is_top = is_there(opened.root / ".git") or is_there(chosen.folder / ".git")
-    return head_commit(chosen.folder, git) if is_top or modes.source == "git" else None
+    return repositories.head(chosen.folder) if is_top or modes.source == "git" else None
 
 
-def _modes(opened: Opened, candidate: Candidate, entries: list[Entry], git: Git) -> Modes:
+def _modes(opened: Opened, candidate: Candidate, entries: list[Entry], repositories: Repositories) -> Modes:
     if opened.archive_modes is not None:
         return archive_modes(entries, opened.archive_modes, path=candidate.path)
-    return folder_modes(entries, candidate.folder, git)
+    return folder_modes(entries, candidate.folder, repositories)
 
 
-def _other(opened: Opened, candidate: Candidate, git: Git) -> SourcePackage:
-    entries = list_entries(candidate.folder, leave_out=opened.leave_out, tolerant=True)
-    return _package(candidate, _modes(opened, candidate, entries, git))
+def _others(
+    opened: Opened, candidates: list[Candidate], repositories: Repositories, limits: Limits
+) -> Iterator[SourcePackage]:
+    """The neighbours, but for those that are too much: nothing of theirs costs the lab's package anything."""
+    for candidate in candidates:
+        try:
+            content = package_content(
+                candidate.folder, limits=limits, leave_out=opened.leave_out, tolerant=True
+            )
+        except (SubmissionError, OSError):
+            continue
+        yield _package(candidate, _modes(opened, candidate, content.entries, repositories), content)
 
 
-def _package(candidate: Candidate, modes: Modes) -> SourcePackage:
+def _package(candidate: Candidate, modes: Modes, content: Content) -> SourcePackage:
     """A name that is not UTF-8 fits no record; the digest counts its file all the same."""
     return SourcePackage(
         name=candidate.name,
@@ -143,9 +165,5 @@ def _package(candidate: Candidate, modes: Modes) -> SourcePackage:
         path=printable(candidate.path),
         mode_source=modes.source,
         executable={path: bit for path, bit in modes.executable.items() if encodable(path)},
+        left_out=frozenset(path.encode("utf-8", "backslashreplace").decode() for path in content.left_out),
     )
-
-
-def _odd_names(modes: Modes) -> list[str]:
-    odd = [printable(path) for path in modes.executable if not encodable(path)]
-    return [f"a file's name is not UTF-8, so it is left out: {name}" for name in odd[:_ODD_NAMES_SHOWN]]

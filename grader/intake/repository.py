@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
+from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.errors import SubmissionError
 from grader.intake.explain import explained
-from grader.intake.git import Git, GitFailed, GitTimeout
+from grader.intake.git import Git, GitFailed, GitTimeout, GitTooMuch, Repository
+from grader.intake.gitdir import Unfit, link_repository
 from grader.intake.limits import Limits, Meter
+from grader.intake.names import brief, listing
 from grader.intake.refs import Wanted, choose_ref, no_such_ref, parse_refs
 from grader.intake.source import Source
 
@@ -23,14 +27,31 @@ _EVERYTHING = (
 )
 
 
+_LINK = b"120000"
+_GIT_LINK = b"160000"
+_LONGEST_NAME_BYTES = 255
+_LONGEST_LINK_BYTES = 4095
+# Of a commit's own attributes, those that make a file many times larger, or name a program.
+_ATTRIBUTES = "* !filter !ident !working-tree-encoding\n"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Clone:
     """`git_links` are the paths where the repository holds only a pointer to another repository's commit."""
 
     root: Path
     commit: str
+    repository: Repository
     git_links: tuple[str, ...]
     hints: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Files:
+    """What a commit holds: `left_out` is not written to disk."""
+
+    git_links: tuple[str, ...]
+    left_out: tuple[str, ...]
 
 
 def clone(source: Source, git: Git, into: Path, limits: Limits) -> Clone:
@@ -39,11 +60,12 @@ def clone(source: Source, git: Git, into: Path, limits: Limits) -> Clone:
     Raises SubmissionError where it cannot be had; the reason is named.
     """
     try:
-        refs = _remote_refs(source, git, into)
+        fetched = _served(source, git, into.parent.parent / "git-served")
+        refs = _remote_refs(fetched, git, into)
         wanted = choose_ref(refs, source.ref, given=source.given)
-        commit = _fetch(source, git, into, refs, wanted)
-        git_links = _measured(source, git, into, commit, limits)
-        git.run("checkout", "--quiet", "--detach", "--force", commit, cwd=into)
+        commit = _fetch(fetched, git, into, refs, wanted)
+        files = _measured(source, git, into, commit, limits)
+        _checkout(source, git, into, commit, files)
     except GitFailed as failure:
         raise explained(failure, source) from None
     root = into / source.inside
@@ -52,14 +74,47 @@ def clone(source: Source, git: Git, into: Path, limits: Limits) -> Clone:
             f"{source.given}: there is no folder {source.inside} in that commit",
             hint="Give the repository itself.",
         )
-    return Clone(root=root, commit=commit, git_links=git_links, hints=(wanted.hint,) if wanted.hint else ())
+    return Clone(
+        root=root,
+        commit=commit,
+        repository=_own(into),
+        git_links=files.git_links,
+        hints=tuple(_hints(wanted, files)),
+    )
+
+
+def _served(source: Source, git: Git, view: Path) -> Source:
+    """A repository on this machine is served by its data alone: its settings could make git run programs."""
+    if source.top is None:
+        return source
+    bare = not (source.top / ".git").exists() or source.top.name == ".git"
+    try:
+        link_repository(source.top, view, git, within=source.top, bare=bare, objects=True)
+    except Unfit as unfit:
+        raise SubmissionError(
+            f"{source.given}: {unfit}", hint="Hand in a clone that stands alone, or the folder without .git."
+        ) from None
+    return replace(source, url=view.as_uri())
+
+
+def _own(into: Path) -> Repository:
+    return Repository(git_dir=into / ".git", top=into)
+
+
+def _hints(wanted: Wanted, files: _Files) -> Iterator[str]:
+    if wanted.hint:
+        yield wanted.hint
+    if files.left_out:
+        yield f"too large, or with a name too long, so left out: {listing(list(files.left_out))}"
 
 
 def _remote_refs(source: Source, git: Git, into: Path) -> dict[str, str]:
     """Asked from inside the new repository: the folder one happens to stand in has settings of its own."""
     into.mkdir(parents=True)
     git.run("init", "--quiet", "--template=", ".", cwd=into)
-    listed = git.run("ls-remote", "--quiet", "--", source.url, cwd=into, remote=source.remote)
+    listed = git.run(
+        "ls-remote", "--quiet", "--", source.url, cwd=into, repository=_own(into), remote=source.remote
+    )
     refs = parse_refs(os.fsdecode(listed))
     if any(len(commit) == _FULL_HASHES[1] for commit in refs.values()):
         shutil.rmtree(into / ".git")
@@ -75,7 +130,7 @@ def _fetch(source: Source, git: Git, into: Path, refs: dict[str, str], wanted: W
         try:
             _fetch_refs(source, git, into, ("--depth=1",), one)
             return _peeled(git, into, "FETCH_HEAD")
-        except GitTimeout:
+        except (GitTimeout, GitTooMuch):
             raise
         except GitFailed:
             pass
@@ -94,24 +149,56 @@ def _everything(refs: dict[str, str], wanted: Wanted) -> tuple[str, ...]:
 
 def _fetch_refs(source: Source, git: Git, into: Path, options: tuple[str, ...], *refspecs: str) -> None:
     always = ("--quiet", "--no-tags", "--no-recurse-submodules")
-    git.run("fetch", *always, *options, "--", source.url, *refspecs, cwd=into, remote=source.remote)
+    git.run(
+        *("fetch", *always, *options, "--", source.url, *refspecs),
+        cwd=into,
+        repository=_own(into),
+        remote=source.remote,
+    )
 
 
 def _peeled(git: Git, into: Path, name: str) -> str:
-    return git.run("rev-parse", "--verify", "--quiet", f"{name}^{{commit}}", cwd=into).decode().strip()
+    args = ("rev-parse", "--verify", "--quiet", f"{name}^{{commit}}")
+    return git.run(*args, cwd=into, repository=_own(into)).decode().strip()
 
 
-def _measured(source: Source, git: Git, into: Path, commit: str, limits: Limits) -> tuple[str, ...]:
+def _measured(source: Source, git: Git, into: Path, commit: str, limits: Limits) -> _Files:
     """Counts the commit's files before they are written: a few objects can stand for any number of them."""
     meter = Meter(limits, name=source.given)
-    git_links = []
-    with closing(git.records("ls-tree", "-r", "-l", "-z", commit, cwd=into)) as records:
+    git_links, left_out = [], []
+    args = ("ls-tree", "-r", "-l", "-z", commit)
+    with closing(git.records(*args, cwd=into, repository=_own(into))) as records:
         for record in records:
-            meta, _, path = record.partition(b"\t")
+            meta, _, raw = record.partition(b"\t")
             mode, _, _, size = meta.split()
-            meter.entry(os.fsdecode(path))
-            if mode == b"160000":
-                git_links.append(os.fsdecode(path))
+            path = os.fsdecode(raw)
+            meter.entry(path)
+            if mode == _GIT_LINK:
+                git_links.append(path)
+                continue
+            longest = max(len(part) for part in raw.split(b"/"))
+            size_limit = _LONGEST_LINK_BYTES if mode == _LINK else limits.largest_bytes(path)
+            if longest > _LONGEST_NAME_BYTES or int(size) > size_limit:
+                left_out.append(path)
             else:
+                meter.folders(path)
                 meter.data(int(size))
-    return tuple(git_links)
+    return _Files(git_links=tuple(git_links), left_out=tuple(left_out))
+
+
+def _checkout(source: Source, git: Git, into: Path, commit: str, files: _Files) -> None:
+    """Writes the files, but for those left out, as git itself can be told to."""
+    info = into / ".git" / "info"
+    info.mkdir(exist_ok=True)
+    (info / "attributes").write_text(_ATTRIBUTES, encoding="utf-8")
+    sparse: tuple[str, ...] = ()
+    if files.left_out:
+        if any("\n" in path for path in files.left_out):
+            raise SubmissionError(
+                f"{source.given}: {brief(files.left_out[0])} is too large",
+                hint="Take it out of the repository.",
+            )
+        lines = ["/*", *("!/" + re.sub(r"([\\*?\[\] ])", r"\\\1", path) for path in files.left_out)]
+        (info / "sparse-checkout").write_bytes(os.fsencode("\n".join(lines) + "\n"))
+        sparse = ("-c", "core.sparseCheckout=true")
+    git.run(*(*sparse, "checkout", "--quiet", "--detach", "--force", commit), cwd=into, repository=_own(into))

@@ -10,7 +10,7 @@ from typing import Literal
 from urllib.parse import unquote
 
 from grader.errors import SubmissionError, UsageError
-from grader.intake.names import archive_stem, printable
+from grader.intake.names import archive_stem, brief, printable
 from grader.intake.tree import is_file, is_there
 
 _SCHEMES = ("https", "http", "ssh", "git", "file")
@@ -29,7 +29,7 @@ class Source:
     """`given` may be shown: it holds no password. `path` is set where the source lies on this machine.
 
     `url`, `ref` and `inside` (the folder of it that was asked for) are for a repository; `remote` tells
-    whether reaching it takes the user's own git settings.
+    whether reaching it takes the user's own git settings. `top` is where one on this machine lies.
     """
 
     kind: Literal["folder", "archive", "repository"]
@@ -40,6 +40,7 @@ class Source:
     ref: str | None = None
     inside: str = "."
     remote: bool = False
+    top: Path | None = None
 
 
 def parse_source(text: str) -> Source:
@@ -110,7 +111,14 @@ def _local_repository(path: Path, ref: str | None, given: str) -> Source:
         )
     inside = path.relative_to(top).as_posix()
     return Source(
-        kind="repository", given=given, name=name, path=path, url=top.as_uri(), ref=ref, inside=inside
+        kind="repository",
+        given=given,
+        name=name,
+        path=path,
+        url=top.as_uri(),
+        ref=ref,
+        inside=inside,
+        top=top,
     )
 
 
@@ -130,6 +138,8 @@ def _from_url(text: str, match: re.Match[str]) -> Source:
         raise UsageError(f"{scheme}:// is no address of a git repository", hint=_SOURCES)
     if scheme == "file" and authority in ("", "localhost"):
         return _from_file_url(path, text)
+    if scheme == "file" or authority.startswith("-"):
+        raise UsageError(f"{brief(text)} names no repository", hint=_SOURCES)
     path, ref = _split_remote(path)
     if not path.strip("/") or not authority:
         raise UsageError(f"{printable(text)} names no repository", hint=_SOURCES)
@@ -150,6 +160,8 @@ def _from_file_url(path: str, text: str) -> Source:
 
 
 def _from_scp(text: str, match: re.Match[str]) -> Source:
+    if match["host"].startswith("-"):  # an option to git or ssh
+        raise UsageError(f"{brief(text)} names no repository", hint=_SOURCES)
     path, ref = _split_remote(match["path"])
     url = f"{match['host']}:{path}"
     return Source(kind="repository", given=printable(text), name=_last(path), url=url, ref=ref, remote=True)

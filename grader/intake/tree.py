@@ -7,14 +7,17 @@ import stat
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
 from grader.errors import SubmissionError
-from grader.intake.names import printable
+from grader.intake.names import brief
 
 # Far more than any workspace; much deeper, and Python's own functions for trees fail.
 MAX_DEPTH = 200
+MAX_IN_FOLDER = 150_000
+MAX_IN_TREE = 1_000_000
 # Part of no submission: git's own files and what macOS adds.
 NO_CONTENT = frozenset({".git", ".DS_Store", "__MACOSX"})
 
@@ -37,29 +40,35 @@ class Folder:
 
 @dataclass(frozen=True, kw_only=True)
 class Entry:
-    """Whatever is no folder: `executable` is the owner's bit on this disk."""
+    """Whatever is no folder: `executable` is the owner's bit on this disk, `size_bytes` 0 for all but files."""
 
     path: str
     kind: Literal["file", "link", "other"]
     executable: bool
+    size_bytes: int
 
 
 def walk(root: Path, *, tolerant: bool = False) -> Iterator[Folder]:
     """Every folder from `root` on, nearest first, in order of names; links are entries, never ways.
 
-    Raises OSError for a folder that cannot be read and SubmissionError for more than MAX_DEPTH folders in each
-    other; `tolerant` passes over those below the root.
+    Raises OSError for a folder that cannot be read, hidden ones left out, and SubmissionError for more than MAX_DEPTH
+    folders in each other or too much in one of them; `tolerant` passes over those below the root. Raises
+    SubmissionError for more than MAX_IN_TREE entries in all.
     """
     waiting = deque(["."])
+    seen = 0
     while waiting:
         path = waiting.popleft()
         try:
-            with os.scandir(root / path) as scan:
-                entries = sorted(scan, key=lambda entry: entry.name)
-        except OSError:
-            if tolerant and path != ".":
+            entries = _scanned(root, path)
+        except (OSError, SubmissionError) as error:
+            hidden = isinstance(error, OSError) and _is_hidden(path)
+            if (tolerant or hidden) and path != ".":
                 continue
             raise
+        seen += len(entries)
+        if seen > MAX_IN_TREE:
+            raise _too_many(root.name, MAX_IN_TREE)
         names = [entry.name for entry in entries if entry.is_dir(follow_symlinks=False)]
         others = [entry for entry in entries if not entry.is_dir(follow_symlinks=False)]
         folder = Folder(path=path, folders=names, others=others)
@@ -72,18 +81,41 @@ def walk(root: Path, *, tolerant: bool = False) -> Iterator[Folder]:
         waiting.extend(below)
 
 
+def _scanned(root: Path, path: str) -> list[os.DirEntry[str]]:
+    with os.scandir(root / path) as scan:
+        entries = list(islice(scan, MAX_IN_FOLDER + 1))
+    if len(entries) > MAX_IN_FOLDER:
+        raise _too_many(root.name if path == "." else path, MAX_IN_FOLDER)
+    return sorted(entries, key=lambda entry: entry.name)
+
+
+def _is_hidden(path: str) -> bool:
+    return any(part.startswith(".") for part in path.split("/") if part != ".")
+
+
 def too_deep(name: str) -> SubmissionError:
     """The error for a tree that no student's work looks like."""
     return SubmissionError(
-        f"{printable(name)} holds more than {MAX_DEPTH} folders in each other",
+        f"{brief(name)} holds more than {MAX_DEPTH} folders in each other",
         hint="Hand in the package alone.",
     )
 
 
-def list_entries(root: Path, *, leave_out: Path | None = None, tolerant: bool = False) -> list[Entry]:
-    """Everything below `root` but folders, sorted by path; `leave_out` is a folder not to enter."""
+def _too_many(name: str, number: int) -> SubmissionError:
+    return SubmissionError(f"{brief(name)} holds more than {number} files", hint="Hand in the package alone.")
+
+
+def list_entries(
+    root: Path, *, leave_out: Path | None = None, tolerant: bool = False, max_folders: int = MAX_IN_TREE
+) -> list[Entry]:
+    """Everything below `root` but folders, sorted by path; `leave_out` is a folder not to enter.
+
+    Raises what `walk` raises, and SubmissionError for more than `max_folders` folders.
+    """
     found = []
-    for folder in walk(root, tolerant=tolerant):
+    for count, folder in enumerate(walk(root, tolerant=tolerant)):
+        if count > max_folders:
+            raise _too_many(root.name, max_folders)
         folder.folders[:] = [
             name
             for name in folder.folders
@@ -110,11 +142,27 @@ def is_there(path: Path) -> bool:
     return True
 
 
+def read_file(path: Path, limit_bytes: int) -> bytes | None:
+    """The file's first bytes; None for what is no regular file. A pipe is never waited for.
+
+    Raises OSError where it cannot be read.
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(descriptor, "rb") as stream:
+        return stream.read(limit_bytes) if stat.S_ISREG(os.fstat(descriptor).st_mode) else None
+
+
 def _entry(folder: Folder, entry: os.DirEntry[str]) -> Entry:
-    mode = entry.stat(follow_symlinks=False).st_mode
+    about = entry.stat(follow_symlinks=False)
+    mode = about.st_mode
     kind: Literal["file", "link", "other"] = "other"
     if stat.S_ISREG(mode):
         kind = "file"
     elif stat.S_ISLNK(mode):
         kind = "link"
-    return Entry(path=folder.inside(entry.name), kind=kind, executable=bool(mode & stat.S_IXUSR))
+    return Entry(
+        path=folder.inside(entry.name),
+        kind=kind,
+        executable=bool(mode & stat.S_IXUSR),
+        size_bytes=about.st_size if kind == "file" else 0,
+    )

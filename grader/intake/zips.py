@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+import io
 import re
 import stat
 import zipfile
+from itertools import pairwise
 from pathlib import Path
+from typing import IO
 
-from grader.intake.names import printable
+from grader.errors import SubmissionError
+from grader.intake.names import brief
 from grader.intake.unpack import Unpacker
 
 _UNIX = (3, 19)
 _UTF8_NAME = 0x800
-_ENCRYPTED = 0x1
+_ENCRYPTED = 0x41
+_LOCAL_HEADER_BYTES = 30
+# The list of contents is read as a whole: this is room for about 50 000 entries.
+_LARGEST_READ_BYTES = 6 << 20
+# Of bzip2 and LZMA, zipfile unpacks all that it has read, however much that becomes.
+_CHUNKS_BYTES = {zipfile.ZIP_STORED: 1 << 16, zipfile.ZIP_DEFLATED: 1 << 16}
+_SMALL_CHUNK_BYTES = 1 << 12
 # `git archive`, and so GitHub and GitLab, puts the commit's hash here.
 _GIT_COMMENT = re.compile(rb"[0-9a-f]{40}|[0-9a-f]{64}")
 _KINDS = (0, stat.S_IFREG, stat.S_IFDIR, stat.S_IFLNK)
@@ -20,10 +30,31 @@ _KINDS = (0, stat.S_IFREG, stat.S_IFDIR, stat.S_IFLNK)
 
 def unpack_zip(path: Path, unpacker: Unpacker) -> None:
     """Every entry of the zip file, handed to `unpacker`."""
-    with zipfile.ZipFile(path) as archive:
+    with _File(path) as file, zipfile.ZipFile(file) as archive:
         by_git = _GIT_COMMENT.fullmatch(archive.comment) is not None
+        _refuse_overlaps(archive.infolist(), unpacker)
         for info in archive.infolist():
             _unpack_entry(archive, info, unpacker, by_git=by_git)
+
+
+class _File(io.FileIO):
+    """A file of which nobody reads very much at once."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is not None and size > _LARGEST_READ_BYTES:
+            raise SubmissionError(
+                f"{brief(Path(str(self.name)).name)} holds more files than a lab's submission may",
+                hint="Hand in the package alone, without build/ and devel/.",
+            )
+        return super().read(size if size is not None else -1) or b""
+
+
+def _refuse_overlaps(infos: list[zipfile.ZipInfo], unpacker: Unpacker) -> None:
+    """One packed content that many entries share would be unpacked over and over."""
+    ordered = sorted(infos, key=lambda info: info.header_offset)
+    for one, two in pairwise(ordered):
+        if one.header_offset + _LOCAL_HEADER_BYTES + one.compress_size > two.header_offset:
+            unpacker.refuse(f"the entry {brief(two.filename)!r} lies in another one")
 
 
 def _unpack_entry(
@@ -36,7 +67,7 @@ def _unpack_entry(
     mode = info.external_attr >> 16 if info.create_system in _UNIX else 0
     kind = stat.S_IFMT(mode)
     if kind not in _KINDS:
-        unpacker.refuse(f"the entry {printable(path)!r} is a device or a pipe")
+        unpacker.refuse(f"the entry {brief(path)!r} is a device or a pipe")
     if name.endswith("/") or kind == stat.S_IFDIR:
         unpacker.folder(path)
         return
@@ -44,11 +75,16 @@ def _unpack_entry(
         unpacker.refuse("it is protected by a password")
     with archive.open(info) as content:
         if kind == stat.S_IFLNK:
-            unpacker.link(path, content.read(1 << 16).decode("utf-8", "surrogateescape"))
+            unpacker.link(path, _target(content))
         else:
             # git archive gives a mode to executable files alone.
             known = bool(mode & stat.S_IXUSR) if mode or by_git else None
-            unpacker.file(path, content, executable=known)
+            chunk_bytes = _CHUNKS_BYTES.get(info.compress_type, _SMALL_CHUNK_BYTES)
+            unpacker.file(path, content, executable=known, chunk_bytes=chunk_bytes)
+
+
+def _target(content: IO[bytes]) -> str:
+    return content.read(_SMALL_CHUNK_BYTES).decode("utf-8", "surrogateescape")
 
 
 def _entry_name(info: zipfile.ZipInfo) -> str:

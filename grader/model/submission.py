@@ -15,7 +15,8 @@ class SourcePackage(Record):
 
     `folder` is absolute on this machine, `path` the same relative to the submission's root (posix, `.` for the
     root itself). `executable` maps each regular file's path, relative to `folder`, to its executable bit, or to
-    None where the source carries no modes (`mode_source` "none").
+    None where the source carries no modes (`mode_source` "none"). `left_out` are the paths, as in `SourceFile.path`, of
+    what nobody opens or copies: files too large or not readable here, pipes and devices.
     """
 
     name: str
@@ -23,6 +24,7 @@ class SourcePackage(Record):
     path: str
     mode_source: ModeSource
     executable: dict[str, bool | None]
+    left_out: frozenset[str] = frozenset()
 
 
 class Submission(Record):

@@ -18,6 +18,9 @@ from grader.package.reading import printable, read_markup
 _CMAKE_FILE = "CMakeLists.txt"
 _CALLS_LIMIT = 5_000
 _DEPTH_LIMIT = 20
+_STEPS_LIMIT = 20_000
+_LETTERS_LIMIT = 2_000_000
+_VALUE_LETTERS = 20_000
 _FALSE = frozenset({"0", "OFF", "NO", "FALSE", "N", "IGNORE", "NOTFOUND"})
 _LONE_DOLLAR = re.compile(r"(\\.)|\$(?![A-Za-z]*\{)", re.DOTALL)
 
@@ -77,6 +80,7 @@ class _Reader:
         self.calls: list[CMakeCall] = []
         self.fault: Fault | None = None
         self.read = {_CMAKE_FILE}
+        self.steps = self.letters = 0
         self.variables = _Variables()
         self.variables["CMAKE_PROJECT_NAME"] = self.variables["PROJECT_NAME"] = name
         unknown = (_Variables("$ENV"), _Variables("$CACHE"))
@@ -84,7 +88,8 @@ class _Reader:
 
     def run(self, tree: Iterable[nodes.AstNode], file: str, depth: int) -> None:
         for node in tree:
-            if len(self.calls) >= _CALLS_LIMIT or depth > _DEPTH_LIMIT:
+            self.steps += 1
+            if self._is_enough() or depth > _DEPTH_LIMIT:
                 return
             if isinstance(node, nodes.If):
                 self._branch(node, file, depth)
@@ -94,6 +99,10 @@ class _Reader:
                 self.run(node.body, file, depth + 1)
             elif not isinstance(node, nodes.Function | nodes.Macro):  # a definition calls nothing
                 self._call(node, file, depth)
+
+    def _is_enough(self) -> bool:
+        """Loops in each other, and values made of each other, multiply without an end."""
+        return len(self.calls) >= _CALLS_LIMIT or self.steps > _STEPS_LIMIT or self.letters > _LETTERS_LIMIT
 
     def _branch(self, node: nodes.If, file: str, depth: int) -> None:
         """Both branches, but for a literal `if(FALSE)`: conditions are CMake's to judge."""
@@ -106,6 +115,9 @@ class _Reader:
         variable, *items = self._arguments(node.args, file) or [""]
         before = self.variables.pop(variable, None)
         for item in self._items(items):
+            self.steps += 1
+            if self._is_enough():
+                break
             self.variables[variable] = item
             self.run(node.body, file, depth + 1)
         self.variables.pop(variable, None)
@@ -133,9 +145,8 @@ class _Reader:
         if name == "set" and args:
             self._set(args)
         elif name == "list" and args[:1] == ["APPEND"] and len(args) > 1:
-            self.variables[args[1]] = ";".join(
-                [*filter(None, [dict.get(self.variables, args[1])]), *args[2:]]
-            )
+            before = filter(None, [dict.get(self.variables, args[1])])
+            self.variables[args[1]] = ";".join([*before, *args[2:]])[:_VALUE_LETTERS]
         elif name == "unset" and args:
             self.variables.pop(args[0], None)
         elif name == "project" and args:
@@ -150,7 +161,7 @@ class _Reader:
         values = args[1:]
         for end in ("CACHE", "PARENT_SCOPE"):
             values = values[: values.index(end)] if end in values else values
-        self.variables[args[0]] = ";".join(values)
+        self.variables[args[0]] = ";".join(values)[:_VALUE_LETTERS]
 
     def _include(self, name: str, place: str, file: str, depth: int) -> None:
         """A file of the same package; modules of CMake and of other packages are none of its facts."""
@@ -175,7 +186,9 @@ class _Reader:
                 file=file, line=line, kind=type(error).__name__, message=str(error), cause=cause
             )
             return [printable(token.value) for token in tokens]
-        return [printable(token.value) for token in resolved]
+        args = [printable(token.value[:_VALUE_LETTERS]) for token in resolved]
+        self.letters += sum(map(len, args)) + 10 * len(args)
+        return args
 
 
 def _escaped(token: Token) -> Token:

@@ -14,7 +14,9 @@ from grader.package.reading import printable
 
 _LINE_LIMIT_BYTES = 1_000_000
 _LINES_LIMIT = 500_000
+_FILE_LIMIT_BYTES = 64_000_000
 _CALLS_LIMIT = 20_000
+_LETTERS_LIMIT = 4_000_000
 _CMAKE_FILE = "CMakeLists.txt"
 _SEPARATOR = re.compile(r"(?<!\\);")
 
@@ -51,12 +53,16 @@ def _guessed_root(calls: list[CMakeCall], names: tuple[str, ...]) -> str | None:
 
 def _calls(trace: Path) -> list[CMakeCall]:
     calls: list[CMakeCall] = []
+    letters = 0
     for entry in _entries(trace):
         version = entry.get("version")
         if isinstance(version, dict) and version.get("major") != 1:
             return []
         call = _call(entry)
         if call is not None:
+            letters += sum(map(len, call.args)) + 100 * len(call.args)
+            if letters > _LETTERS_LIMIT:
+                break
             calls.append(call)
         if len(calls) >= _CALLS_LIMIT:
             break
@@ -66,9 +72,11 @@ def _calls(trace: Path) -> list[CMakeCall]:
 def _entries(trace: Path) -> Iterator[dict[str, Any]]:
     try:
         with trace.open("rb") as stream:
+            read_bytes = 0
             for _ in range(_LINES_LIMIT):
                 line = stream.readline(_LINE_LIMIT_BYTES)
-                if not line:
+                read_bytes += len(line)
+                if not line or read_bytes > _FILE_LIMIT_BYTES:
                     return
                 entry = _decoded(line)
                 if isinstance(entry, dict):

@@ -70,6 +70,8 @@ def _source_file(package: SourcePackage, path: str, interpreters: Interpreters |
             )
         path = file.relative_to(os.path.realpath(package.folder)).as_posix()
     executable = _executable(package, path, file)
+    if printable(path) in package.left_out:
+        return SourceFile(**common, size_bytes=file.lstat().st_size, sha256="", executable=executable)
     try:
         size, digest, head = _contents(file)
     except OSError:

@@ -14,6 +14,9 @@ from grader.package.launch_scope import Scope, wanted
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_xml
 
+_FILES_MAX = 100
+_TAGS_MAX = 40_000
+_LETTERS_MAX = 4_000
 _SUFFIXES = (".launch", ".launch.xml", ".test")
 _TAGS = frozenset(
     {"arg", "env", "group", "include", "machine", "master", "node", "param", "remap", "rosparam", "test"}
@@ -58,7 +61,7 @@ def parse_launch(data: bytes, path: str) -> LaunchFile:
 
 def _records(library: _Library, names: Iterable[str]) -> tuple[LaunchFile, ...]:
     own = tuple(dict.fromkeys(names))
-    paths = filter(is_launch_file, library.paths)
+    paths = list(filter(is_launch_file, library.paths))[:_FILES_MAX]
     return tuple(_record(path, library.parsed(path), own, library.find) for path in paths)
 
 
@@ -69,16 +72,22 @@ class _Library:
         self.paths = paths
         self._read = read
         self._parsed: dict[str, _Parsed] = {}
+        self._tags = 0
 
     def parsed(self, path: str) -> _Parsed:
         if path not in self._parsed:
-            data = self._read(path)
-            self._parsed[path] = (
-                _Parsed(None, data.model_copy(update={"file": path}))
-                if isinstance(data, Fault)
-                else _parse(data, path)
-            )
+            self._parsed[path] = self._new(path)
         return self._parsed[path]
+
+    def _new(self, path: str) -> _Parsed:
+        data = self._read(path)
+        if isinstance(data, Fault):
+            return _Parsed(None, data.model_copy(update={"file": path}))
+        self._tags += data.count(b"<")
+        if self._tags > _TAGS_MAX:
+            cause = "the launch files together hold too many tags, so this one was not read"
+            return _Parsed(None, Fault(file=path, line=None, kind="TooLarge", message=cause, cause=cause))
+        return _parse(data, path)
 
     def find(self, path: str) -> tuple[etree._Element | None, Fault | None]:
         if path not in self.paths:
@@ -91,7 +100,11 @@ def _parse(data: bytes, path: str) -> _Parsed:
     element, fault = parse_xml(data, path, root="launch")
     if element is None:
         return _Parsed(None, fault)
-    root = str(element.tag)
+    for tag in element.iter(etree.Element):
+        for name, value in tag.attrib.items():
+            if len(value) > _LETTERS_MAX:
+                tag.set(name, value[:_LETTERS_MAX])
+    root = str(element.tag)[:_LETTERS_MAX]
     if root != "launch":
         return _Parsed(None, _wrong_root(path, root, line_of(element)), root)
     nested = next((e for e in element.iter("launch") if e is not element), None)

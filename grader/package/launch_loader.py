@@ -13,6 +13,10 @@ from grader.package.xml import line_of
 
 INCLUDES_MAX = 50
 DEPTH_MAX = 10
+WORK_MAX = 20_000
+
+
+_TOO_MUCH = "launch files that hold more than a robot can start"
 
 
 class Find(Protocol):
@@ -31,6 +35,12 @@ class Loaded:
     loads: list[LaunchLoad] = field(default_factory=list)
     faults: list[Fault] = field(default_factory=list)
     included: int = 0
+    work: int = 0
+
+    def full(self, more: int) -> bool:
+        """Whether there is too much of it already; `more` is what the next tag takes."""
+        self.work += 1 + more
+        return self.work > WORK_MAX
 
 
 def load(root: etree._Element, scope: Scope, find: Find) -> Loaded:
@@ -72,6 +82,9 @@ class _Loader:
         for child in parent:
             if not isinstance(child.tag, str) or not wanted(child, scope):
                 continue
+            if self.loaded.full(len(scope.args) // 10 + len(scope.remaps) // 10 + len(scope.private)):
+                self._stop(child, scope)
+                return
             if child.tag == "group":
                 self.walk(child, scope.of(child).below(scope.get(child, "ns")), depth)
             elif child.tag == "include":
@@ -80,6 +93,10 @@ class _Loader:
                 scope = self._changed(child, scope)
             else:
                 self._add(child, scope.of(child))
+
+    def _stop(self, child: etree._Element, scope: Scope) -> None:
+        if not any(fault.message == _TOO_MUCH for fault in self.loaded.faults):
+            self.loaded.faults.append(_fault(child, scope, _TOO_MUCH))
 
     def _changed(self, child: etree._Element, scope: Scope) -> Scope:
         if child.tag == "arg":

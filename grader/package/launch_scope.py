@@ -14,6 +14,8 @@ from grader.model.record import Record
 
 _SUBSTITUTION = re.compile(r"\$\(([^()]*)\)")
 _SLASHES = re.compile(r"//+")
+# Of one value: arguments that name each other can double at every step.
+_LETTERS = 4_000
 _TRUE, _FALSE = frozenset({"true", "1"}), frozenset({"false", "0"})
 
 Remaps = tuple[tuple[str, str], ...]
@@ -35,7 +37,8 @@ class Scope(Record):
 
     def text(self, written: str) -> str:
         """`$(arg …)`, `$(dirname)` and `$(optenv NAME DEFAULT)` resolved; what only roslaunch knows stays as it is."""
-        return _SUBSTITUTION.sub(lambda match: self._value(match[0], match[1].split()), written)
+        text = _SUBSTITUTION.sub(lambda match: self._value(match[0], match[1].split()), written[:_LETTERS])
+        return text[:_LETTERS]
 
     def get(self, element: etree._Element, name: str) -> str | None:
         """An attribute resolved, None where it is not there."""
@@ -52,7 +55,7 @@ class Scope(Record):
         if not namespace:
             return self
         whole = namespace if namespace.startswith("/") else f"{self.namespace}{namespace}"
-        return self.model_copy(update={"namespace": _SLASHES.sub("/", f"/{whole}/")})
+        return self.model_copy(update={"namespace": _SLASHES.sub("/", f"/{whole[:_LETTERS]}/")})
 
     def resolved(self, name: str) -> str:
         """A parameter's whole name."""

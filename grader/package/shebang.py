@@ -12,6 +12,7 @@ from grader.model.package import Shebang
 
 SYSTEM_PATH = "/usr/local/bin:/usr/bin:/bin"
 _LENGTH_LIMIT_BYTES = 255
+_LOOKED_AT_BYTES = 1 << 14
 _BOM = b"\xef\xbb\xbf"
 _ENV = frozenset({"/usr/bin/env", "/bin/env"})
 _SPLIT_STRING = re.compile(r"^(-[iv0]*S|--split-string[= ])\s*")
@@ -89,7 +90,7 @@ def _words(text: str) -> list[str]:
 
 def _near(data: bytes) -> str:
     """Why a file that does not begin with `#!` has no usable shebang."""
-    lines = data.splitlines()[:50]
+    lines = data[:_LOOKED_AT_BYTES].splitlines()[:50]
     first = lines[0].decode("utf-8", "replace").strip() if lines else ""
     later = next((n for n, line in enumerate(lines, 1) if line.strip().startswith(b"#!")), None)
     if not data.strip():

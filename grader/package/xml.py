@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import islice
 
 from lxml import etree
 
@@ -35,13 +36,26 @@ _CAUSES = (
 )  # fmt: skip
 
 
+# A tag where it begins, after all in which a `<` begins none.
+_TAGS = re.compile(
+    rb"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<!DOCTYPE[^\[>]*(?:\[.*?\]\s*)?>|(?P<tag><)[^\s/>!?]",
+    re.DOTALL,
+)
+_MESSAGE_LETTERS = 300
+_OPENERS_A_TAG = 20
+_MESSAGES = 50
+
+
 def parse_xml(
-    data: bytes, file: str, *, root: str, encoding: str | None = None
+    data: bytes, file: str, *, root: str, encoding: str | None = None, max_tags: int = 2_000
 ) -> tuple[etree._Element | None, Fault | None]:
     """The root element, or None and the fault. `root` is the tag that the file should begin with.
 
-    `encoding` overrides what the file says of itself. Nothing that a file declares is expanded or fetched.
+    `encoding` overrides what the file says of itself. Nothing that a file declares is expanded or fetched, and
+    nothing of more than `max_tags` tags is looked at.
     """
+    if data.count(b"<") > _OPENERS_A_TAG * max_tags:
+        return None, _too_many(file, max_tags)
     parser = etree.XMLParser(
         resolve_entities=False,
         load_dtd=False,
@@ -59,21 +73,29 @@ def parse_xml(
     if dtd is not None and dtd.entities():  # type: ignore[union-attr] # lxml-stubs lack it
         cause = "`<!ENTITY ...>` is not read: delete the `<!DOCTYPE ...>` block and write the text out"
         return None, Fault(file=file, line=1, kind="Entity", message="declares entities", cause=cause)
-    _set_first_lines(element, data.split(b"\n"))
+    if sum(1 for _ in element.iter(etree.Element)) > max_tags:
+        return None, _too_many(file, max_tags)
+    _set_first_lines(element, data)
     return element, None
 
 
-def _set_first_lines(root: etree._Element, lines: list[bytes]) -> None:
+def _too_many(file: str, max_tags: int) -> Fault:
+    cause = f"`{file}` holds more than {max_tags} tags and was not read"
+    return Fault(file=file, line=None, kind="TooLarge", message="too many tags", cause=cause)
+
+
+def _set_first_lines(root: etree._Element, data: bytes) -> None:
     """Move each element's line from where its tag ends, which is what libxml2 notes, to where it begins."""
-    earliest = 1
-    for element in root.iter(etree.Element):
-        end = line_of(element) or 1
-        begin = re.compile(
-            rb"<([\w.-]+:)?" + re.escape(etree.QName(element).localname.encode()) + rb"(?![\w.-])"
-        )
-        candidates = range(min(end, len(lines)), earliest - 1, -1)
-        found = next((n for n in candidates if begin.search(lines[n - 1])), end)
-        element.sourceline = earliest = found  # type: ignore[assignment] # lxml-stubs say `...`
+    line, place, lines = 1, 0, []
+    for found in _TAGS.finditer(data):
+        if found["tag"]:
+            line += data.count(b"\n", place, found.start())
+            place = found.start()
+            lines.append(line)
+    elements = list(root.iter(etree.Element))
+    if len(lines) == len(elements):  # in UTF-16, say, they are not
+        for element, number in zip(elements, lines, strict=True):
+            element.sourceline = number  # type: ignore[assignment] # lxml-stubs say `...`
 
 
 def line_of(element: etree._Element) -> int | None:
@@ -84,22 +106,25 @@ def line_of(element: etree._Element) -> int | None:
 
 def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, file: str, root: str) -> Fault:
     line, column = error.position
-    message = re.sub(r", line \d+, column \d+$", "", (error.msg or "not well-formed").strip()).strip()
+    said = (error.msg or "not well-formed").strip()
+    message = re.sub(
+        r", line \d+, column \d+$", "", said[:_MESSAGE_LETTERS] + said[_MESSAGE_LETTERS:][-40:]
+    ).strip()
     # the error's own log holds what went wrong with other files before, too
-    log = [str(entry.message) for entry in parser.error_log]
+    log = [str(entry.message)[:_MESSAGE_LETTERS] for entry in islice(parser.error_log, _MESSAGES)]
     return Fault(
         file=file,
         line=line or None,
         column=column or None,
         kind="XMLSyntaxError",
-        message=message,
-        cause=cause_of(message, log, _line(data, line), root=root),
+        message=message[:_MESSAGE_LETTERS],
+        cause=cause_of(message, log, _line(data, line), root=root)[:_MESSAGE_LETTERS],
     )
 
 
 def _line(data: bytes, number: int) -> str:
     lines = data.split(b"\n")
-    return lines[number - 1].decode("utf-8", "replace") if 0 < number <= len(lines) else ""
+    return lines[number - 1][:_MESSAGE_LETTERS].decode("utf-8", "replace") if 0 < number <= len(lines) else ""
 
 
 def cause_of(message: str, log: list[str], line: str, *, root: str) -> str:

@@ -123,13 +123,16 @@ class _Reader:
         self.faults: list[Fault] = []
         self.visited = 0
 
-    def read(self, node: yaml.Node, path: KeyPath) -> Value:
+    def _count(self, node: yaml.Node) -> None:
         self.visited += 1
         if self.visited > MAX_NODES:
             raise yaml.MarkedYAMLError(
                 problem="too much: aliases multiply to more than a rubric can hold",
                 problem_mark=node.start_mark,
             )
+
+    def read(self, node: yaml.Node, path: KeyPath) -> Value:
+        self._count(node)
         if len(path) > MAX_DEPTH:
             raise yaml.MarkedYAMLError(problem="is nested too deeply", problem_mark=node.start_mark)
         if not isinstance(node, yaml.ScalarNode) and node.tag not in PLAIN_TAGS:
@@ -163,6 +166,7 @@ class _Reader:
 
     def _merge(self, node: yaml.Node, path: KeyPath) -> dict[str, Any]:
         """`<<: *anchor`, or a list of them, of which the first wins."""
+        self._count(node)
         if isinstance(node, yaml.MappingNode):
             return self._mapping(node, path)
         if isinstance(node, yaml.SequenceNode) and all(isinstance(n, yaml.MappingNode) for n in node.value):

@@ -238,7 +238,6 @@ def test_a_later_entry_replaces_an_earlier_one(tmp_path):
     [
         (Limits(entries=2), "more than 2 files"),
         (Limits(total_bytes=1 << 20), "larger than 1 MiB"),
-        (Limits(ratio=20, ratio_floor_bytes=1 << 16), "20 times its size"),
     ],
 )
 @pytest.mark.parametrize("kind", ["zip", "tar.gz"])
@@ -251,14 +250,6 @@ def test_too_much(kind, limits, says, tmp_path):
         entries = tar_with_manifest(tar_entry("lab1/a"), tar_entry("lab1/zeros", zeros))
         make_tar(path, entries, packing="gz")
     assert says in refused(path, tmp_path, limits=limits)
-
-
-def test_a_sparse_giant_is_refused_before_it_is_written(tmp_path):
-    info = tar_entry("lab1/giant")[0]
-    info.size = 1 << 40
-    path = make_tar(tmp_path / "a.tar", tar_with_manifest())
-    path.write_bytes(info.tobuf() + path.read_bytes())
-    assert "larger than" in refused(path, tmp_path)
 
 
 @pytest.mark.parametrize("keep", [0.02, 0.3, 0.6, 0.9, 0.99])
@@ -338,8 +329,3 @@ def test_a_packing_that_python_cannot_undo(tmp_path):
 def test_too_many_folders_in_each_other(tmp_path):
     path = make_tar(tmp_path / "a.tar", tar_with_manifest(tar_entry("lab1/" + "d/" * 1500 + "x")))
     assert "folders in each other" in refused(path, tmp_path)
-
-
-def test_a_name_that_no_disk_takes(tmp_path):
-    path = make_tar(tmp_path / "a.tar", tar_with_manifest(tar_entry("lab1/" + "x" * 300)))
-    assert "too long" in refused(path, tmp_path)

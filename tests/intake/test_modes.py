@@ -30,7 +30,8 @@ def test_a_plain_folder_has_the_disk_s_modes(tmp_path):
         "package.xml": False,
         "src/node.py": False,
     }
-    assert (submission.commit, submission.archive_sha256, submission.hints) == (None, None, ())
+    assert (submission.commit, submission.archive_sha256) == (None, None)
+    assert submission.hints == ("neither a file nor a folder, so left out: pipe",)
 
 
 def test_git_s_word_counts_and_a_difference_is_named(tmp_path):
