@@ -157,7 +157,17 @@ def submission_job(name: str) -> Mapping[str, Any]:
     """What the room needs in order to make the submission, as JSON."""
     attack = load_attack(name)
     beside = ATTACKS / name / "package"
-    fields = {"attacker", "builder", "files", "remove", "modes", "links", "archive", "repository", "generator"}
+    fields = {
+        "attacker",
+        "builder",
+        "files",
+        "remove",
+        "modes",
+        "links",
+        "archive",
+        "repository",
+        "generator",
+    }
     made = attack.model_dump(mode="json", include=fields)
     return made | {"name": name, "beside": str(beside) if beside.is_dir() else None}
 

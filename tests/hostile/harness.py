@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tarfile
 import tempfile
+import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
@@ -45,8 +46,13 @@ def why_no_room() -> str:
     if missing:
         return f"{', '.join(missing)} not installed"
     with tempfile.TemporaryDirectory() as scratch:
-        script = 'mount -t tmpfs t "$1" && cd "$1" && mkdir a b c && mount -t overlay -o lowerdir=/,upperdir=a,workdir=b o c'
-        done = subprocess.run([*UNSHARE, "sh", "-c", script, "sh", scratch], capture_output=True, text=True, check=False)
+        script = (
+            'mount -t tmpfs t "$1" && cd "$1" && mkdir a b c'
+            " && mount -t overlay -o lowerdir=/,upperdir=a,workdir=b o c"
+        )
+        done = subprocess.run(
+            [*UNSHARE, "sh", "-c", script, "sh", scratch], capture_output=True, text=True, check=False
+        )
     return "" if done.returncode == 0 else f"no overlay here: {done.stderr.strip()[-200:]}"
 
 
@@ -79,7 +85,9 @@ def grade_in_room(name: str, user: User, folder: Path, **changes: object) -> Gra
         "secret": secret,
         "rubric": rubric,
         "after": attack.after,
-        "after_rubric": rubric if attack.after == "full" else (HERE / "after.yaml").read_text(encoding="utf-8"),
+        "after_rubric": rubric
+        if attack.after == "full"
+        else (HERE / "after.yaml").read_text(encoding="utf-8"),
         "source": attack.source,
         "arguments": list(attack.arguments),
         "env": attack.env,
@@ -95,17 +103,19 @@ def grade_in_room(name: str, user: User, folder: Path, **changes: object) -> Gra
 def _in_room(job: Mapping[str, Any], scratch: str, folder: Path) -> dict[str, Any]:
     argv = [*UNSHARE, sys.executable, "-B", "-m", "tests.hostile.room", scratch]
     folder.mkdir(parents=True, exist_ok=True)
-    process = subprocess.Popen(argv, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-    try:
+    with subprocess.Popen(argv, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         assert process.stdin is not None
         assert process.stdout is not None
-        process.stdin.write(json.dumps(job).encode())
-        process.stdin.close()
-        _unpack(process.stdout, folder)
-        code = process.wait(timeout=job["wall_s"] + SPARE_S)
-    finally:
-        process.kill()
-        process.wait()
+        watchdog = threading.Timer(job["wall_s"] + SPARE_S, process.kill)
+        watchdog.start()
+        try:
+            process.stdin.write(json.dumps(job).encode())
+            process.stdin.close()
+            _unpack(process.stdout, folder)
+            code = process.wait()
+        finally:
+            watchdog.cancel()
+            process.kill()
     assert code == 0, f"the room itself failed with exit code {code}"
     report: dict[str, Any] = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     return report
@@ -238,7 +248,9 @@ def _words(attack: Attack, graded: Graded) -> Iterator[str]:
     noted = [f"{n.scenario} {n.actor}: {n.text}" for n in getattr(result, "notes", ())]
     yield from _missing("the notes", "\n".join(noted), attack.noticed)
     reports = [p.read_text(encoding="utf-8") for p in graded.folder.glob("*.md")]
-    yield from _missing("what is shown", "\n".join((graded.report["stdout"], graded.report["stderr"], *reports)), attack.shows)
+    yield from _missing(
+        "what is shown", "\n".join((graded.report["stdout"], graded.report["stderr"], *reports)), attack.shows
+    )
 
 
 def _missing(where: str, text: str, patterns: Iterable[str]) -> Iterator[str]:
@@ -249,4 +261,5 @@ def _missing(where: str, text: str, patterns: Iterable[str]) -> Iterator[str]:
 
 def _after(after: Mapping[str, Any]) -> Iterator[str]:
     if after["exit_code"] != ExitCode.PASSED or after["late"]:
-        yield f"the victim, graded next: exit code {after['exit_code']}: {after['stdout'][-1500:]}{after['stderr'][-500:]}"
+        said = after["stdout"][-1500:] + after["stderr"][-500:]
+        yield f"the victim, graded next: exit code {after['exit_code']}: {said}"

@@ -46,7 +46,9 @@ def graded(request, tmp_path_factory) -> Iterator[dict[tuple[str, str], Future[G
     chosen = [(params["attack"], params["user"]) for params in every if "user" in params]
     out = tmp_path_factory.mktemp("hostile")
     with ThreadPoolExecutor(SIDE_BY_SIDE) as pool:
-        yield {pair: pool.submit(grade_in_room, *pair, out / "-".join(pair)) for pair in dict.fromkeys(chosen)}
+        yield {
+            pair: pool.submit(grade_in_room, *pair, out / "-".join(pair)) for pair in dict.fromkeys(chosen)
+        }
         pool.shutdown(cancel_futures=True)
 
 

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from tests.hostile.harness import machine_faults, faults, grade_in_room, why_no_room
+from tests.hostile.harness import faults, grade_in_room, machine_faults, why_no_room
 from tests.hostile.outputs import control_characters, secrets_in
 
 SOUND = {
@@ -16,7 +16,11 @@ SOUND = {
 WITHOUT_SANDBOX = {
     "read-everything": [r"harm was done: .*marks\.csv", r"a secret is in an output: console\.log"],
     "disk-outside": [r"harm was done: wrote into", r"files changed outside", r"left in \$TMPDIR"],
-    "net-services": [r"services of the machine were asked", r"packets were sent", r"harm was done: .*service-port"],
+    "net-services": [
+        r"services of the machine were asked",
+        r"packets were sent",
+        r"harm was done: .*service-port",
+    ],
 }
 
 
@@ -42,7 +46,10 @@ def test_secrets_and_escape_codes_are_found(tmp_path) -> None:
     (tmp_path / "report.md").write_text("a \x1b[2J b")
     (tmp_path / "other.bin").write_bytes(b"xx SECRET-shadow yy")
     assert list(secrets_in("SECRET", tmp_path, {"stdout": "SECRET"})) == ["other.bin : -shadow", "stdout: "]
-    assert [line.partition(":")[0] for line in control_characters(tmp_path, {"stderr": "\x9b"})] == ["stderr", "report.md"]
+    assert [line.partition(":")[0] for line in control_characters(tmp_path, {"stderr": "\x9b"})] == [
+        "stderr",
+        "report.md",
+    ]
 
 
 @pytest.mark.ros

@@ -26,9 +26,11 @@ AFTER_WALL_S = 60.0
 def main() -> None:
     job = json.load(sys.stdin)
     room = Room(job, world.enter(Path(sys.argv[1])))
-    report = room.grade_attack()
-    report["after"] = asdict(room.grade_victim())
-    _send(report, room.results)
+    with tarfile.open(fileobj=sys.stdout.buffer, mode="w|") as tar:
+        report = room.grade_attack()
+        _add_results(tar, room.results)
+        report["after"] = asdict(room.grade_victim())
+        _add_report(tar, report)
 
 
 class Room:
@@ -64,7 +66,9 @@ class Room:
         submission.give(folder, self._uid)
         rubric = canaries.RUBRIC.with_name("after.yaml")
         rubric.write_text(self._job["after_rubric"], encoding="utf-8")
-        command = ["grade", str(folder)] if self._job["after"] == "full" else ["check", str(folder), "--static"]
+        command = (
+            ["grade", str(folder)] if self._job["after"] == "full" else ["check", str(folder), "--static"]
+        )
         argv = [*command, "--rubric", str(rubric), "--out", str(canaries.RESULTS)]
         return self._watch(argv, {}, AFTER_WALL_S)
 
@@ -72,7 +76,7 @@ class Room:
         results = str(self.results).lstrip("/")
         files, sockets, packets = state.files(self._world, results), state.sockets(), state.packets()
         settings, groups = state.settings(), self._job["groups"]
-        scratch, shared = state.folder(canaries.SCRATCH), state.folder(Path("/dev/shm"))  # noqa: S108 - looked at
+        scratch, shared = state.folder(canaries.SCRATCH), state.folder(Path("/dev/shm"))
         watched = self._watch(argv, self._job["env"], self._job["wall_s"])
         left = self._processes_left()
         return asdict(watched) | {
@@ -83,7 +87,7 @@ class Room:
             "asked": self._services.asked,
             "settings": [name for name, value in state.settings().items() if value != settings[name]],
             "scratch": sorted(set(state.folder(canaries.SCRATCH)) ^ set(scratch)),
-            "shared": sorted(set(state.folder(Path("/dev/shm"))) ^ set(shared)),  # noqa: S108 - looked at
+            "shared": sorted(set(state.folder(Path("/dev/shm"))) ^ set(shared)),
             "changed": state.changed(files, state.files(self._world, results)),
             "odd": [str(path) for path in self.results.rglob("*") if not _plain(path)],
         }
@@ -114,15 +118,17 @@ def _plain(path: Path) -> bool:
     return stat.S_ISREG(mode) or stat.S_ISDIR(mode)
 
 
-def _send(report: dict[str, Any], results: Path) -> None:
+def _add_results(tar: tarfile.TarFile, results: Path) -> None:
+    for path in sorted(results.rglob("*")):
+        if path.is_file() and _plain(path):
+            tar.add(path, f"results/{path.relative_to(results)}")
+
+
+def _add_report(tar: tarfile.TarFile, report: dict[str, Any]) -> None:
     data = json.dumps(report).encode()
-    with tarfile.open(fileobj=sys.stdout.buffer, mode="w|") as tar:
-        info = tarfile.TarInfo("report.json")
-        info.size = len(data)
-        tar.addfile(info, io.BytesIO(data))
-        for path in sorted(results.rglob("*")):
-            if path.is_file() and _plain(path):
-                tar.add(path, f"results/{path.relative_to(results)}")
+    info = tarfile.TarInfo("report.json")
+    info.size = len(data)
+    tar.addfile(info, io.BytesIO(data))
 
 
 main()

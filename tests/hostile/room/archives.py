@@ -19,7 +19,13 @@ TYPES = {
     "fifo": tarfile.FIFOTYPE,
     "device": tarfile.CHRTYPE,
 }
-KINDS = {"file": stat.S_IFREG, "folder": stat.S_IFDIR, "link": stat.S_IFLNK, "fifo": stat.S_IFIFO, "device": stat.S_IFCHR}
+KINDS = {
+    "file": stat.S_IFREG,
+    "folder": stat.S_IFDIR,
+    "link": stat.S_IFLNK,
+    "fifo": stat.S_IFIFO,
+    "device": stat.S_IFCHR,
+}
 ENCRYPTED = 0x1
 BLOCK = bytes(1 << 20)
 
@@ -60,7 +66,9 @@ def _name(entry: Mapping[str, Any]) -> bytes:
 
 
 def _tar(entries: list[Any], path: Path, mode: str) -> None:
-    with tarfile.open(path, mode, format=tarfile.GNU_FORMAT, encoding="utf-8", errors="surrogateescape") as tar:  # type: ignore[call-overload]
+    with tarfile.open(
+        path, mode, format=tarfile.GNU_FORMAT, encoding="utf-8", errors="surrogateescape"
+    ) as tar:  # type: ignore[call-overload]
         for entry in entries:
             info = tarfile.TarInfo(_name(entry).decode("utf-8", "surrogateescape"))
             info.type = TYPES[entry["type"]]

@@ -37,7 +37,7 @@ def place(secret: str, rubric: str, home: Path) -> None:
     _file(TOP / "course" / "solution" / "talker.py", secret)
     _file(SCRATCH / "of-another-program" / "notes", secret)
     RUBRIC.write_text(f"# {secret}-rubric\n{rubric}", encoding="utf-8")
-    for folder in ("/tmp", "/var/tmp", "/dev/shm", "/opt", "/var/lib", "/mnt", "/run"):  # noqa: S108 - the room's own
+    for folder in ("/tmp", "/var/tmp", "/dev/shm", "/opt", "/var/lib", "/mnt", "/run"):
         _file(Path(folder) / "canary", secret)
     run("ipcmk", "--shmem", "4096")
 

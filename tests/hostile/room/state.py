@@ -1,4 +1,4 @@
-"""What is in the room at one moment: files that differ from the machine's, processes, sockets, settings of the kernel."""
+"""What is in the room at one moment: files that differ from the machine's, processes, sockets, kernel settings."""
 
 from __future__ import annotations
 
@@ -12,7 +12,13 @@ from tests.hostile.room.world import World
 
 Entry = tuple[object, ...]
 HASHED_BYTES_MAX = 32 << 20
-SETTINGS = ("kernel/core_pattern", "kernel/modprobe", "kernel/hostname", "vm/overcommit_memory", "kernel/sysrq")
+SETTINGS = (
+    "kernel/core_pattern",
+    "kernel/modprobe",
+    "kernel/hostname",
+    "vm/overcommit_memory",
+    "kernel/sysrq",
+)
 LISTENS, TIME_WAIT = "0A", "06"
 
 
@@ -33,7 +39,16 @@ def _walk(world: World, without: str) -> Iterator[tuple[str, Entry]]:
                 if not _same_folder(world, path, found):
                     yield path, owner
             else:
-                yield path, (*owner, found.st_size, found.st_mtime_ns, found.st_rdev, _content(name, descriptor, found))
+                yield (
+                    path,
+                    (
+                        *owner,
+                        found.st_size,
+                        found.st_mtime_ns,
+                        found.st_rdev,
+                        _content(name, descriptor, found),
+                    ),
+                )
 
 
 def _join(folder: str, name: str) -> str:
@@ -60,7 +75,11 @@ def _content(name: str, descriptor: int, found: os.stat_result) -> str:
 
 def changed(before: dict[str, Entry], after: dict[str, Entry]) -> list[str]:
     """A line for each path that is new, gone or different."""
-    lines = [f"{path}: {before[path]} became {after[path]}" for path in before if path in after and before[path] != after[path]]
+    lines = [
+        f"{path}: {before[path]} became {after[path]}"
+        for path in before
+        if path in after and before[path] != after[path]
+    ]
     lines += [f"{path}: gone" for path in before.keys() - after.keys()]
     return sorted(lines + [f"{path}: new: {after[path]}" for path in after.keys() - before.keys()])
 

@@ -90,7 +90,9 @@ def write(path: Path, content: str | bytes, mode: int | None = None) -> None:
 def _repository(folder: Path, steps: list[dict[str, Any]], owner: int) -> None:
     for step in steps:
         if step["git"]:
-            subprocess.run([*GIT, *step["git"]], cwd=folder, env=IDENTITY, user=owner, group=owner, check=True, stdout=2)
+            subprocess.run(
+                [*GIT, *step["git"]], cwd=folder, env=IDENTITY, user=owner, group=owner, check=True, stdout=2
+            )
         elif step["write"]:
             target = step["write"]
             write(folder / target["path"], target["text"], int(target["mode"], 8))

@@ -29,7 +29,9 @@ class Watched:
     stderr: str = ""
 
 
-def watch(argv: Sequence[str], env: dict[str, str], uid: int, wall_s: float, used_bytes: Callable[[], int]) -> Watched:
+def watch(
+    argv: Sequence[str], env: dict[str, str], uid: int, wall_s: float, used_bytes: Callable[[], int]
+) -> Watched:
     """Run it as the user `uid` to its end, or kill it when `wall_s` have passed."""
     seen, began, used_before = Watched(), time.monotonic(), used_bytes()
     outputs = [os.memfd_create(name) for name in ("stdout", "stderr")]

@@ -28,7 +28,9 @@ class World:
 
 
 def run(*argv: str | Path) -> None:
-    subprocess.run([str(word) for word in argv], check=True, stdin=subprocess.DEVNULL, stdout=2)
+    subprocess.run(
+        [str(word) for word in argv], check=True, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+    )
 
 
 def enter(scratch: Path) -> World:
@@ -58,7 +60,13 @@ def enter(scratch: Path) -> World:
 def _elsewhere() -> list[Path]:
     """What the grader needs and the root's own file system does not hold."""
     device = Path("/").stat().st_dev
-    needed = (Path(__file__).resolve().parents[3], Path(sys.prefix), Path(sys.base_prefix), Path("/usr"), Path("/opt"))
+    needed = (
+        Path(__file__).resolve().parents[3],
+        Path(sys.prefix),
+        Path(sys.base_prefix),
+        Path("/usr"),
+        Path("/opt"),
+    )
     return [path for path in needed if path.is_dir() and path.stat().st_dev != device]
 
 

@@ -11,12 +11,16 @@ def say(text):
 def tried(*actions):
     """Call each action, which must not succeed: what comes back is harm, unless it is None."""
     for action in actions:
-        try:
-            got = action()
-        except BaseException as error:  # noqa: BLE001 - an attack goes on
-            say("tried: refused: {}: {}".format(type(error).__name__, error)[:300])
-        else:
-            say("tried: nothing came of it" if got is None else "HARM: {!r}".format(got)[:2000])
+        _try(action)
+
+
+def _try(action):
+    try:
+        got = action()
+    except BaseException as error:  # noqa: BLE001 - an attack goes on
+        say(f"tried: refused: {type(error).__name__}: {error}"[:300])
+    else:
+        say("tried: nothing came of it" if got is None else f"HARM: {got!r}"[:2000])
 
 
 def done(text=""):

@@ -10,7 +10,7 @@ def talk():
     rospy.init_node("talker")
     rate = rospy.Rate(10)
     while not rospy.is_shutdown():
-        publisher.publish("hello world %s" % rospy.get_time())
+        publisher.publish("hello world")
         rate.sleep()
 
 
