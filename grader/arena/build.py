@@ -92,7 +92,7 @@ def _catkin_make(place: Place) -> list[str]:
 def _syntax(place: Place) -> list[str]:
     """ROS's own Python compiles every script of the package, and runs none."""
     script = 'python3 -I "$1/grader-syntax.py" "$2" < "$1/python-files.json" >' + _target(place, SYNTAX)
-    return ["/bin/sh", "-c", script, "sh", place.shims, place.package_folder]
+    return ["/bin/bash", "-c", script, "bash", place.shims, place.package_folder]
 
 
 def _target(place: Place, name: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -120,12 +119,14 @@ def test_build_reaches_nothing_and_writes_nowhere_else(tmp_path: Path) -> None:
     assert not Path("/usr/cmake-was-here").exists()
 
 
-def test_files_that_the_build_leaves_are_not_followed(tmp_path: Path) -> None:
+def test_links_that_the_build_leaves_are_not_followed(tmp_path: Path) -> None:
     with make_place({"src/node.py": SCRIPT}) as place:
         secret = tmp_path / "secret"
         secret.write_text("{}")
-        trap = f"file(CREATE_LINK {secret} {place.output}/environment SYMBOLIC)\n"
+        trap = f"file(CREATE_LINK {secret} {place.output}/cmake-trace.json SYMBOLIC)\n"
         listing = place.workspace.built / "src" / place.workspace.folder / "CMakeLists.txt"
         listing.write_text(CMAKE + trap)
-        built, _, _ = _built(replace(place), tmp_path)
-    assert "CMAKE_PREFIX_PATH" not in built.env
+        built, outcome, _ = _built(place, tmp_path)
+    assert outcome.trace is None
+    assert "devel" in built.env["CMAKE_PREFIX_PATH"]
+    assert secret.read_text() == "{}"

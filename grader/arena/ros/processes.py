@@ -186,7 +186,7 @@ class Process:
         if excess is None:
             self.loop.call_later(WATCH_S, self._watch)
         else:
-            self._limit(excess)
+            self._stopped_for(excess)
             self.kill()
 
     def _excess(self, tree):
@@ -208,8 +208,10 @@ class Process:
     def _too_much_memory(self):
         return "more than {} MB of memory".format(self._limits["memory_bytes"] >> 20)
 
-    def _limit(self, excess):
-        detail = "stopped by the grader: {}".format(excess)
+    def _stopped_for(self, excess):
+        self._limit("stopped by the grader: {}".format(excess))
+
+    def _limit(self, detail):
         self._wire.event("/grader/actor", {"action": "limit", "actor": self.name, "detail": detail})
 
     def line(self, stream, data, cut):
@@ -266,7 +268,7 @@ class Process:
             return
         if self._groups.memory_kills() and self._stopped_by != "KILL":
             self._stopped_by = "KILL"
-            self._limit(self._too_much_memory())
+            self._stopped_for(self._too_much_memory())
         if not self._groups.remove():
             self.loop.call_later(WATCH_S, self._groups.remove)
 
