@@ -21,6 +21,7 @@ from grader.model.package import PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.submission import SourcePackage, Submission
 from grader.package.manifest import read_manifest
+from grader.package.reading import printable
 
 IGNORED = {".git", "build", "devel", "install", "__pycache__"}
 SHEBANG = b"#!/usr/bin/env python3\n"
@@ -138,6 +139,8 @@ class _Copier:
                 self._copy_entry(Path(folder) / name, here / name, package)
 
     def _copy_entry(self, source: Path, target: Path, package: SourcePackage) -> None:
+        if printable(source.relative_to(package.folder).as_posix()) in package.left_out:
+            return
         if source.is_symlink():
             target.symlink_to(source.readlink())
         elif not source.is_file():
