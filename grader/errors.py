@@ -7,10 +7,13 @@
     ├── SubmissionError         3   the submission cannot be read
     │   └── PackageNotFound     3   no package of the lab in it
     ├── EvidenceError           3   an evidence file cannot be read
+    ├── InternalError           3   the grader itself failed
     └── HostError               3   this machine cannot do what is asked
         ├── RosMissing          3   no ROS 1 here
         ├── SandboxMissing      3   `--sandbox require`, and none to be had
-        └── ArenaError          3   the managed roscore failed
+        ├── ArenaError          3   the managed roscore failed
+        ├── OutputLost          3   the output folder could be written, and then it could not
+        └── Busy                3   another grader works on the same submission
 
 Each carries one line that says what is wrong and, as `hint`, what to do about it.
 """
@@ -18,6 +21,9 @@ Each carries one line that says what is wrong and, as `hint`, what to do about i
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Literal
+
+Blame = Literal["submission", "machine", "grader"]
 
 
 class ExitCode(IntEnum):
@@ -32,10 +38,13 @@ class ExitCode(IntEnum):
 
 
 class GraderError(Exception):
-    """The root. `kind` is the word that `result.json` carries."""
+    """The root. `kind` is the word that `result.json` carries, `blame` says whose fault it is: only one of the
+    submission may take the place of an earlier result. `note` says what became of the result."""
 
     kind = "grader"
+    blame: Blame = "grader"
     exit_code = ExitCode.NOT_GRADED
+    note = ""
 
     def __init__(self, message: str, *, hint: str = "") -> None:
         super().__init__(message)
@@ -50,6 +59,7 @@ class UsageError(GraderError):
 
 class OutputError(UsageError):
     kind = "output"
+    blame = "machine"
 
 
 class RubricError(UsageError):
@@ -64,6 +74,7 @@ class RubricError(UsageError):
 
 class SubmissionError(GraderError):
     kind = "submission"
+    blame = "submission"
 
 
 class PackageNotFound(SubmissionError):
@@ -74,8 +85,13 @@ class EvidenceError(GraderError):
     kind = "evidence"
 
 
+class InternalError(GraderError):
+    kind = "internal"
+
+
 class HostError(GraderError):
     kind = "host"
+    blame = "machine"
 
 
 class RosMissing(HostError):
@@ -88,3 +104,11 @@ class SandboxMissing(HostError):
 
 class ArenaError(HostError):
     kind = "arena"
+
+
+class OutputLost(HostError):
+    kind = "output"
+
+
+class Busy(HostError):
+    kind = "busy"

@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import os
 import secrets
 import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from grader.errors import OutputError
+from grader.errors import GraderError, HostError, OutputError
+
+FULL = {
+    errno.ENOSPC: "the disk is full",
+    errno.EDQUOT: "the disk quota is used up",
+    errno.EIO: "the disk failed",
+    errno.EFBIG: "files may not be that large here (ulimit -f)",
+}
 
 
 def atomic_write(path: Path, data: bytes) -> None:
     """Write `data` beside `path`, flush it to the disk, and rename it into place.
 
     A link stays a link, and what is no file (`/dev/null`, a pipe) is written to and stays what it is.
-    Raises OutputError; then `path` is as it was before, and nothing is left beside it.
+    Raises OutputError, or HostError where the disk gives out; then `path` is as it was before, and nothing is
+    left beside it.
     """
     path = path.resolve() if path.is_symlink() else path
     if path.exists() and not path.is_file():
@@ -49,12 +59,47 @@ def check_writable(folder: Path) -> None:
     """Raise OutputError where `folder` (which need not exist yet) cannot be written. Leaves nothing."""
     try:
         place = next(p for p in (folder, *folder.absolute().parents) if os.path.lexists(p))
-        Path(tempfile.mkdtemp(prefix=".grader-", dir=place)).rmdir()
+        with tempfile.TemporaryFile(dir=place):  # without a name: a grader that is killed here leaves nothing
+            pass
     except OSError as error:
         raise unwritable(folder, error) from error
 
 
-def unwritable(path: Path, error: OSError) -> OutputError:
-    """The one line for a file or folder that cannot be written."""
+def unwritable(path: Path, error: OSError) -> GraderError:
+    """The error for what cannot be written: HostError where the disk gives out, else OutputError."""
+    if error.errno in FULL:
+        return HostError(
+            f"cannot write {path}: {FULL[error.errno]}",
+            hint="make room there, or choose another folder with --out; then grade again",
+        )
     reason = error.strerror or type(error).__name__
     return OutputError(f"cannot write {path}: {reason}", hint="choose another folder with --out")
+
+
+def sync_tree(folder: Path) -> None:
+    """Flush everything in `folder`, and the folder itself, to the disk. Raises OSError."""
+    for place, _, files in os.walk(folder, topdown=False):
+        for name in files:
+            sync(Path(place) / name)
+        sync(Path(place))
+
+
+def sync(path: Path) -> None:
+    """Flush one file, or one folder's list of names, to the disk. Raises OSError."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def lock(descriptor: int) -> bool:
+    """Lock an open file or folder until it is closed or this process ends; False where another process has it.
+
+    Raises OSError where the file system knows no locks.
+    """
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True

@@ -7,11 +7,9 @@ A recording that is handed in is evidence already: it skips the package and the 
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from platform import python_version
@@ -19,10 +17,10 @@ from platform import python_version
 from grader import __version__
 from grader.arena.recording import Recorder, Recording
 from grader.arena.sandbox import Mode
-from grader.errors import UsageError
+from grader.errors import EvidenceError, SubmissionError, UsageError
 from grader.evidence.reader import load_evidence
 from grader.evidence.run import Run
-from grader.files import unwritable
+from grader.faults import Attempt, told_apart
 from grader.intake import open_recorded, open_recording, open_submission
 from grader.judge import judge
 from grader.judge.summary import overall_status, total_points
@@ -39,8 +37,10 @@ from grader.model.submission import RecordedSubmission, Submission
 from grader.model.verdict import Status
 from grader.recordings import keep_recording, keep_scenarios
 from grader.report.files import write_reports
+from grader.results import EVIDENCE, Results, finish_killed
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_package, started
+from grader.temporary import temporary_folder
 
 RETRIES = 2
 
@@ -58,18 +58,36 @@ class GradeOptions:
 def grade(
     source: str, rubric: LoadedRubric, out: Path, options: GradeOptions, progress: Progress
 ) -> GradingResult:
-    """Grade one submission into `out/<its id>/`: evidence, then reports. Raises GraderError where it cannot."""
+    """Grade one submission into `out/<its id>/`: evidence and reports, which replace older ones together.
+
+    Raises GraderError where it cannot; the result then says why, with the status `error`.
+    """
     clock = _Clock()
-    with _opened(source, rubric, options, progress) as submission:
-        folder = out / submission.id
-        with _new_evidence(folder) as evidence:
+    attempt = Attempt(
+        source=source,
+        submission_id=options.submission_id,
+        rubric=rubric,
+        out=out,
+        keep_hidden=options.keep_hidden,
+        timing=lambda: clock.timing(None),
+    )
+    finish_killed(out)
+    with told_apart(attempt), _opened(source, rubric, options, progress) as submission:
+        attempt.about = _about(submission)
+        with Results(out / submission.id) as results:
             if isinstance(submission, RecordedSubmission):
-                recording, criteria = None, _kept_and_judged(submission, rubric, evidence, progress)
+                recording = None
+                criteria = _kept_and_judged(submission, rubric, results.evidence, progress)
             else:
-                recording, criteria = _recorded_and_judged(submission, rubric, evidence, options, progress)
-            console = console_log(load_evidence([evidence]))
-        result = _result(submission, rubric, recording, criteria, clock)
-        write_reports(result, folder, console=console, rubric=rubric.rubric, keep_hidden=options.keep_hidden)
+                recording, criteria = _recorded_and_judged(
+                    submission, rubric, results.evidence, options, progress
+                )
+            console = console_log(load_evidence([results.evidence]))
+            result = _result(submission, rubric, recording, criteria, clock)
+            write_reports(
+                result, results.new, console=console, rubric=rubric.rubric, keep_hidden=options.keep_hidden
+            )
+            results.commit()
     return result
 
 
@@ -77,20 +95,19 @@ def record(
     source: str, rubric: LoadedRubric, out: Path, options: GradeOptions, progress: Progress
 ) -> list[Path]:
     """Record the rubric's scenarios into `out/<its id>/evidence/` and judge nothing."""
+    finish_killed(out)
     with _opened(source, rubric, options, progress) as submission:
         if isinstance(submission, RecordedSubmission):
             raise UsageError(
                 f"{submission.source}: there is nothing to run in it", hint="grade it, or judge it"
             )
-        folder = out / submission.id
-        with (
-            _new_evidence(folder) as evidence,
-            _recorder(submission, rubric, evidence, options, progress) as recorder,
-        ):
-            recorder.record_all()
-            keep_scenarios(rubric.rubric, submission, evidence, progress)
-            names = [path.name for path in recorder.recording.files]
-    return [folder / "evidence" / name for name in names]
+        with Results(out / submission.id) as results:
+            with _recorder(submission, rubric, results.evidence, options, progress) as recorder:
+                recorder.record_all()
+                keep_scenarios(rubric.rubric, submission, results.evidence, progress)
+                names = [path.name for path in recorder.recording.files]
+            results.commit()
+    return [out / submission.id / EVIDENCE / name for name in names]
 
 
 def console_log(runs: dict[str, Run]) -> str:
@@ -126,9 +143,9 @@ def _opened(
     source: str, rubric: LoadedRubric, options: GradeOptions, progress: Progress
 ) -> Iterator[Submission | RecordedSubmission]:
     progress.step("intake", "running", source)
-    with tempfile.TemporaryDirectory(prefix="grader-source-", ignore_cleanup_errors=True) as folder:
+    with temporary_folder("source") as folder:
         recorded = open_recording(source, submission_id=options.submission_id)
-        submission = recorded or _opened_tree(source, rubric, Path(folder), options)
+        submission = recorded or _opened_tree(source, rubric, folder, options)
         progress.step("intake", "done", submission.id)
         yield submission
 
@@ -149,32 +166,16 @@ def _kept_and_judged(
     if submission.file is None:
         keep_scenarios(rubric.rubric, submission, evidence, progress)
     else:
-        keep_recording(submission.file, evidence)
+        _keep_recording(submission.file, evidence)
     return judge(rubric.rubric, load_evidence([evidence]), rubric.checks)
 
 
-@contextmanager
-def _new_evidence(folder: Path) -> Iterator[Path]:
-    """A folder to record into, which takes the place of `folder/evidence` when all went well.
-
-    Otherwise it leaves no trace: an older grading stays whole, and folders that it made are gone.
-    """
-    target, beside = folder / "evidence", folder / ".evidence.part"
-    made = [path for path in (folder, *folder.parents) if not path.exists()]
+def _keep_recording(file: Path, evidence: Path) -> None:
+    """A recording that was handed in and cannot be read is the submission's fault."""
     try:
-        shutil.rmtree(beside, ignore_errors=True)
-        beside.mkdir(parents=True)
-    except OSError as error:
-        raise unwritable(folder, error) from error
-    try:
-        yield beside
-        shutil.rmtree(target, ignore_errors=True)
-        beside.rename(target)
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-        for path in made:
-            with suppress(OSError):  # not empty: it is in use
-                path.rmdir()
+        keep_recording(file, evidence)
+    except EvidenceError as error:
+        raise SubmissionError(error.message, hint=error.hint) from error
 
 
 def _recorder(
@@ -222,13 +223,7 @@ def _result(
 ) -> GradingResult:
     ros, sandbox = (recording.ros, recording.sandbox) if recording else (None, None)
     return GradingResult(
-        submission=SubmissionInfo(
-            id=submission.id,
-            source=submission.source,
-            commit=submission.commit,
-            digest=submission.digest,
-            package=submission.package.name if isinstance(submission, Submission) else "",
-        ),
+        submission=_about(submission),
         rubric=RubricInfo(id=rubric.rubric.id, version=rubric.rubric.version, digest=rubric.digest),
         status=overall_status(criteria),
         points=total_points(rubric.rubric, criteria),
@@ -241,4 +236,14 @@ def _result(
             sandbox=sandbox.label if sandbox else "nothing was run",
         ),
         timing=clock.timing(recording),
+    )
+
+
+def _about(submission: Submission | RecordedSubmission) -> SubmissionInfo:
+    return SubmissionInfo(
+        id=submission.id,
+        source=submission.source,
+        commit=submission.commit,
+        digest=submission.digest,
+        package=submission.package.name if isinstance(submission, Submission) else "",
     )

@@ -14,14 +14,18 @@ GRADER = Path(__file__).resolve().parent.parent / "grader"
 ROS_SIDE = GRADER / "arena" / "ros"
 
 # Who may import whom, beside itself. `rubric.model` holds records only: whoever may see records may see it.
-BASE = {"model", "errors"}
+BASE = {"model", "errors", "shown"}
 ALLOWED = {
     "__init__": set[str](),
     "model": set[str](),
     "errors": set[str](),
+    "shown": set[str](),
     "standins": set[str](),
     "files": {"errors"},
-    "evidence": BASE,
+    "temporary": {"errors", "files"},
+    "results": {"errors", "files"},
+    "faults": BASE | {"files", "intake", "report", "results", "rubric"},
+    "evidence": BASE | {"files"},
     "package": BASE,
     "intake": BASE | {"files"},
     "checks": BASE | {"evidence"},
@@ -29,10 +33,11 @@ ALLOWED = {
     "rubric": BASE | {"checks", "evidence", "instructor"},
     "judge": BASE | {"checks", "evidence", "rubric"},
     "report": BASE | {"files", "rubric.model"},
-    "arena": BASE | {"evidence", "files", "package", "rubric.model"},
+    "arena": BASE | {"evidence", "files", "package", "rubric.model", "temporary"},
     "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "pipeline": {
-        *BASE, "arena", "evidence", "files", "intake", "judge", "package", "recordings", "report", "rubric"
+        *BASE, "arena", "evidence", "faults", "files", "intake", "judge", "package", "recordings", "report", "results",
+        "rubric", "temporary"
     },
     "authoring": {
         *BASE, "checks", "evidence", "intake", "package", "pipeline", "rubric"
@@ -40,7 +45,7 @@ ALLOWED = {
     "mutation": BASE | {"pipeline", "rubric"},
     "cli": {
         *BASE, "arena", "authoring", "checks", "evidence", "files", "instructor", "intake", "judge", "mutation",
-        "package", "pipeline", "report", "rubric"
+        "package", "pipeline", "report", "rubric", "temporary"
     },
     "__main__": {"cli"},
 }  # fmt: skip

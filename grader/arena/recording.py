@@ -6,10 +6,9 @@ Runs that do not disturb each other go side by side: a run that measures a rate 
 from __future__ import annotations
 
 import os
-import tempfile
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -34,6 +33,7 @@ from grader.model.progress import Progress
 from grader.model.submission import Submission
 from grader.package import python_paths, read_package, read_syntax_report, with_build_facts
 from grader.rubric.model import Rubric, Scenario
+from grader.temporary import temporary_folder
 
 PACKAGE = "package"
 LONG_S = 3.0
@@ -99,15 +99,16 @@ class Recorder:
         progress.step("package", "done")
         self.recording = Recording(folder=folder, facts=facts, ros=ros, sandbox=choose(mode) if ros else None)
         self._place: Place | None = None
+        self._stack = ExitStack()
 
     def __enter__(self) -> Self:
         base = temporary_base(self.recording.sandbox)
-        self._temporary = tempfile.TemporaryDirectory(prefix="grader-", dir=base, ignore_cleanup_errors=True)
-        Path(self._temporary.name).chmod(0o711)
+        self._folder = self._stack.enter_context(temporary_folder("run", base))
+        self._folder.chmod(0o711)
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._temporary.cleanup()
+        self._stack.close()
 
     def record_all(self) -> None:
         """The package with its build, then every scenario in its lane."""
@@ -177,7 +178,7 @@ class Recorder:
         )
 
     def _make_place(self, ros: RosInstallation, sandbox: Sandbox) -> Place:
-        folder = Path(self._temporary.name)
+        folder = self._folder
         with _readable_by_all():
             prepare(folder, ros)
             workspace: Workspace = make_workspace(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import secrets
+import signal
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,7 +18,7 @@ from grader.arena.child import ArenaProcess
 from grader.arena.frames import Frame, FrameReader
 from grader.arena.live import Live
 from grader.arena.place import Place
-from grader.errors import ArenaError, GraderError
+from grader.errors import ArenaError
 from grader.evidence.events import TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
 from grader.evidence.run import is_grader_node
 from grader.evidence.writer import EvidenceWriter
@@ -27,12 +29,15 @@ LOG_FOLDER = ("/bin/sh", "-c", 'mkdir -p "$ROS_HOME/log" && exec "$0"')
 READY_S = 15.0
 END_S = 5.0
 PORT = 11311
+KILLED_BELOW = re.compile(r"Killed signal terminated program|process has died \[pid \d+, exit code -9,")
+"""What the compiler's driver and roslaunch say of a process of theirs that SIGKILL ended."""
 
 
 class ArenaSession:
     """`async with ArenaSession(…) as arena`: inside, the managed roscore runs (or, without `master`, only processes).
 
-    Raises ArenaError when it does not start or dies.
+    Raises ArenaError when it does not start or dies. Times are those of its start plus monotonic time, as the arena's
+    own are: a clock that is set while it runs moves none of them.
     """
 
     def __init__(self, place: Place, writer: EvidenceWriter, *, master: bool = True) -> None:
@@ -49,7 +54,11 @@ class ArenaSession:
         self._done = False
         self.rosout_up = False
         self._failure = ""
-        self._error: GraderError | None = None
+        self._error: Exception | None = None
+        self._killed: list[str] = []
+        self._limited: set[str] = set()
+        self._stopping: set[str] = set()
+        self._offset_ns = time.time_ns() - time.monotonic_ns()
         self._frames = FrameReader()
         self._calls = 0
         self._answers: dict[int, dict[str, Any]] = {}
@@ -82,15 +91,16 @@ class ArenaSession:
 
     async def interrupt(self, name: str, *, int_s: float, term_s: float) -> None:
         """Ctrl-C; TERM after `int_s`, KILL after another `term_s`. Returns when the process has ended."""
+        self._stopping.add(name)
         self.send(do="interrupt", name=name, int_s=int_s, term_s=term_s)
         await self.wait(lambda: name in self.exit_codes, int_s + term_s + END_S)
 
     def course(self, event: ScenarioEvent) -> None:
-        self._writer.event("/grader/scenario", time.time_ns(), event)
+        self._writer.event("/grader/scenario", self._now_ns(), event)
 
     def note(self, event: ActorEvent) -> None:
         """Write down what the grader did, or learnt."""
-        self._writer.event("/grader/actor", time.time_ns(), event)
+        self._writer.event("/grader/actor", self._now_ns(), event)
 
     async def call(self, timeout_s: float, **command: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
         """Call a service: `{"data": base64}` of its response, or `{"error": why not}`."""
@@ -104,11 +114,10 @@ class ArenaSession:
     async def wait(self, condition: Callable[[], bool], timeout_s: float) -> bool:
         """Wait until the condition holds; False when it does not in time. Raises ArenaError if the arena dies."""
         deadline = time.monotonic() + timeout_s
-        while not condition():
-            if self._error is not None:
-                raise self._error
-            if self._failure:
-                raise ArenaError(f"the managed roscore ended: {self._why()}", hint="grade again")
+        while True:
+            self._raise_failure()
+            if condition():
+                return True
             left = deadline - time.monotonic()
             if left <= 0:
                 return False
@@ -118,12 +127,26 @@ class ArenaSession:
                 await self._changed.wait()
             finally:
                 timer.cancel()
-        return True
+
+    def _raise_failure(self) -> None:
+        """Also where what is waited for has come: something else is missing then."""
+        if self._error is not None:
+            raise self._error
+        if self._failure:
+            raise ArenaError(f"the managed roscore ended: {self._why()}", hint="grade again")
 
     async def finish(self) -> None:
-        """Let the arena stop what is left and give its last frames."""
+        """Let the arena stop what is left and give its last frames. Raises ArenaError where they do not come, or where
+        a process was killed, and not by the arena: the machine had no memory for it, or somebody ended it."""
         self.send(do="finish")
-        await self.wait(lambda: self._done, END_S)
+        if not await self.wait(lambda: self._done, END_S):
+            raise ArenaError("the managed roscore did not end in order", hint="grade again")
+        killed = [name for name in self._killed if name not in self._limited]
+        if killed:
+            raise ArenaError(
+                f"{killed[0]} was killed (SIGKILL), and not by the grader: the machine may be out of memory",
+                hint="grade again",
+            )
 
     def _config(self) -> dict[str, Any]:
         rosout = self._rosout_spec() if self._master else None
@@ -151,10 +174,10 @@ class ArenaSession:
         try:
             for frame in self._frames.feed(chunk):
                 self._take(frame)
-        except GraderError as error:
-            self._error = error
         except (ValueError, KeyError) as error:
             self._failure = f"it sent what is no frame: {type(error).__name__}"
+        except Exception as error:  # noqa: BLE001 - the disk, the memory: `wait` raises it where it is heeded
+            self._error = error
         if not chunk and not self._done:
             self._failure = self._failure or "its output ended"
         self._changed.set()
@@ -188,12 +211,16 @@ class ArenaSession:
             self.live.graph(nodes, record["processes"], time.monotonic(), picture=picture)
             self.live.services = set(record["services"])
         elif topic == "/grader/console":
+            if KILLED_BELOW.search(record["line"]) and record["process"] not in self._stopping:
+                self._killed.append(record["process"])
             if record["process"] not in self.live.helpers:
                 self.live.printed(record["line"], time.monotonic())
         elif topic == "/grader/process" and record["event"] == "exit":
             self._exited(record)
         elif topic == "/grader/param" and not is_grader_node(record["caller_id"]):
             self.live.active(time.monotonic())
+        elif topic == "/grader/actor" and record["action"] == "limit":
+            self._limited.add(record["actor"])
         elif topic == "/grader/actor" and record["action"] == "open":
             self.live.opened.add(record["actor"])
             self.live.active(time.monotonic())
@@ -205,6 +232,9 @@ class ArenaSession:
         else:
             self.student_cpu_s += record["cpu_s"]
         self.exit_codes[name] = record["exit_code"]
+        tried_out = record["role"] == "student" and not self._master  # what a build says of a script
+        if record["signal"] == signal.SIGKILL and record["stopped_by"] is None and not tried_out:
+            self._killed.append(name)
         self.live.helpers.discard(name)
         if name in self.live.running:
             self.live.running.remove(name)
@@ -239,7 +269,10 @@ class ArenaSession:
             cpu_s=round(fields["cpu_s"], 4),
             max_rss_bytes=fields["max_rss_bytes"],
         )
-        self._writer.event("/grader/process", time.time_ns(), event)
+        self._writer.event("/grader/process", self._now_ns(), event)
+
+    def _now_ns(self) -> int:
+        return self._offset_ns + time.monotonic_ns()
 
     def _why(self) -> str:
         return f"{self._failure} {self._process.last_words()}".strip() or "it did not answer"

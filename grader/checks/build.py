@@ -96,20 +96,28 @@ def judge_build(package: PackageFacts, build: Run) -> Verdict:
         reason = build.metadata.get("not_run") or (build.outcome.detail if build.outcome else "")
         message = f"the package was not built{': ' + reason if reason else ''}"
         return inconclusive(message, expected=EXPECTED, measured="not built", hint=run_hint(reason))
-    if "exit" not in found:
-        return inconclusive("the recording of the build was cut short", expected=EXPECTED, hint="grade again")
+    if "exit" not in found or (build.outcome is not None and build.outcome.outcome == "host"):
+        detail = build.outcome.detail if build.outcome else "the recording was cut short"
+        message = f"the build failed on the grading machine: {detail}"
+        return inconclusive(message, expected=EXPECTED, hint="`grader doctor`, then grade again")
     end_ns, end = found["exit"]
     took = seconds(end_ns - found.get("start", found["exit"])[0])
     if end.exit_code == 0:
         return passed("catkin_make succeeded", expected=EXPECTED, measured=f"exit code 0 after {took}")
     if end.stopped_by is not None:
-        return failed(
-            f"catkin_make had not finished after {took} and was stopped",
-            expected=EXPECTED,
-            measured=f"stopped after {took}",
-            hint="look for a command in CMakeLists.txt that waits or never ends",
-        )
+        return _stopped_build(build, took)
     return _broken_build(package, build, end.exit_code)
+
+
+def _stopped_build(build: Run, took: str) -> Verdict:
+    """By a limit that it broke, which is named, or because its time was up."""
+    limit = next((e.detail for _, e in build.actors if e.action == "limit" and e.actor == CATKIN_MAKE), "")
+    return failed(
+        f"catkin_make was {limit}" if limit else f"catkin_make had not finished after {took} and was stopped",
+        expected=EXPECTED,
+        measured=limit or f"stopped after {took}",
+        hint="look at what CMakeLists.txt runs: a command that waits, never ends, or needs far too much",
+    )
 
 
 def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> Verdict:

@@ -12,13 +12,12 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
 
 from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
-from grader.arena.sandbox import why_not
 from grader.arena.standins import missing_packages
+from grader.cli.row import Row
+from grader.cli.walls import walls
 from grader.errors import RosMissing
-from grader.model.record import Record
 
 PROGRAMS = {"git": "git", "cmake": "cmake", "make": "make", "c++": "g++"}
 ROS_PROGRAMS = ("catkin_make", "roslaunch", "rosrun", "rospack")
@@ -39,18 +38,9 @@ GIB = 1 << 30
 MIN_MEMORY_BYTES, MIN_DISK_BYTES = GIB, GIB
 
 
-class Row(Record):
-    """`missing`: grading is not fully possible. `limited`: it is, but less safely or more slowly."""
-
-    name: str
-    state: Literal["ok", "limited", "missing"]
-    detail: str
-    mend: str = ""
-
-
 def diagnose() -> tuple[Row, ...]:
     """Every row, in the order in which things are needed."""
-    return (_python(), *_programs(), *_ros(), _sandbox(), _user(), *_resources(), _hostname(), _encoding())
+    return (_python(), *_programs(), *_ros(), *walls(), _user(), *_resources(), _hostname(), _encoding())
 
 
 def _python() -> Row:
@@ -106,17 +96,6 @@ def _standins(ros: RosInstallation) -> Row:
     missing = missing_packages(ros)
     detail = f"for {', '.join(missing)}, which this ROS lacks" if missing else "not needed for any package"
     return Row(name="stand-ins", state="ok", detail=detail)
-
-
-def _sandbox() -> Row:
-    reason = why_not()
-    if not reason:
-        return Row(name="sandbox", state="ok", detail="bubblewrap, both layers")
-    detail = f"{reason}; students' code runs without a wall around it"
-    if shutil.which("bwrap") is None:
-        return Row(name="sandbox", state="limited", detail=detail, mend="apt-get install bubblewrap")
-    mend = "sysctl -w kernel.unprivileged_userns_clone=1 kernel.apparmor_restrict_unprivileged_userns=0"
-    return Row(name="sandbox", state="limited", detail=detail, mend=mend)
 
 
 def _user() -> Row:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 from collections.abc import Mapping
@@ -18,8 +17,8 @@ from pydantic_core import PydanticSerializationError
 from typing_extensions import Self
 
 from grader import __version__
-from grader.errors import GraderError, HostError, OutputError
 from grader.evidence.events import EVIDENCE_VERSION, METADATA_NAME, PACKAGE_TOPIC, TOPICS
+from grader.files import unwritable
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 
@@ -27,11 +26,6 @@ ReadableBuffer: TypeAlias = Any
 
 CHUNK_BYTES = 256 * 1024
 MAX_DEPTH = 32
-_FULL = {
-    errno.ENOSPC: "the disk is full",
-    errno.EDQUOT: "the disk quota is used up",
-    errno.EIO: "the disk failed",
-}
 
 
 class EvidenceStream:
@@ -47,7 +41,7 @@ class EvidenceStream:
         own = {"format": EVIDENCE_VERSION, "scenario": scenario, "clock": clock, "warp": f"{warp:g}"}
         entries = {**metadata, **own}
         self._mcap.add_metadata(METADATA_NAME, {_text(k): _text(v) for k, v in entries.items()})
-        self._schemas: dict[tuple[str, bytes], int] = {}
+        self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._channels: dict[tuple[str, str, str, str], list[int]] = {}
         self._events: dict[str, list[int]] = {}
 
@@ -128,7 +122,7 @@ class EvidenceStream:
         channel[1] += 1
 
     def _schema(self, name: str, encoding: str, data: bytes) -> int:
-        key = (name, data)
+        key = (name, encoding, data)  # a student's node may send a text of ours as its definition
         if key not in self._schemas:
             self._schemas[key] = self._mcap.register_schema(name, encoding, data)
         return self._schemas[key]
@@ -175,7 +169,7 @@ class EvidenceWriter(EvidenceStream):
             self._part.replace(self._path)
         except OSError as error:
             self.abort()
-            raise _translated(error, self._path) from error
+            raise unwritable(self._path, error) from error
         except BaseException:
             self.abort()
             raise
@@ -199,7 +193,7 @@ class _Guarded(BufferedIOBase):
         try:
             return self._file.write(data)
         except OSError as error:
-            raise _translated(error, self._path) from error
+            raise unwritable(self._path, error) from error
 
     def tell(self) -> int:
         return self._file.tell()
@@ -210,16 +204,7 @@ def _open(part: Path) -> BinaryIO:
         part.parent.mkdir(parents=True, exist_ok=True)
         return part.open("wb")
     except OSError as error:
-        raise _translated(error, part) from error
-
-
-def _translated(error: OSError, path: Path) -> GraderError:
-    if error.errno in _FULL:
-        return HostError(
-            f"cannot write {path}: {_FULL[error.errno]}", hint="make room there, or choose another folder"
-        )
-    reason = error.strerror or type(error).__name__
-    return OutputError(f"cannot write {path}: {reason}", hint="choose a folder that can be written")
+        raise unwritable(part, error) from error
 
 
 def _text(text: str) -> str:

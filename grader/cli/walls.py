@@ -1,0 +1,100 @@
+"""What this machine has of each part of the sandbox, and what mends it where it is missing."""
+
+from __future__ import annotations
+
+import os
+import resource
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from grader.arena.cgroups import describe, find_cgroups
+from grader.arena.limits import Limits
+from grader.arena.sandbox import NETWORK, choose, why_not
+from grader.cli.row import Row
+from grader.errors import HostError
+
+PROGRAMS = {"bwrap": "bubblewrap", "setpriv": "util-linux", "prlimit": "util-linux"}
+PROBE_S = 20
+SWITCHES = {
+    "kernel/unprivileged_userns_clone": ("0", "sysctl -w kernel.unprivileged_userns_clone=1"),
+    "user/max_user_namespaces": ("0", "sysctl -w user.max_user_namespaces=10000"),
+    "kernel/apparmor_restrict_unprivileged_userns": (
+        "1",
+        "sysctl -w kernel.apparmor_restrict_unprivileged_userns=0",
+    ),
+}
+CONTAINER = "in a container: start it with --privileged, or with --security-opt seccomp=unconfined apparmor=unconfined"
+DELEGATE = "systemd-run --user --scope -p Delegate=yes grader …, or run it as root"
+
+
+def walls() -> Iterator[Row]:
+    """A row for each part, then one for what `--sandbox auto` makes of them."""
+    yield from map(_program, PROGRAMS)
+    yield _probe("user namespaces", ["unshare", "--user", "--pid", "--fork", "true"], drop=os.geteuid() == 0)
+    yield _probe("network", [sys.executable, "-I", str(NETWORK), "true"], drop=False)
+    held = find_cgroups().memory is not None
+    yield Row(
+        name="limits", state="ok" if held else "limited", detail=describe(), mend="" if held else DELEGATE
+    )
+    yield from _too_low()
+    yield _mode()
+
+
+def _program(name: str) -> Row:
+    path, package = shutil.which(name), PROGRAMS[name]
+    if path is None:
+        return Row(name=name, state="limited", detail="not found", mend=f"apt-get install {package}")
+    return Row(name=name, state="ok", detail=path)
+
+
+def _probe(name: str, command: Sequence[str], *, drop: bool) -> Row:
+    """Whether namespaces of that kind can be made, by the user who needs them."""
+    nobody = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"] if drop else []
+    try:
+        done = subprocess.run([*nobody, *command], capture_output=True, check=False, timeout=PROBE_S)
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        reason = "" if done.returncode == 0 else (said or [f"exit code {done.returncode}"])[-1]
+    except (OSError, subprocess.TimeoutExpired) as error:
+        reason = str(error)
+    if not reason:
+        return Row(name=name, state="ok", detail="namespaces can be made")
+    return Row(name=name, state="limited", detail=reason[:200], mend=_switch())
+
+
+def _switch() -> str:
+    """The setting of the kernel that forbids it, where it is one."""
+    for name, (forbidding, mend) in SWITCHES.items():
+        path = Path("/proc/sys", name)
+        if path.is_file() and path.read_text(errors="replace").strip() == forbidding:
+            return mend
+    return CONTAINER
+
+
+def _too_low() -> Iterator[Row]:
+    """Limits of this shell that are lower than what a student's processes may use."""
+    known = Limits()
+    wanted = {
+        "ulimit -f": (resource.RLIMIT_FSIZE, known.file_bytes),
+        "ulimit -n": (resource.RLIMIT_NOFILE, known.open_files),
+        "ulimit -t": (resource.RLIMIT_CPU, int(known.cpu_s)),
+    }
+    for name, (number, least) in wanted.items():
+        _, hard = resource.getrlimit(number)
+        if hard not in (resource.RLIM_INFINITY, -1) and hard < least and os.geteuid() != 0:
+            detail = f"{hard}, and a student's process may use {least}"
+            yield Row(name=name, state="limited", detail=detail, mend=f"{name} unlimited, before the grader")
+
+
+def _mode() -> Row:
+    reason = why_not()
+    try:
+        label = choose("auto").label
+    except HostError as error:
+        return Row(name="sandbox", state="missing", detail=error.message, mend=error.hint)
+    if not reason:
+        return Row(name="sandbox", state="ok", detail=f"--sandbox auto takes {label}")
+    detail = f"{label}: students' code runs without a wall around it, and --sandbox require refuses"
+    return Row(name="sandbox", state="limited", detail=detail, mend="mend the rows above")

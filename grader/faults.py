@@ -1,0 +1,186 @@
+"""Whose fault it is that a submission could not be graded, and the result that says so."""
+
+from __future__ import annotations
+
+import errno
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from platform import python_version
+
+from grader import __version__
+from grader.errors import (
+    Busy,
+    EvidenceError,
+    GraderError,
+    HostError,
+    InternalError,
+    OutputError,
+    OutputLost,
+    SubmissionError,
+    UsageError,
+)
+from grader.files import FULL
+from grader.intake.identity import identify
+from grader.model.result import (
+    CriterionResult,
+    EnvironmentInfo,
+    ErrorInfo,
+    GradingResult,
+    RubricInfo,
+    SubmissionInfo,
+    TimingInfo,
+)
+from grader.model.verdict import Status
+from grader.report.files import write_reports
+from grader.results import RESULT, Results
+from grader.rubric.load import LoadedRubric
+from grader.rubric.model import Criterion
+
+MACHINE = FULL | {
+    errno.ENOMEM: "there is too little memory",
+    errno.EAGAIN: "no more processes can be started",
+    errno.EMFILE: "too many files are open (ulimit -n)",
+    errno.ENFILE: "too many files are open",
+    errno.EROFS: "the disk became read-only",
+    errno.ESTALE: "the network disk is gone",
+}
+AGAIN = "mend that (`grader doctor` looks at this machine), then grade again"
+UNEXPECTED = {EvidenceError.kind, GraderError.kind}
+MEMORY = "grade fewer submissions side by side, or on a machine with more memory"
+REPORT = "run with --debug for the traceback, and report it; the submission can be graded again"
+
+
+@dataclass(kw_only=True)
+class Attempt:
+    """What is known of a grading while it runs: enough to say in the end that it failed. `about` is None until the
+    submission is open."""
+
+    source: str
+    submission_id: str | None
+    rubric: LoadedRubric
+    out: Path
+    keep_hidden: bool
+    timing: Callable[[], TimingInfo]
+    about: SubmissionInfo | None = None
+
+
+@contextmanager
+def told_apart(attempt: Attempt) -> Iterator[None]:
+    """Whatever ends the grading becomes an error that says whose fault it is, and a result that says the same.
+
+    Errors of the command line and of the rubric leave no result, and neither does a submission that another grader
+    is working on.
+    """
+    try:
+        yield
+    except (Exception, SystemExit) as error:  # whatever it is, it must not look as if nobody had been graded
+        fault = fault_of(error)
+        if not isinstance(fault, (UsageError, Busy)):
+            fault.note = _keep(fault, attempt)
+        if fault is error:
+            raise
+        raise fault from error
+
+
+def fault_of(error: BaseException) -> GraderError:
+    """The error with its kind: the student's, the machine's or the grader's own."""
+    if isinstance(error, MemoryError):
+        return HostError("the grader ran out of memory", hint=MEMORY)
+    if isinstance(error, GraderError) and not isinstance(error, (OutputError, SubmissionError)):
+        return error if error.kind not in UNEXPECTED else _internal(error)
+    machine = _machine_fault(error)
+    if machine is not None:
+        return machine
+    return error if isinstance(error, SubmissionError) else _internal(error)
+
+
+def _machine_fault(error: BaseException) -> HostError | None:
+    """The machine's fault behind an error, whoever met it first; None where it is not at fault."""
+    cause = error if isinstance(error, OSError) else error.__cause__
+    reason = MACHINE.get(cause.errno or 0) if isinstance(cause, OSError) else None
+    if reason and isinstance(error, GraderError):
+        more = "" if reason in error.message else f" ({reason})"
+        return HostError(f"{error.message}{more}", hint=AGAIN)
+    if reason and isinstance(cause, OSError):
+        return HostError(f"{reason}: {cause.filename}" if cause.filename else reason, hint=AGAIN)
+    if isinstance(error, OutputError):
+        return OutputLost(error.message, hint=error.hint)
+    if isinstance(error, subprocess.TimeoutExpired):
+        return HostError(f"{error.cmd[0]} did not end within {error.timeout:g} s", hint=AGAIN)
+    return None
+
+
+def _internal(error: BaseException) -> InternalError:
+    return InternalError(f"internal error: {type(error).__name__}: {error}", hint=REPORT)
+
+
+def error_result(fault: GraderError, about: SubmissionInfo, attempt: Attempt) -> GradingResult:
+    """The result that says that nothing was graded: every criterion open, no point given."""
+    rubric = attempt.rubric
+    return GradingResult(
+        submission=about,
+        rubric=RubricInfo(id=rubric.rubric.id, version=rubric.rubric.version, digest=rubric.digest),
+        status="error",
+        points=0.0,
+        max_points=rubric.rubric.max_points,
+        criteria=tuple(_open(criterion, fault) for criterion in rubric.rubric.criteria),
+        environment=EnvironmentInfo(
+            grader=__version__, ros="", python=python_version(), sandbox="nothing was run"
+        ),
+        timing=attempt.timing(),
+        error=ErrorInfo(kind=fault.kind, message=fault.message, hint=fault.hint),
+    )
+
+
+def _open(criterion: Criterion, fault: GraderError) -> CriterionResult:
+    own = fault.blame == "submission"
+    lost = "not judged" if own else "not judged, which is not the submission's fault, so no mark is lost"
+    return CriterionResult(
+        id=criterion.id,
+        title=criterion.title,
+        check=criterion.check,
+        scenario=criterion.scenario,
+        status=Status.ERROR,
+        points=0.0,
+        max_points=criterion.points,
+        message=f"{lost}: {fault.message}",
+        expected="",
+        measured="",
+        hint=fault.hint if own else "grade the submission again",
+        reproduce="",
+        citations=(),
+    )
+
+
+def _keep(fault: GraderError, attempt: Attempt) -> str:
+    """Write the result that says what went wrong, and give a remark where there is none.
+
+    What an earlier run found out stays, unless the submission itself is at fault now.
+    """
+    about = attempt.about or _about(attempt)
+    if about is None:
+        return ""
+    folder = attempt.out / about.id
+    try:
+        with Results(folder) as results:
+            if fault.blame != "submission" and results.complete:
+                return f"the result of an earlier run stays as it is: {folder / RESULT}"
+            result = error_result(fault, about, attempt)
+            results.evidence.rmdir()
+            rubric, hidden = attempt.rubric.rubric, attempt.keep_hidden
+            write_reports(result, results.new, console="", rubric=rubric, keep_hidden=hidden)
+            (results.new / "console.log").unlink()
+            results.commit()
+    except Exception as second:  # noqa: BLE001 - what went wrong first is what has to be told
+        return f"no result could be written: {getattr(second, 'message', '') or type(second).__name__}"
+    return ""
+
+
+def _about(attempt: Attempt) -> SubmissionInfo | None:
+    known = identify(attempt.source, attempt.submission_id)
+    if known is None:
+        return None
+    return SubmissionInfo(id=known[0], source=known[1], commit=None, digest="", package="")

@@ -1,0 +1,186 @@
+"""One submission's folder of results: evidence and reports take the place of older ones together.
+
+Everything is written into `.grader-new`, flushed to the disk, and renamed to `.grader-ready`: from there on it counts.
+Then the old result goes, the new evidence and reports come, and the new result last. A grader that is killed in between
+leaves no result, or one that fits the evidence beside it; the next one finishes what it had begun.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+
+from typing_extensions import Self
+
+from grader.errors import Busy
+from grader.files import lock, sync, sync_tree, unwritable
+
+NEW, READY = ".grader-new", ".grader-ready"
+NAMES, REPLACED = "names.json", "replaced"
+EVIDENCE, RESULT = "evidence", "result.json"
+PARTS = (RESULT, EVIDENCE, "report.md", "report.html", "junit.xml", "console.log")
+COMPLETE = ("graded", "inconclusive")
+ATTEMPTS = 10
+
+
+class Results:
+    """`with Results(folder) as results:` write into `results.new`, then `results.commit()`; without it nothing changes,
+    and folders that were made are gone again.
+
+    Raises Busy where another grader works on the same submission, OutputError or HostError where the folder cannot
+    be written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.new = folder / NEW
+
+    def __enter__(self) -> Self:
+        self._made = [path for path in (self.folder, *self.folder.parents) if not path.exists()]
+        with self._writable():
+            self._lock = _locked(self.folder)
+        try:
+            with self._writable():
+                _recover(self.folder)
+                self.evidence.mkdir(parents=True)
+        except BaseException:
+            self._leave()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._leave()
+
+    @property
+    def evidence(self) -> Path:
+        """Where the new evidence goes."""
+        return self.new / EVIDENCE
+
+    @property
+    def complete(self) -> bool:
+        """Whether an earlier run left a result that says what was reached."""
+        try:
+            return json.loads((self.folder / RESULT).read_bytes()).get("status") in COMPLETE
+        except (OSError, ValueError, AttributeError):
+            return False
+
+    def commit(self) -> None:
+        """Let what is in `new` take the place of what was there."""
+        with self._writable():
+            names = sorted(path.name for path in self.new.iterdir())
+            (self.new / NAMES).write_text(json.dumps(names))
+            sync_tree(self.new)
+            self.new.rename(self.folder / READY)
+            sync(self.folder)
+            _roll_forward(self.folder)
+
+    def _leave(self) -> None:
+        shutil.rmtree(self.new, ignore_errors=True)
+        for path in self._made:
+            with suppress(OSError):  # not empty: it is in use
+                path.rmdir()
+        os.close(self._lock)
+
+    @contextmanager
+    def _writable(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise unwritable(self.folder, error) from error
+
+
+def finish_killed(out: Path) -> None:
+    """Finish, or throw away, what graders that were killed left in the folders of `out`. Those of live ones stay."""
+    with suppress(
+        OSError
+    ):  # housekeeping: whatever cannot be done here is done when its own submission is graded
+        for folder in [p for p in out.iterdir() if (p / NEW).is_dir() or (p / READY).is_dir()]:
+            _finish(folder)
+
+
+def _finish(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        if lock(descriptor):
+            _recover(folder)
+            folder.rmdir()
+    except OSError:  # not empty: it holds a result
+        return
+    finally:
+        os.close(descriptor)
+
+
+def _locked(folder: Path) -> int:
+    """A descriptor that holds the folder, made anew where the grader that held it before has just removed it."""
+    for _ in range(ATTEMPTS):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        except FileNotFoundError:
+            continue
+        held = _held(descriptor)
+        if held and _is_at(descriptor, folder):
+            return descriptor
+        os.close(descriptor)
+        if not held:
+            break
+    raise Busy(
+        f"another grader works on {folder} just now",
+        hint="wait until it has ended, or choose another folder with --out",
+    )
+
+
+def _is_at(descriptor: int, folder: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(descriptor), folder.stat())
+    except FileNotFoundError:
+        return False
+
+
+def _held(descriptor: int) -> bool:
+    try:
+        return lock(descriptor)
+    except OSError:  # a file system without locks: whoever shares it has to know what they do
+        return True
+
+
+def _recover(folder: Path) -> None:
+    if (folder / READY).is_dir():
+        _roll_forward(folder)
+    shutil.rmtree(folder / NEW, ignore_errors=True)
+
+
+def _roll_forward(folder: Path) -> None:
+    """Put what is ready into its place. May be stopped anywhere, and begun again."""
+    ready = folder / READY
+    names = ready / NAMES
+    if names.exists():
+        coming = json.loads(names.read_text())
+        _clear(folder, coming)
+        sync(folder)
+        for name in (*(n for n in coming if n != RESULT), RESULT):
+            if (ready / name).exists():
+                (ready / name).rename(folder / name)
+        sync(folder)
+        names.unlink()
+    shutil.rmtree(ready, ignore_errors=True)
+
+
+def _clear(folder: Path, coming: list[str]) -> None:
+    """The old result goes first. What is in place already is no longer among what is ready, and stays."""
+    ready = folder / READY
+    for name in dict.fromkeys((*PARTS, *coming)):
+        old = folder / name
+        if os.path.lexists(old) and ((ready / name).exists() or name not in coming):
+            if name == EVIDENCE:
+                shutil.rmtree(ready / REPLACED, ignore_errors=True)
+                old.rename(ready / REPLACED)
+            else:
+                old.unlink()
