@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from grader.cli.show import show
 from grader.errors import ExitCode
 from grader.files import check_writable
 from grader.report.hidden import hidden_ids, without_hidden
+from grader.temporary import temporary_folder
 
 
 def run(
@@ -33,7 +33,7 @@ def run(
         sandbox=sandbox, submission_id=None, static_only=static, keep_hidden=False
     )
     with ExitStack() as stack:
-        folder = out or Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="grader-")))
+        folder = out or stack.enter_context(temporary_folder("check"))
         with open_progress() as progress:
             result = pipeline.grade(source, loaded, folder, options, progress)
         shown = without_hidden(result, loaded.rubric)
