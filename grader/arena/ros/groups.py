@@ -11,6 +11,8 @@ KEYS = {
     ("pids", 2): "pids.max",
 }
 SWAP = {1: "memory.memsw.limit_in_bytes", 2: "memory.swap.max"}
+PEAK = "memory.max_usage_in_bytes"
+NEAR_BYTES = 4 << 20  # the kernel charges in pieces, the largest is a huge page
 KILLS = {1: "memory.oom_control", 2: "memory.events"}
 
 
@@ -49,16 +51,17 @@ class Groups:
                     _write(folder, "cgroup.procs", pid)
 
     def memory_kills(self):
-        """How often the kernel killed a process because the tree had too much memory."""
+        """How often the kernel killed a process because the tree had too much memory. What it kills because the whole
+        machine has too little counts here too: then this group never came to its own limit."""
         if "memory" not in self._made:
             return 0
         version, folder = self._made["memory"]
-        try:
-            with open(os.path.join(folder, KILLS[version])) as file:
-                rows = [line.split() for line in file]
-        except OSError:
-            return 0
-        return sum(int(row[1]) for row in rows if row[0] == "oom_kill")
+        events = dict(_rows(folder, KILLS[version]))
+        if version == 2:
+            reached = events.get("oom", 0) > 0
+        else:
+            reached = _number(folder, PEAK) > _number(folder, KEYS["memory", 1]) - NEAR_BYTES
+        return events.get("oom_kill", 0) if reached else 0
 
     def remove(self):
         """Once its processes have ended. Gives back whether nothing is left."""
@@ -67,6 +70,22 @@ class Groups:
                 os.rmdir(folder)
                 del self._made[controller]
         return not self._made
+
+
+def _rows(folder, name):
+    try:
+        with open(os.path.join(folder, name)) as file:
+            return [(key, int(value)) for key, value in (line.split() for line in file)]
+    except (OSError, ValueError):
+        return []
+
+
+def _number(folder, name):
+    try:
+        with open(os.path.join(folder, name)) as file:
+            return int(file.read())
+    except (OSError, ValueError):
+        return 0
 
 
 def _write(folder, name, value):

@@ -1,0 +1,60 @@
+"""Whose memory ran out: the tree's, which broke its limit, or the machine's."""
+
+from __future__ import annotations
+
+import secrets
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from grader.arena.cgroups import find_cgroups
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "grader" / "arena" / "ros"))
+from groups import Groups
+
+FOUND = find_cgroups().memory
+MB = 1 << 20
+EAT = "import sys; open(sys.argv[1] + '/cgroup.procs', 'w').write('0'); bytearray(300 << 20)"
+
+
+@pytest.fixture
+def machine() -> Iterator[Path]:
+    """A group that stands for a machine with 100 MB."""
+    if FOUND is None or FOUND.version != 1:
+        pytest.skip("needs control groups of version 1 that can be written")
+    folder = Path(FOUND.folder, f"grader-machine-{secrets.token_hex(4)}")
+    folder.mkdir()
+    (folder / "memory.use_hierarchy").write_text("1")
+    (folder / "memory.limit_in_bytes").write_text(str(100 * MB))
+    yield folder
+    folder.rmdir()
+
+
+@pytest.mark.parametrize(("limit_mb", "kills"), [(60, 1), (1000, 0)], ids=["the tree's", "the machine's"])
+def test_a_kill_counts_where_the_tree_reached_its_own_limit(machine: Path, limit_mb: int, kills: int) -> None:
+    limits = {"memory_bytes": limit_mb * MB, "tasks": 100}
+    groups = Groups({"memory": {"version": 1, "folder": str(machine)}}, limits)
+    (folder,) = (path for path in machine.iterdir() if path.is_dir())
+    done = subprocess.run([sys.executable, "-c", EAT, str(folder)], check=False)
+    assert done.returncode == -9
+    assert groups.memory_kills() == kills
+    assert groups.remove()
+
+
+@pytest.mark.parametrize(
+    ("events", "kills"),
+    [
+        ("max 9\noom 1\noom_kill 1\n", 1),
+        ("max 0\noom 0\noom_kill 1\n", 0),
+        ("oom 1\noom_kill 0\n", 0),
+        ("", 0),
+    ],
+)
+def test_events_of_version_2(tmp_path: Path, events: str, kills: int) -> None:
+    groups = Groups({"memory": {"version": 2, "folder": str(tmp_path)}}, {"memory_bytes": MB, "tasks": 1})
+    (folder,) = tmp_path.iterdir()
+    (folder / "memory.events").write_text(events)
+    assert groups.memory_kills() == kills
