@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
+from grader.errors import EvidenceError
 from grader.evidence.decode import Decoder
 from grader.evidence.events import (
     ActorEvent,
@@ -18,6 +20,10 @@ from grader.evidence.events import (
     RecorderEvent,
     ScenarioEvent,
 )
+from grader.evidence.room import NoRoom, Room
+
+OWN_NODE = re.compile(r"/grader_(recorder|actor)_[0-9a-f]{8}(_knock)?")
+BARE_NAME = "/grader"
 
 
 class Message(NamedTuple):
@@ -30,7 +36,7 @@ class Message(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Channel:
-    """All messages of one publisher on one topic."""
+    """All messages of one publisher on one topic. `room` is what their decoded values may take."""
 
     topic: str
     callerid: str
@@ -39,10 +45,12 @@ class Channel:
     definition: str
     latching: bool
     messages: tuple[Message, ...]
+    room: Room = field(default_factory=Room, repr=False, compare=False)
 
     @property
     def by_grader(self) -> bool:
-        return is_grader_node(self.callerid)
+        exported = self.callerid == BARE_NAME and self.topic.startswith(f"{BARE_NAME}/")
+        return exported or is_grader_node(self.callerid)
 
     @property
     def publisher(self) -> str:
@@ -55,8 +63,16 @@ class Channel:
 
     @cached_property
     def values(self) -> tuple[Any, ...]:
-        """Each message decoded to a dict of its fields; None where its definition does not fit."""
+        """Each message decoded to a dict of its fields; None where its definition does not fit.
+
+        Raises EvidenceError where that would take more memory than there is for it.
+        """
         decoder = Decoder(self.type, self.definition)
+        try:
+            for message in self.messages:
+                self.room.decode(decoder.decoded_bytes(len(message.data)))
+        except NoRoom as error:
+            raise EvidenceError(f"{self.topic}: {error}", hint="publish less on it") from error
         return tuple(decoder.decode(m.data) for m in self.messages)
 
     @property
@@ -66,8 +82,8 @@ class Channel:
 
 
 def is_grader_node(name: str) -> bool:
-    """The grader's own nodes are `/grader…`, and `/rosout` is part of every ROS system."""
-    return name.startswith("/grader") or name == "/rosout"
+    """Whether it is one of the grader's own nodes, whose names no other node can have, or ROS's own `/rosout`."""
+    return OWN_NODE.fullmatch(name) is not None or name == "/rosout"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +123,14 @@ class Run:
         own = {e.name for _, e in self.processes if e.role == "grader"}
         return frozenset(n for _, e in self.graph for n, process in e.processes.items() if process in own)
 
+    @cached_property
+    def _bare_is_grader(self) -> bool:
+        """Older recordings have its parameters set by `/grader`, newer ones by its node, the first before all else."""
+        return not any(OWN_NODE.fullmatch(event.caller_id) for _, event in self.params)
+
     def is_student_node(self, name: str) -> bool:
+        if name == BARE_NAME and self._bare_is_grader:
+            return False
         return not is_grader_node(name) and name not in self.grader_nodes
 
     def student_channels(self, topic: str | None = None) -> tuple[Channel, ...]:

@@ -20,14 +20,16 @@ from grader.arena.session import ARENA
 URL = "https://www.e-yantra.org/"
 NOTE = """
 import json, sys
+from guard import Guard
 from master import ARGUMENT_CHARS, ARGUMENTS_MAX, OPENED_MAX, RecordingMaster
 events = []
 class Wire:
     def event(self, topic, record): events.append((topic, record))
-master = RecordingMaster(None, Wire(), None, "/grader", lambda address: None)
+master = RecordingMaster(None, Wire(), None, "/grader", guard=Guard(Wire()), owners=None)
 print(ARGUMENT_CHARS, ARGUMENTS_MAX, OPENED_MAX, file=sys.stderr)
 for number in range(OPENED_MAX + 5):
     answer = master.noteOpened("/firefox", "firefox", ["x" * 9999] * 99)
+events = [event for event in events if event[1].get("action") == "open"]
 print(json.dumps([answer, len(events), len(events[0][1]["value"]), len(events[0][1]["value"][0]), events[0][0]]))
 """
 

@@ -14,7 +14,7 @@ import signal
 import threading
 
 from groups import Groups
-from host import Lateness
+from host import Lateness, peak_bytes
 from keys import leave_keys_behind
 from loop import Loop
 from network import enter_own_network
@@ -22,7 +22,6 @@ from processes import Process, kill_orphans
 from wire import Wire
 
 PR_SET_CHILD_SUBREAPER = 36
-OWN_PREFIX = "/grader"
 FINISH_S = 2.0
 
 
@@ -48,18 +47,24 @@ class Arena:
 
     def _start_master(self, config):
         from actor import Actor, SlaveApi  # noqa: PLC0415 - a build needs no ROS imports
-        from master import RecordingMaster, serve  # noqa: PLC0415
+        from guard import Guard  # noqa: PLC0415
+        from master import RecordingMaster  # noqa: PLC0415
         from owners import Owners  # noqa: PLC0415
         from recorder import Recorder  # noqa: PLC0415
+        from rpc import serve  # noqa: PLC0415
 
-        name = OWN_PREFIX + "_{}" + config["suffix"]
-        self._recorder = Recorder(self.loop, self._wire, name.format("recorder"), self._limits)
+        name = "/grader_{}" + config["suffix"]
+        guard, owners = Guard(self._wire), Owners(self._trees)
+        self._recorder = Recorder(self.loop, self._wire, name.format("recorder"), self._limits, guard)
+        self._actor = Actor(self.loop, self._wire, name.format("actor"), guard, owners)
         self._master = RecordingMaster(
-            self.loop, self._wire, self._recorder, OWN_PREFIX, owner=Owners(self._trees).of
+            self.loop, self._wire, self._recorder, self._actor.caller_id, guard=guard, owners=owners
         )
-        os.environ["ROS_MASTER_URI"] = serve(self._master, config["port"])
-        self._actor = Actor(self.loop, self._wire, name.format("actor"))
-        self._actor.uri = serve(SlaveApi(self._actor), 0)
+        server = serve(config["port"], self._master.answer, guard, owners, title="the master")
+        self._master.uri = os.environ["ROS_MASTER_URI"] = server.uri
+        api = serve(0, SlaveApi(self._actor, guard).answer, guard, owners, title="the grader's node")
+        self._actor.uri = api.uri
+        self._master.own_ports.update((server.port, api.port, self._actor.port))
         if config["rosout"]:
             self._spawn(config["rosout"])
 
@@ -110,7 +115,7 @@ class Arena:
         self._wire.event("/grader/actor", command["record"])
 
     def _set_param(self, command):
-        self._master.setParam(OWN_PREFIX, command["name"], command["value"])
+        self._master.setParam(self._actor.caller_id, command["name"], command["value"])
         self._wire.event("/grader/actor", command["record"])
 
     def _call(self, command):
@@ -144,7 +149,7 @@ class Arena:
     def _warp(self, command):
         from actor import CLOCK, Clock  # noqa: PLC0415 - only where there is a master
 
-        self._master.setParam(OWN_PREFIX, "/use_sim_time", True)
+        self._master.setParam(self._actor.caller_id, "/use_sim_time", True)
         self._actor.advertise(self._master, CLOCK)
         self._clock = Clock(self._actor, command["warp"], command["step_s"])
         record = {"action": "clock", "actor": "grader", "topic": "/clock", "value": command["warp"]}
@@ -161,9 +166,7 @@ class Arena:
         """Ask the nodes for their connections, beside the loop: a node that never answers must not stop it."""
 
         def ask():
-            record = self._master.graph(connections=True)
-            self._wire.event("/grader/graph", record)
-            self._wire.status("graph", connections=record["connections"])
+            self._wire.status("graph", connections=self._master.tell_connections())
 
         threading.Thread(target=ask, daemon=True).start()
 
@@ -195,7 +198,7 @@ class Arena:
         if self._finishing and not self._processes:
             self._lateness.stop()
             if self._master:
-                self._wire.event("/grader/graph", self._master.graph())
+                self._master.finish()
             self.loop.stop()
 
     def _reap(self):
@@ -221,7 +224,7 @@ def main():
     arena.loop.run()
     kill_orphans()
     usage = resource.getrusage(resource.RUSAGE_SELF)
-    wire.status("done", cpu_s=usage.ru_utime + usage.ru_stime, max_rss_bytes=usage.ru_maxrss * 1024)
+    wire.status("done", cpu_s=usage.ru_utime + usage.ru_stime, max_rss_bytes=peak_bytes())
     os._exit(0)
 
 

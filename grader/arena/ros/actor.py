@@ -10,11 +10,16 @@ import struct
 import threading
 import time
 
-from rosgraph.xmlrpc import XmlRpcHandler
-from tcpros import LENGTH, ProtocolError, read_header, write_header
+from bounded import BoundedSocket, ProtocolError
+from guard import shown
+from tcpros import HEADER_BYTES_MAX, LENGTH, Closed, check_fields, read_header, write_header
 from wire import now_ns
 
 HANDSHAKE_S = 2.0
+CONNECTIONS_MAX = 256
+"""Subscribers, and those that have yet to say what they want."""
+SOMEBODY = "a subscriber"
+OTHER_TYPES_MAX = 100
 CLOCK = {
     "topic": "/clock",
     "type": "rosgraph_msgs/Clock",
@@ -26,19 +31,30 @@ TIME = struct.Struct("<II")
 NS = 1000000000
 
 
-class SlaveApi(XmlRpcHandler):
+class SlaveApi:
     """The part of the slave API that subscribers and tools use (wiki.ros.org/ROS/Slave_API)."""
 
-    def __init__(self, actor):
-        super().__init__()
-        self._actor = actor
-        self.listening = threading.Event()
+    METHODS = frozenset(
+        (
+            "getBusInfo", "getBusStats", "getMasterUri", "getPid", "getPublications", "getSubscriptions", "paramUpdate",
+            "publisherUpdate", "requestTopic", "shutdown",
+        )
+    )  # fmt: skip
 
-    def _ready(self, uri):  # noqa: ARG002 - rosgraph calls it so
-        self.listening.set()
+    def __init__(self, actor, guard):
+        self._actor = actor
+        self._guard = guard
+
+    def answer(self, method, args, caller):
+        """A call from outside."""
+        if method not in self.METHODS:
+            raise ValueError("no method {}".format(shown(method)))
+        if method == "shutdown":
+            self._guard.refused(caller.name, "told the grader's node to shut down")
+        return getattr(self, method)(*args)
 
     def requestTopic(self, _caller_id, topic, protocols):
-        if topic not in self._actor.topics or ["TCPROS"] not in protocols:
+        if str(topic) not in self._actor.topics or ["TCPROS"] not in protocols:
             return 0, "no such topic or protocol", []
         return 1, "ready", ["TCPROS", self._actor.host, self._actor.port]
 
@@ -90,8 +106,12 @@ class _Topic:
 class Actor:
     """One node, `/grader_…`, with a TCPROS server for any number of topics."""
 
-    def __init__(self, loop, wire, caller_id):
+    def __init__(self, loop, wire, caller_id, guard, owners):
         self.topics = {}
+        self._guard = guard
+        self._owners = owners
+        self._shaking = 0
+        self._other_types = set()
         self.caller_id = caller_id
         self.host = "127.0.0.1"
         self._loop = loop
@@ -130,29 +150,55 @@ class Actor:
         sock.close()
 
     def _accept(self):
-        sock, _ = self._server.accept()
-        sock.settimeout(HANDSHAKE_S)
-        threading.Thread(target=self._handshake, args=(sock,), daemon=True).start()
+        sock, address = self._server.accept()
+        sock = BoundedSocket(fileno=sock.detach())
+        topics = list(self.topics.values())
+        if self._shaking + sum(len(topic.subscribers) for topic in topics) >= CONNECTIONS_MAX:
+            sock.close()
+            detail = "opened more than {} connections to the grader's node".format(CONNECTIONS_MAX)
+            self._guard.limit(SOMEBODY, detail)
+            return
+        self._shaking += 1
+        sock.allow(HANDSHAKE_S, HEADER_BYTES_MAX + LENGTH.size)
+        threading.Thread(target=self._handshake, args=(sock, address), daemon=True).start()
 
-    def _handshake(self, sock):
+    def _handshake(self, sock, address):
         try:
-            header = read_header(sock)
-            topic = self.topics.get(header.get("topic"))
-            problem = self._mismatch(topic, header)
-            if problem:
-                write_header(sock, {"error": problem})
-                sock.close()
-                return
-            write_header(sock, dict(topic.header, callerid=self.caller_id))
-        except (OSError, ProtocolError):
+            self._join(sock)
+        except (OSError, Closed):
+            sock.close()
+        except ProtocolError as error:
+            self._guard.refused(
+                self._who(address), "sent the grader's node no header: {}".format(shown(error))
+            )
+            sock.close()
+        finally:
+            self._loop.call_soon(self._shaken)
+
+    def _who(self, address):
+        return self._owners.caller(address[1], self.port) or SOMEBODY
+
+    def _shaken(self):
+        self._shaking -= 1
+
+    def _join(self, sock):
+        """Take a subscriber up, or tell it why not."""
+        header = read_header(sock)
+        check_fields(header)
+        topic = self.topics.get(header.get("topic"))
+        problem = self._mismatch(topic, header)
+        if problem:
+            write_header(sock, {"error": problem})
             sock.close()
             return
+        write_header(sock, dict(topic.header, callerid=self.caller_id))
         subscriber = str(header.get("callerid", ""))
+        sock.allow(None, 0)
+        sock.setblocking(False)
         with topic.lock:
-            if topic.latching and topic.last:
-                sock.sendall(topic.last)
-            sock.setblocking(False)
             topic.subscribers[sock] = subscriber
+            if topic.latching and topic.last:
+                self._send(topic, sock, topic.last)
         self._wire.status("subscribed", topic=topic.name, subscriber=subscriber)
 
     def _mismatch(self, topic, header):
@@ -160,15 +206,25 @@ class Actor:
             return "no such topic"
         for field in ("type", "md5sum"):
             if header.get(field) not in ("*", topic.header[field]):
-                asked = {"topic": topic.name, "type": header.get("type")}
-                note = {
-                    "action": "note",
-                    "actor": str(header.get("callerid")),
-                    "detail": "asks for another type",
-                }
-                self._wire.event("/grader/actor", dict(asked, **note))
+                self._note_other_type(topic, header)
                 return "{} differs: this topic carries {}".format(field, topic.type)
         return ""
+
+    def _note_other_type(self, topic, header):
+        """Each subscriber and type once: it tries again and again."""
+        who, type_ = str(header.get("callerid")), header.get("type")
+        key = topic.name, who, type_
+        if key in self._other_types or len(self._other_types) >= OTHER_TYPES_MAX:
+            return
+        self._other_types.add(key)
+        note = {
+            "action": "note",
+            "actor": who,
+            "topic": topic.name,
+            "type": type_,
+            "detail": "asks for another type",
+        }
+        self._wire.event("/grader/actor", note)
 
 
 class Clock:

@@ -1,126 +1,172 @@
-"""One publisher's connection: cuts the stream into messages and hands them on, up to the limits."""
-
-import threading
+"""One publisher's connection: cuts the stream into messages and hands them on, as far as there is room for them."""
 
 from tcpros import LENGTH
 from wire import now_ns
 
-READ_BYTES = 1 << 18
-MESSAGE_BYTES_MAX = 64 << 20
+READ_BYTES = 1 << 16
+MESSAGE_BYTES_MAX = 16 << 20
+HELD_BYTES_MAX = 4 << 20
+LATCHING_S = 1.5
+DROPPED_MAX = 2000
+"""After so many that were dropped, what comes is thrown away unread: its bytes say about how many they were."""
+_WASTE = bytearray(1 << 20)
 
 
 class Connection:
     """Its channel opens with the first message, when the publisher can say whether it latches; until then messages
-    are held, with the times of their arrival."""
+    are held, with the times of their arrival.
 
-    def __init__(self, recorder, sock, topic, caller_id, header):
+    Each look takes no more than `READ_BYTES`, so that others have their turn, and what is not recorded is never kept:
+    it is skipped as it comes. Without an `account` nothing is recorded.
+    """
+
+    def __init__(self, recorder, sock, *, topic, caller_id, header, account):
         self.sock = sock
+        self.topic = topic
+        self.caller_id = caller_id
+        self.port = sock.getpeername()[1]
         self._recorder = recorder
-        self._topic = topic
-        self._caller_id = caller_id
-        self._buffer = bytearray()
-        self._messages = 0
-        self._bytes = 0
-        self._dropped = 0
-        self._closed = False
         self._header = header
-        self._port = sock.getpeername()[1]
-        self._channel = None
+        self._account = account
+        self._buffer = bytearray()
+        self._reserved = 0
+        self._accepted = False
+        self._skip = 0
+        self._messages = self._dropped = self._wasted_bytes = 0
+        self._length = 0
+        self._closed = self._opened = self._paused = False
         self._held = []
+        self._held_bytes = 0
+
+    def watch(self):
+        """Begin to read, as far as the run has not ended meanwhile."""
+        if not self._closed:
+            self._recorder.loop.add_reader(self.sock, self.readable)
 
     def readable(self):
-        """Take all that the socket holds now."""
-        while not self._closed:
-            try:
-                chunk = self.sock.recv(READ_BYTES)
-            except BlockingIOError:
-                return
-            except OSError:
-                chunk = b""
-            if not chunk:
-                self.close()
-                return
-            self._buffer += chunk
-            self._record(self._frames())
-            if len(chunk) < READ_BYTES:
-                return
+        """Take one piece of what the socket holds; False where there was none."""
+        if self._closed:
+            return False
+        if self._dropped >= DROPPED_MAX:
+            return self._throw_away()
+        try:
+            chunk = self.sock.recv(READ_BYTES)
+        except BlockingIOError:
+            return False
+        except OSError:
+            chunk = b""
+        if not chunk:
+            self.close()
+            return False
+        frames = self._frames(chunk)
+        if frames:
+            self._messages += len(frames)
+            self._hand_on(frames, now_ns())
+        return True
 
-    def _frames(self):
-        """Cut whole messages off the buffer."""
+    def _throw_away(self):
+        try:
+            count = self.sock.recv_into(_WASTE)
+        except BlockingIOError:
+            return False
+        except OSError:
+            count = 0
+        self._wasted_bytes += count
+        if not count:
+            self.close()
+        return count > 0
+
+    def _frames(self, chunk):
+        """Cut whole messages off the stream, those for which there is room."""
         frames = []
-        start = 0
+        skipped = min(self._skip, len(chunk))
+        self._skip -= skipped
         buffer = self._buffer
-        while len(buffer) - start >= LENGTH.size:
+        buffer += chunk[skipped:]
+        start, size = 0, len(buffer)
+        while size - start >= LENGTH.size:
             (length,) = LENGTH.unpack_from(buffer, start)
             if length > MESSAGE_BYTES_MAX:
-                self._recorder.note("invalid", self._topic, self._caller_id, detail="{} bytes".format(length))
-                self.close()
+                self._invalid(length)
                 break
             end = start + LENGTH.size + length
-            if end > len(buffer):
+            self._length = length
+            if not self._accepted and not self._has_room(length, end > size):
+                self._skip = max(0, end - size)
+                start = min(end, size)
+                continue
+            self._accepted = end > size
+            if self._accepted:
                 break
             frames.append(bytes(buffer[start + LENGTH.size : end]))
+            self._release()
             start = end
         del buffer[:start]
         return frames
 
-    def _record(self, frames):
-        if not frames:
-            return
-        recorder = self._recorder
-        time_ns = now_ns()
-        room = recorder.messages_max - self._messages
-        kept = frames if len(frames) <= room else frames[: max(0, room)]
-        size = sum(map(len, kept))
-        if self._bytes + size > recorder.bytes_max:
-            kept, size = [], 0
-        if kept:
-            self._hand_on(kept, time_ns)
-        self._messages += len(kept)
-        self._bytes += size
-        if len(kept) < len(frames):
-            if not self._dropped:
-                recorder.note("limit", self._topic, self._caller_id, messages=self._messages)
-            self._dropped += len(frames) - len(kept)
+    def _has_room(self, length, waits):
+        """Whether a message is recorded; one that is not yet here as a whole (`waits`) needs room in memory, too."""
+        reserved = length if waits else 0
+        if self._account is not None and self._recorder.reserve(reserved):
+            self._reserved = reserved
+            if self._account.take(length):
+                return True
+            self._release()
+        self._dropped += 1
+        if self._dropped == 1:
+            self._recorder.overflows(self, self._messages)
+        return False
+
+    def _release(self):
+        self._recorder.release(self._reserved)
+        self._reserved = 0
+
+    def _invalid(self, length):
+        self._recorder.note("invalid", self.topic, self.caller_id, detail="{} bytes".format(length))
+        self._recorder.too_large(self, length)
+        self.close()
 
     def _hand_on(self, frames, time_ns):
-        if self._channel is not None:
-            self._recorder.wire.messages(self._channel, frames, time_ns)
+        if self._opened:
+            self._recorder.wire.messages(self._account.channel, frames, time_ns)
             return
+        if not self._held:
+            self._recorder.ask_latching(self)
+            self._recorder.loop.call_later(LATCHING_S, lambda: self.open(latching=False))
         self._held.append((frames, time_ns))
-        if len(self._held) == 1:
-            threading.Thread(target=self._ask, daemon=True).start()
+        self._held_bytes += sum(map(len, frames))
+        if self._held_bytes > HELD_BYTES_MAX and not self._paused:
+            self._paused = True
+            self._recorder.loop.remove_reader(self.sock)
 
-    def _ask(self):
-        latching = False
-        try:
-            latching = self._recorder.ask_latching(self._topic, self._port)
-        finally:
-            self._recorder.loop.call_soon(lambda: self._open(latching))
-
-    def _open(self, latching):
-        if self._channel is not None:
+    def open(self, *, latching):
+        """Hand on what was held; the channel is made where it is not there from an earlier connection."""
+        if self._opened or self._account is None:
             return
-        header = self._header
-        self._channel = self._recorder.wire.channel(
-            topic=self._topic,
-            callerid=self._caller_id,
-            type=header["type"],
-            md5sum=header["md5sum"],
-            definition=header.get("message_definition", ""),
-            latching=latching or header.get("latching") == "1",
-        )
+        self._opened = True
+        if self._account.channel is None:
+            self._account.channel = self._recorder.wire.channel(
+                topic=self.topic,
+                callerid=self.caller_id,
+                type=self._header["type"],
+                md5sum=self._header["md5sum"],
+                definition=self._header.get("message_definition", ""),
+                latching=latching or self._header.get("latching") == "1",
+            )
         for frames, time_ns in self._held:
-            self._recorder.wire.messages(self._channel, frames, time_ns)
+            self._recorder.wire.messages(self._account.channel, frames, time_ns)
         self._held = []
+        if self._paused:
+            self._paused = False
+            self.watch()
 
     def close(self):
         if self._closed:
             return
         self._closed = True
-        self._open(False)
+        self._release()
+        self.open(latching=False)
         self._recorder.closed(self)
         self.sock.close()
-        self._recorder.note(
-            "closed", self._topic, self._caller_id, messages=self._messages, dropped=self._dropped
-        )
+        dropped = self._dropped + self._wasted_bytes // (LENGTH.size + self._length)
+        self._recorder.note("closed", self.topic, self.caller_id, messages=self._messages, dropped=dropped)

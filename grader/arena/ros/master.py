@@ -1,53 +1,109 @@
-"""The ROS master of one arena: ros_comm's own, with the recorder inside and its graph told to the grader."""
+"""The ROS master of one arena: ros_comm's own, with the recorder inside and its graph told to the grader.
 
+Students' processes reach it only through `answer`, which asks `guard` first.
+"""
+
+import functools
+import logging
 import threading
 import time
 
 import rosmaster.master_api
+import rosmaster.registrations
 import services
-from rosgraph.xmlrpc import XmlRpcNode
-from tcpros import ProtocolError, call, slave_api
+from bounded import ProtocolError, call, port_of, slave_api
+from graph import GraphLog
+from guard import NAME_CHARS_MAX, OWN_NODE, ROSOUT, Rules
+from params import ParamLog
+from pool import Notifications, Pool
+from values import cut
 
-GRAPH_QUIET_S = 0.02
-BUS_INFO_S = 0.5
-OPENED_MAX, ARGUMENTS_MAX, ARGUMENT_CHARS = 200, 50, 2000
+BUS_INFO_S, CONNECTIONS_S = 0.5, 1.5
+CONNECTIONS_MAX = 2000
+NOTIFY_S = 10.0
+OPENED_MAX, ARGUMENTS_MAX, ARGUMENT_CHARS = 100, 20, 1000
 PROBE_S = 0.5
 SUBSCRIBED_S = 0.3
 LOOK_S = 0.01
 EVERY_NODE_HAS = ("/get_loggers", "/set_logger_level")
+METHODS = frozenset(
+    (
+        "deleteParam", "getParam", "getParamNames", "getPid", "getPublishedTopics", "getSystemState", "getTopicTypes",
+        "getUri", "hasParam", "lookupNode", "lookupService", "noteOpened", "registerPublisher", "registerService",
+        "registerSubscriber", "searchParam", "setParam", "shutdown", "subscribeParam", "unregisterPublisher",
+        "unregisterService", "unregisterSubscriber", "unsubscribeParam",
+    )
+)  # fmt: skip
+_notified = functools.partial(slave_api, seconds=NOTIFY_S)
+rosmaster.master_api.xmlrpcapi = rosmaster.registrations.xmlrpcapi = _notified
+logging.getLogger("rosmaster").setLevel(logging.CRITICAL)
 
 
 class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
     """A node's publishers are recorded before it can publish (see `recorder`).
 
-    `owner` gives the name of the process whose node has a slave API, or None; it is asked while the node registers,
-    when the process is sure to be there.
+    `own` is the name under which the arena itself calls; `owners` says which process a node belongs to: it is asked
+    while the node registers, when the process is sure to be there.
     """
 
-    def __init__(self, loop, wire, recorder, own_prefix, owner):
-        super().__init__(3)
-        self._owner = owner
+    def __init__(self, loop, wire, recorder, own, *, guard, owners):
+        super().__init__(0)
+        self.thread_pool = self.reg_manager.thread_pool = Notifications()
+        self._owners = owners
         self._service_types = {}
-        self._loop = loop
         self._wire = wire
         self._recorder = recorder
-        self._own_prefix = own_prefix
-        self._graph_due = False
-        self._arrivals = False
+        self._own = own
         self._opened = 0
-        self.listening = threading.Event()
+        self._rosout_ended = False
+        self._pool = Pool()
+        self._calling = threading.local()
+        self._guard = guard
+        self.own_ports = set()
+        self._rules = Rules(owners, self._registered, self.own_ports)
+        self._params = ParamLog(wire, self._guard)
+        self._graph = GraphLog(loop, wire, self._guard, self.graph)
         # Unset, every rospy.loginfo asks the master for it, and a SIGINT during that call locks the node up for ever.
-        self.param_server.set_param("/rosout_disable_topics_generation", False)
+        self.setParam(own, "/rosout_disable_topics_generation", False)
 
-    def _ready(self, uri):
-        super()._ready(uri)
-        self.listening.set()
+    def answer(self, method, args, caller):
+        """A call from outside."""
+        if method not in METHODS:
+            raise ValueError("no method {}".format(cut(method, 100)))
+        fault = self._rules.why_not(method, args, caller)
+        if fault:
+            self._guard.refused(caller.process or _name(args), fault)
+            return -1, "refused: this {}".format(fault), 0
+        if self._rules.too_much(method, args, caller):
+            detail = "registered more topics and services than a process may"
+            self._guard.limit(caller.process or _name(args), detail)
+            return -1, "refused: this {}".format(detail), 0
+        self._calling.caller = caller
+        try:
+            return getattr(self, method)(*args)
+        finally:
+            self._calling.caller = None
+
+    @property
+    def _caller(self):
+        """Whose call this thread answers; None for the arena itself."""
+        return getattr(self._calling, "caller", None)
+
+    @property
+    def _process(self):
+        return self._caller.process if self._caller else None
+
+    def _registered(self, node):
+        """The address of a node, or None."""
+        with self.ps_lock:
+            known = self.reg_manager.get_node(node)
+        return known.api if known else None
 
     def registerPublisher(self, caller_id, topic, topic_type, caller_api):
         answer = super().registerPublisher(caller_id, topic, topic_type, caller_api)
-        self._owner(caller_api)
-        if answer[0] == 1 and not caller_id.startswith(self._own_prefix):
-            held = self._recorder.connect(topic, caller_id, caller_api)
+        self._owners.of(caller_api)
+        if answer[0] == 1 and self._caller is not None:
+            held = self._recorder.connect(topic, caller_id, caller_api, self._process)
             if held:
                 self._await_subscribers(topic, caller_id, caller_api)
         return self._arrived(answer)
@@ -57,7 +113,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         as one of them (`while pub.get_num_connections() == 0`)."""
         with self.ps_lock:
             there = {name for name, _ in self.subscribers.map.get(topic, ())}
-        wanted = {n for n in there if n != caller_id and not n.startswith(self._own_prefix)}
+        wanted = {n for n in there if n != caller_id and not OWN_NODE.fullmatch(n)}
         deadline = time.monotonic() + SUBSCRIBED_S
         pause = threading.Event()
         while wanted and time.monotonic() < deadline:
@@ -67,24 +123,29 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
             pause.wait(LOOK_S)
 
     def unregisterPublisher(self, caller_id, topic, caller_api):
-        self._before_leaving()
+        self._graph.before_leaving()
         return self._after(super().unregisterPublisher(caller_id, topic, caller_api))
 
     def registerSubscriber(self, caller_id, topic, topic_type, caller_api):
-        self._owner(caller_api)
+        self._owners.of(caller_api)
         return self._arrived(super().registerSubscriber(caller_id, topic, topic_type, caller_api))
 
     def unregisterSubscriber(self, caller_id, topic, caller_api):
-        self._before_leaving()
+        if caller_id == ROSOUT and not self._rosout_ended:
+            self._rosout_ended = True
+            detail = "rosout ended before the run did: something told it to"
+            self._wire.event("/grader/actor", {"action": "note", "actor": ROSOUT, "detail": detail})
+        self._graph.before_leaving()
         return self._after(super().unregisterSubscriber(caller_id, topic, caller_api))
 
     def registerService(self, caller_id, service, service_api, caller_api):
         if str(service).endswith("/get_loggers"):
             self._recorder.gate(caller_id)
-        self._owner(caller_api)
-        if not str(service).endswith(EVERY_NODE_HAS):
-            threading.Thread(target=self._learn_type, args=(service, service_api), daemon=True).start()
-        return self._arrived(super().registerService(caller_id, service, service_api, caller_api))
+        self._owners.of(caller_api)
+        answer = super().registerService(caller_id, service, service_api, caller_api)
+        if answer[0] == 1 and not service.endswith(EVERY_NODE_HAS):
+            self._pool.submit(port_of(service_api), lambda: self._learn_type(service, service_api))
+        return self._arrived(answer)
 
     def getParam(self, caller_id, key):
         if key == "/use_sim_time":
@@ -92,35 +153,42 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         return super().getParam(caller_id, key)
 
     def unregisterService(self, caller_id, service, service_api):
-        self._before_leaving()
+        self._graph.before_leaving()
         return self._after(super().unregisterService(caller_id, service, service_api))
 
     def setParam(self, caller_id, key, value):
+        fault = self._params.why_not(str(key), value, self._process) if self._caller else ""
+        if fault:
+            self._guard.limit(self._process or caller_id, "tried to {}".format(fault))
+            return -1, "refused: more than one may {}".format(fault), 0
         answer = super().setParam(caller_id, key, value)
-        self._param("set", key, caller_id, value)
+        if answer[0] == 1:
+            self._params.note("set", key, caller_id, value, self._process)
         return answer
 
     def deleteParam(self, caller_id, key):
         answer = super().deleteParam(caller_id, key)
-        self._param("delete", key, caller_id, None)
+        if answer[0] == 1:
+            self._params.note("delete", key, caller_id, None, self._process)
         return answer
-
-    def shutdown(self, caller_id, msg=""):  # noqa: ARG002 - the master API
-        """A student's node has no business ending the master: refused, and noted."""
-        self._wire.event(
-            "/grader/actor",
-            {"action": "note", "actor": str(caller_id), "detail": "asked the master to shut down; refused"},
-        )
-        return -1, "refused", 0
 
     def noteOpened(self, caller_id, program, arguments):  # noqa: ARG002 - shaped as the master API is
         """What a stand-in for a browser was asked to open (see `opener`)."""
         self._opened += 1
         if self._opened <= OPENED_MAX:
-            shown = [str(argument)[:ARGUMENT_CHARS] for argument in arguments[:ARGUMENTS_MAX]]
-            record = {"action": "open", "actor": str(program)[:ARGUMENT_CHARS], "value": shown}
+            shown = [cut(argument, ARGUMENT_CHARS) for argument in list(arguments)[:ARGUMENTS_MAX]]
+            record = {"action": "open", "actor": cut(program, ARGUMENT_CHARS), "value": shown}
             self._wire.event("/grader/actor", record)
+        else:
+            self._guard.limit(
+                self._process or cut(program, ARGUMENT_CHARS), "opened more than {} things".format(OPENED_MAX)
+            )
         return 1, "noted", 0
+
+    def finish(self):
+        """What was left out so far and matters in the end."""
+        self._params.finish()
+        self._graph.tell(self.graph(), last=True)
 
     def graph(self, *, connections=False):
         """The state as a GraphEvent's fields."""
@@ -137,18 +205,21 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
             "publishers": dict(publishers),
             "subscribers": dict(subscribers),
             "services": dict(offered),
-            "processes": {name: owner for name, api in apis.items() if (owner := self._owner(api))},
+            "processes": {name: owner for name, api in apis.items() if (owner := self._owners.of(api))},
         }
         record["service_types"] = self._types_of(service_apis)
         if connections:
-            publishing = {node for _, nodes in publishers for node in nodes}
-            record["connections"] = [
-                found
-                for node in sorted(publishing)
-                if not node.startswith(self._own_prefix) and apis.get(node)
-                for found in self._connections(node, apis[node])
-            ]
+            publishing = {node for _, nodes in publishers for node in nodes if not OWN_NODE.fullmatch(node)}
+            record["connections"] = self._all_connections(
+                {n: apis[n] for n in sorted(publishing) if n in apis}
+            )
         return record
+
+    def tell_connections(self):
+        """The graph with its connections, as an event; give the connections."""
+        record = self.graph(connections=True)
+        self._graph.tell(record)
+        return record["connections"]
 
     def service_api(self, service):
         """Where a service is offered, or None."""
@@ -168,66 +239,52 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
             found = self._type_of(service, api)
             if found:
                 self._service_types[service, api] = found
-                self._graph_changed()
+                self._graph.changed(None)
                 return
             pause.wait(LOOK_S)
 
     def _type_of(self, service, api):
         try:
-            return services.probe(service, api, self._own_prefix, PROBE_S)
+            return services.probe(service, api, self._own, PROBE_S)
         except ProtocolError:
             return ""
+
+    def _all_connections(self, apis):
+        """Of these nodes, asked side by side; who does not answer in time has none."""
+        deadline = time.monotonic() + CONNECTIONS_S
+        found, answered, asked = {}, threading.Semaphore(0), 0
+        for node, api in apis.items():
+
+            def ask(node=node, api=api):
+                if time.monotonic() < deadline:
+                    found[node] = list(self._connections(node, api))
+                answered.release()
+
+            asked += self._pool.submit(port_of(api), ask)
+        for _ in range(asked):
+            answered.acquire(timeout=max(0.0, deadline - time.monotonic()))
+        return [c for node in apis for c in found.get(node, ())][:CONNECTIONS_MAX]
 
     def _connections(self, node, api):
         """The node's outgoing connections, as the node itself reports them."""
         try:
-            entries = call(slave_api(api, BUS_INFO_S).getBusInfo, self._own_prefix)
+            entries = call(slave_api(api, BUS_INFO_S).getBusInfo, self._own)
         except (ProtocolError, ValueError):
             return
-        for entry in entries if isinstance(entries, list) else ():
+        for entry in entries[:CONNECTIONS_MAX] if isinstance(entries, list) else ():
             if isinstance(entry, list) and len(entry) >= 5 and entry[2] == "o":
-                subscriber, topic = str(entry[1]), str(entry[4])
-                if not subscriber.startswith(self._own_prefix):
+                subscriber, topic = cut(entry[1], NAME_CHARS_MAX), cut(entry[4], NAME_CHARS_MAX)
+                if not OWN_NODE.fullmatch(subscriber):
                     yield {"topic": topic, "publisher": node, "subscriber": subscriber}
 
     def _after(self, answer):
-        self._graph_changed()
+        self._graph.changed(self._process)
         return answer
 
     def _arrived(self, answer):
-        self._arrivals = True
-        return self._after(answer)
-
-    def _before_leaving(self):
-        """A node that comes and goes between two looks at the graph shall be seen all the same."""
-        if self._arrivals:
-            self._arrivals = False
-            self._wire.event("/grader/graph", self.graph())
-
-    def _graph_changed(self):
-        """Registrations come in bursts: tell the grader once they pause."""
-        self._loop.call_soon(self._schedule_graph)
-
-    def _schedule_graph(self):
-        if not self._graph_due:
-            self._graph_due = True
-            self._loop.call_later(GRAPH_QUIET_S, self._tell_graph)
-
-    def _tell_graph(self):
-        self._graph_due = self._arrivals = False
-        self._wire.event("/grader/graph", self.graph())
-
-    def _param(self, action, key, caller_id, value):
-        if isinstance(value, (bytes, bytearray)) or type(value).__name__ in ("Binary", "DateTime"):
-            value = repr(value)
-        record = {"action": action, "name": str(key), "caller_id": str(caller_id), "value": value}
-        self._wire.event("/grader/param", record)
+        self._graph.changed(self._process, arrival=True)
+        return answer
 
 
-def serve(handler, port, patience_s=5.0):
-    """Serve the XML-RPC API of a handler that sets its event `listening`; return its URI."""
-    node = XmlRpcNode(port, handler)
-    node.start()
-    if not handler.listening.wait(patience_s):
-        raise OSError("no XML-RPC server on port {} after {} s".format(port, patience_s))
-    return node.uri
+def _name(args):
+    return args[0] if args else "a node"

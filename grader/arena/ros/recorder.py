@@ -10,40 +10,64 @@ under its own lock, what was made before `init_node`) is held in the next call t
 returns: `gate`. Neither waits longer than 1 s. Reading is the loop's work.
 """
 
+import collections
+import contextlib
 import threading
 import time
 
-from connection import Connection
-from tcpros import ProtocolError, call, connect, read_header, slave_api, write_header
+from bounded import ProtocolError, call, connect, port_of, slave_api
+from budget import Budget
+from connection import MESSAGE_BYTES_MAX, Connection
+from guard import shown
+from pool import Pool
+from tcpros import HEADER_BYTES_MAX, LENGTH, check_fields, read_header, write_header
 
 HOLD_S = 1.0
 CONNECT_S = 10.0
 RETRY_S = 0.05
 KNOCK = "_knock"
 LATCHING_S = 1.0
+PENDING_BYTES_MAX = 32 << 20
+"""Of messages that are not yet here as a whole, all together."""
+LAST_READS_S = 0.5
+OPEN_MAX, SAME_MAX = 600, 4
+"""Connections at a time: of all publishers, and to one node for one topic."""
+NOTES_MAX = 3000
 
 
 class Recorder:
-    def __init__(self, loop, wire, caller_id, limits):
+    def __init__(self, loop, wire, caller_id, limits, guard):
         self.loop = loop
         self.wire = wire
         self._caller_id = caller_id
-        self.messages_max = limits["channel_messages"]
-        self.bytes_max = limits["channel_bytes"]
+        self._guard = guard
+        self._budget = Budget(limits)
+        self._pool = Pool()
+        self._pending_bytes = 0
+        self._notes = 0
         self._open = {}
+        self._same = collections.Counter()
         self._pending = {}
         self._serving = set()
+        self._processes = {}
         self._lock = threading.Lock()
 
-    def connect(self, topic, caller_id, caller_api):
+    def connect(self, topic, caller_id, caller_api, process):
         """Connect to a publisher, beside the caller; hold the caller, and say so, if the publisher can answer."""
         connected = threading.Event()
         with self._lock:
             self._pending.setdefault(caller_id, []).append(connected)
+            self._processes[caller_id] = process
             serving = (caller_id, caller_api) in self._serving
-        threading.Thread(
-            target=self._connect, args=(topic, caller_id, caller_api, connected), daemon=True
-        ).start()
+        deadline = time.monotonic() + CONNECT_S
+
+        def work():
+            self._connect(topic, caller_id, caller_api, deadline)
+            self._answered(caller_id, connected)
+
+        if not self._pool.submit(port_of(caller_api), work):
+            self._guard.limit(process or caller_id, "registered publishers faster than they can be recorded")
+            self._answered(caller_id, connected)
         if serving:
             connected.wait(HOLD_S)
         return serving
@@ -56,8 +80,7 @@ class Recorder:
         for connected in pending:
             connected.wait(max(0.0, deadline - time.monotonic()))
 
-    def _connect(self, topic, caller_id, caller_api, connected):
-        deadline = time.monotonic() + CONNECT_S
+    def _connect(self, topic, caller_id, caller_api, deadline):
         pause = threading.Event()
         while True:
             try:
@@ -65,29 +88,52 @@ class Recorder:
                 break
             except ProtocolError as error:
                 if time.monotonic() > deadline:
-                    self.note("refused", topic, caller_id, detail=str(error)[:300])
-                    self._answered(caller_id, connected)
+                    self.note("refused", topic, caller_id, detail=shown(error))
                     return
             pause.wait(RETRY_S)
-        connection = Connection(self, sock, topic, caller_id, header)
+        account = self._account(topic, caller_id, header)
+        connection = Connection(self, sock, topic=topic, caller_id=caller_id, header=header, account=account)
         with self._lock:
-            self._open[sock] = connection
-            self._serving.add((caller_id, caller_api))
+            full = len(self._open) >= OPEN_MAX or self._same[topic, caller_id] >= SAME_MAX
+            if not full:
+                self._open[sock] = connection
+                self._same[topic, caller_id] += 1
+                self._serving.add((caller_id, caller_api))
+        if full:
+            self._guard.limit(
+                self._processes.get(caller_id) or caller_id,
+                "registered the same publishers again and again",
+            )
+            sock.close()
+            return
         self.note("connected", topic, caller_id)
-        self.loop.call_soon(lambda: self.loop.add_reader(sock, connection.readable))
-        self._answered(caller_id, connected)
+        self.loop.call_soon(connection.watch)
+
+    def _account(self, topic, caller_id, header):
+        """Where the channel's messages are counted, or None where there are too many channels."""
+        process = self._processes.get(caller_id)
+        definition = header.get("message_definition", "")
+        account = self._budget.open((topic, caller_id, header["type"], header["md5sum"], definition), process)
+        if account is None:
+            self._guard.limit(process or caller_id, "published on so many topics that not all are recorded")
+        return account
 
     def _answered(self, caller_id, connected):
         with self._lock:
-            self._pending[caller_id].remove(connected)
+            pending = self._pending[caller_id]
+            pending.remove(connected)
+            if not pending:
+                del self._pending[caller_id]
         connected.set()
 
     def finish(self):
         """Read what has already arrived, then close every connection and give its totals."""
         with self._lock:
             connections = list(self._open.values())
+        until_s, talking = time.monotonic() + LAST_READS_S, connections
+        while talking and time.monotonic() < until_s:
+            talking = [connection for connection in talking if connection.readable()]
         for connection in connections:
-            connection.readable()
             connection.close()
 
     def _handshake(self, topic, caller_api, deadline):
@@ -99,35 +145,75 @@ class Recorder:
         if not isinstance(protocol, list) or len(protocol) != 3 or not isinstance(protocol[2], int):
             raise ProtocolError("no TCPROS offered")
         port = protocol[2]
+        sock, header = self._subscribe(self._caller_id, topic, port, deadline - time.monotonic())
         try:
-            sock, header = self._subscribe(self._caller_id, topic, port, deadline)
-            self._subscribe(self._caller_id + KNOCK, topic, port, deadline)[0].close()
-        except (OSError, ValueError) as error:
-            raise ProtocolError(str(error)) from error
+            self._subscribe(self._caller_id + KNOCK, topic, port, deadline - time.monotonic())[0].close()
+        except ProtocolError:
+            sock.close()
+            raise
+        sock.allow(None, 0)
         sock.setblocking(False)
         return sock, header
 
-    def _subscribe(self, caller_id, topic, port, deadline):
-        sock = connect(port, max(0.05, deadline - time.monotonic()))
-        request = {"callerid": caller_id, "topic": topic, "md5sum": "*", "type": "*", "tcp_nodelay": "1"}
-        write_header(sock, request)
-        header = read_header(sock)
-        if "error" in header or "md5sum" not in header or "type" not in header:
-            raise ProtocolError(header.get("error", "header without type and md5sum"))
+    def _subscribe(self, caller_id, topic, port, seconds):
+        """A connection whose header was answered rightly; raise ProtocolError."""
+        sock = None
+        try:
+            sock = connect(port, max(0.05, seconds), LENGTH.size + HEADER_BYTES_MAX)
+            request = {"callerid": caller_id, "topic": topic, "md5sum": "*", "type": "*", "tcp_nodelay": "1"}
+            write_header(sock, request)
+            header = _answered_header(sock)
+        except (OSError, ValueError, ProtocolError) as error:
+            if sock is not None:
+                sock.close()
+            raise ProtocolError(str(error)) from error
         return sock, header
 
-    def ask_latching(self, topic, port):
+    def ask_latching(self, connection):
         """Whether the publisher latches: rospy knows it only once its constructor is through."""
-        try:
-            sock, header = self._subscribe(
-                self._caller_id + KNOCK, topic, port, time.monotonic() + LATCHING_S
-            )
-        except (OSError, ProtocolError):
-            return False
-        sock.close()
-        return header.get("latching") == "1"
+
+        def work():
+            latching = False
+            with contextlib.suppress(ProtocolError):  # then nobody knows
+                sock, header = self._subscribe(
+                    self._caller_id + KNOCK, connection.topic, connection.port, LATCHING_S
+                )
+                sock.close()
+                latching = header.get("latching") == "1"
+            self.loop.call_soon(lambda: connection.open(latching=latching))
+
+        self._pool.submit(connection.port, work)
+
+    def reserve(self, size):
+        """Room in memory for a message that is still coming."""
+        with self._lock:
+            if size and self._pending_bytes + size > PENDING_BYTES_MAX:
+                return False
+            self._pending_bytes += size
+        return True
+
+    def release(self, size):
+        with self._lock:
+            self._pending_bytes -= size
+
+    def overflows(self, connection, messages):
+        """Its first message that is not recorded."""
+        topic, caller_id = connection.topic, connection.caller_id
+        self.note("limit", topic, caller_id, messages=messages)
+        detail = "sent more on {} than is recorded".format(shown(topic))
+        self._guard.limit(self._processes.get(caller_id) or caller_id, detail)
+
+    def too_large(self, connection, length):
+        detail = "began a message of {} MB on {}; the most is {} MB".format(
+            length >> 20, shown(connection.topic), MESSAGE_BYTES_MAX >> 20
+        )
+        caller_id = connection.caller_id
+        self._guard.limit(self._processes.get(caller_id) or caller_id, detail)
 
     def note(self, event, topic, caller_id, **fields):
+        self._notes += 1
+        if self._notes > (2 * NOTES_MAX if event == "closed" else NOTES_MAX):
+            return
         record = {"event": event, "topic": topic, "callerid": caller_id}
         record.update(fields)
         self.wire.event("/grader/recorder", record)
@@ -135,4 +221,13 @@ class Recorder:
     def closed(self, connection):
         with self._lock:
             self._open.pop(connection.sock, None)
+            self._same[connection.topic, connection.caller_id] -= 1
         self.loop.remove_reader(connection.sock)
+
+
+def _answered_header(sock):
+    header = read_header(sock)
+    if "error" in header or "md5sum" not in header or "type" not in header:
+        raise ProtocolError(header.get("error", "header without type and md5sum"))
+    check_fields(header)
+    return header

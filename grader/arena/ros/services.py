@@ -1,11 +1,12 @@
 """Calls services as `rosservice` does (wiki.ros.org/ROS/TCPROS), with bytes that the grader has serialised."""
 
 import socket
-from urllib.parse import urlparse
+import time
 
-from tcpros import LENGTH, LOOPBACK, ProtocolError, read_exactly, read_header, write_header
+from bounded import ProtocolError, connect, port_of
+from tcpros import HEADER_BYTES_MAX, LENGTH, check_fields, read_exactly, read_header, write_header
 
-ANSWER_BYTES_MAX = 16 << 20
+ANSWER_BYTES_MAX = 4 << 20
 ANY = "*"
 
 
@@ -23,10 +24,11 @@ def call(service, uri, caller_id, *, type_, request, timeout_s):
 
     A service of another type would wait for bytes that never come, so it is asked first.
     """
+    until_s = time.monotonic() + timeout_s
     found = probe(service, uri, caller_id, timeout_s)
     if found != type_:
         raise ProtocolError("the service is of type {}".format(found))
-    with _connected(service, uri, caller_id, timeout_s) as sock:
+    with _connected(service, uri, caller_id, until_s - time.monotonic()) as sock:
         try:
             _header(sock)
             sock.sendall(LENGTH.pack(len(request)) + request)
@@ -46,9 +48,13 @@ def call(service, uri, caller_id, *, type_, request, timeout_s):
 
 def _connected(service, uri, caller_id, timeout_s, **more):
     try:
-        sock = socket.create_connection((LOOPBACK, urlparse(uri).port), timeout_s)
+        sock = connect(port_of(uri), max(0.05, timeout_s), HEADER_BYTES_MAX + ANSWER_BYTES_MAX)
+    except OSError as error:
+        raise ProtocolError(str(error)) from error
+    try:
         write_header(sock, dict(service=service, md5sum=ANY, callerid=caller_id, **more))
     except (OSError, ValueError) as error:
+        sock.close()
         raise ProtocolError(str(error)) from error
     return sock
 
@@ -60,4 +66,5 @@ def _header(sock):
         raise ProtocolError(str(error)) from error
     if "error" in header:
         raise ProtocolError(header["error"])
+    check_fields(header)
     return header

@@ -19,6 +19,7 @@ HEADER = struct.Struct("<BIQ")
 CHANNEL_ID = struct.Struct("<I")
 F_SETPIPE_SZ = 1031
 PIPE_BYTES = 1 << 20
+LARGE_BYTES = 256 << 10
 
 _OFFSET_NS = time.time_ns() - time.monotonic_ns()
 
@@ -54,24 +55,31 @@ class Wire:
         return fields["id"]
 
     def messages(self, channel_id, datas, time_ns):
-        """Several messages of one channel in one write."""
+        """Several messages of one channel, small ones in one write."""
         head = CHANNEL_ID.pack(channel_id)
-        parts = []
+        parts, size = [], 0
         for data in datas:
-            parts.append(HEADER.pack(ord("M"), len(data) + len(head), time_ns))
-            parts.append(head)
-            parts.append(data)
-        self._write(b"".join(parts))
+            parts += [HEADER.pack(ord("M"), len(data) + len(head), time_ns), head]
+            size += len(data)
+            if size > LARGE_BYTES:
+                self._write(b"".join(parts), data)
+                parts, size = [], 0
+            else:
+                parts.append(data)
+        if parts:
+            self._write(b"".join(parts))
 
     def _json(self, kind, value, time_ns=None):
         payload = json.dumps(value).encode("utf-8", "surrogatepass")
         self._write(HEADER.pack(ord(kind), len(payload), time_ns or now_ns()) + payload)
 
-    def _write(self, data):
-        view = memoryview(data)
-        with (
-            self._lock,
-            contextlib.suppress(BrokenPipeError),
-        ):  # nobody reads any more: the end of stdin says so too
-            while view:
-                view = view[os.write(self._fd, view) :]
+    def _write(self, *pieces):
+        """Where the grader does not read, this waits, and with it whoever floods it."""
+        with self._lock:
+            for piece in pieces:
+                view = memoryview(piece)
+                with contextlib.suppress(
+                    BrokenPipeError
+                ):  # nobody reads any more: the end of stdin says so too
+                    while view:
+                        view = view[os.write(self._fd, view) :]

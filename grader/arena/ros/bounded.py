@@ -1,0 +1,136 @@
+"""Sockets to and from student's programs: never waited for longer than said, never more read than said."""
+
+import http.client
+import socket
+import time
+import xmlrpc.client
+from urllib.parse import urlparse
+
+import strict
+
+LOOPBACK = "127.0.0.1"
+ANSWER_BYTES_MAX = 1 << 20
+
+
+class ProtocolError(Exception):
+    """The other side does not keep to TCPROS or to the slave API."""
+
+
+class BoundedSocket(socket.socket):
+    """All reading and writing since `allow` takes at most so many seconds and bytes together: a byte now and then
+    does not buy more time."""
+
+    _until_s = None
+    _bytes_left = 0
+
+    def allow(self, seconds, size):
+        """`seconds` of None lift both bounds."""
+        self._until_s = None if seconds is None else time.monotonic() + seconds
+        self._bytes_left = size
+
+    def recv(self, size, *flags):
+        self._before()
+        data = super().recv(size, *flags)
+        self._after(len(data))
+        return data
+
+    def recv_into(self, *args):
+        self._before()
+        count = super().recv_into(*args)
+        self._after(count)
+        return count
+
+    def sendall(self, data, *flags):
+        self._before()
+        super().sendall(data, *flags)
+
+    def _before(self):
+        if self._until_s is not None:
+            left_s = self._until_s - time.monotonic()
+            if left_s <= 0:
+                raise socket.timeout("timed out")
+            self.settimeout(left_s)
+
+    def _after(self, count):
+        if self._until_s is not None:
+            self._bytes_left -= count
+            if self._bytes_left < 0:
+                raise ConnectionAbortedError("more bytes than allowed")
+
+
+def connect(port, seconds, size):
+    """A connection to a port of this machine, bounded; raise OSError."""
+    sock = BoundedSocket(socket.AF_INET, socket.SOCK_STREAM)
+    sock.allow(seconds, size)
+    sock.settimeout(seconds)
+    try:
+        sock.connect((LOOPBACK, port))
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    except (OSError, OverflowError, TypeError) as error:
+        sock.close()
+        raise OSError(str(error)) from error
+    return sock
+
+
+def port_of(uri):
+    """The port of `http://…:port/` or `rosrpc://…:port`; None where there is none.
+
+    Nodes are on this machine, by whatever name they call it.
+    """
+    try:
+        return urlparse(uri).port or None
+    except (ValueError, AttributeError, TypeError):
+        return None
+
+
+class _Connection(http.client.HTTPConnection):
+    def __init__(self, port, seconds):
+        super().__init__(LOOPBACK, port)
+        self._seconds = seconds
+
+    def connect(self):
+        self.sock = connect(self.port, self._seconds, 2 * ANSWER_BYTES_MAX)
+
+
+class _Transport(xmlrpc.client.Transport):
+    accept_gzip_encoding = False
+
+    def __init__(self, port, seconds):
+        super().__init__()
+        self._port, self._seconds = port, seconds
+
+    def make_connection(self, host):
+        self._connection = host, _Connection(self._port, self._seconds)
+        return self._connection[1]
+
+    def parse_response(self, response):
+        try:
+            if response.getheader("Content-Encoding", "identity") != "identity":
+                raise strict.Malformed("an encoded answer")
+            data = response.read(ANSWER_BYTES_MAX + 1)
+            if len(data) > ANSWER_BYTES_MAX:
+                raise strict.Malformed("an answer of more than {} bytes".format(ANSWER_BYTES_MAX))
+            return strict.read(data)[0]
+        finally:
+            self.close()
+
+
+def slave_api(uri, seconds):
+    """A proxy of a node's slave API, each of whose calls takes at most so many seconds; raise ValueError."""
+    port = port_of(uri)
+    if port is None:
+        raise ValueError("no address of a node: {}".format(str(uri)[:100]))
+    return xmlrpc.client.ServerProxy(
+        "http://{}:{}/".format(LOOPBACK, port), transport=_Transport(port, seconds)
+    )
+
+
+def call(method, *args):
+    """Call a method of the slave API and return its value; raise ProtocolError for anything but success."""
+    try:
+        code, message, value = method(*args)
+    except Exception as error:
+        raise ProtocolError("{}: {}".format(type(error).__name__, str(error)[:200])) from error
+    if code != 1:
+        raise ProtocolError(str(message)[:200])
+    return value

@@ -1,0 +1,88 @@
+"""Reads XML-RPC as ROS's clients write it, and nothing that is made to break a reader.
+
+What is left out no client of ROS sends: document types, entities, comments, attributes, other encodings than UTF-8,
+`nil`, numbers that do not fit into 32 bits, names that are no text. So that nothing is worked out twice: the parser
+is expat, the rest is Python's own `xmlrpc.client`.
+"""
+
+import re
+import xmlrpc.client
+from xml.parsers import expat
+
+ELEMENTS_MAX = 200000
+DEPTH_MAX = 120
+"""Of elements: a value inside of a value takes four or five."""
+DIGITS_MAX = 40
+_ATTRIBUTE = re.compile(rb"<[^<?!/>\s]+\s+[^<>/\s]")
+_LEFT_OUT = ("nil", "i1", "i2", "biginteger", "bigdecimal")
+
+
+class Malformed(ValueError):
+    """No XML-RPC that a client of ROS would send; says what it is in a few words."""
+
+
+def read(data):
+    """(values, method name or None) of a whole call or answer; raise Malformed, or the xmlrpc.client.Fault in it."""
+    if b"<!" in data:
+        raise Malformed("a document type, entities or comments")
+    if _ATTRIBUTE.search(data):
+        raise Malformed("attributes")
+    target = _Unmarshaller()
+    try:
+        _parse(data, target)
+        return target.close(), target.getmethodname()
+    except xmlrpc.client.Fault:
+        raise
+    except Malformed:
+        raise
+    except Exception as error:
+        raise Malformed("no XML-RPC ({})".format(type(error).__name__)) from error
+
+
+def _parse(data, target):
+    elements = depth = 0
+
+    def start(tag, attributes):
+        nonlocal elements, depth
+        elements += 1
+        depth += 1
+        if elements > ELEMENTS_MAX:
+            raise Malformed("more than {} elements".format(ELEMENTS_MAX))
+        if depth > DEPTH_MAX:
+            raise Malformed("values nested too deeply")
+        target.start(tag, attributes)
+
+    def end(tag):
+        nonlocal depth
+        depth -= 1
+        target.end(tag)
+
+    target.xml(None, None)
+    parser = expat.ParserCreate("UTF-8")
+    parser.buffer_text = True
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler = target.data
+    parser.Parse(data, True)
+
+
+class _Unmarshaller(xmlrpc.client.Unmarshaller):
+    def end_number(self, data):
+        if len(data) > DIGITS_MAX or not xmlrpc.client.MININT <= int(data) <= xmlrpc.client.MAXINT:
+            raise Malformed("a number that is too large")
+        self.append(int(data))
+        self._value = 0
+
+    def end_map(self, data):
+        mark = self._marks[-1]
+        if not all(isinstance(name, str) for name in self._stack[mark::2]):
+            raise Malformed("a name that is no text")
+        self.end_struct(data)
+
+
+_Unmarshaller.dispatch = dict(
+    {tag: end for tag, end in xmlrpc.client.Unmarshaller.dispatch.items() if tag not in _LEFT_OUT},
+    int=_Unmarshaller.end_number,
+    i4=_Unmarshaller.end_number,
+    i8=_Unmarshaller.end_number,
+    struct=_Unmarshaller.end_map,
+)
