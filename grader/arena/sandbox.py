@@ -38,8 +38,13 @@ OWN_FOLDER = Path(__file__).resolve().parent.parent
 NETWORK = Path(__file__).parent / "ros" / "network.py"
 WALLS = ("--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try")
 NO_NESTING = "--disable-userns"
+UID_MAP = Path("/proc/self/uid_map")
+UNUSED_UIDS = (1_900_000_000, 2_000_000_000)
+"""Left alone by distributions and by systemd (systemd.io/UIDS-GIDS)."""
+FEW_UIDS = (30_000, 60_000)
 COUNTS_BY_NAMESPACE = (5, 14)
 """Since this kernel RLIMIT_NPROC counts the processes of a user namespace, before it all of the user's."""
+ULIMIT_HINT = "raise what this shell allows (`ulimit -Ha` shows it), then grade again"
 INSTALL_HINT = "apt-get install bubblewrap (in a container: allow user namespaces, or run it privileged)"
 
 
@@ -76,7 +81,7 @@ class Sandbox(Record):
         """One process tree's layer. `place` is the run's own folder (see `inside.prepare`), `binds` bubblewrap
         arguments. Only tmpfs of fixed size can be written, and what `binds` give."""
         drop = ["setpriv", f"--reuid={self.uid}", f"--regid={self.uid}", "--clear-groups"] if self.uid else []
-        drop += ["prlimit", *self._rlimits(limits), "--"]
+        drop += ["prlimit", *self.rlimits(limits), "--"]
         if not self.bubblewrap:
             return [*drop, *argv]
         return [
@@ -99,7 +104,8 @@ class Sandbox(Record):
             return ""
         return f"ulimit -u {limits.tasks}; "
 
-    def _rlimits(self, limits: Limits) -> Iterator[str]:
+    def rlimits(self, limits: Limits) -> Iterator[str]:
+        """The arguments of prlimit."""
         yield f"--fsize={limits.file_bytes}"
         yield f"--nofile={limits.open_files}"
         yield f"--as={limits.address_space_bytes}"
@@ -156,14 +162,40 @@ def temporary_base(sandbox: Sandbox | None) -> Path:
 
 
 def choose(mode: Mode) -> Sandbox:
-    """The sandbox to use: `require` raises SandboxMissing where there is none, `auto` goes without and says so."""
+    """The sandbox to use: `require` raises SandboxMissing where there is none, `auto` goes without and says so.
+
+    Raises HostError where this machine does not let the limits of student's processes be set: every one would fail.
+    """
+    refused = refused_limits()
+    if refused:
+        raise HostError(f"the limits of students' processes cannot be set here: {refused}", hint=ULIMIT_HINT)
     reason = "--sandbox none" if mode == "none" else why_not()
     if reason and mode == "require":
         raise SandboxMissing(f"no sandbox on this machine: {reason}", hint=INSTALL_HINT)
     can_drop = os.geteuid() == 0 and shutil.which("setpriv") is not None
-    uid = random.SystemRandom().randrange(30_000, 60_000) if can_drop else None
+    uid = _nobodys_uid() if can_drop else None
     nesting = not reason and _refusal(NO_NESTING) != ""
     return Sandbox(bubblewrap=not reason, uid=uid, reason=reason, nesting=nesting, cgroups=find_cgroups())
+
+
+@lru_cache(maxsize=1)
+def refused_limits() -> str:
+    """What this machine says to the limits of students' processes; empty where it sets them, or has no prlimit."""
+    if shutil.which("prlimit") is None:
+        return ""
+    limits = Sandbox(bubblewrap=False, uid=None).rlimits(Limits())
+    command = ["prlimit", *limits, "--", "/bin/true"]
+    done = subprocess.run(command, capture_output=True, check=False, timeout=20)
+    return "" if done.returncode == 0 else done.stderr.decode(errors="replace").strip()[-200:]
+
+
+def _nobodys_uid() -> int:
+    """A user that no directory of users knows, where this machine has the whole range of them (a container may not)."""
+    try:
+        mapped = max(int(line.split()[0]) + int(line.split()[2]) for line in UID_MAP.read_text().splitlines())
+    except (OSError, ValueError, IndexError):
+        mapped = 0
+    return random.SystemRandom().randrange(*(UNUSED_UIDS if mapped >= UNUSED_UIDS[1] else FEW_UIDS))
 
 
 @lru_cache(maxsize=1)
