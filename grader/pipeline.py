@@ -23,6 +23,7 @@ from grader.evidence.run import Run
 from grader.faults import Attempt, told_apart
 from grader.intake import open_recorded, open_recording, open_submission
 from grader.judge import judge
+from grader.judge.notes import notes_of
 from grader.judge.summary import overall_status, total_points
 from grader.model.progress import Progress
 from grader.model.result import (
@@ -82,8 +83,10 @@ def grade(
                 recording, criteria = _recorded_and_judged(
                     submission, rubric, results.evidence, options, progress
                 )
-            console = console_log(load_evidence([results.evidence]))
-            result = _result(submission, rubric, recording, criteria, clock)
+            runs = load_evidence([results.evidence])
+            graded = _result(submission, rubric, recording, criteria, clock)
+            result = graded.model_copy(update={"notes": notes_of(runs)})
+            console = console_log(runs)
             write_reports(
                 result, results.new, console=console, rubric=rubric.rubric, keep_hidden=options.keep_hidden
             )
@@ -119,7 +122,8 @@ def console_log(runs: dict[str, Run]) -> str:
         for time_ns, line in run.console:
             if line.process in own:
                 continue
-            lines.append(f"{(time_ns - run.start_ns) / 1e9:8.3f} {line.process} {line.stream}: {line.line}")
+            text = line.line.replace("\n", "\\n")  # a line is one, whatever a recording says
+            lines.append(f"{(time_ns - run.start_ns) / 1e9:8.3f} {line.process} {line.stream}: {text}")
     return "".join(f"{line}\n" for line in lines)
 
 

@@ -8,6 +8,9 @@ from typing import Any
 
 import yaml
 
+from grader.shown import line, visible
+
+NOTE_CHARS = 300
 HEAD = """\
 # Proposed by `grader rubric new` from a run of a correct package. Look through it: it asks for what this package does,
 # and only you know what the handout asks for. `grader explain CHECK` tells more about each check, and
@@ -49,21 +52,26 @@ def rubric_text(
 
 
 def _block(data: object) -> str:
-    return yaml.dump(
-        data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110, default_flow_style=False
-    )
+    return _dumped(data, flow=False)
 
 
 def _indented(data: object) -> str:
-    return "".join(f"  {line}\n" if line else "\n" for line in _compact(data).splitlines())
-
-
-def _compact(data: object) -> str:
     """Innermost lists and maps in flow style: `[rospy, std_msgs]`."""
-    return yaml.dump(
-        data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110, default_flow_style=None
-    )
+    rows = _dumped(data, flow=None).removesuffix("\n").split("\n")
+    return "".join(f"  {row}\n" if row else "\n" for row in rows)
+
+
+def _dumped(data: object, *, flow: bool | None) -> str:
+    """Names of topics and texts come from a program: where one holds what cannot be seen, letters are escaped."""
+
+    def dump(*, letters: bool) -> str:
+        return yaml.dump(
+            data, Dumper=_Dumper, sort_keys=False, allow_unicode=letters, width=110, default_flow_style=flow
+        )
+
+    text = dump(letters=True)
+    return text if visible(text, lines=True) == text else dump(letters=False)
 
 
 def _one_line(text: str) -> str:
-    return re.sub(r"\s+", " ", text)[:300]
+    return line(re.sub(r"\s+", " ", text), NOTE_CHARS)

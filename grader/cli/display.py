@@ -17,9 +17,10 @@ from rich.table import Table
 from rich.text import Text
 
 from grader.model.progress import Progress, StepState
-from grader.report.text import clip, visible
+from grader.shown import line
 
 REFRESH_HZ = 8
+NAME_LIMIT = 120
 DETAIL_LIMIT = 160
 WORDS = {
     "waiting": ("·", "dim"),
@@ -91,7 +92,7 @@ class PlainSteps(Steps):
         if before is not None and before.state == after.state:
             return
         stamp = datetime.now().astimezone().strftime("%H:%M:%S")
-        words = [visible(after.name), after.state, _times(after, now_s), _shown(after.detail)]
+        words = [line(after.name, NAME_LIMIT), after.state, _times(after, now_s), _shown(after.detail)]
         print(stamp, "  ".join(word for word in words if word), file=self.stream, flush=True)
 
 
@@ -115,7 +116,7 @@ class LiveSteps(Steps):
         table.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
         for step in steps:
             mark, style = WORDS[step.state]
-            name = Text(f"{mark} {visible(step.name)}", style)
+            name = Text(f"{mark} {line(step.name, NAME_LIMIT)}", style)
             detail = Text(_shown(step.detail), "dim")
             table.add_row(name, Text(step.state, style), Text(_times(step, now_s)), detail)
         table.add_row(
@@ -170,4 +171,4 @@ def _left(steps: tuple[Step, ...], now_s: float) -> str:
 
 
 def _shown(detail: str) -> str:
-    return visible(clip(detail, DETAIL_LIMIT))
+    return line(detail, DETAIL_LIMIT)

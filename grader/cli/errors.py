@@ -9,7 +9,9 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from grader.errors import ExitCode, GraderError, RubricError
+from grader.shown import line, visible
 
+LINE_CHARS = 2000
 SIGPIPE_CODE = 141  # what a shell reports for a program that a closed pipe ended
 
 
@@ -39,12 +41,15 @@ DEBUG_HINT = " (run with --debug for the traceback)"
 
 
 def report(error: GraderError) -> None:
-    """One line that says what is wrong, one that says what to do. A rubric's faults have a line each."""
+    """One line that says what is wrong, one that says what to do, one that says what became of the result. A rubric's
+    faults have a line each."""
     faults = error.faults if isinstance(error, RubricError) else [error.message]
     for fault in faults:
         _say(f"grader: error: {_line(fault)}")
     if error.hint:
         _say(f"  hint: {_line(error.hint)}")
+    if error.note:
+        _say(f"  note: {_line(error.note)}")
 
 
 def flush() -> None:
@@ -54,9 +59,7 @@ def flush() -> None:
 
 
 def _line(text: object) -> str:
-    from grader.report.text import visible  # noqa: PLC0415 - not needed where nothing goes wrong
-
-    return visible(str(text))
+    return line(str(text), LINE_CHARS)
 
 
 def _say(line: str) -> None:
@@ -67,7 +70,7 @@ def _say(line: str) -> None:
 def _trace(debug: bool) -> None:
     if debug:
         with suppress(OSError, ValueError):
-            traceback.print_exc()
+            sys.stderr.write(visible(traceback.format_exc(), lines=True))
 
 
 def _drop_stdout() -> None:

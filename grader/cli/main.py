@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import threading
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
@@ -20,6 +21,10 @@ def run(argv: Sequence[str]) -> int:
     """Run one command line and return its exit code. Prints its errors itself; raises nothing."""
     _prepare_streams()
     _prepare_signals()
+    if not sys.warnoptions:
+        warnings.simplefilter(
+            "ignore"
+        )  # Python's remarks on a student's code quote it, and are for nobody here
     return guarded(lambda: _dispatch(argv), debug="--debug" in argv)
 
 

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from grader.mutation.model import LostCriterion, MutantResult, RubricTest
 from grader.report.terminal import emit, open_console
-from grader.report.text import number, visible
+from grader.report.text import line, number, visible
 
 MARKS = {
     "killed": ("✓", "green"),
@@ -20,6 +20,7 @@ MARKS = {
     "inconclusive": ("?", "yellow"),
     "error": ("!", "red"),
 }
+TEXT_CHARS = 500
 DIFF_STYLES = {"+": "green", "-": "red", "@": "cyan"}
 
 
@@ -47,14 +48,14 @@ def _table(test: RubricTest) -> Table:
 
 def _lost(mutant: MutantResult) -> str:
     """`chatter fail, chatter-rate blocked`."""
-    return ", ".join(f"{c.id} {c.status}" for c in mutant.lost) or visible(mutant.error) or "nothing"
+    return ", ".join(f"{c.id} {c.status}" for c in mutant.lost) or line(mutant.error, TEXT_CHARS) or "nothing"
 
 
 def _reference(test: RubricTest) -> Iterator[Text]:
     if test.reference.lost:
         reached = f"{number(test.reference.points)} of {number(test.reference.max_points)} points"
         yield Text(f"The reference solution does not get everything: {reached}", "bold red")
-        yield Text(f"  {test.solution}")
+        yield Text(f"  {visible(test.solution)}")
         yield from _criteria(test.reference.lost)
         yield from _evidence(test.reference.evidence)
 
@@ -64,23 +65,23 @@ def _open(mutant: MutantResult) -> Iterator[Text]:
     yield Text(f"{mutant.state}: {visible(mutant.label)}", "bold red")
     yield Text(f"  the student {mutant.mistake[:1].lower()}{mutant.mistake[1:]}")
     if mutant.error:
-        yield Text(f"  not graded: {visible(mutant.error)}")
+        yield Text(f"  not graded: {line(mutant.error, TEXT_CHARS)}")
     for words, names in (
         ("should cost, and does not", mutant.missing),
         ("should not cost, and does", mutant.surplus),
         ("has another status", mutant.differing),
     ):
         if names:
-            yield Text(f"  {words}: {', '.join(names)}", "yellow")
+            yield Text(f"  {words}: {visible(', '.join(names))}", "yellow")
     yield from _criteria(mutant.lost)
-    for line in mutant.diff.splitlines():
-        yield Text(f"    {visible(line)}", DIFF_STYLES.get(line[:1], ""))
+    for row in mutant.diff.rstrip("\n").split("\n"):
+        yield Text(f"    {line(row, TEXT_CHARS)}", DIFF_STYLES.get(row[:1], ""))
     yield from _evidence(mutant.evidence)
 
 
 def _criteria(lost: tuple[LostCriterion, ...]) -> Iterator[Text]:
     for criterion in lost:
-        yield Text(f"  {criterion.id} {criterion.status}: {visible(criterion.message)}")
+        yield Text(f"  {criterion.id} {criterion.status}: {line(criterion.message, TEXT_CHARS)}")
 
 
 def _evidence(folder: str | None) -> Iterator[Text]:

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from grader.cli.errors import report
 from grader.cli.outcome import exit_code, settled
+from grader.cli.say import say, say_document
 from grader.errors import ExitCode, GraderError
 from grader.model.result import GradingResult
-from grader.report.result_json import result_bytes
+from grader.report.result_json import result_text
 from grader.report.terminal import open_console, print_report
 from grader.rubric.model import Rubric
 
@@ -30,7 +31,7 @@ def show(
     With `static` nothing was run on purpose: the exit code is that of the criteria that could be judged.
     """
     if as_json:
-        sys.stdout.write(result_bytes(result).decode())
+        say_document(lambda ascii_only: result_text(result, ascii_only=ascii_only))
     else:
         print_report(result, rubric, open_console(sys.stdout), hidden=hidden, static=static)
         _paths(folder)
@@ -47,6 +48,6 @@ def _paths(folder: Path | None) -> None:
     print("\nReports:")
     for name in REPORTS:
         if (folder / name).is_file():
-            print(f"  {folder / name}")
+            say(f"  {folder / name}")
     if (folder / "evidence").is_dir():
-        print(f"  {folder / 'evidence'}/")
+        say(f"  {folder / 'evidence'}/")

@@ -6,7 +6,6 @@ import hashlib
 import importlib.util
 import sys
 from collections.abc import Callable, Mapping
-from contextlib import redirect_stdout
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, wraps
 from importlib.abc import ExecutionLoader
@@ -15,6 +14,7 @@ from pathlib import Path
 from traceback import extract_tb
 
 from grader.checks.registry import Check, collecting
+from grader.instructor.printing import printing_to_stderr
 from grader.model.verdict import Verdict
 
 LineFault = tuple[int, str]
@@ -47,7 +47,7 @@ def _contained(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
     @wraps(function)
     def contained(**facts: object) -> Verdict:
         try:
-            with redirect_stdout(sys.stderr):
+            with printing_to_stderr():
                 return function(**facts)
         except SystemExit as error:
             raise RuntimeError("it called sys.exit") from error
@@ -63,7 +63,7 @@ def _run(path: Path, raw: bytes) -> LineFault | None:
     try:
         assert module.__spec__ is not None  # noqa: S101 - made two lines above
         assert module.__spec__.loader is not None  # noqa: S101 - as above
-        with redirect_stdout(sys.stderr):
+        with printing_to_stderr():
             module.__spec__.loader.exec_module(module)
     except SyntaxError as error:
         own = error.filename in {str(path), None}

@@ -129,7 +129,8 @@ class _Notes:
         return self._short(f"{type(error).__name__}{': ' if text else ''}{text}")
 
     def _short(self, text: str) -> str:
-        """Without what differs from run to run: addresses and folders."""
+        """Without what differs from run to run, addresses and folders, and as what can be written down."""
+        text = text.encode("utf-8", "backslashreplace").decode()
         text = text.replace(self._folder, "…").replace(f"{self._rootdir}/", "")
         text = _ADDRESS.sub("0x…", text)
         return text if len(text) <= MESSAGE_CHARS else text[: MESSAGE_CHARS - 1] + "…"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from decimal import Decimal
 from typing import Literal
@@ -11,7 +10,9 @@ from grader.judge.points import round_half_up
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
+from grader.shown import clipped, json_text, text_limit
 
+LIMIT = 2000
 OPEN = {Status.INCONCLUSIVE, Status.MANUAL, Status.ERROR}
 
 
@@ -41,7 +42,12 @@ def reached_pass_mark(rubric: Rubric, results: Sequence[CriterionResult]) -> boo
     return bool(judged) and all(r.status is Status.PASS for r in judged)
 
 
-def criteria_bytes(results: Sequence[CriterionResult]) -> bytes:
+def criteria_text(results: Sequence[CriterionResult], *, ascii_only: bool = False) -> str:
     """The criteria as canonical JSON in the rubric's order: the same from `grader grade` and `grader judge`."""
-    data = [r.model_dump(mode="json") for r in results]
-    return (json.dumps(data, ensure_ascii=False, indent=2) + "\n").encode()
+    data = [result.model_dump(mode="json") for result in results]
+    return json_text(clipped(data, text_limit(len(results), LIMIT)), ascii_only=ascii_only)
+
+
+def criteria_bytes(results: Sequence[CriterionResult]) -> bytes:
+    """The same as UTF-8."""
+    return criteria_text(results).encode()

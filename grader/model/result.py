@@ -59,6 +59,18 @@ class TimingInfo(Record):
     student_cpu_s: float
 
 
+class Note(Record):
+    """What a student's process was not allowed (`refused`), or had too much of (`limit`). It costs no points.
+
+    `scenario` is the run that it was noticed in (`package`: the build), `actor` the process or node.
+    """
+
+    scenario: str
+    actor: str
+    kind: Literal["refused", "limit"]
+    text: str
+
+
 class ErrorInfo(Record):
     kind: str
     message: str
@@ -75,4 +87,5 @@ class GradingResult(Record):
     criteria: tuple[CriterionResult, ...]
     environment: EnvironmentInfo
     timing: TimingInfo
+    notes: tuple[Note, ...] = ()
     error: ErrorInfo | None = None

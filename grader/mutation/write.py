@@ -8,6 +8,7 @@ import yaml
 
 from grader.mutation.model import MutantResult, Step
 from grader.mutation.plan import Planned
+from grader.shown import visible
 
 HEADER = """\
 # The mutants of {rubric}'s reference solution, and the criteria that each of them must cost, no more and no less.
@@ -47,7 +48,12 @@ def _entry(step: Step, costs: dict[str, str]) -> str:
 
 
 def _flow(data: object) -> str:
-    """A map in one line."""
-    return yaml.safe_dump(
-        data, default_flow_style=True, sort_keys=False, allow_unicode=True, width=10_000
-    ).strip()
+    """A map in one line; letters are escaped where there is something that cannot be seen."""
+
+    def dump(*, letters: bool) -> str:
+        return yaml.safe_dump(
+            data, default_flow_style=True, sort_keys=False, allow_unicode=letters, width=10_000
+        ).strip()
+
+    text = dump(letters=True)
+    return text if visible(text, lines=True) == text else dump(letters=False)

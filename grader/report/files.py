@@ -13,6 +13,8 @@ from grader.report.result_json import result_bytes
 from grader.report.text import visible
 from grader.rubric.model import Rubric
 
+CONSOLE_CHARS = 4_000_000
+
 
 def write_reports(
     result: GradingResult, out_dir: Path, *, console: str, rubric: Rubric, keep_hidden: bool = True
@@ -27,8 +29,20 @@ def write_reports(
         "result.json": result_bytes(shown),
         "report.md": markdown_report(shown, rubric, hidden=hidden).encode(),
         "junit.xml": junit(shown),
-        "console.log": visible(console, lines=True).encode(),
+        "console.log": _console(console).encode(),
     }
     for name, data in files.items():
         atomic_write(out_dir / name, data)
     return tuple(out_dir / name for name in files)
+
+
+def _console(text: str) -> str:
+    rows: list[str] = []
+    room = CONSOLE_CHARS
+    for row in text.splitlines(keepends=True):
+        shown = visible(row[:room], lines=True)
+        if len(row) > room or len(shown) > room:
+            return "".join([*rows, "… the rest is in the evidence\n"])
+        rows.append(shown)
+        room -= len(shown)
+    return "".join(rows)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from lxml import etree
 
-from grader.model.result import CriterionResult, GradingResult
+from grader.model.result import CriterionResult, ErrorInfo, GradingResult, Note
 from grader.model.verdict import FileCitation, Status
-from grader.report.text import clip, number, visible
+from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
+from grader.report.text import line, number, text_limit, visible
 from grader.report.view import places
 
 OUTCOME = {
@@ -23,27 +24,79 @@ LIMIT = 2000
 
 def junit(result: GradingResult) -> bytes:
     """The file's bytes, UTF-8. Points are properties of each case, and of the suite."""
-    suite = etree.Element("testsuite", {"name": _text(result.rubric.id), **_counts(result)})
-    _properties(
-        suite,
-        {
-            "submission": result.submission.id,
-            "package": result.submission.package,
-            "points": number(result.points),
-            "max_points": number(result.max_points),
-        },
-    )
-    for criterion in result.criteria:
-        suite.append(_case(criterion, result.rubric.id))
-    if result.error is not None:
-        case = etree.SubElement(
-            suite, "testcase", classname=_text(result.rubric.id), name="grading", time="0"
-        )
-        text = f"{result.error.message}\n{result.error.hint}".strip()
-        _outcome(case, "error", result.error.kind, result.error.message, text)
-    root = etree.Element("testsuites", _counts(result))
-    root.append(suite)
-    return etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
+    return _Writer(text_limit(len(result.criteria), LIMIT)).document(result)
+
+
+class _Writer:
+    """`limit` is how long a text may be. What XML cannot hold is no sign that can be seen: it is written out."""
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+
+    def document(self, result: GradingResult) -> bytes:
+        suite = etree.Element("testsuite", {"name": self._text(result.rubric.id), **_counts(result)})
+        about = {"submission": result.submission.id, "package": result.submission.package}
+        points = {"points": number(result.points), "max_points": number(result.max_points)}
+        self._properties(suite, {**about, **points})
+        for criterion in result.criteria:
+            suite.append(self._case(criterion, result.rubric.id))
+        if result.error is not None:
+            self._error(suite, result.rubric.id, result.error)
+        if result.notes:
+            etree.SubElement(suite, "system-out").text = self._noticed(result.notes)
+        root = etree.Element("testsuites", _counts(result))
+        root.append(suite)
+        return etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
+
+    def _case(self, criterion: CriterionResult, rubric_id: str) -> etree._Element:
+        cited = next((c for c in criterion.citations if isinstance(c, FileCitation)), None)
+        attributes = {"classname": self._text(rubric_id), "name": self._text(criterion.id), "time": "0"}
+        if cited is not None:
+            attributes["file"] = self._text(cited.file)
+            if cited.line is not None:
+                attributes["line"] = str(cited.line)
+        case = etree.Element("testcase", attributes)
+        points = {"points": number(criterion.points), "max_points": number(criterion.max_points)}
+        self._properties(case, {"title": criterion.title, "status": criterion.status.value, **points})
+        outcome = OUTCOME[criterion.status]
+        if outcome is not None:
+            self._outcome(case, outcome, criterion.status.value, criterion.message, self._details(criterion))
+        return case
+
+    def _error(self, suite: etree._Element, rubric_id: str, error: ErrorInfo) -> None:
+        case = etree.SubElement(suite, "testcase", classname=self._text(rubric_id), name="grading", time="0")
+        details = "\n".join(self._text(text) for text in (error.message, error.hint) if text)
+        self._outcome(case, "error", error.kind, error.message, details)
+
+    def _details(self, criterion: CriterionResult) -> str:
+        rows = {
+            "measured": criterion.measured,
+            "expected": criterion.expected,
+            "hint": criterion.hint,
+            "see": criterion.reproduce,
+            "where": ", ".join(places(criterion)),
+        }
+        lines = [f"{name}: {self._text(value)}" for name, value in rows.items() if value]
+        return "\n".join([self._text(criterion.message), *lines])
+
+    def _noticed(self, notes: tuple[Note, ...]) -> str:
+        lines = [f"{self._text(place(note))}: {self._text(words(note))}" for note in notes]
+        return "\n".join([f"{TITLE}. {COSTS_NOTHING}", *lines])
+
+    def _outcome(self, case: etree._Element, tag: str, kind: str, message: str, details: str) -> None:
+        if tag == "skipped":
+            etree.SubElement(case, tag, message=self._text(message))
+            return
+        outcome = etree.SubElement(case, tag, type=self._text(kind), message=self._text(message))
+        outcome.text = visible(details, lines=True)
+
+    def _properties(self, parent: etree._Element, values: dict[str, str]) -> None:
+        properties = etree.SubElement(parent, "properties")
+        for name, value in values.items():
+            etree.SubElement(properties, "property", name=name, value=self._text(value))
+
+    def _text(self, text: str) -> str:
+        return line(text, self._limit)
 
 
 def _counts(result: GradingResult) -> dict[str, str]:
@@ -55,48 +108,3 @@ def _counts(result: GradingResult) -> dict[str, str]:
         "skipped": str(outcomes.count("skipped")),
         "time": f"{result.timing.wall_s:.3f}",
     }
-
-
-def _case(criterion: CriterionResult, rubric_id: str) -> etree._Element:
-    place = next((c for c in criterion.citations if isinstance(c, FileCitation)), None)
-    attributes = {"classname": _text(rubric_id), "name": _text(criterion.id), "time": "0"}
-    if place is not None:
-        attributes["file"] = _text(place.file)
-        if place.line is not None:
-            attributes["line"] = str(place.line)
-    case = etree.Element("testcase", attributes)
-    points = {"points": number(criterion.points), "max_points": number(criterion.max_points)}
-    _properties(case, {"title": criterion.title, "status": criterion.status.value, **points})
-    outcome = OUTCOME[criterion.status]
-    if outcome is not None:
-        _outcome(case, outcome, criterion.status.value, criterion.message, _details(criterion))
-    return case
-
-
-def _details(criterion: CriterionResult) -> str:
-    rows = {
-        "measured": criterion.measured,
-        "expected": criterion.expected,
-        "hint": criterion.hint,
-        "see": criterion.reproduce,
-        "where": ", ".join(places(criterion)),
-    }
-    lines = [f"{name}: {_text(value)}" for name, value in rows.items() if value]
-    return "\n".join([_text(criterion.message), *lines])
-
-
-def _outcome(case: etree._Element, tag: str, kind: str, message: str, details: str) -> None:
-    if tag == "skipped":
-        etree.SubElement(case, tag, message=_text(message))
-        return
-    etree.SubElement(case, tag, type=_text(kind), message=_text(message)).text = visible(details, lines=True)
-
-
-def _properties(parent: etree._Element, values: dict[str, str]) -> None:
-    properties = etree.SubElement(parent, "properties")
-    for name, value in values.items():
-        etree.SubElement(properties, "property", name=name, value=_text(value))
-
-
-def _text(text: str) -> str:
-    return visible(clip(text, LIMIT))

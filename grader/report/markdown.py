@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
-from grader.model.result import CriterionResult, GradingResult
-from grader.report.text import clip, markdown, markdown_code, number
+from grader.model.result import CriterionResult, GradingResult, Note
+from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
+from grader.report.text import line, markdown, markdown_code, number, text_limit
 from grader.report.view import Loss, arrange, places, points_of
 from grader.rubric.model import Rubric
 
@@ -14,109 +15,126 @@ LIMIT = 1000
 
 def markdown_report(result: GradingResult, rubric: Rubric, *, hidden: int = 0) -> str:
     """The report as GitHub-flavoured Markdown. `hidden` is how many criteria are left out of it."""
-    view = arrange(result, rubric)
-    lines = [*_head(result, rubric, hidden)]
-    if result.error is not None:
-        lines += ["## Not graded", "", _text(result.error.message), "", _text(result.error.hint), ""]
-    lines += _losses("What was lost", view.lost)
-    lines += _losses("What is still open", view.open)
-    lines += _advice(view.advice)
-    lines += _table(result.criteria)
-    lines += _foot(result)
-    return "\n".join(lines) + "\n"
+    return _Writer(text_limit(len(result.criteria), LIMIT)).report(result, rubric, hidden)
 
 
-def _head(result: GradingResult, rubric: Rubric, hidden: int) -> Iterator[str]:
-    submission = result.submission
-    yield f"# {number(result.points)} of {number(result.max_points)} points"
-    yield ""
-    yield f"{_text(rubric.title)} ({_code(result.rubric.id)}, version {_text(result.rubric.version)})"
-    yield ""
-    commit = f", commit {_code(submission.commit[:12])}" if submission.commit else ""
-    kind = f"package {_code(submission.package)}" if submission.package else "a recording"
-    yield f"Submission {_code(submission.id)}, {kind}{commit}."
-    yield ""
-    if result.status == "inconclusive":
-        yield "**Not settled yet:** some criteria could not be judged; no points are lost for good."
+class _Writer:
+    """`limit` is how long a text may be. Whatever is not the template's own goes through `_text` or `_code`."""
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+
+    def report(self, result: GradingResult, rubric: Rubric, hidden: int) -> str:
+        view = arrange(result, rubric)
+        lines = [*self._head(result, rubric, hidden)]
+        if result.error is not None:
+            error = result.error
+            lines += ["## Not graded", "", self._text(error.message), "", self._text(error.hint), ""]
+        lines += self._losses("What was lost", view.lost)
+        lines += self._losses("What is still open", view.open)
+        lines += self._advice(view.advice)
+        lines += self._noticed(result.notes)
+        lines += self._table(result.criteria)
+        lines += self._foot(result)
+        return "\n".join(lines) + "\n"
+
+    def _head(self, result: GradingResult, rubric: Rubric, hidden: int) -> Iterator[str]:
+        submission = result.submission
+        yield f"# {number(result.points)} of {number(result.max_points)} points"
         yield ""
-    if hidden:
-        yield f"{hidden} hidden {'criterion is' if hidden == 1 else 'criteria are'} not part of this report."
+        version = self._text(result.rubric.version)
+        yield f"{self._text(rubric.title)} ({self._code(result.rubric.id)}, version {version})"
+        yield ""
+        commit = f", commit {self._code(submission.commit[:12])}" if submission.commit else ""
+        kind = f"package {self._code(submission.package)}" if submission.package else "a recording"
+        yield f"Submission {self._code(submission.id)}, {kind}{commit}."
+        yield ""
+        if result.status == "inconclusive":
+            yield "**Not settled yet:** some criteria could not be judged; no points are lost for good."
+            yield ""
+        if hidden:
+            yield f"{hidden} hidden {'criterion is' if hidden == 1 else 'criteria are'} not part of this report."
+            yield ""
+
+    def _losses(self, title: str, losses: tuple[Loss, ...]) -> Iterator[str]:
+        if not losses:
+            return
+        yield f"## {title}"
+        yield ""
+        for loss in losses:
+            criterion = loss.criterion
+            yield f"### {self._code(criterion.id)}: {points_of(criterion)}, {criterion.status.value}"
+            yield ""
+            yield self._text(criterion.message) or self._text(criterion.title)
+            yield ""
+            details = [*self._details(criterion), *self._blocked(loss)]
+            yield from ([*details, ""] if details else [])
+
+    def _details(self, criterion: CriterionResult) -> Iterator[str]:
+        rows = {"Measured": criterion.measured, "Expected": criterion.expected, "Hint": criterion.hint}
+        yield from (f"- {name}: {self._text(value)}" for name, value in rows.items() if value)
+        if criterion.reproduce:
+            yield f"- See it yourself: {self._code(criterion.reproduce)}"
+        if criterion.citations:
+            yield f"- Where: {', '.join(self._code(cited) for cited in places(criterion))}"
+
+    def _blocked(self, loss: Loss) -> Iterator[str]:
+        if loss.alike:
+            yield f"- The same holds for: {self._names(loss.alike)}"
+        if loss.blocked:
+            yield f"- Could not be judged because of this: {self._names(loss.blocked)}"
+
+    def _names(self, criteria: tuple[CriterionResult, ...]) -> str:
+        return ", ".join(f"{self._code(c.id)} ({points_of(c)})" for c in criteria)
+
+    def _advice(self, criteria: tuple[CriterionResult, ...]) -> Iterator[str]:
+        if not criteria:
+            return
+        yield "## Advice, costs nothing"
+        yield ""
+        for criterion in criteria:
+            hint = f" {self._text(criterion.hint)}" if criterion.hint else ""
+            yield f"- {self._code(criterion.id)}: {self._text(criterion.message)}{hint}"
         yield ""
 
-
-def _losses(title: str, losses: tuple[Loss, ...]) -> Iterator[str]:
-    if not losses:
-        return
-    yield f"## {title}"
-    yield ""
-    for loss in losses:
-        criterion = loss.criterion
-        yield f"### {_code(criterion.id)}: {points_of(criterion)}, {criterion.status.value}"
+    def _noticed(self, notes: tuple[Note, ...]) -> Iterator[str]:
+        if not notes:
+            return
+        yield f"## {TITLE}"
         yield ""
-        yield _text(criterion.message) or _text(criterion.title)
+        yield COSTS_NOTHING
         yield ""
-        details = [*_details(criterion), *_blocked(loss)]
-        yield from ([*details, ""] if details else [])
+        yield from (f"- {self._code(place(note))}: {self._text(words(note))}" for note in notes)
+        yield ""
 
+    def _table(self, criteria: tuple[CriterionResult, ...]) -> Iterator[str]:
+        yield "## All criteria"
+        yield ""
+        yield "| points | status | criterion | | measured |"
+        yield "|---:|---|---|---|---|"
+        for c in criteria:
+            cells = [
+                points_of(c),
+                c.status.value,
+                self._code(c.id, cell=True),
+                self._text(c.title, cell=True),
+                self._text(c.measured, cell=True),
+            ]
+            yield f"| {' | '.join(cells)} |"
+        yield ""
 
-def _details(criterion: CriterionResult) -> Iterator[str]:
-    rows = {"Measured": criterion.measured, "Expected": criterion.expected, "Hint": criterion.hint}
-    yield from (f"- {name}: {_text(value)}" for name, value in rows.items() if value)
-    if criterion.reproduce:
-        yield f"- See it yourself: {_code(criterion.reproduce)}"
-    if criterion.citations:
-        yield f"- Where: {', '.join(_code(place) for place in places(criterion))}"
+    def _foot(self, result: GradingResult) -> Iterator[str]:
+        used = result.environment
+        kind = "package" if result.submission.package else "recording"
+        yield (
+            f"Graded by grader {self._text(used.grader)} with ROS {self._text(used.ros or 'not used')}, "
+            f"Python {self._text(used.python)}, sandbox {self._text(used.sandbox)}, "
+            f"in {result.timing.wall_s:.1f} s. Rubric digest {self._code(result.rubric.digest[:12])}, "
+            f"{kind} digest {self._code(result.submission.digest[:12])}."
+        )
 
+    def _text(self, text: str, *, cell: bool = False) -> str:
+        return markdown(line(text, self._limit), cell=cell)
 
-def _blocked(loss: Loss) -> Iterator[str]:
-    if loss.alike:
-        yield f"- The same holds for: {', '.join(f'{_code(c.id)} ({points_of(c)})' for c in loss.alike)}"
-    if loss.blocked:
-        names = ", ".join(f"{_code(c.id)} ({points_of(c)})" for c in loss.blocked)
-        yield f"- Could not be judged because of this: {names}"
-
-
-def _advice(criteria: tuple[CriterionResult, ...]) -> Iterator[str]:
-    if not criteria:
-        return
-    yield "## Advice, costs nothing"
-    yield ""
-    for criterion in criteria:
-        hint = f" {_text(criterion.hint)}" if criterion.hint else ""
-        yield f"- {_code(criterion.id)}: {_text(criterion.message)}{hint}"
-    yield ""
-
-
-def _table(criteria: Iterable[CriterionResult]) -> Iterator[str]:
-    yield "## All criteria"
-    yield ""
-    yield "| points | status | criterion | | measured |"
-    yield "|---:|---|---|---|---|"
-    for c in criteria:
-        cells = [
-            points_of(c),
-            c.status.value,
-            _code(c.id, cell=True),
-            _text(c.title, cell=True),
-            _text(c.measured, cell=True),
-        ]
-        yield f"| {' | '.join(cells)} |"
-    yield ""
-
-
-def _foot(result: GradingResult) -> Iterator[str]:
-    environment = result.environment
-    yield (
-        f"Graded by grader {_text(environment.grader)} with ROS {_text(environment.ros or 'not used')}, "
-        f"Python {_text(environment.python)}, sandbox {_text(environment.sandbox)}, "
-        f"in {result.timing.wall_s:.1f} s. Rubric digest {_code(result.rubric.digest[:12])}, "
-        f"{'package' if result.submission.package else 'recording'} digest {_code(result.submission.digest[:12])}."
-    )
-
-
-def _text(text: str, *, cell: bool = False) -> str:
-    return markdown(clip(text, LIMIT), cell=cell)
-
-
-def _code(text: str, *, cell: bool = False) -> str:
-    return markdown_code(clip(text, LIMIT), cell=cell)
+    def _code(self, text: str, *, cell: bool = False) -> str:
+        return markdown_code(line(text, self._limit), cell=cell)

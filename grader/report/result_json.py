@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 from grader.model.result import GradingResult
+from grader.shown import clipped, json_text, text_limit
+
+LIMIT = 2000
 
 
 def result_bytes(result: GradingResult) -> bytes:
-    """The file's bytes, UTF-8. `error` is there only where there is one.
+    """The file's bytes, UTF-8 (see `result_text`)."""
+    return result_text(result).encode()
 
-    Numbers and text are written as `judge.summary.criteria_bytes` writes them.
+
+def result_text(result: GradingResult, *, ascii_only: bool = False) -> str:
+    """`notes` and `error` are there only where there are any.
+
+    Criteria are written as `judge.summary.criteria_bytes` writes them.
     """
     data: dict[str, Any] = result.model_dump(mode="json", by_alias=True)
-    if data["error"] is None:
-        del data["error"]
-    return (json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    for name in ("notes", "error"):
+        if not data[name]:
+            del data[name]
+    return json_text(clipped(data, text_limit(len(result.criteria), LIMIT)), ascii_only=ascii_only)

@@ -10,13 +10,16 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from grader.model.result import CriterionResult, GradingResult
+from grader.model.result import CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
-from grader.report.text import clip, number, visible
+from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
+from grader.report.text import line, number, uncommanded
 from grader.report.view import Loss, arrange, places, points_of
 from grader.rubric.model import Rubric
 
 LIMIT = 500
+NAME_LIMIT = 30
+MEASURED_LIMIT = 120
 STYLES = {
     Status.PASS: "green",
     Status.PARTIAL: "yellow",
@@ -52,11 +55,15 @@ def open_console(file: IO[str]) -> Console:
 
 
 def emit(console: Console, parts: Iterable[RenderableType]) -> None:
-    """Print each part on lines of its own, without the blanks that fill a column."""
+    """Print each part on lines of its own, without the blanks that fill a column.
+
+    A text that is wrapped must not become a command to a CI system where its next line begins.
+    """
     with console.capture() as capture:
         for part in parts:
             console.print(part, overflow="fold")
-    console.file.write("".join(f"{line.rstrip()}\n" for line in capture.get().splitlines()))
+    rows = capture.get().split("\n")
+    console.file.write(uncommanded("\n".join(row.rstrip() for row in rows)))
 
 
 def print_report(
@@ -82,6 +89,7 @@ class Terminal:
         else:
             parts += self._losses("Still open: no points are lost for good", view.open)
         parts += self._section("Advice, costs nothing", [self._advice(c) for c in view.advice])
+        parts += self._section(TITLE, self._noticed(result.notes))
         parts += self._section("All criteria", [self._table(result.criteria)])
         if hidden:
             words = "1 hidden criterion is" if hidden == 1 else f"{hidden} hidden criteria are"
@@ -120,6 +128,11 @@ class Terminal:
         head = self._line(criterion, criterion.message or criterion.title)
         return Group(head, Padding(self._rows([("hint", criterion.hint)]), (0, 0, 0, 4)))
 
+    def _noticed(self, notes: tuple[Note, ...]) -> list[RenderableType]:
+        if not notes:
+            return []
+        return [self._rows([(place(note), words(note)) for note in notes]), Text(COSTS_NOTHING, "dim")]
+
     def _line(self, criterion: CriterionResult, words: str, width: int = 0) -> Table:
         """`✗ chatter-rate  0/10  fail  /chatter came at 5.02 Hz, not 10 Hz`, wrapped in its column."""
         grid = Table.grid(padding=(0, 2, 0, 0))
@@ -142,7 +155,7 @@ class Terminal:
         grid.add_column(overflow="fold")
         for name, value in rows:
             if value:
-                grid.add_row(Text(name), Text(self._show(value)))
+                grid.add_row(Text(self._show(name, NAME_LIMIT)), Text(self._show(value)))
         return grid
 
     def _table(self, criteria: Iterable[CriterionResult]) -> Table:
@@ -155,15 +168,15 @@ class Terminal:
             points = Text(points_of(c))
             status = Text(f"{self._mark(c.status)} {c.status.value}", STYLES[c.status])
             measured = c.measured or (c.title if c.status is Status.PASS else c.message)
-            table.add_row(points, status, Text(self._show(c.id)), Text(self._show(clip(measured, 120))))
+            table.add_row(points, status, Text(self._show(c.id)), Text(self._show(measured, MEASURED_LIMIT)))
         return table
 
     def _mark(self, status: Status) -> str:
         return MARKS[status][1 if self.plain else 0]
 
-    def _show(self, text: str) -> str:
+    def _show(self, text: str, limit: int = LIMIT) -> str:
         """Harmless, of bounded length, and in characters that the terminal's encoding has."""
-        text = visible(clip(text, LIMIT))
+        text = line(text, limit)
         return text.encode(self.console.encoding, "backslashreplace").decode(self.console.encoding)
 
 

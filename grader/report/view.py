@@ -8,6 +8,9 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
 from grader.report.text import number
 from grader.rubric.model import Rubric
+from grader.shown import CITATIONS_MAX, clip
+
+PLACE_CHARS = 300
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,8 +100,8 @@ def points_of(criterion: CriterionResult) -> str:
 
 
 def places(criterion: CriterionResult) -> list[str]:
-    """Where it was seen: `src/talker.py:17`, `real.mcap /chatter, 6.0 s`."""
-    return [_place(citation) for citation in criterion.citations]
+    """Where it was seen: `src/talker.py:17`, `real.mcap /chatter, 6.0 s`; the first twenty."""
+    return [clip(_place(citation), PLACE_CHARS) for citation in criterion.citations[:CITATIONS_MAX]]
 
 
 def _place(citation: Citation) -> str:

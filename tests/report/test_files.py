@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.errors import OutputError
+from grader.errors import HostError, OutputError
 from grader.files import atomic_write, check_writable
 from grader.model.result import ErrorInfo
 from grader.model.verdict import Status
@@ -120,9 +120,9 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path, monkeypat
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OutputError) as caught:
+    with pytest.raises(HostError) as caught:
         atomic_write(target, b"new")
-    assert caught.value.message == f"cannot write {target}: No space left on device"
+    assert caught.value.message == f"cannot write {target}: the disk is full"
     assert target.read_text() == "old"
     assert list(tmp_path.iterdir()) == [target]
 

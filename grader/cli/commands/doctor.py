@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import sys
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from grader.cli.diagnosis import Row, diagnose
+from grader.cli.diagnosis import diagnose
+from grader.cli.row import Row
+from grader.cli.say import say_json
 from grader.errors import ExitCode
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible
@@ -21,7 +22,7 @@ def run(*, as_json: bool = False) -> ExitCode:
     """Print a row for each thing that grading needs. NOT_GRADED where one is missing."""
     rows = diagnose()
     if as_json:
-        print(json.dumps([row.model_dump() for row in rows], indent=2, ensure_ascii=False))
+        say_json([row.model_dump() for row in rows])
     else:
         _print(rows, open_console(sys.stdout))
     return ExitCode.NOT_GRADED if any(row.state == "missing" for row in rows) else ExitCode.PASSED

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from grader.cli.say import say
 from grader.errors import EvidenceError, ExitCode, UsageError
 from grader.evidence.export import export_bag
 from grader.evidence.reader import load_evidence
@@ -49,4 +50,4 @@ def _name(run: Run) -> str:
 
 def _export(run: Run, path: Path, *, everything: bool) -> None:
     count = export_bag(run, path, everything=everything)
-    print(f"{path}: {count} messages")
+    say(f"{path}: {count} messages")

@@ -10,21 +10,26 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from grader.cli.say import say_json
 from grader.errors import ExitCode
 from grader.evidence.inspect import ChannelSummary, Inspection, ProcessSummary, inspect_file
 from grader.report.terminal import emit, open_console
-from grader.report.text import clip, number, visible
+from grader.report.text import line, number
+
+CHANNELS_MAX = 500
 
 
 def run(*, file: Path, as_json: bool = False) -> ExitCode:
     """Print rates, gaps, nodes and how the run went. Raises EvidenceError."""
     inspection = inspect_file(file)
     if as_json:
-        print(inspection.model_dump_json(indent=2))
+        say_json(inspection.model_dump(mode="json"))
     else:
-        lines = [Text(visible(clip(line, 500))) for line in _head(inspection)]
+        lines = [Text(line(text, 500)) for text in _head(inspection)]
         table: list[RenderableType] = [Text(), _channels(inspection)] if inspection.channels else []
-        emit(open_console(sys.stdout), [*lines, *table])
+        left = len(inspection.channels) - CHANNELS_MAX
+        more = [Text(f"and {left} more channels (--json has them all)")] if left > 0 else []
+        emit(open_console(sys.stdout), [*lines, *table, *more])
     return ExitCode.PASSED
 
 
@@ -56,9 +61,8 @@ def _channels(inspection: Inspection) -> Table:
     for heading in ("count", "Hz", "gaps in ms"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("topic, type, publisher", overflow="fold", ratio=1)
-    for channel in inspection.channels:
-        names = f"{visible(clip(channel.topic, 200))}\n{visible(clip(channel.type, 200))} by "
-        names += visible(clip(channel.publisher, 200))
+    for channel in inspection.channels[:CHANNELS_MAX]:
+        names = f"{line(channel.topic, 200)}\n{line(channel.type, 200)} by {line(channel.publisher, 200)}"
         table.add_row(*map(Text, (str(channel.rate.count), *_rate(channel), names)))
     return table
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from grader.cli.outcome import exit_code
+from grader.cli.say import say_document
 from grader.errors import ExitCode
 from grader.evidence.reader import load_evidence
 from grader.files import atomic_write
 from grader.judge import judge
-from grader.judge.summary import criteria_bytes
+from grader.judge.summary import criteria_bytes, criteria_text
 from grader.rubric.load import load_rubric
 
 
@@ -18,9 +18,8 @@ def run(*, evidence: list[Path], rubric: str, out: str = "-") -> ExitCode:
     """Judge and write the criteria as JSON to the file `out`, or to stdout."""
     loaded = load_rubric(rubric)
     criteria = judge(loaded.rubric, load_evidence(evidence), loaded.checks)
-    data = criteria_bytes(criteria)
     if out == "-":
-        sys.stdout.write(data.decode())
+        say_document(lambda ascii_only: criteria_text(criteria, ascii_only=ascii_only))
     else:
-        atomic_write(Path(out), data)
+        atomic_write(Path(out), criteria_bytes(criteria))
     return exit_code(criteria, loaded.rubric)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import sys
 
 from rich.table import Table
 from rich.text import Text
 
+from grader.cli.say import say_json
 from grader.errors import ExitCode
 from grader.report.terminal import emit, open_console
-from grader.report.text import number
+from grader.report.text import number, visible
 from grader.rubric.load import all_rubrics
 from grader.rubric.model import Rubric
 
@@ -19,14 +19,14 @@ def run(*, as_json: bool = False) -> ExitCode:
     """List them, with the package that each is for."""
     rubrics = [loaded.rubric for loaded in all_rubrics()]
     if as_json:
-        print(json.dumps([_row(r) for r in rubrics], indent=2, ensure_ascii=False))
+        say_json([_row(r) for r in rubrics])
         return ExitCode.PASSED
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="dim")
     for heading in ("lab", "package", "criteria", "points", "title"):
         table.add_column(heading, no_wrap=heading != "title")
     for r in rubrics:
         cells = (r.id, r.package, str(len(r.criteria)), number(r.max_points), r.title)
-        table.add_row(*map(Text, cells))
+        table.add_row(*(Text(visible(cell)) for cell in cells))
     emit(open_console(sys.stdout), [table])
     return ExitCode.PASSED
 

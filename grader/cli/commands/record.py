@@ -9,6 +9,7 @@ from grader import pipeline
 from grader.arena.sandbox import Mode
 from grader.cli.choice import only_package
 from grader.cli.display import open_progress
+from grader.cli.say import say
 from grader.errors import ExitCode, UsageError
 from grader.files import check_writable
 from grader.rubric.load import LoadedRubric, load_rubric
@@ -41,7 +42,7 @@ def run(
     with open_progress() as progress:
         files = pipeline.record(source, loaded, out, options, progress)
     for file in files:
-        print(file)
+        say(str(file))
     return ExitCode.PASSED
 
 

@@ -11,6 +11,7 @@ from grader.arena.sandbox import Mode
 from grader.authoring.new import propose_rubric
 from grader.cli.choice import only_package
 from grader.cli.display import open_progress
+from grader.cli.say import say
 from grader.errors import ExitCode, UsageError
 from grader.files import atomic_write
 from grader.rubric.model import NAME_PATTERN
@@ -37,8 +38,8 @@ def run(
         sys.stdout.write(text)
         return ExitCode.PASSED
     atomic_write(Path(out), text.encode())
-    print(f"{out}: look through it, then `grader rubric validate {out}`")
-    print(f"and `grader rubric test {out} --solution {solution}`")
+    say(f"{out}: look through it, then `grader rubric validate {out}`")
+    say(f"and `grader rubric test {out} --solution {solution}`")
     return ExitCode.PASSED
 
 

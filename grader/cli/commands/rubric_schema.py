@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-
+from grader.cli.say import say_json
 from grader.errors import ExitCode
 from grader.rubric.load import load_rubric
 from grader.rubric.schema import rubric_schema
@@ -12,5 +11,5 @@ from grader.rubric.schema import rubric_schema
 def run(*, rubric: str | None = None) -> ExitCode:
     """Print the schema; with `rubric`, that rubric's own checks are part of it."""
     checks = load_rubric(rubric).checks if rubric is not None else None
-    print(json.dumps(rubric_schema(checks), indent=2, ensure_ascii=False))
+    say_json(rubric_schema(checks))
     return ExitCode.PASSED

@@ -11,6 +11,7 @@ from pathlib import Path
 from grader.arena.sandbox import Mode
 from grader.cli.display import open_progress
 from grader.cli.mutants import print_test
+from grader.cli.say import say_json
 from grader.errors import ExitCode
 from grader.files import atomic_write, check_writable
 from grader.mutation.find import find_reference, given_reference, load_solution, mutants_file
@@ -61,7 +62,7 @@ def run(
     if write is not None and not test.reference.lost:
         atomic_write(write, mutants_text(loaded.rubric.id, plan.mutants, test.mutants).encode())
     if as_json:
-        print(test.model_dump_json(by_alias=True, indent=2))
+        say_json(test.model_dump(mode="json", by_alias=True))
     else:
         print_test(test, sys.stdout)
     return ExitCode.PASSED if test.passed else ExitCode.BELOW_PASS_MARK

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from grader.cli.say import say
 from grader.errors import ExitCode, RubricError
 from grader.report.text import number
 from grader.rubric.load import load_rubric
@@ -22,5 +23,5 @@ def _validate(file: str) -> RubricError | None:
     except RubricError as error:
         return error
     points = number(rubric.max_points)
-    print(f"{file}: ok, {rubric.id}, {len(rubric.criteria)} criteria, {points} points")
+    say(f"{file}: ok, {rubric.id}, {len(rubric.criteria)} criteria, {points} points")
     return None

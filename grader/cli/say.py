@@ -1,0 +1,26 @@
+"""How commands print: whatever a student wrote is shown on a line of its own, and never obeyed."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+from grader.shown import json_text, line
+
+LINE_CHARS = 4000
+
+
+def say(text: str) -> None:
+    """Print one line to stdout."""
+    print(line(text, LINE_CHARS))
+
+
+def say_json(data: object) -> None:
+    """Print JSON to stdout."""
+    say_document(lambda ascii_only: json_text(data, ascii_only=ascii_only))
+
+
+def say_document(made: Callable[[bool], str]) -> None:
+    """Print JSON that is made for an encoding: in one that lacks a letter, only an escape can stand for it."""
+    encoding = (sys.stdout.encoding or "ascii").lower().replace("-", "")
+    sys.stdout.write(made(encoding != "utf8"))

@@ -1,0 +1,82 @@
+"""Markdown as GitHub, GitLab and others render it, and what they do to the text afterwards.
+
+A backslash keeps markup from being read. It does not keep a forge from finding names, numbers of issues, addresses or
+emoji in the rendered text; in code they do not look, so a word with any of these becomes code.
+"""
+
+from __future__ import annotations
+
+import re
+
+from grader.shown import visible
+
+_LINKED = re.compile(
+    r"""
+      @[\w-]                                # a mention, an e-mail address
+    | ://                                   # an address
+    | ^\W*/\w|^\W*~/                        # a topic, a path; a command to GitLab or to a robot that reads comments
+    | (?:^|\W)(?:www\.|mailto:|xmpp:)
+    | [\w-]\.[^\W\d_]{2}                    # `package.xml`, which some take for a host in Paraguay
+    | [\#!%&~^]["\w{]                       # an issue, merge request, milestone, epic, label, alert
+    | (?:^|\W)GH-\d
+    | (?<!\w)(?=\d*[a-f])[0-9a-f]{7,40}(?!\w)  # a commit
+    | \$                                    # a formula, a snippet
+    | :(?!\d+:)[+-]?\w[\w+-]*:|:100:|:1234: # an emoji
+    | [\[{][+-]|[+-][\]}]                   # GitLab: text that was added or removed
+    | \[\[|\[_*TOC|\[\w+:                   # GitLab: a page, a table of contents, other references
+    """,
+    re.VERBOSE | re.IGNORECASE,
+)
+_BEFORE, _AFTER = "(\"'", ".,;)\"'"
+_MARKUP = re.compile(r"[\\`*\[\]|~$]|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])")
+_FIRST = re.compile(r"[#=:{]|[-+](?![^\s+-])")
+_NUMBERED = re.compile(r"(\d{1,9})([.)])(?!\S)")
+_ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
+
+
+def markdown(text: str, *, cell: bool = False) -> str:
+    """One line of Markdown that reads as `text`, wherever it stands: at a line's start, in a list, in a table's `cell`.
+
+    No markup, link, mention, emoji, formula or HTML of it takes effect.
+    """
+    words = visible(text).split()
+    shown = " ".join(_word(word, cell=cell) for word in words)
+    return shown if cell else _begun(shown)
+
+
+def markdown_code(text: str, *, cell: bool = False) -> str:
+    """A code span that shows `text` as it is. A bar is escaped in a table's `cell`, and only there."""
+    text = visible(text)
+    if not text.strip():
+        return ""
+    fence = "`" * (1 + max((len(run) for run in re.findall("`+", text)), default=0))
+    pad = " " if text[0] in "` " or text[-1] in "` " else ""
+    return f"{fence}{pad}{text.replace('|', chr(92) + '|') if cell else text}{pad}{fence}"
+
+
+def _word(word: str, *, cell: bool) -> str:
+    if _LINKED.search(word) is None:
+        return _escaped(word)
+    rest = word.lstrip(_BEFORE)
+    middle = _closed(rest, rest.rstrip(_AFTER))
+    before, after = word[: len(word) - len(rest)], rest[len(middle) :]
+    return _escaped(before) + markdown_code(middle, cell=cell) + _escaped(after)
+
+
+def _closed(rest: str, middle: str) -> str:
+    """With the brackets that close what was opened in it: `rate.sleep()`."""
+    closing = re.match(r"\)*", rest[len(middle) :])
+    missing = middle.count("(") - middle.count(")")
+    return middle + ")" * min(max(missing, 0), len(closing.group()) if closing else 0)
+
+
+def _escaped(text: str) -> str:
+    text = "".join(_ENTITIES.get(character, character) for character in text)
+    return _MARKUP.sub(lambda match: "\\" + match.group(), text)
+
+
+def _begun(shown: str) -> str:
+    """What would make a heading, a list or a quotation of the line is no more than a sign."""
+    if _FIRST.match(shown):
+        return f"\\{shown}"
+    return _NUMBERED.sub(r"\1\\\2", shown, count=1) if _NUMBERED.match(shown) else shown

@@ -1,0 +1,198 @@
+"""Any text in every field of a result: every report parses back, and none of it is obeyed."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+from collections.abc import Iterator
+from xml.parsers import expat
+
+import pytest
+from cmarkgfm import github_flavored_markdown_to_html
+from cmarkgfm.cmark import Options
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from lxml import etree
+from lxml import html as parser
+from rich.console import Console
+
+from grader.judge import criteria_bytes
+from grader.model.result import CriterionResult, ErrorInfo, GradingResult, Note, SubmissionInfo
+from grader.model.verdict import EvidenceCitation, FileCitation, Status
+from grader.report.files import write_reports
+from grader.report.junit import junit
+from grader.report.markdown import markdown_report
+from grader.report.result_json import result_bytes, result_text
+from grader.report.terminal import open_console, print_report
+from grader.report.text import line
+from tests.report.hostile import criterion, result, rubric
+from tests.report.nasty import STEERING, TEXTS
+from tests.report.test_shown import TO_A_CI
+from tests.report.test_text import FOUND_BY_FORGES, HARMLESS, MARKDOWN, QUICK_ACTION, prose
+
+FIELDS = ("id", "title", "check", "scenario", "message", "expected", "measured", "hint", "reproduce")
+SOME = settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow])
+
+
+def spoiled(texts: Iterator[str], status: str = "fail") -> GradingResult:
+    """A result with the next of these texts in each field that holds one."""
+    citations = (
+        FileCitation(file=next(texts), line=3),
+        EvidenceCitation(evidence=next(texts), topic=next(texts), from_ns=0, to_ns=10**9),
+    )
+    fields = {name: next(texts) for name in FIELDS}
+    one = CriterionResult(**fields, status=Status(status), points=0, max_points=5, citations=citations)
+    return result(
+        submission=SubmissionInfo(
+            id=next(texts), source=next(texts), commit=next(texts), digest=next(texts), package=next(texts)
+        ),
+        criteria=(one, criterion("other", Status.BLOCKED, 0, 5, message=next(texts))),
+        notes=(Note(scenario=next(texts), actor=next(texts), kind="refused", text=next(texts)),),
+        error=ErrorInfo(kind=next(texts), message=next(texts), hint=next(texts)),
+        status="error",
+    )
+
+
+def of(text: str) -> Iterator[str]:
+    while True:
+        yield text
+
+
+@st.composite
+def results(draw) -> GradingResult:
+    """Each field has its own text; the sign at the end keeps a field from being left out for having none."""
+    texts = draw(st.lists(TEXTS, min_size=4, max_size=12))
+    some = (text + "a" for _ in range(100) for text in texts)
+    return spoiled(some, draw(st.sampled_from([s.value for s in Status])))
+
+
+def terminal(shown: GradingResult, **how) -> str:
+    out = io.StringIO()
+    console = (
+        Console(file=out, width=80, markup=False, emoji=False, highlight=False, **how)
+        if how
+        else open_console(out)
+    )
+    print_report(shown, rubric(), console)
+    return out.getvalue()
+
+
+def blocks(source: str) -> list[str]:
+    return [token.type for token in MARKDOWN.parse(source)]
+
+
+@SOME
+@given(results())
+def test_markdown_holds_nothing_but_the_template(shown):
+    source = markdown_report(shown, rubric())
+    plain = spoiled(of("word"), shown.criteria[0].status.value)
+    assert blocks(source) == blocks(markdown_report(plain, rubric()))
+    inlines = [token.children for token in MARKDOWN.parse(source) if token.type == "inline"]
+    assert {token.type for children in inlines for token in children} <= HARMLESS
+    assert [found for children in inlines if (found := FOUND_BY_FORGES.search(prose(children)))] == []
+    assert QUICK_ACTION.search(source) is None
+    assert STEERING.search(source) is None
+    assert TO_A_CI.search(source) is None
+
+
+def elements(source: str) -> list[str]:
+    """The elements that GitHub's own renderer makes of it, code spans left out."""
+    page = parser.document_fromstring(github_flavored_markdown_to_html(source, Options.CMARK_OPT_FOOTNOTES))
+    return [element.tag for element in page.iter() if element.tag != "code"]
+
+
+@SOME
+@given(results())
+def test_githubs_renderer_makes_nothing_else_of_it(shown):
+    source = markdown_report(shown, rubric())
+    plain = spoiled(of("word"), shown.criteria[0].status.value)
+    assert elements(source) == elements(markdown_report(plain, rubric()))
+
+
+@SOME
+@given(results())
+def test_junit_parses_and_gives_the_visible_text_back(shown):
+    data = junit(shown)
+    expat.ParserCreate().Parse(data, True)
+    suite = etree.fromstring(data)[0]
+    tags = {element.tag for element in suite.iter()}
+    own = {"testsuite", "properties", "property", "testcase", "failure", "error", "skipped", "system-out"}
+    assert tags <= own
+    case, hostile = suite.find("testcase"), shown.criteria[0]
+    assert case.get("name") == line(hostile.id, 2000)
+    assert case.get("file") == line(hostile.citations[0].file, 2000)
+    assert case.find("properties/property[@name='title']").get("value") == line(hostile.title, 2000)
+    outcome = [child for child in case if child.tag != "properties"]
+    assert [child.get("message") for child in outcome] in ([], [line(hostile.message, 2000)])
+    assert line(shown.notes[0].text, 2000) in suite.findtext("system-out")
+    assert STEERING.search(data.decode()) is None
+    assert TO_A_CI.search(data.decode()) is None
+
+
+@SOME
+@given(results())
+def test_json_is_the_result_itself(shown):
+    def encodable(text: str) -> str:
+        return text.encode("utf-8", "backslashreplace").decode()
+
+    data = json.loads(result_bytes(shown))
+    assert list(data)[-2:] == ["notes", "error"]
+    for name in FIELDS:
+        assert data["criteria"][0][name] == encodable(getattr(shown.criteria[0], name))
+    assert data["notes"][0]["text"] == encodable(shown.notes[0].text)
+    assert data["error"]["hint"] == encodable(shown.error.hint)
+    assert json.loads(criteria_bytes(shown.criteria)) == data["criteria"]
+    assert json.loads(result_text(shown, ascii_only=True).encode("ascii")) == data
+    assert STEERING.search(result_bytes(shown).decode()) is None
+    assert TO_A_CI.search(result_bytes(shown).decode()) is None
+
+
+@SOME
+@given(results())
+def test_a_terminal_gets_no_escape_and_a_log_no_command(shown):
+    plain, coloured = terminal(shown), terminal(shown, force_terminal=True, color_system="standard")
+    assert STEERING.search(plain) is None
+    assert STEERING.search(re.sub(r"\x1b\[[0-9;]*m", "", coloured)) is None
+    assert TO_A_CI.search(plain) is None
+    assert TO_A_CI.search(re.sub(r"\x1b\[[0-9;]*m", "", coloured)) is None
+
+
+@pytest.mark.parametrize("before", range(60, 84))
+def test_a_command_that_wraps_to_a_lines_start_is_none(before):
+    text = "x" * (before - 30) + " ::error file=a::owned ::stop-commands::t"
+    shown = terminal(result(criteria=(criterion("c", Status.FAIL, 0, 5, message=text, hint=text),)))
+    assert "owned" in shown
+    assert TO_A_CI.search(shown) is None
+
+
+HUGE = ("x" * 10**6, "\U000e0001" * 10**6, "&" * 10**6, "*" * 10**6, "/a.b " * 200_000)
+
+
+@pytest.mark.parametrize("text", HUGE, ids=["letters", "hidden", "entities", "stars", "names"])
+def test_a_message_of_a_megabyte_is_clipped_everywhere(text, tmp_path):
+    write_reports(spoiled(of(text)), tmp_path, console="", rubric=rubric())
+    sizes = {path.name: path.stat().st_size for path in tmp_path.iterdir()}
+    assert max(sizes.values()) < 800_000, sizes
+    assert "more characters)" in (tmp_path / "result.json").read_text()
+    assert len(terminal(spoiled(of(text)))) < 60_000
+
+
+@pytest.mark.parametrize("text", HUGE[1:3], ids=["hidden", "entities"])
+def test_two_hundred_criteria_of_the_longest_texts_make_a_few_megabytes(text, tmp_path):
+    citations = (FileCitation(file=text),) * 100
+    fields = dict.fromkeys(("title", "message", "expected", "measured", "hint", "reproduce"), text)
+    criteria = tuple(
+        criterion(f"c{i}", Status.FAIL, 0, 0.5, citations=citations, **fields) for i in range(200)
+    )
+    console = f"{text[:1000]}\n" * 3000
+    write_reports(result(criteria=criteria), tmp_path, console=console, rubric=rubric())
+    sizes = {path.name: path.stat().st_size for path in tmp_path.iterdir()}
+    assert max(sizes.values()) < 4_200_000, sizes
+
+
+def test_a_longer_console_says_that_it_goes_on(tmp_path):
+    write_reports(result(), tmp_path, console="line\n" * 2_000_000, rubric=rubric())
+    text = (tmp_path / "console.log").read_text()
+    assert 3_900_000 < len(text) < 4_100_000
+    assert text.endswith("\nline\n… the rest is in the evidence\n")

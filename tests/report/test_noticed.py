@@ -1,0 +1,59 @@
+"""Where notes are shown: every report says what was noticed, and that it costs nothing."""
+
+from __future__ import annotations
+
+import io
+import json
+
+from lxml import etree
+
+from grader.model.result import Note
+from grader.report.junit import junit
+from grader.report.markdown import markdown_report
+from grader.report.result_json import result_bytes
+from grader.report.terminal import open_console, print_report
+from tests.report.hostile import result, rubric
+
+NOTES = (
+    Note(scenario="real", actor="talker.py", kind="refused", text="asked the master to shut down"),
+    Note(scenario="package", actor="", kind="limit", text="had more than 400 processes"),
+)
+COSTS_NOTHING = "No points were taken for any of this."
+
+
+def test_result_json_names_them_last_and_only_where_there_are_any():
+    data = json.loads(result_bytes(result(notes=NOTES)))
+    assert list(data)[-2:] == ["timing", "notes"]
+    assert data["notes"][0] == {
+        "scenario": "real",
+        "actor": "talker.py",
+        "kind": "refused",
+        "text": "asked the master to shut down",
+    }
+    assert "notes" not in json.loads(result_bytes(result()))
+
+
+def test_markdown_has_a_section():
+    text = markdown_report(result(notes=NOTES), rubric())
+    assert f"## Noticed while it ran\n\n{COSTS_NOTHING}\n\n- `real, talker.py`: asked the master" in text
+    assert "- `build`: had more than 400 processes (limited)" in text
+    assert "Noticed" not in markdown_report(result(), rubric())
+
+
+def test_the_terminal_has_a_section():
+    out = io.StringIO()
+    print_report(result(notes=NOTES), rubric(), open_console(out))
+    assert "\nNoticed while it ran\n" in out.getvalue()
+    assert "real, talker.py  asked the master to shut down (refused)\n" in out.getvalue()
+    assert COSTS_NOTHING in out.getvalue()
+
+
+def test_junit_has_it_as_output_of_the_suite():
+    suite = etree.fromstring(junit(result(notes=NOTES)))[0]
+    assert suite[-1].tag == "system-out"
+    assert suite[-1].text.splitlines() == [
+        f"Noticed while it ran. {COSTS_NOTHING}",
+        "real, talker.py: asked the master to shut down (refused)",
+        "build: had more than 400 processes (limited)",
+    ]
+    assert etree.fromstring(junit(result())).find("testsuite/system-out") is None

@@ -1,0 +1,140 @@
+"""What every other output stands on: text made visible, JSON that may be printed, bounded lengths."""
+
+from __future__ import annotations
+
+import json
+import re
+import unicodedata
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from grader.shown import HIDDEN_CATEGORIES, clip, clipped, json_text, line, text_limit, uncommanded, visible
+from tests.report.nasty import ANY_TEXT, STEERING, TEXTS
+
+TO_A_CI = re.compile(r"^\s*::|##[A-Za-z]*\[", re.MULTILINE)
+
+
+@given(ANY_TEXT)
+def test_nothing_that_steers_a_terminal_gets_through(text):
+    assert not [c for c in visible(text) if unicodedata.category(c) in HIDDEN_CATEGORIES]
+    assert not [c for c in visible(text, lines=True) if unicodedata.category(c) in HIDDEN_CATEGORIES - {"Cc"}]
+    assert set(visible(text, lines=True)) & {chr(i) for i in (*range(32), *range(127, 160))} <= {"\n", "\t"}
+
+
+@given(TEXTS)
+def test_what_is_visible_stays_as_it_is_and_encodes(text):
+    for lines in (False, True):
+        once = visible(text, lines=lines)
+        assert visible(once, lines=lines) == once
+        assert once.encode().decode() == once
+        assert STEERING.search(once) is None
+        assert TO_A_CI.search(once) is None
+
+
+@given(
+    st.text(
+        st.characters(categories=["L", "N", "P", "S"], exclude_characters="#:\u115f\u1160\u2800\u3164\uffa0")
+    )
+)
+def test_printed_characters_are_not_touched(text):
+    assert visible(text) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("\x1b[31m", "\\x1b[31m"),
+        ("a\nb\r\t", "a\\nb\\r\\t"),
+        ("\u202e", "\\u202e"),
+        ("\x9b", "\\x9b"),
+        ("\U000e0001", "\\U000e0001"),
+        ("\ud800", "\\ud800"),
+        ("\ufffe", "\\ufffe"),
+        ("\u3164\u2800\U000e0100", "\\u3164\\u2800\\U000e0100"),
+        ("Grüße, 10 Hz ± 5 % ✓", "Grüße, 10 Hz ± 5 % ✓"),
+        ("a\u0300\u0301", "a\u0300\u0301"),
+        ("a" + "\u0300" * 6, "a" + "\u0300" * 4 + "\\u0300\\u0300"),
+        ("std::vector and ## [x]", "std::vector and ## [x]"),
+        ("::error file=a::b", "\\x3a:error file=a::b"),
+        ("\u3000 ::set-output::", "\u3000 \\x3a:set-output::"),
+        ("x ##[error]", "x \\x23#[error]"),
+        ("###vso[task.complete]", "#\\x23#vso[task.complete]"),
+        ("##teamcity[x]", "\\x23#teamcity[x]"),
+    ],
+)
+def test_written_out(text, shown):
+    assert visible(text) == shown
+
+
+def test_every_line_of_many_is_no_command():
+    assert visible("a\n ::error::b\n\t::x", lines=True) == "a\n \\x3a:error::b\n\t\\x3a:x"
+    assert uncommanded("\x1b[31m::error::x") == "\x1b[31m\\x3a:error::x"
+
+
+def test_clip_says_how_much_is_gone():
+    assert clip("abc", 3) == "abc"
+    assert clip("abcdef", 3) == "abc… (3 more characters)"
+
+
+@given(TEXTS, st.integers(1, 60))
+def test_a_line_keeps_to_its_length_and_counts_what_it_leaves_out(text, limit):
+    shown = line(text, limit)
+    if len(visible(text)) <= limit:
+        assert shown == visible(text)
+    else:
+        head, left = re.fullmatch(r"(.*)… \((\d+) more characters\)", shown, re.DOTALL).groups()
+        assert len(head) <= limit
+        assert head == visible(text[: len(text) - int(left)])
+
+
+def test_a_line_of_what_must_be_written_out_is_no_longer_than_another():
+    assert len(line("\U000e0001" * 10**6, 500)) < 540
+
+
+def test_many_criteria_share_the_room():
+    assert text_limit(0, 2000) == text_limit(30, 2000) == 2000
+    assert text_limit(200, 2000) * 200 * 8 <= 600_000
+    assert text_limit(10**6, 2000) == 200
+
+
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | TEXTS,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXTS, inner, max_size=3),
+    max_leaves=6,
+)
+
+
+def _encodable(data):
+    """What a file of JSON can hold: lone surrogates as the text of their escapes."""
+    if isinstance(data, str):
+        return data.encode("utf-8", "backslashreplace").decode()
+    if isinstance(data, dict):
+        return {_encodable(key): _encodable(item) for key, item in data.items()}
+    return [_encodable(item) for item in data] if isinstance(data, list) else data
+
+
+@given(JSON, st.booleans())
+def test_json_reads_back_and_may_be_printed(data, ascii_only):
+    text = json_text(data, ascii_only=ascii_only)
+    assert json.loads(text.encode()) == _encodable(data)
+    assert text.isascii() or not ascii_only
+    assert STEERING.search(text) is None
+    assert TO_A_CI.search(text) is None
+
+
+def test_json_keeps_letters_and_has_no_number_that_json_lacks():
+    assert json_text(["größer\x9b\u2028\U000e0001", float("nan"), float("-inf")]).split() == [
+        "[",
+        '"größer\\u009b\\u2028\\udb40\\udc01",',
+        "null,",
+        "null",
+        "]",
+    ]
+
+
+def test_of_citations_only_the_first_are_kept():
+    data = clipped({"citations": [{"file": "x" * 999}] * 50, "other": ["y" * 9] * 50}, 4)
+    assert data["citations"] == [{"file": "x" * 120 + "… (879 more characters)"}] * 20
+    assert data["other"] == ["yyyy… (5 more characters)"] * 50
