@@ -25,7 +25,7 @@ class Frame(NamedTuple):
 
 
 class FrameReader:
-    """Bytes in, whole frames out."""
+    """Bytes in, whole frames out. Raises ArenaError for what is none."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
@@ -46,7 +46,18 @@ class FrameReader:
 
 
 def _frame(kind: str, time_ns: int, payload: bytes) -> Frame:
-    if kind == "M":
-        (channel,) = CHANNEL_ID.unpack_from(payload)
-        return Frame(kind, time_ns, channel, payload[CHANNEL_ID.size :], {})
-    return Frame(kind, time_ns, 0, b"", json.loads(payload))
+    try:
+        if kind == "M":
+            (channel,) = CHANNEL_ID.unpack_from(payload)
+            return Frame(kind, time_ns, channel, payload[CHANNEL_ID.size :], {})
+        return Frame(kind, time_ns, 0, b"", _fields(payload))
+    except (struct.error, ValueError, TypeError, RecursionError) as error:
+        raise ArenaError("the arena sent bytes that are no frame") from error
+
+
+def _fields(payload: bytes) -> dict[str, Any]:
+    """Halves of surrogate pairs, which no record can hold, become question marks."""
+    fields = json.loads(payload)
+    if b"\\ud" in payload or b"\xed" in payload:
+        fields = json.loads(json.dumps(fields, ensure_ascii=False).encode(errors="replace"))
+    return dict(fields)

@@ -3,24 +3,36 @@
 from __future__ import annotations
 
 import bz2
+import os
 import struct
-from collections import defaultdict
+from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
+from typing import Literal
 
 import lz4.frame  # type: ignore[import-untyped] # it has no stubs
 from rosbags.interfaces import Connection, ConnectionExtRosbag1
 from rosbags.rosbag1 import Reader, ReaderError
+from rosbags.rosbag1.reader import ChunkInfo, Header, RecordType, read_bytes, read_uint32
 
 from grader.errors import EvidenceError
 from grader.evidence.channels import merged
 from grader.evidence.container import MAX_CHUNK_BYTES, MAX_UNPACKED_BYTES
+from grader.evidence.room import NoRoom, Room
 from grader.evidence.run import Channel, Message, Run
 
 MAGIC = b"#ROSBAG V"
 BZ2 = b"BZh"
 LZ4 = b"\x04\x22\x4d\x18"
-MAX_MESSAGES = 2_000_000
 MAX_CONNECTIONS = 4_096
+MAX_CHUNKS = 100_000
+MAX_RECORDS = 4_000_000
+MAX_HEADER_BYTES = 1 << 20
+MAX_LINE_BYTES = 64
+READ_TIMES = 4
+"""No sound bag's bytes are read as often as this."""
+LESS = "record the lab's topics only: `rosbag record /topic …`, or cut it with `rosbag filter`"
+_LENGTH = struct.Struct("<I")
 _DAMAGE = (
     AssertionError,
     EOFError,
@@ -39,15 +51,18 @@ class BagLimitError(ValueError):
     """The bag breaks a limit."""
 
 
-def load_bag(path: Path) -> Run:
+def load_bag(path: Path, room: Room | None = None) -> Run:
     """A bag as a real-time run named after the file; it says nothing of processes. Raises EvidenceError."""
+    room = room or Room()
     try:
-        with Reader(path) as reader:
-            channels = _channels(reader)
+        with _Reader(path) as reader:
+            channels = _channels(reader, room)
     except ReaderError as error:
         raise _refusal(path, str(error)) from error
     except BagLimitError as error:
         raise EvidenceError(f"{path}: {error}") from error
+    except NoRoom as error:
+        raise EvidenceError(f"{path}: {error}", hint=LESS) from error
     except (*_DAMAGE, struct.error, OSError) as error:
         raise EvidenceError(f"{path}: damaged", hint=_AGAIN) from error
     times = [t for channel in channels for t in channel.times_ns]
@@ -78,25 +93,133 @@ def _refusal(path: Path, reason: str) -> EvidenceError:
     return EvidenceError(f"{path}: damaged or cut short", hint=_REINDEX)
 
 
-def _channels(reader: Reader) -> tuple[Channel, ...]:
-    if len(reader.connections) > MAX_CONNECTIONS:
-        raise BagLimitError(f"more than {MAX_CONNECTIONS} connections")
-    if reader.message_count > MAX_MESSAGES:
-        raise BagLimitError(f"more than {MAX_MESSAGES} messages")
-    unpacker = _Unpacker()
-    for place, chunk in reader.chunks.items():
-        reader.chunks[place] = chunk._replace(decompressor=unpacker)
-    messages: dict[int, list[Message]] = defaultdict(list)
-    for count, (connection, time_ns, data) in enumerate(reader.messages()):
-        if count >= MAX_MESSAGES:
-            raise BagLimitError(f"more than {MAX_MESSAGES} messages")
-        messages[connection.id].append(Message(time_ns, count, bytes(data)))
-    found = (_channel(connection, messages[connection.id]) for connection in reader.connections)
+class _Reader(Reader):
+    """rosbags' reader of the index, within limits: a few bytes of it can ask for any amount of work.
+
+    Where messages lie it need not know: chunks are read from front to back, each once.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.file = _File(path)
+        super().__init__(self.file)  # type: ignore[arg-type] # as far as it needs a path
+        self._seen: set[int] = set()
+        self._count = 0
+
+    def read_connection(self) -> Connection:
+        connection = super().read_connection()
+        if connection.id in self._seen:
+            raise ReaderError("a connection is listed twice")
+        self._seen.add(connection.id)
+        if len(self._seen) > MAX_CONNECTIONS:
+            raise BagLimitError(f"more than {MAX_CONNECTIONS} connections")
+        return connection
+
+    def read_chunk_info(self) -> ChunkInfo:
+        self._count += 1
+        if self._count > MAX_CHUNKS:
+            raise BagLimitError(f"more than {MAX_CHUNKS} chunks")
+        assert self.bio is not None  # noqa: S101 - it is open
+        place = self.bio.tell()
+        if Header.read(self.bio, RecordType.CHUNK_INFO).get_uint32("count") > MAX_CONNECTIONS:
+            raise BagLimitError(f"more than {MAX_CONNECTIONS} connections")
+        self.bio.seek(place)
+        return super().read_chunk_info()
+
+    def read_index_data(self, pos: int, indexes: dict[int, list[object]]) -> None:  # type: ignore[override]
+        """Passed over."""
+
+    def read_chunks(self) -> Iterator[bytes]:
+        """The chunks' bytes, unpacked, in the order in which they lie in the file."""
+        unpacker = _Unpacker()
+        for _, chunk in sorted(self.chunks.items()):
+            yield unpacker(self.file.chunk(chunk.datapos, chunk.datasize))
+
+
+class _File:
+    """A file that gives no more at once than a header may be, and no more in all than a sound bag needs."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._left_bytes = READ_TIMES * path.stat().st_size + MAX_HEADER_BYTES
+
+    def __str__(self) -> str:
+        return str(self._path)
+
+    def exists(self) -> bool:
+        return self._path.exists()
+
+    def open(self, mode: Literal["rb"]) -> _File:
+        self._file = self._path.open(mode)
+        return self
+
+    def close(self) -> None:
+        self._file.close()
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+    def seek(self, place: int, whence: int = os.SEEK_SET) -> int:
+        return self._file.seek(place, whence)
+
+    def readline(self) -> bytes:
+        return self._file.readline(MAX_LINE_BYTES)
+
+    def read(self, size: int) -> bytes:
+        if size > MAX_HEADER_BYTES:
+            raise ReaderError("a header is too long")
+        return self._taken(size)
+
+    def chunk(self, place: int, size: int) -> bytes:
+        """Raises ReaderError where the file ends before."""
+        if size > MAX_CHUNK_BYTES:
+            raise BagLimitError(f"a chunk of more than {MAX_CHUNK_BYTES >> 20} MiB")
+        self._file.seek(place)
+        data = self._taken(size)
+        if len(data) < size:
+            raise ReaderError("a chunk is cut short")
+        return data
+
+    def _taken(self, size: int) -> bytes:
+        data = self._file.read(size)
+        self._left_bytes -= len(data)
+        if self._left_bytes < 0:
+            raise BagLimitError("its index leads to the same bytes again and again")
+        return data
+
+
+def _channels(reader: _Reader, room: Room) -> tuple[Channel, ...]:
+    messages: dict[int, list[Message]] = {connection.id: [] for connection in reader.connections}
+    count = 0
+    for chunk in reader.read_chunks():
+        for header, data in _records(chunk):
+            count += 1
+            if count > MAX_RECORDS:
+                raise BagLimitError(f"more than {MAX_RECORDS} records")
+            if header.get_uint8("op") == RecordType.MSGDATA:
+                room.hold(len(data), foreign=True)
+                kept = messages[header.get_uint32("conn")]
+                kept.append(Message(header.get_time("time"), len(kept), data))
+    found = (_channel(connection, messages.pop(connection.id), room) for connection in reader.connections)
     return merged(found, renumber=True)
 
 
+def _records(chunk: bytes) -> Iterator[tuple[Header, bytes]]:
+    """Header and content of each record; content of messages alone."""
+    stream, size = BytesIO(chunk), len(chunk)
+    while (place := stream.tell()) < size:
+        if _LENGTH.unpack_from(chunk, place)[0] > MAX_HEADER_BYTES:
+            raise ReaderError("a header is too long")
+        header = Header.read(stream)
+        length = read_uint32(stream)
+        if header.get_uint8("op") == RecordType.MSGDATA:
+            yield header, read_bytes(stream, length)
+        else:
+            stream.seek(length, os.SEEK_CUR)
+            yield header, b""
+
+
 class _Unpacker:
-    """Unpacks chunks to no more than the limits, whatever they hold and however often they are asked for."""
+    """Unpacks chunks to no more than the limits, whatever they hold."""
 
     def __init__(self) -> None:
         self._unpacked_bytes = 0
@@ -107,7 +230,7 @@ class _Unpacker:
         elif data.startswith(LZ4):
             plain = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=MAX_CHUNK_BYTES + 1)
         else:
-            return data
+            plain = data
         self._unpacked_bytes += len(plain)
         if len(plain) > MAX_CHUNK_BYTES:
             raise BagLimitError(f"a chunk of more than {MAX_CHUNK_BYTES >> 20} MiB")
@@ -116,7 +239,7 @@ class _Unpacker:
         return plain
 
 
-def _channel(connection: Connection, messages: list[Message]) -> Channel:
+def _channel(connection: Connection, messages: list[Message], room: Room) -> Channel:
     ext = connection.ext
     recorded = ext if isinstance(ext, ConnectionExtRosbag1) else ConnectionExtRosbag1(None, None)
     package, _, name = connection.msgtype.partition("/msg/")
@@ -128,4 +251,5 @@ def _channel(connection: Connection, messages: list[Message]) -> Channel:
         definition=connection.msgdef.data,
         latching=bool(recorded.latching),
         messages=tuple(messages),
+        room=room,
     )

@@ -17,11 +17,11 @@ def merged(channels: Iterable[Channel], *, renumber: bool) -> tuple[Channel, ...
     for one in channels:
         key = (one.topic, one.callerid, one.type, one.md5sum, one.definition)
         groups.setdefault(key, []).append(one)
-    return tuple(_merged(group, renumber=renumber) for group in groups.values())
+    return tuple(_merged(groups.pop(key), renumber=renumber) for key in list(groups))
 
 
 def _merged(group: list[Channel], *, renumber: bool) -> Channel:
     messages = sorted((m for one in group for m in one.messages), key=lambda message: message.log_time_ns)
-    if renumber:
+    if renumber and any(m.sequence != number for number, m in enumerate(messages)):
         messages = [Message(m.log_time_ns, number, m.data) for number, m in enumerate(messages)]
     return replace(group[0], latching=any(one.latching for one in group), messages=tuple(messages))

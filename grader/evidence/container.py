@@ -2,44 +2,128 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+import struct
+import zlib
+from collections.abc import Callable, Iterator
 from io import BytesIO
+from typing import BinaryIO
 
 import lz4.frame  # type: ignore[import-untyped] # it has no stubs
 import zstandard
-from mcap.records import Chunk, McapRecord
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Header, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import read_magic
 
 MAX_FILE_BYTES = 1 << 30
 MAX_CHUNK_BYTES = 64 << 20
+"""Of any record, too. The arena records no message that comes near it."""
 MAX_UNPACKED_BYTES = 2 << 30
+MAX_RECORDS = 4_000_000
+
+MESSAGE_HEAD_BYTES = 22
+_HEAD = struct.Struct("<BQ")
+_Read = Callable[[bytes], McapRecord]
 
 
 class ContainerError(ValueError):
     """The container breaks a limit or does not end where it says."""
 
 
-def records(data: bytes) -> Iterator[McapRecord]:
-    """Every record, those inside chunks included. All checksums are verified, and so is the end of the file.
+def _plain(kind: type[Header | Schema | Channel | Attachment | Metadata]) -> _Read:
+    return lambda body: kind.read(ReadDataStream(BytesIO(body)))
 
-    Raises ContainerError, and whatever `mcap`, `zstandard` and `lz4` raise for a damaged file.
+
+_IN_CHUNK: dict[int, _Read] = {Opcode.SCHEMA: _plain(Schema), Opcode.CHANNEL: _plain(Channel)}
+_OUTSIDE: dict[int, _Read] = {
+    **_IN_CHUNK,
+    Opcode.HEADER: _plain(Header),
+    Opcode.ATTACHMENT: _plain(Attachment),
+    Opcode.METADATA: _plain(Metadata),
+}
+
+
+def records(stream: BinaryIO) -> Iterator[McapRecord]:
+    """Every record that carries content, those inside chunks included; indexes are passed over.
+
+    All checksums are verified, and so is the end of the file. Raises ContainerError, and whatever `mcap`,
+    `zstandard` and `lz4` raise for a damaged file.
     """
-    stream = BytesIO(data)
-    unpacked = 0
-    for record in StreamReader(
-        stream, emit_chunks=True, validate_crcs=True, record_size_limit=len(data)
-    ).records:
-        if not isinstance(record, Chunk):
-            yield record
-            continue
-        plain = _unpacked(record)
-        unpacked += len(plain)
-        if unpacked > MAX_UNPACKED_BYTES:
-            raise ContainerError(f"more than {MAX_UNPACKED_BYTES >> 20} MiB unpacked")
-        yield from breakup_chunk(replace(record, compression="", data=plain), validate_crc=True)
+    source, meter = ReadDataStream(stream, calculate_crc=True), _Meter()
+    read_magic(source)
+    while True:
+        checksum = source.checksum()
+        opcode, body = _next(source, meter)
+        if isinstance(body, Message):
+            yield body
+        elif opcode == Opcode.CHUNK:
+            yield from _inside(Chunk.read(ReadDataStream(BytesIO(body))), meter)
+        elif opcode == Opcode.DATA_END:
+            _verify(DataEnd.read(ReadDataStream(BytesIO(body))).data_section_crc, checksum, "the data")
+        elif opcode == Opcode.FOOTER:
+            break
+        elif opcode in _OUTSIDE:
+            yield _OUTSIDE[opcode](body)
+    read_magic(source)
     if stream.read(1):
         raise ContainerError("bytes after its end")
+
+
+class _Meter:
+    """Counts over the whole file: many small records cost time, and unpacked ones need no space in it."""
+
+    def __init__(self) -> None:
+        self._records = self._unpacked_bytes = 0
+
+    def record(self, size_bytes: int) -> None:
+        self._records += 1
+        if self._records > MAX_RECORDS:
+            raise ContainerError(f"more than {MAX_RECORDS} records")
+        if size_bytes > MAX_CHUNK_BYTES:
+            raise ContainerError(f"a record of more than {MAX_CHUNK_BYTES >> 20} MiB")
+
+    def unpacked(self, size_bytes: int) -> None:
+        self._unpacked_bytes += size_bytes
+        if self._unpacked_bytes > MAX_UNPACKED_BYTES:
+            raise ContainerError(f"more than {MAX_UNPACKED_BYTES >> 20} MiB unpacked")
+
+
+def _next(source: ReadDataStream, meter: _Meter) -> tuple[int, bytes | Message]:
+    """The next record's kind and content. Nothing is read past its end, whatever lengths it holds.
+
+    Messages, which may be many and large, are read at once.
+    """
+    opcode, length = _HEAD.unpack(source.read(_HEAD.size))
+    meter.record(length)
+    if opcode == Opcode.MESSAGE and length >= MESSAGE_HEAD_BYTES:
+        message = Message.read(source, length)
+        if len(message.data) < length - MESSAGE_HEAD_BYTES:
+            raise EndOfFile
+        return opcode, message
+    body = source.read(length)
+    if len(body) < length:
+        raise EndOfFile
+    return opcode, body
+
+
+def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord]:
+    plain = _unpacked(chunk)
+    meter.unpacked(len(plain))
+    _verify(chunk.uncompressed_crc, zlib.crc32(plain), "a chunk")
+    source = ReadDataStream(BytesIO(plain))
+    while source.count < len(plain):
+        opcode, body = _next(source, meter)
+        if isinstance(body, Message):
+            yield body
+        elif opcode in _IN_CHUNK:
+            yield _IN_CHUNK[opcode](body)
+
+
+def _verify(said: int, found: int, what: str) -> None:
+    """A checksum of 0 says nothing."""
+    if said not in {0, found}:
+        raise ContainerError(f"the checksum of {what} is wrong")
 
 
 def _unpacked(chunk: Chunk) -> bytes:
@@ -47,7 +131,8 @@ def _unpacked(chunk: Chunk) -> bytes:
     if chunk.uncompressed_size > MAX_CHUNK_BYTES:
         raise ContainerError(f"a chunk of more than {MAX_CHUNK_BYTES >> 20} MiB")
     if chunk.compression == "zstd":
-        with zstandard.ZstdDecompressor().stream_reader(chunk.data, read_across_frames=True) as reader:
+        unpacker = zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK_BYTES)
+        with unpacker.stream_reader(chunk.data, read_across_frames=True) as reader:
             plain = reader.read(chunk.uncompressed_size + 1)
     elif chunk.compression == "lz4":
         plain = lz4.frame.LZ4FrameDecompressor().decompress(
@@ -56,7 +141,7 @@ def _unpacked(chunk: Chunk) -> bytes:
     elif chunk.compression == "":
         plain = chunk.data
     else:
-        raise ContainerError(f"compressed by {chunk.compression!r}, which is not known")
+        raise ContainerError(f"compressed by {chunk.compression[:20]!r}, which is not known")
     if len(plain) != chunk.uncompressed_size:
         raise ContainerError("a chunk of another size than it says")
     return plain

@@ -24,13 +24,17 @@ from grader.evidence.definitions import (
     Field,
     Types,
     alias,
+    bound,
     canonical,
     parse,
 )
+from grader.evidence.room import DECODED_BYTES_MAX
 
 Value: TypeAlias = Any
 """What a message holds: numbers, text, bytes, lists and dicts of these."""
 
+KEPT_LETTERS_MAX = 8_000
+"""Longer definitions make much code, which is not kept for later."""
 _CLOCK_FIELDS = {"sec": "secs", "nanosec": "nsecs"}
 
 
@@ -48,12 +52,17 @@ class Decoder:
         """False where the definition itself could not be followed."""
         return self._plan is not None
 
+    def decoded_bytes(self, message_bytes: int) -> int:
+        """What a message of that size takes in memory once decoded, at most, about."""
+        return self._plan.bound.decoded(message_bytes) if self._plan is not None else 0
+
     def decode(self, data: bytes) -> Value:
         """A dict of the message's fields: numbers, bool, str, bytes for `uint8[]`, lists, dicts; or None.
 
-        `time` and `duration` become `{"secs": …, "nsecs": …}`.
+        `time` and `duration` become `{"secs": …, "nsecs": …}`. None too for what would take more memory than
+        a whole recording may.
         """
-        if self._plan is None:
+        if self._plan is None or self.decoded_bytes(len(data)) > DECODED_BYTES_MAX:
             return None
         try:
             return self._plan.decode(data)
@@ -78,6 +87,7 @@ class Encoder:
 class _Plan:
     def __init__(self, type_: str, definition: str) -> None:
         self._types: Types = parse(type_, definition)
+        self.bound = bound(self._types)
         self._type = type_
         self._store = get_typestore(Stores.EMPTY)
         self._store.register(get_types_from_msg(canonical(self._types), f"{PACKAGE}/{alias(type_)}"))
@@ -129,8 +139,16 @@ class _Plan:
         return value if field.type == "string" else value.tolist()
 
 
-@lru_cache(maxsize=256)
 def _plan(type_: str, definition: str) -> _Plan | None:
+    return _kept(type_, definition) if len(definition) <= KEPT_LETTERS_MAX else _made(type_, definition)
+
+
+@lru_cache(maxsize=64)
+def _kept(type_: str, definition: str) -> _Plan | None:
+    return _made(type_, definition)
+
+
+def _made(type_: str, definition: str) -> _Plan | None:
     try:
         return _Plan(type_, definition)
     except (DefinitionError, TypesysError, SyntaxError, RecursionError):

@@ -19,6 +19,12 @@ MAX_UNROLLED = 2_000
 MAX_ARRAY = 1 << 24
 MAX_STEPS = 20_000
 STEPS_PER_BYTE = 64
+OBJECT_BYTES = 400
+"""An object with its fields and the map that is made of it; the next three are what comes on top, about."""
+FIELD_BYTES = 8
+NUMBER_BYTES = 32
+TEXT_BYTES = 60
+TEXT_GROWTH = 2
 
 PACKAGE = "recorded"
 PRIMITIVES = {
@@ -154,12 +160,24 @@ def _resolved(owner: str, type_: str) -> str:
     return "std_msgs/Header" if type_ == "Header" else f"{owner.split('/', 1)[0]}/{type_}"
 
 
-class _Bound(NamedTuple):
-    """What decoding one value takes at least: bytes, steps, and levels of nesting."""
+class Bound(NamedTuple):
+    """What decoding one value takes: at least so many bytes, steps, and levels of nesting; in memory at most
+    `decoded_bytes`, and `growth` more for every byte of its arrays and texts."""
 
     size: int
     steps: int
     levels: int
+    decoded_bytes: int
+    growth: int
+
+    def decoded(self, message_bytes: int) -> int:
+        """What a message of so many bytes takes in memory, at most."""
+        return self.decoded_bytes + self.growth * message_bytes
+
+
+def bound(types: Types) -> Bound:
+    """The bound of the first of the types, as `parse` gives them."""
+    return _Bounds(types).check(next(iter(types)), depth=0)
 
 
 class _Bounds:
@@ -167,9 +185,9 @@ class _Bounds:
 
     def __init__(self, types: Types) -> None:
         self._types = types
-        self.known: dict[str, _Bound] = {}
+        self.known: dict[str, Bound] = {}
 
-    def check(self, type_: str, *, depth: int) -> _Bound:
+    def check(self, type_: str, *, depth: int) -> Bound:
         """Raises DefinitionError for loops, missing types and what grows out of proportion."""
         if type_ in self.known:
             return self.known[type_]
@@ -177,27 +195,38 @@ class _Bounds:
             raise DefinitionError(f"{type_} nests too deeply or is not defined")
         fields = self._types[type_]
         inner = [self._field(field, depth) for field in fields]
-        bound = _Bound(
+        found = Bound(
             size=sum(b.size for b in inner),
             steps=1 + sum(b.steps for b in inner),
             levels=1 + max((b.levels for b in inner), default=0),
+            decoded_bytes=OBJECT_BYTES + sum(FIELD_BYTES + b.decoded_bytes for b in inner),
+            growth=max((b.growth for b in inner), default=0),
         )
         unrolled = sum(f.size or 1 for f in fields if f.type not in PRIMITIVES or f.type == "string")
-        if bound.levels > MAX_DEPTH or unrolled > MAX_UNROLLED:
+        if found.levels > MAX_DEPTH or unrolled > MAX_UNROLLED:
             raise DefinitionError(f"{type_} nests too deeply or has too long arrays")
-        if bound.steps > min(MAX_STEPS, STEPS_PER_BYTE * (1 + bound.size)):
+        if found.steps > min(MAX_STEPS, STEPS_PER_BYTE * (1 + found.size)):
             raise DefinitionError(f"{type_} grows out of proportion")
-        self.known[type_] = bound
-        return bound
+        self.known[type_] = found
+        return found
 
-    def _field(self, field: Field, depth: int) -> _Bound:
-        plain = field.primitive
-        one = _Bound(PRIMITIVES[field.type], 1, 0) if plain else self.check(field.type, depth=depth + 1)
+    def _field(self, field: Field, depth: int) -> Bound:
+        one = _primitive(field.type) if field.primitive else self.check(field.type, depth=depth + 1)
         if not field.array:
             return one
         if one.size == 0 or (field.size or 0) > MAX_ARRAY:
             raise DefinitionError(f"{field.name} is an array without end")
+        # Bytes become one object, and Python has its own objects for small numbers.
+        light = {"uint8": 2, "int8": FIELD_BYTES, "bool": FIELD_BYTES}
+        each = light.get(field.type, one.decoded_bytes + FIELD_BYTES)
         if field.size is None:
-            return _Bound(4, 1, one.levels)
-        at_once = plain and field.type != "string"
-        return _Bound(field.size * one.size, 1 if at_once else 1 + field.size * one.steps, one.levels)
+            return Bound(4, 1, one.levels, OBJECT_BYTES, max(one.growth, -(-each // one.size)))
+        at_once = field.primitive and field.type != "string"
+        steps = 1 if at_once else 1 + field.size * one.steps
+        taken = OBJECT_BYTES + field.size * each
+        return Bound(field.size * one.size, steps, one.levels, taken, one.growth)
+
+
+def _primitive(type_: str) -> Bound:
+    text = type_ == "string"
+    return Bound(PRIMITIVES[type_], 1, 0, TEXT_BYTES if text else NUMBER_BYTES, TEXT_GROWTH if text else 0)

@@ -6,9 +6,12 @@ from pathlib import Path
 from typing import Literal
 
 from grader.evidence.reader import load_run
+from grader.evidence.room import NoRoom, Room
 from grader.evidence.run import Channel, Run, is_grader_node
 from grader.evidence.stats import RateStats, rate_stats
 from grader.model.record import Record
+
+LOOKED_INTO_BYTES = 256 << 20
 
 
 class ChannelSummary(Record):
@@ -79,6 +82,7 @@ def inspect_file(path: Path) -> Inspection:
 def inspect_run(run: Run, *, kind: Literal["grader", "mcap", "bag"] = "grader") -> Inspection:
     """The same of a run that has been read already."""
     end = run.outcome
+    room = Room(decoded_bytes=LOOKED_INTO_BYTES)
     channels = sorted(run.channels, key=lambda channel: (channel.topic, channel.callerid))
     return Inspection(
         file=run.evidence,
@@ -90,7 +94,7 @@ def inspect_run(run: Run, *, kind: Literal["grader", "mcap", "bag"] = "grader") 
         start_ns=run.start_ns,
         duration_s=(run.end_ns - run.start_ns) / 1e9,
         messages=sum(len(channel.messages) for channel in channels),
-        channels=tuple(_channel(channel) for channel in channels),
+        channels=tuple(_channel(channel, room) for channel in channels),
         nodes=_nodes(run),
         processes=_processes(run),
         console_lines=len(run.console),
@@ -101,7 +105,7 @@ def inspect_run(run: Run, *, kind: Literal["grader", "mcap", "bag"] = "grader") 
     )
 
 
-def _channel(channel: Channel) -> ChannelSummary:
+def _channel(channel: Channel, room: Room) -> ChannelSummary:
     return ChannelSummary(
         topic=channel.topic,
         type=channel.type,
@@ -109,10 +113,23 @@ def _channel(channel: Channel) -> ChannelSummary:
         md5sum=channel.md5sum,
         latching=channel.latching,
         by_grader=channel.by_grader,
-        readable=all(value is not None for value in channel.values),
+        readable=_readable(channel, room),
         bytes=sum(len(message.data) for message in channel.messages),
         rate=rate_stats(channel.times_ns),
     )
+
+
+def _readable(channel: Channel, room: Room) -> bool:
+    """Whether the definition fits every message, as far as that is known within seconds."""
+    try:
+        decoder = channel.decoder(room)
+        for message in channel.messages:
+            room.decode(decoder.decoded_bytes(len(message.data)))
+            if decoder.decode(message.data) is None:
+                return False
+    except NoRoom:
+        return True
+    return True
 
 
 def _nodes(run: Run) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from pathlib import PurePath
-from typing import Any
+from typing import Any, BinaryIO
 
 from mcap import records as mcap
 
@@ -12,10 +12,12 @@ from grader.errors import EvidenceError
 from grader.evidence.channels import merged
 from grader.evidence.container import ContainerError, records
 from grader.evidence.events import EVIDENCE_VERSION, METADATA_NAME, PACKAGE_TOPIC, TOPICS
+from grader.evidence.room import Room
 from grader.evidence.run import Channel, Message, Run
 
-MAX_MESSAGES = 2_000_000
 MAX_CHANNELS = 4_096
+NAMES_SHOWN = 5
+NAME_CHARS_SHOWN = 80
 
 FIELDS = {
     "processes": "/grader/process",
@@ -30,10 +32,14 @@ FIELDS = {
 
 
 class Loading:
-    """Collects by channel and decodes nothing; only the grader's own JSON channels are read into records."""
+    """Collects by channel and decodes nothing; only the grader's own JSON channels are read into records.
 
-    def __init__(self, name: str) -> None:
+    `room` is what all that is loaded together may take.
+    """
+
+    def __init__(self, name: str, room: Room) -> None:
         self._name = name
+        self._room = room
         self._schemas: dict[int, mcap.Schema] = {}
         self._channels: dict[int, mcap.Channel] = {}
         self._messages: dict[int, list[Message]] = defaultdict(list)
@@ -41,38 +47,49 @@ class Loading:
         self._metadata: dict[str, str] | None = None
         self._profile = ""
 
-    def read(self, data: bytes) -> Run:
-        """Raises EvidenceError for another format, and what `container.records` and pydantic raise."""
-        count = 0
-        for record in records(data):
+    def read(self, stream: BinaryIO) -> Run:
+        """Raises EvidenceError for another format, NoRoom, and what `container.records` and pydantic raise."""
+        for record in records(stream):
             if isinstance(record, mcap.Message):
-                count += 1
-                if count > MAX_MESSAGES:
-                    raise ContainerError(f"more than {MAX_MESSAGES} messages")
+                self._hold_message(record)
                 self._messages[record.channel_id].append(
                     Message(record.log_time, record.sequence, record.data)
                 )
             else:
                 self._describe(record)
         if unknown := self._messages.keys() - self._channels.keys():
-            raise ContainerError(f"messages on channels that are not there: {sorted(unknown)}")
+            raise ContainerError(f"messages on {len(unknown)} channels that are not there")
         for messages in self._messages.values():
             messages.sort(key=lambda message: message.log_time_ns)
         return self._run()
 
     def _describe(self, record: mcap.McapRecord) -> None:
         if isinstance(record, mcap.Schema):
-            self._schemas.setdefault(record.id, record)
+            if record.id not in self._schemas:
+                self._room.hold(len(record.data), foreign=self._metadata is None)
+                self._schemas[record.id] = record
         elif isinstance(record, mcap.Channel):
             self._channels.setdefault(record.id, record)
             if len(self._channels) > MAX_CHANNELS:
                 raise ContainerError(f"more than {MAX_CHANNELS} channels")
         elif isinstance(record, mcap.Attachment):
-            self._attachments[record.name] = record.data
+            self._attach(record)
         elif isinstance(record, mcap.Header):
             self._profile = record.profile
         elif isinstance(record, mcap.Metadata) and record.name == METADATA_NAME and self._metadata is None:
             self._metadata = record.metadata
+
+    def _hold_message(self, message: mcap.Message) -> None:
+        """The arena has limits of its own for its events."""
+        channel, foreign = self._channels.get(message.channel_id), self._metadata is None
+        if foreign or channel is None or channel.message_encoding != "json":
+            self._room.hold(len(message.data), foreign=foreign)
+
+    def _attach(self, record: mcap.Attachment) -> None:
+        """Another tool's attachments are of no use; the grader's own come behind its metadata."""
+        if self._metadata is not None:
+            self._room.hold(len(record.data), foreign=False)
+            self._attachments[record.name] = record.data
 
     def _run(self) -> Run:
         about = self._about()
@@ -97,7 +114,7 @@ class Loading:
     def _about(self) -> dict[str, Any]:
         if self._metadata is None:
             return {"scenario": PurePath(self._name).stem, "clock": "real", "warp": 1.0}
-        version = self._metadata.get("format")
+        version = self._metadata.get("format", "")[:NAME_CHARS_SHOWN]
         if version != EVIDENCE_VERSION:
             raise EvidenceError(
                 f"{self._name}: evidence of format {version!r}, and this grader reads {EVIDENCE_VERSION!r}",
@@ -118,13 +135,14 @@ class Loading:
                 hint="record again with ROS 1: `rosbag record`",
             )
         if encodings and "ros1" not in encodings:
-            raise EvidenceError(
-                f"{self._name}: no message of ROS 1 in it, only {', '.join(sorted(encodings))}"
-            )
+            names = ", ".join(map(_shown, sorted(encodings)[:NAMES_SHOWN]))
+            raise EvidenceError(f"{self._name}: no message of ROS 1 in it, only {names}")
         for channel in self._channels.values():
             schema = self._schemas.get(channel.schema_id)
             if channel.message_encoding == "ros1" and (schema is None or schema.encoding != "ros1msg"):
-                raise EvidenceError(f"{self._name}: {channel.topic} has no message definition (ros1msg)")
+                raise EvidenceError(
+                    f"{self._name}: {_shown(channel.topic)} has no message definition (ros1msg)"
+                )
 
     def _ros_channels(self) -> tuple[Channel, ...]:
         found = (
@@ -143,7 +161,8 @@ class Loading:
             md5sum=about.get("md5sum", ""),
             definition=schema.data.decode(errors="replace") if schema else "",
             latching=about.get("latching") in {"1", "true", "True"},
-            messages=tuple(self._messages.get(number, ())),
+            messages=tuple(self._messages.pop(number, ())),
+            room=self._room,
         )
 
     def _json(self, topic: str) -> list[Message]:
@@ -167,3 +186,9 @@ class Loading:
     def _package(self) -> bytes | None:
         messages = self._json(PACKAGE_TOPIC)
         return messages[-1].data if messages else None
+
+
+def _shown(name: str) -> str:
+    """A name out of a foreign file, on one line."""
+    text = name[:NAME_CHARS_SHOWN] + ("…" if len(name) > NAME_CHARS_SHOWN else "")
+    return text if text.isprintable() else repr(text)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import struct
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
@@ -16,10 +18,12 @@ from grader.errors import EvidenceError
 from grader.evidence import bag
 from grader.evidence.container import MAX_FILE_BYTES, ContainerError
 from grader.evidence.loading import Loading
+from grader.evidence.room import NoRoom, Room
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 
 SUFFIXES = {".mcap", ".bag"}
+MAGIC = b"\x89MCAP0\r\n"
 _DAMAGE = (
     McapError,
     ZstdError,
@@ -33,20 +37,22 @@ _DAMAGE = (
 )
 
 
-def load_run(source: Path | BinaryIO) -> Run:
+def load_run(source: Path | BinaryIO, room: Room | None = None) -> Run:
     """One recorded run. A file without the grader's metadata is a real-time run named after the file.
 
-    Raises EvidenceError, in one line that names the file, for whatever cannot be read to its end.
+    `room` is shared with what is loaded beside it. Raises EvidenceError, in one line that names the file, for
+    whatever cannot be read to its end.
     """
+    room = room or Room()
     if not isinstance(source, Path):
         name = Path(str(getattr(source, "name", "evidence.mcap"))).name
-        return _load(name, source.read(MAX_FILE_BYTES + 1))
-    with _readable(source):
-        with source.open("rb") as file:
-            head = file.read(len(bag.MAGIC))
+        return _load(name, BytesIO(source.read(MAX_FILE_BYTES + 1)), room)
+    with _readable(source), source.open("rb") as file:
+        head = file.read(len(bag.MAGIC))
+        file.seek(0)
         if head == bag.MAGIC:
-            return bag.load_bag(source)
-        return _load(source.name, source.read_bytes(), shown=str(source))
+            return bag.load_bag(source, room)
+        return _load(source.name, file, room, shown=str(source))
 
 
 def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
@@ -57,8 +63,9 @@ def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
     """
     runs: dict[str, Run] = {}
     origin: dict[str, Path] = {}
+    room = Room()
     for path in _files(paths):
-        run = load_run(path)
+        run = load_run(path, room)
         if run.foreign and not any(channel.messages for channel in run.channels):
             raise EvidenceError(f"{path}: holds no messages", hint="record while the nodes run")
         if run.scenario in runs:
@@ -82,35 +89,43 @@ def package_facts(run: Run) -> PackageFacts:
         raise EvidenceError(f"{run.evidence}: the package facts cannot be read: {_first(error)}") from error
 
 
-def _load(name: str, data: bytes, *, shown: str = "") -> Run:
+def _load(name: str, stream: BinaryIO, room: Room, *, shown: str = "") -> Run:
     shown = shown or name
-    if len(data) > MAX_FILE_BYTES:
+    size_bytes = stream.seek(0, os.SEEK_END)
+    stream.seek(0)
+    if size_bytes > MAX_FILE_BYTES:
         raise EvidenceError(f"{shown}: larger than {MAX_FILE_BYTES >> 20} MiB")
-    if not data:
+    if not size_bytes:
         raise EvidenceError(f"{shown}: the file is empty")
     try:
-        return Loading(name).read(data)
+        return Loading(name, room).read(stream)
     except ValidationError as error:
         raise EvidenceError(
             f"{shown}: a record of the grader's own cannot be read: {_first(error)}"
         ) from error
+    except NoRoom as error:
+        raise EvidenceError(f"{shown}: {error}", hint=bag.LESS) from error
     except ContainerError as error:
         raise EvidenceError(f"{shown}: not sound MCAP: {error}") from error
     except _DAMAGE as error:
-        wrong, hint = _damage(data)
+        wrong, hint = _damage(stream)
         raise EvidenceError(f"{shown}: {wrong}", hint=hint) from error
 
 
-def _damage(data: bytes) -> tuple[str, str]:
+def _damage(stream: BinaryIO) -> tuple[str, str]:
     """What is wrong, and what to do."""
-    if data.startswith(b"version https://git-lfs"):
+    stream.seek(0)
+    head = stream.read(32)
+    stream.seek(-min(stream.seek(0, os.SEEK_END), len(MAGIC)), os.SEEK_END)
+    tail = stream.read()
+    if head.startswith(b"version https://git-lfs"):
         return "only a pointer of Git LFS, the recording itself is not here", "`git lfs pull` fetches it"
-    if data.startswith(b"SQLite format 3"):
+    if head.startswith(b"SQLite format 3"):
         return "a bag of ROS 2, and this grader reads those of ROS 1", "record with ROS 1: `rosbag record`"
     again = "record it again, or copy it again"
-    if not data.startswith(b"\x89MCAP"):
+    if not head.startswith(MAGIC[:5]):
         return "not an MCAP file and not a bag", again
-    return ("damaged" if data.endswith(b"\x89MCAP0\r\n") else "cut short: it has no end"), again
+    return ("damaged" if tail == MAGIC else "cut short: it has no end"), again
 
 
 def _first(error: ValidationError) -> str:

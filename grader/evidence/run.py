@@ -24,6 +24,8 @@ from grader.evidence.room import NoRoom, Room
 
 OWN_NODE = re.compile(r"/grader_(recorder|actor)_[0-9a-f]{8}(_knock)?")
 BARE_NAME = "/grader"
+DECODER_BYTES = 300
+"""For each letter of a definition: time more than memory."""
 
 
 class Message(NamedTuple):
@@ -67,13 +69,18 @@ class Channel:
 
         Raises EvidenceError where that would take more memory than there is for it.
         """
-        decoder = Decoder(self.type, self.definition)
         try:
+            decoder = self.decoder(self.room)
             for message in self.messages:
                 self.room.decode(decoder.decoded_bytes(len(message.data)))
         except NoRoom as error:
             raise EvidenceError(f"{self.topic}: {error}", hint="publish less on it") from error
         return tuple(decoder.decode(m.data) for m in self.messages)
+
+    def decoder(self, room: Room) -> Decoder:
+        """What decodes its messages; that takes room too. Raises NoRoom."""
+        room.decode(DECODER_BYTES * len(self.definition))
+        return Decoder(self.type, self.definition)
 
     @property
     def data(self) -> tuple[Any, ...]:

@@ -9,6 +9,7 @@ from traceback import extract_tb
 
 from grader.checks import CHECKS, Check
 from grader.checks.evidence import NotRecorded
+from grader.errors import EvidenceError
 from grader.evidence.run import Run
 from grader.judge.facts import Facts, try_facts
 from grader.judge.points import round_half_up
@@ -55,6 +56,8 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
         return asked if isinstance(asked, Verdict) else _sound(check.function(**asked))
     except NotRecorded as missing:
         return missing.verdict
+    except EvidenceError as error:
+        return inconclusive(error.message, hint=error.hint)
     except Exception as error:  # noqa: BLE001 - whatever goes wrong in a check must not cost a student a mark
         return _broken(check, error)
 

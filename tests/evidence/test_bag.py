@@ -132,8 +132,8 @@ def test_a_chunk_that_blows_up_is_refused(tmp_path, monkeypatch, compression):
 
 def test_too_many_messages_or_connections_are_refused(tmp_path, monkeypatch):
     path = write_bag(tmp_path / "lab.bag", CHATTER, COUNT)
-    monkeypatch.setattr(bag, "MAX_MESSAGES", 10)
-    assert "more than 10 messages" in refused(path)
+    monkeypatch.setattr(bag, "MAX_RECORDS", 10)
+    assert "more than 10 records" in refused(path)
     monkeypatch.undo()
     monkeypatch.setattr(bag, "MAX_CONNECTIONS", 1)
     assert "more than 1 connections" in refused(path)

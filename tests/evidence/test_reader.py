@@ -122,7 +122,7 @@ def test_a_record_that_does_not_fit_is_named():
     ("metadata", "reason"),
     [
         ({**OWN, "format": "2"}, "format '2'"),
-        ({}, "format None"),
+        ({}, "format ''"),
         ({**OWN, "warp": "fast"}, "scenario, clock and warp"),
     ],
 )
@@ -194,8 +194,8 @@ def test_a_chunk_that_blows_up_is_refused(monkeypatch):
 
 
 def test_too_many_messages_or_channels_are_refused(monkeypatch):
-    monkeypatch.setattr(loading, "MAX_MESSAGES", 10)
-    assert "more than 10 messages" in refused(BytesIO(sample()))
+    monkeypatch.setattr(container, "MAX_RECORDS", 10)
+    assert "more than 10 records" in refused(BytesIO(sample()))
     monkeypatch.undo()
     monkeypatch.setattr(loading, "MAX_CHANNELS", 2)
     assert "more than 2 channels" in refused(BytesIO(sample()))
