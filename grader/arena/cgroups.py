@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import secrets
+import time
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
@@ -16,6 +17,7 @@ from grader.model.record import Record
 
 MOUNTINFO = Path("/proc/self/mountinfo")
 MEMBERSHIP = Path("/proc/self/cgroup")
+ABANDONED_S = 600.0
 KEYS = {
     ("memory", 1): "memory.limit_in_bytes",
     ("memory", 2): "memory.max",
@@ -59,6 +61,7 @@ def describe() -> str:
 
 def _find(controller: str) -> Cgroup | None:
     for version, folder in _own_groups(controller):
+        _sweep(folder)
         if _usable(folder, KEYS[controller, version]):
             return Cgroup(version=version, folder=str(folder))
     return None
@@ -94,6 +97,14 @@ def _below(mount: list[str], path: str) -> Path:
     root, point = mount[3], Path(mount[4])
     inside = os.path.relpath(path, root) if path.startswith(root) else "."
     return point / inside
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what a killed arena left: its groups are empty, and too old to be just made."""
+    for group in folder.glob("grader-*"):
+        with suppress(OSError):  # somebody's processes are in it, or it is gone
+            if time.time() - group.stat().st_mtime > ABANDONED_S:
+                group.rmdir()
 
 
 def _usable(folder: Path, key: str) -> bool:

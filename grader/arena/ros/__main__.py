@@ -18,11 +18,12 @@ from host import Lateness, peak_bytes
 from keys import leave_keys_behind
 from loop import Loop
 from network import enter_own_network
-from processes import Process, kill_orphans
+from processes import Process, kill_orphans, reap_all
 from wire import Wire
 
 PR_SET_CHILD_SUBREAPER = 36
 FINISH_S = 2.0
+REAP_S = 1.0
 
 
 class Arena:
@@ -30,6 +31,7 @@ class Arena:
         self._wire = wire
         self._limits = config["limits"]
         self._cgroups = config["cgroups"]
+        self._groups = []
         self._processes = {}
         self._finishing = False
         self._clock = None
@@ -88,12 +90,24 @@ class Arena:
     def _spawn(self, spec):
         spec["env"]["ROS_MASTER_URI"] = os.environ.get("ROS_MASTER_URI", "http://127.0.0.1:11311")
         try:
-            groups = Groups(self._cgroups, self._limits) if spec["role"] != "grader" else None
+            groups = self._new_groups() if spec["role"] != "grader" else None
             self._processes[spec["name"]] = Process(
                 self.loop, self._wire, spec, self._limits, self._exited, groups=groups
             )
         except OSError as error:
             self._wire.status("spawn-failed", name=spec["name"], detail=str(error))
+
+    def _new_groups(self):
+        groups = Groups(self._cgroups, self._limits)
+        self._groups.append(groups)
+        return groups
+
+    def clear(self):
+        """Once everything has been stopped: nothing of the run shall be left on the machine."""
+        kill_orphans()
+        reap_all(REAP_S)
+        for groups in self._groups:
+            groups.remove()
 
     def _trees(self):
         """Each process of the run with the ids of all that runs below it."""
@@ -209,7 +223,7 @@ class Arena:
 def main():
     libc = ctypes.CDLL(None, use_errno=True)
     libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGINT, lambda *_: None)  # ignored, it would be ignored by all that is started
     wire = Wire(os.dup(1))
     os.dup2(2, 1)
     with open(0, "rb", buffering=0, closefd=False) as commands:
@@ -222,7 +236,7 @@ def main():
         enter_own_network()
     arena = Arena(wire, config)
     arena.loop.run()
-    kill_orphans()
+    arena.clear()
     usage = resource.getrusage(resource.RUSAGE_SELF)
     wire.status("done", cpu_s=usage.ru_utime + usage.ru_stime, max_rss_bytes=peak_bytes())
     os._exit(0)

@@ -6,6 +6,7 @@ import os
 import signal
 import socket
 import subprocess
+import time
 
 from streams import Collected, Lines
 from tree import cpu_s, descendants, resident_bytes
@@ -287,6 +288,18 @@ def kill_orphans():
     """End whatever still descends from the arena: without a sandbox, a student's daemon is adopted by it."""
     for pid in descendants(os.getpid()):
         _kill(pid, signal.SIGKILL)
+
+
+def reap_all(patience_s):
+    """Wait for every child that has been killed; one that the kernel holds on to is not waited for."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGCHLD})
+    deadline = time.monotonic() + patience_s
+    with contextlib.suppress(ChildProcessError):  # there is none left
+        while True:
+            pid, _ = os.waitpid(-1, os.WNOHANG)
+            left_s = deadline - time.monotonic()
+            if pid == 0 and (left_s <= 0 or signal.sigtimedwait({signal.SIGCHLD}, left_s) is None):
+                return
 
 
 def _signal_of(code):
