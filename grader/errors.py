@@ -5,7 +5,8 @@
     │   ├── OutputError         2   the output folder cannot be written
     │   └── RubricError         2   one or more faults in a rubric, all of them named
     ├── SubmissionError         3   the submission cannot be read
-    │   └── PackageNotFound     3   no package of the lab in it
+    │   ├── PackageNotFound     3   no package of the lab in it
+    │   └── Unreachable         3   it could not be fetched: the network, the server, no git or no room here
     ├── EvidenceError           3   an evidence file cannot be read
     ├── InternalError           3   the grader itself failed
     └── HostError               3   this machine cannot do what is asked
@@ -79,6 +80,11 @@ class SubmissionError(GraderError):
 
 class PackageNotFound(SubmissionError):
     kind = "package-not-found"
+
+
+class Unreachable(SubmissionError):
+    kind = "host"
+    blame = "machine"
 
 
 class EvidenceError(GraderError):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+import re
+import shutil
 import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -48,6 +50,7 @@ MACHINE = FULL | {
     errno.ESTALE: "the network disk is gone",
 }
 AGAIN = "mend that (`grader doctor` looks at this machine), then grade again"
+NUMBER = re.compile(r"\[Errno (\d+)\]")
 UNEXPECTED = {EvidenceError.kind, GraderError.kind}
 MEMORY = "grade fewer submissions side by side, or on a machine with more memory"
 REPORT = "run with --debug for the traceback, and report it; the submission can be graded again"
@@ -100,7 +103,7 @@ def fault_of(error: BaseException) -> GraderError:
 def _machine_fault(error: BaseException) -> HostError | None:
     """The machine's fault behind an error, whoever met it first; None where it is not at fault."""
     cause = error if isinstance(error, OSError) else error.__cause__
-    reason = MACHINE.get(cause.errno or 0) if isinstance(cause, OSError) else None
+    reason = MACHINE.get(_number(cause)) if isinstance(cause, OSError) else None
     if reason and isinstance(error, GraderError):
         more = "" if reason in error.message else f" ({reason})"
         return HostError(f"{error.message}{more}", hint=AGAIN)
@@ -111,6 +114,12 @@ def _machine_fault(error: BaseException) -> HostError | None:
     if isinstance(error, subprocess.TimeoutExpired):
         return HostError(f"{error.cmd[0]} did not end within {error.timeout:g} s", hint=AGAIN)
     return None
+
+
+def _number(error: OSError) -> int:
+    """Its errno; shutil has only the text of many."""
+    told = NUMBER.search(str(error)) if isinstance(error, shutil.Error) else None
+    return int(told[1]) if told else error.errno or 0
 
 
 def _internal(error: BaseException) -> InternalError:

@@ -94,6 +94,7 @@ ERRORS = [
     (OSError(errno.ENOSPC, "No space left on device", "/tmp/grader-run-x/a"), "host", "machine"),
     (OSError(errno.EMFILE, "Too many open files"), "host", "machine"),
     (BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable"), "host", "machine"),
+    (shutil.Error([("a", "b", "[Errno 28] No space left on device: 'b'")]), "host", "machine"),
     (MemoryError(), "host", "machine"),
     (subprocess.TimeoutExpired(["bwrap", "x"], 20), "host", "machine"),
     (ZeroDivisionError("division by zero"), "internal", "grader"),

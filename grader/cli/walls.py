@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import shutil
 import subprocess
 import sys
@@ -11,8 +10,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from grader.arena.cgroups import describe, find_cgroups
-from grader.arena.limits import Limits
-from grader.arena.sandbox import NETWORK, choose, why_not
+from grader.arena.sandbox import NETWORK, ULIMIT_HINT, choose, refused_limits, why_not
 from grader.cli.row import Row
 from grader.errors import HostError
 
@@ -39,7 +37,7 @@ def walls() -> Iterator[Row]:
     yield Row(
         name="limits", state="ok" if held else "limited", detail=describe(), mend="" if held else DELEGATE
     )
-    yield from _too_low()
+    yield _limits_of_processes()
     yield _mode()
 
 
@@ -73,19 +71,11 @@ def _switch() -> str:
     return CONTAINER
 
 
-def _too_low() -> Iterator[Row]:
-    """Limits of this shell that are lower than what a student's processes may use."""
-    known = Limits()
-    wanted = {
-        "ulimit -f": (resource.RLIMIT_FSIZE, known.file_bytes),
-        "ulimit -n": (resource.RLIMIT_NOFILE, known.open_files),
-        "ulimit -t": (resource.RLIMIT_CPU, int(known.cpu_s)),
-    }
-    for name, (number, least) in wanted.items():
-        _, hard = resource.getrlimit(number)
-        if hard not in (resource.RLIM_INFINITY, -1) and hard < least and os.geteuid() != 0:
-            detail = f"{hard}, and a student's process may use {least}"
-            yield Row(name=name, state="limited", detail=detail, mend=f"{name} unlimited, before the grader")
+def _limits_of_processes() -> Row:
+    refused = refused_limits()
+    if not refused:
+        return Row(name="ulimit", state="ok", detail="limits of students' processes can be set")
+    return Row(name="ulimit", state="missing", detail=refused, mend=ULIMIT_HINT)
 
 
 def _mode() -> Row:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from grader.errors import SubmissionError
+from grader.errors import SubmissionError, Unreachable
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.names import brief
 from grader.intake.source import Source
@@ -14,6 +14,7 @@ _PRIVATE = (
 )
 _NETWORK = "Check the address and the network, and try `git ls-remote URL`."
 _PAGE = "This looks like a page of the website: give the repository's own address, then @branch."
+_NOT_THEIRS = re.compile(r"this machine|name was not found|cannot be reached")
 # In this order: the first that fits what git said is the cause.
 _CAUSES: tuple[tuple[str, str, str], ...] = (
     (
@@ -76,12 +77,12 @@ _CAUSES: tuple[tuple[str, str, str], ...] = (
 def explained(failure: GitFailed, source: Source) -> SubmissionError:
     """The error to raise for what git said about `source`."""
     if isinstance(failure, GitMissing):
-        return SubmissionError(
+        return Unreachable(
             f"{source.given}: git is not installed here, so no repository can be read",
             hint="Install it (`sudo apt install git`), or give a folder or an archive.",
         )
     if isinstance(failure, GitTimeout):
-        return SubmissionError(
+        return Unreachable(
             f"{source.given}: {failure.stderr}",
             hint="Check the network, or clone it by hand and give the folder.",
         )
@@ -93,7 +94,8 @@ def explained(failure: GitFailed, source: Source) -> SubmissionError:
     for pattern, cause, hint in _CAUSES:
         if re.search(pattern, failure.stderr):
             page = re.search(r"/(tree|blob)/|/-/", source.url)
-            return SubmissionError(f"{source.given}: {cause}", hint=_PAGE if page else hint)
+            kind = Unreachable if _NOT_THEIRS.search(cause) else SubmissionError
+            return kind(f"{source.given}: {cause}", hint=_PAGE if page else hint)
     return SubmissionError(f"{source.given}: git says: {said(failure, source)}", hint=_NETWORK)
 
 

@@ -287,6 +287,9 @@ def test_what_git_says_becomes_one_line(says, message, hint, tmp_path, monkeypat
     assert hint in error.hint
     assert "secret" not in error.message + error.hint
     assert error.message.startswith("https://h.invalid/lab: ")
+    assert (error.blame == "machine") == (
+        message in {"name was not found", "reached", "certificate", "does not know"}
+    )
 
 
 def stand_in_for_git(tmp_path, monkeypatch, script):
@@ -318,6 +321,7 @@ def test_a_server_that_does_not_answer(tmp_path, monkeypatch):
     stand_in_for_git(tmp_path, monkeypatch, f"sleep 60 & echo $! > {tmp_path}/pid; wait")
     error = refused("https://h.invalid/lab", tmp_path, git_timeout_s=0.5)
     assert "no answer within 0.5 s" in error.message
+    assert error.blame == "machine"
     assert ended(int((tmp_path / "pid").read_text()))
 
 
