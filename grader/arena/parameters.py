@@ -16,6 +16,7 @@ from grader.rubric.model import Param
 
 FILE_BYTES_MAX = 256 << 10
 EVENTS_MAX = 2_000
+VALUES_MAX = 5_000
 DEPTH_MAX = 20
 ALIASES_MAX = 20
 WORD_LETTERS = 9
@@ -44,9 +45,7 @@ def settings(
             continue
         leaves, remark = _file(find(param.file))
         remarks += [f"{param.file}: {remark}"] if remark else []
-        found += [
-            Setting(name, made_up(value), f"made up, for {param.file}") for name, value in leaves.items()
-        ]
+        found += [Setting(name, value, f"made up, for {param.file}") for name, value in leaves.items()]
         lacking = [name for name in map(_absolute, param.also) if name not in leaves]
         found += [Setting(name, made_up(""), f"made up, {NOT_IN_FILE} {param.file}") for name in lacking]
     return found, remarks
@@ -57,7 +56,7 @@ def made_up(like: object) -> Any:  # noqa: ANN401 - of the type that it stands f
     if isinstance(like, bool) or like is None:
         return like
     if isinstance(like, int):
-        return int(_digits(min(max(len(str(abs(like))), 5), 9)))
+        return int(_digits(min(max(len(str(min(abs(like), 10**9))), 5), 9)))
     if isinstance(like, float):
         return round(_random.uniform(100, 1000), 3)
     if isinstance(like, list):
@@ -97,10 +96,12 @@ class _UnreadableError(ValueError):
 
 
 def _file(path: Path | None) -> tuple[dict[str, Any], str]:
-    """The file's leaves by their names, or why there are none."""
+    """Values made up for the file's leaves, by their names, or why there are none."""
     data = read_untrusted(path, FILE_BYTES_MAX + 1) if path else None
     try:
-        return dict(_leaves(_content(data), "", 0)), ""
+        leaves = dict(_leaves(_content(data), "", 0))
+        _check_size(list(leaves.values()))
+        return {name: made_up(value) for name, value in leaves.items()}, ""
     except _UnreadableError as error:
         return {}, str(error)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
@@ -124,9 +125,19 @@ def _content(data: bytes | None) -> dict[Any, Any]:
     return content
 
 
+def _check_size(values: list[Any]) -> None:
+    """Aliases let a few letters stand for lists without number or end."""
+    count, waiting = 0, [(values, 0)]
+    for items, depth in waiting:
+        count += len(items)
+        if count > VALUES_MAX or depth > DEPTH_MAX:
+            raise _UnreadableError("too much in it")
+        waiting += [(item, depth + 1) for item in items if isinstance(item, list)]
+
+
 def _leaves(content: Mapping[Any, Any], prefix: str, depth: int) -> Iterator[tuple[str, Any]]:
     for key, value in content.items():
-        name = f"{prefix}/{str(key).strip('/')}"
+        name = f"{prefix}/{str(key).strip('/')}".encode(errors="replace").decode()
         if isinstance(value, dict) and value and depth < DEPTH_MAX:
             yield from _leaves(value, name, depth + 1)
         elif isinstance(value, float) and not math.isfinite(value):

@@ -17,9 +17,9 @@ from mcap.records import Attachment, Channel, Chunk, DataEnd, Header, McapRecord
 from mcap.stream_reader import read_magic
 
 MAX_FILE_BYTES = 1 << 30
-MAX_CHUNK_BYTES = 64 << 20
+MAX_CHUNK_BYTES = 32 << 20
 """Of any record, too. The arena records no message that comes near it."""
-MAX_UNPACKED_BYTES = 2 << 30
+MAX_UNPACKED_BYTES = 512 << 20
 MAX_RECORDS = 4_000_000
 
 MESSAGE_HEAD_BYTES = 22

@@ -11,7 +11,7 @@ from grader.evidence.run import Channel, Run, is_grader_node
 from grader.evidence.stats import RateStats, rate_stats
 from grader.model.record import Record
 
-LOOKED_INTO_BYTES = 256 << 20
+LOOKED_INTO_BYTES = 64 << 20
 
 
 class ChannelSummary(Record):

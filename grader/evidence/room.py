@@ -4,7 +4,7 @@ from __future__ import annotations
 
 HELD_BYTES_MAX = 192 << 20
 """More than the arena records of one submission (`arena/limits.py`)."""
-FOREIGN_BYTES_MAX = 112 << 20
+FOREIGN_BYTES_MAX = 96 << 20
 """Of another tool's recordings, which have to be unpacked beside it."""
 DECODED_BYTES_MAX = 96 << 20
 RECORD_BYTES = 150

@@ -24,8 +24,9 @@ from grader.evidence.room import NoRoom, Room
 
 OWN_NODE = re.compile(r"/grader_(recorder|actor)_[0-9a-f]{8}(_knock)?")
 BARE_NAME = "/grader"
-DECODER_BYTES = 300
-"""For each letter of a definition: time more than memory."""
+DECODER_BYTES = 200_000
+LETTER_BYTES = 1_000
+"""What a decoder takes, and for each letter of its definition: time more than memory."""
 
 
 class Message(NamedTuple):
@@ -79,7 +80,7 @@ class Channel:
 
     def decoder(self, room: Room) -> Decoder:
         """What decodes its messages; that takes room too. Raises NoRoom."""
-        room.decode(DECODER_BYTES * len(self.definition))
+        room.decode(DECODER_BYTES + LETTER_BYTES * len(self.definition))
         return Decoder(self.type, self.definition)
 
     @property

@@ -17,8 +17,9 @@ from grader.package.xml import line_of, parse_xml
 
 MANIFEST = "package.xml"
 _TEXT_LETTERS = 4_000
+_CONDITIONS = 200
 _CONDITION_LETTERS = 300
-_CONDITION_BRACKETS = 4
+_CONDITION_BRACKETS = 20
 _MESSAGE_LETTERS = 500
 
 # What `condition="$ROS_VERSION == 1"` (REP 149) is measured by: the labs are ROS 1 on its last distribution.
@@ -84,8 +85,10 @@ def _meaning(root: etree._Element, said: list[str]) -> Package:
 def _shorten(root: etree._Element) -> None:
     """Cut what is too long for catkin_pkg: its patterns take time by the square of a text's length.
 
-    Raises ValueError for a condition that its parser could work on for years.
+    Raises ValueError for conditions that its parser could work on for years.
     """
+    if sum("condition" in element.attrib for element in root.iter(etree.Element)) > _CONDITIONS:
+        raise ValueError(f"more than {_CONDITIONS} conditions")
     for element in root.iter():
         if element.text and len(element.text) > _TEXT_LETTERS:
             element.text = element.text[:_TEXT_LETTERS]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 import unicodedata
 
 _TYPOGRAPHIC = (
@@ -11,6 +12,7 @@ _TYPOGRAPHIC = (
     ("\u2010\u2011\u2012\u2013\u2014\u2015\u2212", "dash", "-"),
 )
 _LETTERS = 1_000
+TEXT_LETTERS = 300
 _COPIED = "copied from a PDF or a web page"
 
 # On any message: the faulty line itself tells.
@@ -76,6 +78,7 @@ def cause_of(
     `text` is the faulty line, `column` the place in it (from 1), `opened` the line of a bracket that is never
     closed, `mixed` whether the file indents with tabs and with spaces.
     """
+    message, text = message[:TEXT_LETTERS], text[:TEXT_LETTERS]
     message, text = message[:_LETTERS], text[:_LETTERS]
     vague = message.startswith(("invalid syntax", "expected ':'", "invalid decimal", "unexpected EOF"))
     odd = "invalid decimal" in message and _strange(text)  # Python 3.10 on `1` and an invisible character
@@ -113,7 +116,7 @@ def _lacks_colon(text: str, column: int | None) -> bool:
 def _character(message: str, text: str) -> str:
     """Python before 3.9 does not name the character; it is then looked for in the line."""
     named = re.search(r"U\+([0-9A-Fa-f]{4,6})", message)
-    if named:
+    if named and int(named[1], 16) <= sys.maxunicode:
         return _character_words(chr(int(named[1], 16)))
     strange = sorted(_strange(text), key=lambda c: c.isprintable() and not _is_typographic(c))
     return (

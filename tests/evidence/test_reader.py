@@ -187,7 +187,7 @@ def bomb(claimed: int, real: int) -> bytes:
 
 
 def test_a_chunk_that_blows_up_is_refused(monkeypatch):
-    assert "a chunk of more than 64 MiB" in refused(BytesIO(bomb(1 << 40, 10)))
+    assert "a chunk of more than 32 MiB" in refused(BytesIO(bomb(1 << 40, 10)))
     assert "another size" in refused(BytesIO(bomb(10, 50 << 20)))
     monkeypatch.setattr(container, "MAX_UNPACKED_BYTES", 1000)
     assert "unpacked" in refused(BytesIO(sample()))
