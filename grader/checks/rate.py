@@ -60,6 +60,11 @@ class RateParams(Record):
     def period_ns(self) -> float:
         return 1e9 / self.rate_hz
 
+    @property
+    def bounds_ns(self) -> tuple[float, float]:
+        """Within which a gap is as it should be."""
+        return self.period_ns * (1 - self.gap_tolerance), self.period_ns * (1 + self.gap_tolerance)
+
 
 @check("rate", params=RateParams, messages_only=True)
 def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
@@ -77,7 +82,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         In real time, over at least 5 s after the first message. The mean has to lie within 5 % of the
         nominal rate, and 95 % of the gaps within half a period of the nominal one (a rubric may set other
         bounds). One single stall costs nothing. If the grading machine itself was late while a rate failed,
-        nothing is taken: the run is repeated.
+        nothing is taken: the run is repeated. The mean is given with its 95 % confidence interval.
 
     How to fix
         `rate = rospy.Rate(10)` once before the loop, `rate.sleep()` (with its brackets) once in each turn
@@ -103,7 +108,18 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         evidence=run.evidence, topic=params.topic, from_ns=found.times_ns[0], to_ns=found.times_ns[-1]
     )
     citations: tuple[Citation, ...] = (*verdict.citations, span)
-    return verdict.model_copy(update={"expected": expected, "measured": found.text, "citations": citations})
+    return verdict.model_copy(
+        update={"expected": expected, "measured": _measured(found, run, params), "citations": citations}
+    )
+
+
+def _measured(found: Rhythm, run: Run, params: RateParams) -> str:
+    """What came, and how late the machine was meanwhile."""
+    seen = found.described(*params.bounds_ns)
+    if not run.host or not found.gaps_ns:
+        return seen
+    _, _, max_ms = lateness_ms(run, found.times_ns[0], found.until_ns)
+    return f"{seen}; the grading machine was late by at most {max_ms:.0f} ms"
 
 
 def _flood(found: Rhythm, package: PackageFacts, params: RateParams) -> Verdict | None:
@@ -135,8 +151,7 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
 def _uneven(found: Rhythm, params: RateParams) -> Verdict | None:
     """What is wrong with the rate, None if nothing is."""
     mean_hz, period_ns = found.mean_hz, params.period_ns
-    bounds = (period_ns * (1 - params.gap_tolerance), period_ns * (1 + params.gap_tolerance))
-    outside = found.outside(*bounds)
+    outside = found.outside(*params.bounds_ns)
     allowed = (1 - params.share_in_bounds) * len(found.gaps_ns) + ROUNDING
     even = len(outside) <= allowed or found.is_single_stall(outside, period_ns)
     in_bounds = params.low_hz * (1 - ROUNDING) <= mean_hz <= params.high_hz * (1 + ROUNDING)
