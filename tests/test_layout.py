@@ -29,7 +29,7 @@ ALLOWED = {
     "package": BASE,
     "intake": BASE | {"files"},
     "checks": BASE | {"evidence"},
-    "instructor": BASE | {"checks"},
+    "instructor": BASE | {"checks", "temporary"},
     "rubric": BASE | {"checks", "evidence", "instructor"},
     "judge": BASE | {"checks", "evidence", "rubric"},
     "report": BASE | {"files", "rubric.model"},
@@ -40,9 +40,9 @@ ALLOWED = {
         "rubric", "temporary"
     },
     "authoring": {
-        *BASE, "checks", "evidence", "intake", "package", "pipeline", "rubric"
+        *BASE, "checks", "evidence", "intake", "package", "pipeline", "rubric", "temporary"
     },
-    "mutation": BASE | {"pipeline", "rubric"},
+    "mutation": BASE | {"pipeline", "rubric", "temporary"},
     "cli": {
         *BASE, "arena", "authoring", "checks", "evidence", "files", "instructor", "intake", "judge", "mutation",
         "package", "pipeline", "report", "rubric", "temporary"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 
 from grader import pipeline
@@ -18,6 +17,7 @@ from grader.model.package import PackageFacts
 from grader.model.progress import Progress
 from grader.package import read_package
 from grader.rubric.load import LoadedRubric
+from grader.temporary import temporary_folder
 
 
 def propose_rubric(
@@ -27,19 +27,19 @@ def propose_rubric(
 
     Raises GraderError: SubmissionError where nothing of it can be run, RosMissing without ROS.
     """
-    with tempfile.TemporaryDirectory(prefix="grader-new-") as folder:
-        submission = open_submission(source, package=package, workdir=Path(folder) / "source")
+    with temporary_folder("new") as folder:
+        submission = open_submission(source, package=package, workdir=folder / "source")
         facts = read_package(submission.package)
         parts = find_parts(submission.package.folder, facts)
         if not parts.nodes and not parts.launches:
             raise SubmissionError(
                 f"{package} has no node and no launch file", hint="name a finished solution"
             )
-        runs = _look(source, first_look(package, parts), Path(folder) / "first", options, progress)
+        runs = _look(source, first_look(package, parts), folder / "first", options, progress)
         seen = {name: observe(runs[name]) for name in (*parts.nodes, *parts.launches)}
         again = second_look(package, parts, seen)
         if again is not None:
-            runs |= _look(source, again, Path(folder) / "second", options, progress)
+            runs |= _look(source, again, folder / "second", options, progress)
         known = _facts(runs, facts)
         proposal = Proposal(known, parts, seen, runs)
         return rubric_text(package, rubric_id, proposal.scenarios, proposal.criteria, proposal.notes)

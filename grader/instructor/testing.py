@@ -8,7 +8,6 @@ import pickle
 import signal
 import subprocess
 import sys
-import tempfile
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -23,6 +22,7 @@ from grader.checks.registry import parts
 from grader.instructor.files import FileFault, read_beside
 from grader.instructor.job import SessionOutcome, TestOutcome
 from grader.model.verdict import Status
+from grader.temporary import temporary_folder
 
 HINTS = 4
 SHOWN_TESTS = 20
@@ -87,8 +87,7 @@ def run_tests(folder: Path, evidence: Evidence, params: PytestParams) -> Verdict
 
 def _session(path: Path, evidence: Evidence, params: PytestParams) -> SessionOutcome:
     """Run the file's tests. Raises TestsBroken."""
-    with tempfile.TemporaryDirectory(prefix="grader-tests-", ignore_cleanup_errors=True) as name:
-        folder = Path(name)
+    with temporary_folder("tests") as folder:
         (folder / "evidence").write_bytes(pickle.dumps(evidence))
         code = _run(_command(path, folder, params), folder, params.timeout_s)
         try:

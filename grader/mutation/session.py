@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 import time
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
@@ -22,6 +21,7 @@ from grader.mutation.solution import Solution
 from grader.mutation.tree import Tree, unified_diff, write_tree
 from grader.mutation.workers import Graded, Job, Sandbox, grade_all
 from grader.rubric.load import LoadedRubric
+from grader.temporary import temporary_folder
 
 REFERENCE = "reference"
 SOURCE = "source"
@@ -184,10 +184,10 @@ def _graded(
 ) -> Generator[Graded, None, None]:
     """Each tree's grading in `out/<name>/`. The trees are written where no repository of the user's is around them,
     for a repository would know their modes better than the disk."""
-    with tempfile.TemporaryDirectory(prefix="grader-mutants-source-", ignore_cleanup_errors=True) as folder:
+    with temporary_folder("mutants") as folder:
         work = []
         for name, tree in trees.items():
-            source = Path(folder) / name
+            source = folder / name
             write_tree(tree, source)
             work.append(
                 Job(name=name, source=source, rubric=plan.rubric.path, out=plan.out, sandbox=plan.sandbox)
