@@ -222,5 +222,6 @@ class Place:
 
 
 def _path(ros: RosInstallation, path: str, *first: str) -> str:
-    entries = [*first, *path.split(os.pathsep), *ros.env["PATH"].split(os.pathsep), *SYSTEM_PATH.split(":")]
+    """What the package adds comes last: a program of its own never takes the place of the system's or of ROS's."""
+    entries = [*first, *ros.env["PATH"].split(os.pathsep), *SYSTEM_PATH.split(":"), *path.split(os.pathsep)]
     return os.pathsep.join(dict.fromkeys(e for e in entries if e))

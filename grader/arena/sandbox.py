@@ -100,9 +100,11 @@ class Sandbox(Record):
 
     def first_words(self, limits: Limits) -> str:
         """What a process tree's shell does before anything else: the number of its tasks, where it is counted apart."""
-        if not self.bubblewrap or self.uid or not _counts_by_namespace():
-            return ""
-        return f"ulimit -u {limits.tasks}; "
+        return f"ulimit -u {limits.tasks}; " if self._counts_apart() else ""
+
+    def _counts_apart(self) -> bool:
+        """Otherwise all trees of one user share a number, and one of them can leave the others none."""
+        return self.bubblewrap and _counts_by_namespace()
 
     def rlimits(self, limits: Limits) -> Iterator[str]:
         """The arguments of prlimit."""
@@ -111,7 +113,7 @@ class Sandbox(Record):
         yield f"--as={limits.address_space_bytes}"
         yield f"--cpu={limits.cpu_s:.0f}:{limits.cpu_s + 10:.0f}"
         yield "--core=0"
-        if self.uid:
+        if self.uid and not self._counts_apart():
             yield f"--nproc={limits.tasks}"
 
 
