@@ -51,13 +51,13 @@ class Room:
         submission.give(self._home / ".ssh", self._uid)
         self._path = submission.make(job["submission"], canaries.HANDED_IN, self._uid)
         os.chown(canaries.RESULTS, self._uid, self._uid)
-        self.results = canaries.RESULTS / job["submission"]["name"]
+        self._name = job["submission"]["name"]
         self._services = canaries.Services(job["secret"])
 
     def grade_attack(self) -> dict[str, Any]:
         source = self._job["source"].replace("{path}", str(self._path))
         argv = ["grade", source, "--rubric", str(canaries.RUBRIC), "--out", str(canaries.RESULTS)]
-        return self._observed([*argv, "--id", self.results.name, *self._job["arguments"]])
+        return self._observed([*argv, "--id", self._name, *self._job["arguments"]])
 
     def grade_victim(self) -> Watched:
         """In the place of what was handed in before, by the same student."""
@@ -73,8 +73,7 @@ class Room:
         return self._watch(argv, {}, AFTER_WALL_S)
 
     def _observed(self, argv: list[str]) -> dict[str, Any]:
-        results = str(self.results).lstrip("/")
-        files, sockets, packets = state.files(self._world, results), state.sockets(), state.packets()
+        files, sockets, packets = state.files(self._world), state.sockets(), state.packets()
         settings, groups = state.settings(), self._job["groups"]
         scratch, shared = state.folder(canaries.SCRATCH), state.folder(Path("/dev/shm"))
         watched = self._watch(argv, self._job["env"], self._job["wall_s"])
@@ -88,9 +87,22 @@ class Room:
             "settings": [name for name, value in state.settings().items() if value != settings[name]],
             "scratch": sorted(set(state.folder(canaries.SCRATCH)) ^ set(scratch)),
             "shared": sorted(set(state.folder(Path("/dev/shm"))) ^ set(shared)),
-            "changed": state.changed(files, state.files(self._world, results)),
-            "odd": [str(path) for path in self.results.rglob("*") if not _plain(path)],
+            "changed": state.changed(files, state.files(self._world)),
+            "odd": self._odd_results(),
         }
+
+    @property
+    def results(self) -> Path:
+        """The folder of the submission's id, which an attack may choose."""
+        made = {path for path in canaries.RESULTS.iterdir() if path.name != canaries.OTHER.name}
+        named = canaries.RESULTS / self._name
+        return min(made - {named}, default=named)
+
+    def _odd_results(self) -> list[str]:
+        """What is no plain file or folder, and folders that are too many."""
+        made = [path.name for path in canaries.RESULTS.iterdir() if path.name != canaries.OTHER.name]
+        odd = [str(path) for path in canaries.RESULTS.rglob("*") if not _plain(path)]
+        return odd if len(made) < 2 else [*odd, *made]
 
     def _watch(self, argv: list[str], env: Mapping[str, str], wall_s: float) -> Watched:
         secret = self._job["secret"]

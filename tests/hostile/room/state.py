@@ -8,6 +8,7 @@ import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from tests.hostile.room.canaries import OTHER, RESULTS
 from tests.hostile.room.world import World
 
 Entry = tuple[object, ...]
@@ -22,15 +23,16 @@ SETTINGS = (
 LISTENS, TIME_WAIT = "0A", "06"
 
 
-def files(world: World, without: str) -> dict[str, Entry]:
-    """Whatever differs from the machine's own files, by path; `without` is a folder that is left out."""
-    return dict(_walk(world, without))
+def files(world: World) -> dict[str, Entry]:
+    """Whatever differs from the machine's own files, by path, without the new results."""
+    return dict(_walk(world))
 
 
-def _walk(world: World, without: str) -> Iterator[tuple[str, Entry]]:
+def _walk(world: World) -> Iterator[tuple[str, Entry]]:
     for top, folders, names, descriptor in os.fwalk(".", dir_fd=world.changes):
         here = top.removeprefix(".").lstrip("/")
-        folders[:] = [name for name in folders if _join(here, name) != without]
+        if here == str(RESULTS).lstrip("/"):
+            folders[:] = [name for name in folders if name == OTHER.name]
         for name in (*folders, *names):
             path = _join(here, name)
             found = os.stat(name, dir_fd=descriptor, follow_symlinks=False)
