@@ -176,7 +176,7 @@ class Actor:
             self._loop.call_soon(self._shaken)
 
     def _who(self, address):
-        return self._owners.caller(address[1], self.port) or SOMEBODY
+        return self._owners.caller(address, (self.host, self.port)) or SOMEBODY
 
     def _shaken(self):
         self._shaking -= 1

@@ -10,8 +10,8 @@ class Budget:
     """`limits` holds `channel_messages`, `channel_bytes`, `run_bytes` and `channels`.
 
     A quarter of the run's bytes is set apart, the same for each channel that there may be. Of the rest a channel takes
-    no more than a part that gets smaller with every channel that talks; of the channels a process has at most half
-    of what is left.
+    no more than a part that gets smaller with every other one that needs more than was set apart for it; of the
+    channels a process has at most half of what is left.
     """
 
     def __init__(self, limits):
@@ -19,9 +19,10 @@ class Budget:
         self.channel_bytes = limits["channel_bytes"]
         self.run_bytes = limits.get("run_bytes", 64 << 20)
         self.channels_max = limits.get("channels", 300)
-        self._own_share = self.run_bytes // 4 // self.channels_max
+        self.own_share = self.run_bytes // 4 // self.channels_max
         self._shared_left = self.run_bytes - self.run_bytes // 4
         self._channels = {}
+        self._heavy = set()
         self._of_process = {}
         self._lock = threading.Lock()
 
@@ -46,8 +47,9 @@ class Budget:
         with self._lock:
             if account.messages >= self.channel_messages or account.bytes + size > self.channel_bytes:
                 return False
-            if account.bytes + size > self._own_share:
-                share = self.run_bytes // (len(self._channels) + 1)
+            if account.bytes + size > self.own_share:
+                self._heavy.add(account)
+                share = self.run_bytes // (len(self._heavy) + 1)
                 if size > self._shared_left or account.bytes + size > share:
                     return False
                 self._shared_left -= size
@@ -63,6 +65,11 @@ class Account:
         self.budget = budget
         self.messages = self.bytes = 0
         self.channel = None
+
+    @property
+    def heavy(self):
+        """Whether it has more than was set apart for it."""
+        return self.bytes > self.budget.own_share
 
     def take(self, size):
         return self.budget.take(self, size)

@@ -4,9 +4,12 @@ from tcpros import LENGTH
 from wire import now_ns
 
 READ_BYTES = 1 << 16
+FEW_BYTES, MANY_FRAMES = 1 << 13, 500
+"""Small messages take more time than their bytes: after a piece with so many, the next one is shorter."""
 MESSAGE_BYTES_MAX = 16 << 20
 HELD_BYTES_MAX = 4 << 20
 LATCHING_S = 1.5
+REST_S = 0.01
 DROPPED_MAX = 2000
 """After so many that were dropped, what comes is thrown away unread: its bytes say about how many they were."""
 _WASTE = bytearray(1 << 20)
@@ -34,14 +37,29 @@ class Connection:
         self._skip = 0
         self._messages = self._dropped = self._wasted_bytes = 0
         self._length = 0
-        self._closed = self._opened = self._paused = False
+        self._piece_bytes = FEW_BYTES
+        self._closed = self._opened = self._broken = False
+        self._watched = self._paused = False
         self._held = []
         self._held_bytes = 0
 
     def watch(self):
-        """Begin to read, as far as the run has not ended meanwhile."""
-        if not self._closed:
-            self._recorder.loop.add_reader(self.sock, self.readable)
+        """Read on, as far as the run has not ended meanwhile."""
+        if not self._watched and not self._closed and not self._paused:
+            self._watched = True
+            self._recorder.loop.add_reader(self.sock, self._look)
+
+    def _rest(self):
+        self._watched = False
+        self._recorder.loop.remove_reader(self.sock)
+
+    def _look(self):
+        """Who sends much waits while the grader is behind; all others are read in time."""
+        if self._account is not None and self._account.heavy and self._recorder.wire.congested:
+            self._rest()
+            self._recorder.loop.call_later(REST_S, self.watch)
+        else:
+            self.readable()
 
     def readable(self):
         """Take one piece of what the socket holds; False where there was none."""
@@ -50,7 +68,7 @@ class Connection:
         if self._dropped >= DROPPED_MAX:
             return self._throw_away()
         try:
-            chunk = self.sock.recv(READ_BYTES)
+            chunk = self.sock.recv(self._piece_bytes)
         except BlockingIOError:
             return False
         except OSError:
@@ -59,9 +77,12 @@ class Connection:
             self.close()
             return False
         frames = self._frames(chunk)
+        self._piece_bytes = FEW_BYTES if len(frames) > MANY_FRAMES else READ_BYTES
         if frames:
             self._messages += len(frames)
             self._hand_on(frames, now_ns())
+        if self._broken:
+            self.close()
         return True
 
     def _throw_away(self):
@@ -107,7 +128,7 @@ class Connection:
     def _has_room(self, length, waits):
         """Whether a message is recorded; one that is not yet here as a whole (`waits`) needs room in memory, too."""
         reserved = length if waits else 0
-        if self._account is not None and self._recorder.reserve(reserved):
+        if self._account is not None and (not reserved or self._recorder.reserve(reserved)):
             self._reserved = reserved
             if self._account.take(length):
                 return True
@@ -118,13 +139,14 @@ class Connection:
         return False
 
     def _release(self):
-        self._recorder.release(self._reserved)
-        self._reserved = 0
+        if self._reserved:
+            self._recorder.release(self._reserved)
+            self._reserved = 0
 
     def _invalid(self, length):
         self._recorder.note("invalid", self.topic, self.caller_id, detail="{} bytes".format(length))
         self._recorder.too_large(self, length)
-        self.close()
+        self._broken = True
 
     def _hand_on(self, frames, time_ns):
         if self._opened:
@@ -137,7 +159,7 @@ class Connection:
         self._held_bytes += sum(map(len, frames))
         if self._held_bytes > HELD_BYTES_MAX and not self._paused:
             self._paused = True
-            self._recorder.loop.remove_reader(self.sock)
+            self._rest()
 
     def open(self, *, latching):
         """Hand on what was held; the channel is made where it is not there from an earlier connection."""

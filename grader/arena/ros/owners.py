@@ -4,14 +4,12 @@ A node's is the one that listens on the port of its slave API, so nodes that `ro
 copies that fight for one name. A caller's is the one that is connected from the port that the call comes from.
 """
 
-import contextlib
 import os
 import time
 
+import sockets
 from bounded import port_of
 
-TABLES = ("/proc/net/tcp", "/proc/net/tcp6")
-CONNECTED, LISTENING = "01", "0A"
 LOOKS_MAX = 3
 AGAIN_S = 0.2
 ASKED_MAX = 5000
@@ -34,14 +32,14 @@ class Owners:
     def look(self, api):
         """The same, found out anew: ports are used again."""
         port = port_of(api)
-        owner = self._holder(_sockets(port, None, LISTENING)) if port else None
+        owner = self._holder(sockets.listening(port)) if port else None
         if owner is not None:
             self._known[api] = owner
         return owner
 
-    def caller(self, port, own_port):
-        """The name of the process that is connected from `port` to `own_port`; None where it cannot be told."""
-        return self._holder(_sockets(port, own_port, CONNECTED))
+    def caller(self, near, far):
+        """The name of the process whose connection goes from `near` to `far`, both (address, port), or None."""
+        return self._holder(sockets.connected(near, far))
 
     def _may_look(self, api):
         """An address that nobody listens on costs a few looks, not one at every change of the graph."""
@@ -52,25 +50,12 @@ class Owners:
         self._looked[api] = looks + 1, now_s
         return True
 
-    def _holder(self, sockets):
-        inodes = {"socket:[{}]".format(inode) for inode in sockets}
+    def _holder(self, inodes):
+        """The process that has one of these sockets open."""
+        inodes = {"socket:[{}]".format(inode) for inode in inodes}
         if not inodes:
             return None
         return next((name for name, pids in self._trees() if any(_holds(pid, inodes) for pid in pids)), None)
-
-
-def _sockets(local, remote, state):
-    """The inodes of sockets of this network namespace that have these ports and this state (man 5 proc)."""
-    ending = ":{:04X}".format(local)
-    for table in TABLES:
-        with contextlib.suppress(OSError), open(table) as file:
-            for row in (line.split(None, 10) for line in file if ending in line):
-                if row[1].endswith(ending) and row[3] == state and remote in (None, _port(row[2])):
-                    yield row[9]
-
-
-def _port(address):
-    return int(address.rpartition(":")[2], 16)
 
 
 def _holds(pid, inodes):

@@ -69,7 +69,7 @@ class Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
             if not full or oldest is not None:
                 self._count += 1
         if full:
-            self._note_flood(client_address)
+            self._note_flood(client_address, request.getsockname())
         if full and oldest is None:
             self.shutdown_request(request)
             return
@@ -78,12 +78,12 @@ class Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
                 oldest.shutdown(socket.SHUT_RDWR)
         super().process_request(request, client_address)
 
-    def _note_flood(self, address):
+    def _note_flood(self, *ends):
         """Who it was is not asked for each of thousands."""
         self._refused += 1
         if self._refused % LOOK_EVERY == 1:
             detail = "opened more than {} connections to {}".format(CONNECTIONS_MAX, self.title)
-            self.guard.limit(Caller(self, address).name, detail)
+            self.guard.limit(Caller(self.owners, *ends).name, detail)
 
     def process_request_thread(self, request, client_address):
         try:
@@ -133,9 +133,9 @@ class Pace:
 class Caller:
     """Who is at the other end of a connection; `process` is looked up when it is first asked for."""
 
-    def __init__(self, server, address):
-        self._server = server
-        self._address = address
+    def __init__(self, owners, near, far):
+        self._owners = owners
+        self._ends = near, far
         self._found = None
         self._looked = False
 
@@ -144,7 +144,7 @@ class Caller:
         """The name of the process of the run, or None."""
         if not self._looked:
             self._looked = True
-            self._found = self._server.owners.caller(self._address[1], self._server.port)
+            self._found = self._owners.caller(*self._ends)
         return self._found
 
     @property
@@ -159,7 +159,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
 
     def setup(self):
         super().setup()
-        self.caller = Caller(self.server, self.client_address)
+        self.caller = Caller(self.server.owners, self.client_address, self.connection.getsockname())
 
     def handle_one_request(self):
         sock = self.connection
