@@ -239,6 +239,7 @@ def main():
     arena.clear()
     usage = resource.getrusage(resource.RUSAGE_SELF)
     wire.status("done", cpu_s=usage.ru_utime + usage.ru_stime, max_rss_bytes=peak_bytes())
+    wire.flush()
     os._exit(0)
 
 
