@@ -1,0 +1,55 @@
+"""`kill -9` of the grader at random moments of a run, each in one of several PID namespaces side by side."""
+
+from __future__ import annotations
+
+import json
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.faulty import ROOM, ROOT, grading, result_in, why_not
+
+pytestmark = [
+    pytest.mark.ros,
+    pytest.mark.skipif(bool(why_not()), reason=why_not()),
+]
+KILLS, SIDE_BY_SIDE = 20, 4
+
+
+def test_killed_at_random_moments(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tmp_path.chmod(0o755)
+    tmp_path.parent.chmod(0o755)
+    seed = random.SystemRandom().randrange(1 << 30)
+    begun = time.monotonic()
+    with grading(tmp_path / "measured") as one:
+        assert one.end() == 0, one.err
+    length_s = time.monotonic() - begun
+    assert result_in(tmp_path / "measured").points == 100
+    chance = random.Random(seed)  # noqa: S311 - moments, no secrets
+    moments_s = [length_s * (n + chance.random()) / KILLS for n in range(KILLS)]
+    lanes = [lane(tmp_path / str(n), moments_s[n::SIDE_BY_SIDE]) for n in range(SIDE_BY_SIDE)]
+    wrong = [what for process in lanes for what in finished(process)]
+    with capsys.disabled():
+        shown = " ".join(f"{moment_s:.2f}" for moment_s in moments_s)
+        print(f"\nseed {seed}: a run takes {length_s:.2f} s, killed after {shown} s")
+    assert wrong == [], f"seed {seed}"
+
+
+def lane(folder: Path, moments_s: list[float]) -> subprocess.Popen[bytes]:
+    argv = [*ROOM, sys.executable, "-m", "tests.killing", folder, *moments_s]
+    return subprocess.Popen(list(map(str, argv)), cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
+
+
+def finished(process: subprocess.Popen[bytes]) -> list[str]:
+    try:
+        out, _ = process.communicate(timeout=240)
+    finally:
+        process.kill()
+        process.communicate()
+    assert process.returncode == 0
+    wrong: list[str] = json.loads(out)
+    return wrong
