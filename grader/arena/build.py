@@ -16,6 +16,7 @@ from grader.arena.workspace import READ_MAX, read_untrusted, run_in_place
 from grader.evidence.events import ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.record import Record
+from grader.package.cmake_written import written_calls
 
 BUILD_S = 120.0
 BUILD_EXPECTED_S = 2.0
@@ -122,11 +123,16 @@ async def _answer(place: Place, arena: ArenaSession, script: str) -> None:
 
 
 def _trace(place: Place) -> Path | None:
-    """The trace that CMake left, out of what the build handed over."""
-    if not place.sandbox.bubblewrap:
-        return _kept(place, TRACE)
-    data = read_member(place.archive, f"./{TRACE}", READ_MAX)
-    return None if data is None else _written(place, TRACE, data)
+    """The trace that CMake left, as far as the package's files bear it out: the build could write into it."""
+    if place.sandbox.bubblewrap:
+        data = read_member(place.archive, f"./{TRACE}", READ_MAX)
+    else:
+        data = read_untrusted(Path(place.output) / TRACE)
+    if data is None:
+        return None
+    workspace = place.workspace
+    source = workspace.built / "src" / workspace.folder
+    return _written(place, TRACE, written_calls(data, source, place.package_folder))
 
 
 def _kept(place: Place, name: str) -> Path | None:

@@ -27,10 +27,9 @@ def parse_tree_of(data: bytes, file: str) -> tuple[list[nodes.AstFileNode], Faul
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         cause = f"`{file}` is saved as UTF-16: save it as UTF-8"
         return [], Fault(file=file, line=1, kind="ParseError", message="is UTF-16", cause=cause)
-    text = data.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\0", " ")
-    if len(_OPENERS.findall(text)) * len(text) > _WORK_LIMIT:
+    text = _readable(data)
+    if text is None:
         return [], _fault(file, None, "too many brackets", f"`{file}` holds too many `[[` to be read")
-    text = _COMMENTS.sub(lambda found: found["keep"] or "# ", text)
     commands, fault = _commands(text, file)
     whole, unbalanced = _balanced(commands, file)
     fault = unbalanced or fault
@@ -43,6 +42,21 @@ def parse_tree_of(data: bytes, file: str) -> tuple[list[nodes.AstFileNode], Faul
         line = tree[-1].line if tree else 1
         fault = fault or _fault(file, line, str(error), "")
     return tree, fault
+
+
+def commands_of(data: bytes) -> list[nodes.Command] | None:
+    """Every command of a CMake file, those in blocks and definitions too; None where it cannot be read through."""
+    text = _readable(data)
+    commands, fault = ([], None) if text is None else _commands(text, "")
+    return None if text is None or fault else commands
+
+
+def _readable(data: bytes) -> str | None:
+    """The text as the library takes it; None where that would take it too long."""
+    text = data.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\0", " ")
+    if len(_OPENERS.findall(text)) * len(text) > _WORK_LIMIT:
+        return None
+    return _COMMENTS.sub(lambda found: found["keep"] or "# ", text)
 
 
 def _commands(text: str, file: str) -> tuple[list[nodes.Command], Fault | None]:
