@@ -59,11 +59,11 @@ def _call(line: bytes) -> dict[str, Any] | None:
 
 def _commands(folder: Path, path: str) -> _Commands | None:
     """By line and name; None where the file cannot be read through."""
-    data = read_markup(folder, path, _FILE_LIMIT_BYTES)
+    data = read_markup(folder, path)
     if isinstance(data, Fault):
         return {} if data.kind == "Missing" else None
     found: _Commands = defaultdict(list)
-    read = commands_of(data)
+    read = commands_of(data) if len(data) <= _FILE_LIMIT_BYTES else None
     for command in read or ():
         found[command.line, command.identifier.lower()].append(command)
     return None if read is None else found
