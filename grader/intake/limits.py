@@ -27,6 +27,7 @@ class Limits:
     recording_bytes: int = 96 << 20
     package_bytes: int = 48 << 20
     entries: int = 100_000
+    folders: int = 10_000
     package_files: int = 10_000
     links: int = 2_000
 
@@ -59,11 +60,13 @@ class Meter:
         while above and above not in self._folders:
             self._folders.add(above)
             self.data(1)
+            if len(self._folders) > self._limits.folders:
+                raise too_much(self._name, f"holds more than {self._limits.folders} folders")
             above = above.rpartition("/")[0]
 
     def data(self, size_bytes: int) -> None:
-        """Count a file that is to be written."""
-        self._bytes += -(-size_bytes // _BLOCK_BYTES) * _BLOCK_BYTES
+        """Count a file that is to be written; an empty one is not for nothing either."""
+        self._bytes += max(1, -(-size_bytes // _BLOCK_BYTES)) * _BLOCK_BYTES
         if self._bytes > self._limits.total_bytes:
             raise too_much(self._name, f"is larger than {self._limits.total_bytes >> 20} MiB when unpacked")
 

@@ -15,7 +15,7 @@ from grader.errors import SubmissionError
 from grader.intake.names import brief
 
 # Far more than any workspace; much deeper, and Python's own functions for trees fail.
-MAX_DEPTH = 200
+MAX_DEPTH = 60
 MAX_IN_FOLDER = 150_000
 MAX_IN_TREE = 1_000_000
 # Part of no submission: git's own files and what macOS adds.

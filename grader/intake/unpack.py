@@ -65,13 +65,11 @@ class Unpacker:
         self._meter.folders(f"{path}/")
         (self._root / path).mkdir(parents=True, exist_ok=True)
 
-    def file(
-        self, path: str, content: IO[bytes], *, executable: bool | None, chunk_bytes: int = _CHUNK_BYTES
-    ) -> None:
-        """Write a file; `chunk_bytes` are asked of `content` at a time."""
+    def file(self, path: str, content: IO[bytes], *, executable: bool | None) -> None:
+        """Write a file."""
         target = self._free(path)
         with target.open("xb") as out:
-            shutil.copyfileobj(content, out, chunk_bytes)
+            shutil.copyfileobj(content, out, _CHUNK_BYTES)
             self._sizes[path] = out.tell()
         target.chmod(0o755 if executable else 0o644)
         self.executable[path] = executable

@@ -20,9 +20,9 @@ _ENCRYPTED = 0x41
 _LOCAL_HEADER_BYTES = 30
 # The list of contents is read as a whole: this is room for about 50 000 entries.
 _LARGEST_READ_BYTES = 6 << 20
-# Of bzip2 and LZMA, zipfile unpacks all that it has read, however much that becomes.
-_CHUNKS_BYTES = {zipfile.ZIP_STORED: 1 << 16, zipfile.ZIP_DEFLATED: 1 << 16}
-_SMALL_CHUNK_BYTES = 1 << 12
+# Of bzip2 and LZMA, zipfile unpacks whatever it has read at once: a kilobyte can become a gigabyte of memory.
+_PACKINGS = {zipfile.ZIP_BZIP2: "bzip2", zipfile.ZIP_LZMA: "LZMA"}
+_LINK_BYTES = 1 << 12
 # `git archive`, and so GitHub and GitLab, puts the commit's hash here.
 _GIT_COMMENT = re.compile(rb"[0-9a-f]{40}|[0-9a-f]{64}")
 _KINDS = (0, stat.S_IFREG, stat.S_IFDIR, stat.S_IFLNK)
@@ -73,18 +73,19 @@ def _unpack_entry(
         return
     if info.flag_bits & _ENCRYPTED:
         unpacker.refuse("it is protected by a password")
+    if info.compress_type in _PACKINGS:
+        raise NotImplementedError(f"by {_PACKINGS[info.compress_type]}")
     with archive.open(info) as content:
         if kind == stat.S_IFLNK:
             unpacker.link(path, _target(content))
         else:
             # git archive gives a mode to executable files alone.
             known = bool(mode & stat.S_IXUSR) if mode or by_git else None
-            chunk_bytes = _CHUNKS_BYTES.get(info.compress_type, _SMALL_CHUNK_BYTES)
-            unpacker.file(path, content, executable=known, chunk_bytes=chunk_bytes)
+            unpacker.file(path, content, executable=known)
 
 
 def _target(content: IO[bytes]) -> str:
-    return content.read(_SMALL_CHUNK_BYTES).decode("utf-8", "surrogateescape")
+    return content.read(_LINK_BYTES).decode("utf-8", "surrogateescape")
 
 
 def _entry_name(info: zipfile.ZipInfo) -> str:

@@ -21,6 +21,7 @@ _DEPTH_LIMIT = 20
 _STEPS_LIMIT = 20_000
 _LETTERS_LIMIT = 2_000_000
 _VALUE_LETTERS = 20_000
+_FILE_LIMIT_BYTES = 200_000
 _FALSE = frozenset({"0", "OFF", "NO", "FALSE", "N", "IGNORE", "NOTFOUND"})
 _LONE_DOLLAR = re.compile(r"(\\.)|\$(?![A-Za-z]*\{)", re.DOTALL)
 
@@ -54,7 +55,7 @@ def parse_cmake(folder: Path, name: str) -> CMakeFacts | None:
 
     Never raises; `fault` says why CMake would not read the file, and the calls are then those before it.
     """
-    data = read_markup(folder, _CMAKE_FILE)
+    data = read_markup(folder, _CMAKE_FILE, _FILE_LIMIT_BYTES)
     if isinstance(data, Fault):
         is_link = (folder / _CMAKE_FILE).is_symlink()
         if data.kind == "Missing" and not is_link:
@@ -81,6 +82,7 @@ class _Reader:
         self.fault: Fault | None = None
         self.read = {_CMAKE_FILE}
         self.steps = self.letters = 0
+        self.left_bytes = _FILE_LIMIT_BYTES
         self.variables = _Variables()
         self.variables["CMAKE_PROJECT_NAME"] = self.variables["PROJECT_NAME"] = name
         unknown = (_Variables("$ENV"), _Variables("$CACHE"))
@@ -170,13 +172,17 @@ class _Reader:
         if path in self.read or path.startswith(("/", "../")) or "\0" in path:
             return
         self.read.add(path)
-        data = read_markup(self.folder, path)
+        data = read_markup(self.folder, path, self.left_bytes)
         if isinstance(data, bytes):
+            self.left_bytes -= len(data)
             tree, fault = parse_tree_of(data, path)
             self.fault = self.fault or fault
             self.run(tree, path, depth + 1)
 
     def _arguments(self, tokens: list[Token], file: str) -> list[str]:
+        references = sum(token.value.count("${") for token in tokens)
+        if references * max(map(len, self.variables.values())) > _LETTERS_LIMIT:
+            return [printable(token.value[:_VALUE_LETTERS]) for token in tokens]
         try:
             resolved = resolve_args(self.context, [_escaped(t) for t in tokens if t.kind != "COMMENT"])
         except (CMakeError, RecursionError) as error:

@@ -15,7 +15,7 @@ from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_xml
 
 _FILES_MAX = 100
-_TAGS_MAX = 40_000
+_TAGS_MAX = 20_000
 _LETTERS_MAX = 4_000
 _SUFFIXES = (".launch", ".launch.xml", ".test")
 _TAGS = frozenset(

@@ -13,7 +13,7 @@ from grader.package.xml import line_of
 
 INCLUDES_MAX = 50
 DEPTH_MAX = 10
-WORK_MAX = 20_000
+WORK_MAX = 10_000
 
 
 _TOO_MUCH = "launch files that hold more than a robot can start"

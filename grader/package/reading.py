@@ -55,18 +55,19 @@ def _translated(error: OSError) -> Unreadable:
     return Unreadable(type(error).__name__, f"cannot be read: {error.strerror or error}")
 
 
-def read_markup(folder: Path, path: str) -> bytes | Fault:
-    """The bytes of a file of at most 1 MB, or the fault that keeps it from being read."""
+def read_markup(folder: Path, path: str, limit_bytes: int = MARKUP_LIMIT_BYTES) -> bytes | Fault:
+    """The bytes of a file of at most that size (1 MB), or the fault that keeps it from being read."""
     try:
         file = regular_file(folder, path)
         with file.open("rb") as stream:
-            data = stream.read(MARKUP_LIMIT_BYTES + 1)
+            data = stream.read(limit_bytes + 1)
     except Unreadable as error:
         return _unread(folder, path, error)
     except OSError as error:
         return _unread(folder, path, _translated(error))
-    if len(data) > MARKUP_LIMIT_BYTES:
-        return _unread(folder, path, Unreadable("TooLarge", "is larger than 1 MB and was not read"))
+    if len(data) > limit_bytes:
+        size = f"{limit_bytes // 1_000_000} MB" if limit_bytes >= 1_000_000 else f"{limit_bytes // 1_000} kB"
+        return _unread(folder, path, Unreadable("TooLarge", f"is larger than {size} and was not read"))
     return data
 
 
