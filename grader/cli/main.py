@@ -21,10 +21,8 @@ def run(argv: Sequence[str]) -> int:
     """Run one command line and return its exit code. Prints its errors itself; raises nothing."""
     _prepare_streams()
     _prepare_signals()
-    if not sys.warnoptions:
-        warnings.simplefilter(
-            "ignore"
-        )  # Python's remarks on a student's code quote it, and are for nobody here
+    if not sys.warnoptions:  # Python's remarks on a student's code quote it, and are for nobody here
+        warnings.simplefilter("ignore")
     return guarded(lambda: _dispatch(argv), debug="--debug" in argv)
 
 

@@ -154,7 +154,7 @@ def test_what_a_forge_would_act_on_is_code(text):
         ("    no code", "no code"),
         ("/chatter came at 5.02 Hz, not 10 Hz", "`/chatter` came at 5.02 Hz, not 10 Hz"),
         ("see (https://ros.org).", "see (`https://ros.org`)."),
-        ("package.xml: 10 %, R & D, 5 # 3", "`package.xml:` 10 %, R &amp; D, 5 # 3"),
+        ("package.xml: 10 %, R & D, 5 # 3", "`package.xml`: 10 %, R &amp; D, 5 # 3"),
         ("12:30:45", "12:30:45"),
         ("@0@0 and #1#2", "`@0@0` and `#1#2`"),
     ],

@@ -27,7 +27,7 @@ _LINKED = re.compile(
     """,
     re.VERBOSE | re.IGNORECASE,
 )
-_BEFORE, _AFTER = "(\"'", ".,;)\"'"
+_BEFORE, _AFTER = "(\"'", ".,:;)\"'"
 _MARKUP = re.compile(r"[\\`*\[\]|~$]|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])")
 _FIRST = re.compile(r"[#=:{]|[-+](?![^\s+-])")
 _NUMBERED = re.compile(r"(\d{1,9})([.)])(?!\S)")
@@ -46,7 +46,10 @@ def markdown(text: str, *, cell: bool = False) -> str:
 
 def markdown_code(text: str, *, cell: bool = False) -> str:
     """A code span that shows `text` as it is. A bar is escaped in a table's `cell`, and only there."""
-    text = visible(text)
+    return _code(visible(text), cell=cell)
+
+
+def _code(text: str, *, cell: bool) -> str:
     if not text.strip():
         return ""
     fence = "`" * (1 + max((len(run) for run in re.findall("`+", text)), default=0))
@@ -60,7 +63,7 @@ def _word(word: str, *, cell: bool) -> str:
     rest = word.lstrip(_BEFORE)
     middle = _closed(rest, rest.rstrip(_AFTER))
     before, after = word[: len(word) - len(rest)], rest[len(middle) :]
-    return _escaped(before) + markdown_code(middle, cell=cell) + _escaped(after)
+    return _escaped(before) + _code(middle, cell=cell) + _escaped(after)
 
 
 def _closed(rest: str, middle: str) -> str:
