@@ -12,6 +12,7 @@ _LETTERS = str.maketrans(
     | {"đ": "d", "Đ": "D", "ð": "d", "þ": "th", "\N{LATIN SMALL LETTER DOTLESS I}": "i"}
 )
 _ARCHIVE_SUFFIX = re.compile(r"\.(zip|tar|tar\.(gz|xz|bz2)|tgz|txz|tbz2?)$", re.IGNORECASE)
+_DEVICE = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 _SHOWN_AT_MOST = 5
 _SHOWN_LETTERS = 120
 
@@ -19,13 +20,14 @@ _SHOWN_LETTERS = 120
 def safe_name(text: str) -> str:
     """`text` as a file's name: `[A-Za-z0-9._-]`, 1 to 100 characters, not hidden, never `.` or `..`.
 
-    Accents are dropped. Where letters had to be given up, or the name was too long, a short hash of the whole
+    Nor is it a device of Windows (`CON`, `nul.txt`), where somebody may look at the results. Accents are dropped. Where letters had to be given up, or the name was too long, a short hash of the whole
     keeps two such names apart.
     """
     plain = unicodedata.normalize("NFKD", text.translate(_LETTERS))
     plain = "".join(char for char in plain if not unicodedata.combining(char))
     lost = any(ord(char) > 127 and not char.isspace() for char in plain)
     name = re.sub(r"[^A-Za-z0-9._-]+", "-", plain).lstrip(".-").rstrip(".-")
+    name = f"submission-{name}" if _DEVICE.fullmatch(name) else name
     if not lost and len(name) <= MAX_NAME:
         return name or "submission"
     digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]

@@ -24,6 +24,11 @@ from grader.intake.names import archive_stem, printable, safe_name
         ("", "submission"),
         ("ros_lab-1.0", "ros_lab-1.0"),
         ("-rf", "rf"),
+        ("CON", "submission-CON"),
+        ("nul.tar", "submission-nul.tar"),
+        ("com1..", "submission-com1"),
+        ("console", "console"),
+        ("\x1b[2J\n::error::", "2J-error"),
     ],
 )
 def test_names(text, name):
