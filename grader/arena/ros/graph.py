@@ -1,5 +1,6 @@
 """Tells the grader what is registered, after each change: often while there is little to tell, rarely when much."""
 
+import collections
 import json
 import threading
 import time
@@ -21,12 +22,12 @@ class GraphLog:
         self._due = self._arrivals = False
         self._bytes = 0
         self._last_s = 0.0
-        self._by = ""
+        self._changes = collections.Counter()
         self._lock = threading.Lock()
 
     def changed(self, by, *, arrival=False):
         """Registrations come in bursts: tell once they pause. `by` is the process that made the change."""
-        self._by = by or self._by
+        self._changes[by or ""] += 1
         self._arrivals = self._arrivals or arrival
         self._loop.call_soon(self._schedule)
 
@@ -49,9 +50,9 @@ class GraphLog:
                 self._bytes += size
                 self._last_s = now_s
         if left_out:
-            self._guard.limit(
-                self._by, "registered and unregistered so much that not every change is recorded"
-            )
+            ((most, _),) = self._changes.most_common(1) or (("", 0),)
+            detail = "registered and unregistered so much that not every change is recorded"
+            self._guard.limit(most, detail)
         else:
             self._wire.event("/grader/graph", record)
 

@@ -205,7 +205,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
             "publishers": dict(publishers),
             "subscribers": dict(subscribers),
             "services": dict(offered),
-            "processes": {name: owner for name, api in apis.items() if (owner := self._owners.of(api))},
+            "processes": {name: owner for name, api in apis.items() if (owner := self._owners.known(api))},
         }
         record["service_types"] = self._types_of(service_apis)
         if connections:

@@ -5,6 +5,7 @@ copies that fight for one name. A caller's is the one that is connected from the
 """
 
 import os
+import threading
 import time
 
 import sockets
@@ -13,6 +14,8 @@ from bounded import port_of
 LOOKS_MAX = 3
 AGAIN_S = 0.2
 ASKED_MAX = 5000
+REST = 2
+"""So many times as long as the last look took, there is no other."""
 
 
 class Owners:
@@ -21,7 +24,10 @@ class Owners:
     def __init__(self, trees):
         self._trees = trees
         self._known = {}
-        self._looked = {}
+        self._asked = {}
+        self._looking = threading.Lock()
+        self._looked_s = self._look_took_s = 0.0
+        self._holders = {}
 
     def of(self, api):
         """The name of the process whose node has this address; None where it cannot be told."""
@@ -29,8 +35,12 @@ class Owners:
             self.look(api)
         return self._known.get(api)
 
+    def known(self, api):
+        """The same, without a look."""
+        return self._known.get(api)
+
     def look(self, api):
-        """The same, found out anew: ports are used again."""
+        """The owner, found out anew: ports are used again."""
         port = port_of(api)
         owner = self._holder(sockets.listening(port)) if port else None
         if owner is not None:
@@ -44,27 +54,48 @@ class Owners:
     def _may_look(self, api):
         """An address that nobody listens on costs a few looks, not one at every change of the graph."""
         now_s = time.monotonic()
-        looks, last_s = self._looked.get(api, (0, 0.0))
-        if looks >= LOOKS_MAX or now_s - last_s < AGAIN_S or len(self._looked) > ASKED_MAX:
+        looks, last_s = self._asked.get(api, (0, 0.0))
+        if looks >= LOOKS_MAX or now_s - last_s < AGAIN_S or len(self._asked) > ASKED_MAX:
             return False
-        self._looked[api] = looks + 1, now_s
+        self._asked[api] = looks + 1, now_s
         return True
 
     def _holder(self, inodes):
-        """The process that has one of these sockets open."""
-        inodes = {"socket:[{}]".format(inode) for inode in inodes}
-        if not inodes:
+        """The process that has one of these sockets open. Many who ask at once share one look at all processes."""
+        wanted = ["socket:[{}]".format(inode) for inode in inodes]
+        if not wanted:
             return None
-        return next((name for name, pids in self._trees() if any(_holds(pid, inodes) for pid in pids)), None)
+        asked_s = time.monotonic()
+        with self._looking:
+            if self._looked_s < asked_s:
+                self._look_at_all()
+            return next((self._holders[link] for link in wanted if link in self._holders), None)
+
+    def _look_at_all(self):
+        """Thousands of open files make looks rarer, not the arena slower."""
+        pause_s = REST * self._look_took_s - (time.monotonic() - self._looked_s)
+        if pause_s > 0:
+            threading.Event().wait(pause_s)
+        self._looked_s = time.monotonic()
+        self._holders = {
+            link: name
+            for name, pids in reversed(self._trees())
+            for pid in pids
+            for link in _open_sockets(pid)
+        }
+        self._look_took_s = time.monotonic() - self._looked_s
 
 
-def _holds(pid, inodes):
+def _open_sockets(pid):
     folder = "/proc/{}/fd".format(pid)
     try:
         numbers = os.listdir(folder)
     except OSError:
-        return False  # it has ended, or is not ours to look into
-    return any(_target("{}/{}".format(folder, number)) in inodes for number in numbers)
+        return  # it has ended, or is not ours to look into
+    for number in numbers:
+        link = _target("{}/{}".format(folder, number))
+        if link.startswith("socket:"):
+            yield link
 
 
 def _target(link):

@@ -5,11 +5,13 @@ import contextlib
 import threading
 
 from bounded import port_of
+from values import weight
 
 WORKERS_MAX = 256
 EACH_MAX = 8
 WAITING_MAX = 5000
 IDLE_S = 5.0
+LARGE_BYTES = 64 << 10
 
 
 class Pool:
@@ -88,10 +90,12 @@ class Pool:
 
 class Notifications:
     """What rosmaster queues for nodes (a new publisher, a changed parameter, a name that was taken over), in the
-    shape of its own thread pool. One node gets them one after the other, in order."""
+    shape of its own thread pool. One node gets them one after the other, in order; large ones, of which each takes
+    memory anew, are told to one node at a time."""
 
     def __init__(self):
         self._pool = Pool(each_max=1)
+        self._large = Pool(workers_max=1)
 
     def queue_task(self, marker, task, args):
         """`marker` is the address of the node that the task speaks to."""
@@ -100,7 +104,8 @@ class Notifications:
             with contextlib.suppress(Exception):  # whatever a node answers, or does not: nobody waits for it
                 task(*args)
 
-        return self._pool.submit(port_of(marker), job)
+        large = weight(args, LARGE_BYTES) > LARGE_BYTES
+        return (self._large if large else self._pool).submit(port_of(marker), job)
 
     def join_all(self, wait_for_tasks=True, wait_for_threads=True):
         """Its threads end with the arena."""

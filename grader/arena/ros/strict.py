@@ -13,7 +13,10 @@ ELEMENTS_MAX = 200000
 DEPTH_MAX = 120
 """Of elements: a value inside of a value takes four or five."""
 DIGITS_MAX = 40
-_ATTRIBUTE = re.compile(rb"<[^<?!/>\s]+\s+[^<>/\s]")
+TAG_BYTES_MAX = 100
+PIECE_BYTES = 1 << 16
+"""Read at once: other threads have their turn in between."""
+_LONG_TAG = re.compile(rb"<[^<>]{%d}" % TAG_BYTES_MAX)
 _LEFT_OUT = ("nil", "i1", "i2", "biginteger", "bigdecimal")
 
 
@@ -25,8 +28,9 @@ def read(data):
     """(values, method name or None) of a whole call or answer; raise Malformed, or the xmlrpc.client.Fault in it."""
     if b"<!" in data:
         raise Malformed("a document type, entities or comments")
-    if _ATTRIBUTE.search(data):
-        raise Malformed("attributes")
+    for start in range(0, len(data), PIECE_BYTES):
+        if _LONG_TAG.search(data, start, start + PIECE_BYTES + TAG_BYTES_MAX):
+            raise Malformed("an element with more than a name")
     target = _Unmarshaller()
     try:
         _parse(data, target)
@@ -48,6 +52,8 @@ def _parse(data, target):
         depth += 1
         if elements > ELEMENTS_MAX:
             raise Malformed("more than {} elements".format(ELEMENTS_MAX))
+        if attributes:
+            raise Malformed("an element with more than a name")
         if depth > DEPTH_MAX:
             raise Malformed("values nested too deeply")
         target.start(tag, attributes)
@@ -62,7 +68,9 @@ def _parse(data, target):
     parser.buffer_text = True
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler = target.data
-    parser.Parse(data, True)
+    for piece in range(0, len(data), PIECE_BYTES):
+        parser.Parse(data[piece : piece + PIECE_BYTES], False)
+    parser.Parse(b"", True)
 
 
 class _Unmarshaller(xmlrpc.client.Unmarshaller):
