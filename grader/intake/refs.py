@@ -54,7 +54,7 @@ def no_such_ref(refs: dict[str, str], ref: str, *, given: str) -> SubmissionErro
     hint = (
         f"Did you mean @{printable(near[0])}?" if near else f"There are: {listing(names) or 'no branches'}."
     )
-    return SubmissionError(f"{given}: there is no branch, tag or commit {printable(ref)!r}", hint=hint)
+    return SubmissionError(f"{given}: there is no branch, tag or commit '{printable(ref)}'", hint=hint)
 
 
 def _default(refs: dict[str, str], given: str) -> Wanted:

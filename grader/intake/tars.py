@@ -72,7 +72,7 @@ def _unpack_member(archive: tarfile.TarFile, member: tarfile.TarInfo, unpacker: 
     elif member.isreg() and (content := archive.extractfile(member)) is not None:
         unpacker.file(path, content, executable=bool(member.mode & 0o100))
     else:
-        unpacker.refuse(f"the entry {brief(path)!r} is a device or a pipe")
+        unpacker.refuse(f"the entry '{brief(path)}' is a device or a pipe")
 
 
 class _Member(tarfile.TarInfo):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import shutil
@@ -46,7 +47,7 @@ class Unpacker:
         self._meter.entry(name)
         parts = [part for part in name.split("/") if part not in ("", ".")]
         if name.startswith("/") or ".." in parts or _OUTSIDE.search(name):
-            self.refuse(f"the entry {brief(name)!r} leads outside of it")
+            self.refuse(f"the entry '{brief(name)}' leads outside of it")
         if not parts or NO_CONTENT.intersection(parts) or parts[-1].startswith("._"):
             return None
         path = "/".join(parts)
@@ -84,7 +85,7 @@ class Unpacker:
             self._large.append(path)
             return
         if first not in self.executable:
-            self.refuse(f"the entry {brief(path)!r} is a link to what is not in it")
+            self.refuse(f"the entry '{brief(path)}' is a link to what is not in it")
         if first != path:
             # Whoever copies the package or reads all of it meets the file once more.
             self._meter.data(self._sizes[first])
@@ -94,7 +95,7 @@ class Unpacker:
 
     def link(self, path: str, target: str) -> None:
         if len(os.fsencode(target)) > _LONGEST_TARGET or "\0" in target or not target:
-            self.refuse(f"the link {brief(path)!r} has no usable target")
+            self.refuse(f"the link '{brief(path)}' has no usable target")
         self._links[path] = target
 
     def finish(self) -> list[str]:
@@ -127,10 +128,10 @@ class Unpacker:
     def _make_link(self, path: str, target: str) -> None:
         place = self._root / path
         if place.is_dir() and not place.is_symlink():
-            self.refuse(f"the entry {brief(path)!r} is a link and a folder at once")
+            self.refuse(f"the entry '{brief(path)}' is a link and a folder at once")
         place = self._free(path)
         if place.parent.resolve() != self._root.resolve().joinpath(*path.split("/")[:-1]):
-            self.refuse(f"the entry {brief(path)!r} lies behind a link")
+            self.refuse(f"the entry '{brief(path)}' lies behind a link")
         place.symlink_to(target)
 
     def refuse(self, why: str) -> None:
@@ -142,13 +143,14 @@ class Unpacker:
     def _leads_out(self, path: str) -> bool:
         if self._links[path].startswith("/"):
             return True
+        place = self._root / path
         try:
-            real = Path(
-                os.path.realpath(self._root / path)
-            )  # Path.resolve raises for a loop, before Python 3.13
-        except RecursionError:  # a chain that no system would follow
-            return True
-        return not real.is_relative_to(self._root.resolve())
+            place.stat()
+        except OSError as error:
+            if error.errno == errno.ELOOP:  # a chain that no system follows leads nowhere
+                return False
+        # Path.resolve raises for a loop, before Python 3.13
+        return not Path(os.path.realpath(place)).is_relative_to(self._root.resolve())
 
     def _free(self, path: str) -> Path:
         """The place for an entry; a later entry of the same name replaces the one before."""

@@ -54,7 +54,7 @@ def _refuse_overlaps(infos: list[zipfile.ZipInfo], unpacker: Unpacker) -> None:
     ordered = sorted(infos, key=lambda info: info.header_offset)
     for one, two in pairwise(ordered):
         if one.header_offset + _LOCAL_HEADER_BYTES + one.compress_size > two.header_offset:
-            unpacker.refuse(f"the entry {brief(two.filename)!r} lies in another one")
+            unpacker.refuse(f"the entry '{brief(two.filename)}' lies in another one")
 
 
 def _unpack_entry(
@@ -67,7 +67,7 @@ def _unpack_entry(
     mode = info.external_attr >> 16 if info.create_system in _UNIX else 0
     kind = stat.S_IFMT(mode)
     if kind not in _KINDS:
-        unpacker.refuse(f"the entry {brief(path)!r} is a device or a pipe")
+        unpacker.refuse(f"the entry '{brief(path)}' is a device or a pipe")
     if name.endswith("/") or kind == stat.S_IFDIR:
         unpacker.folder(path)
         return
