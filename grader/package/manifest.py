@@ -96,7 +96,7 @@ def _shorten(root: etree._Element) -> None:
             element.tail = element.tail[:_TEXT_LETTERS]
         for name, value in element.attrib.items():
             element.set(name, value[:_TEXT_LETTERS])
-        condition = element.get("condition", "")
+        condition = element.get("condition") or ""  # a comment has no attributes, not even the default
         if len(condition) > _CONDITION_LETTERS or condition.count("(") > _CONDITION_BRACKETS:
             raise ValueError(f"condition '{condition[:40]}...' failed to parse")
 

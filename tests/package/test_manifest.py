@@ -156,6 +156,13 @@ def test_a_doctype_without_entities_is_harmless():
     assert manifest.name == "lab1"
 
 
+def test_comments_and_processing_instructions_are_harmless():
+    data = changed("<name>", "<!-- a comment --><?an instruction?>\n<name>")
+    manifest, fault = parse_manifest(data)
+    assert fault is None
+    assert manifest is not None
+
+
 def test_missing_and_misnamed_files_and_links(tmp_path):
     assert read_manifest(tmp_path)[1].kind == "Missing"
     (tmp_path / "Package.xml").write_text(MANIFEST)
