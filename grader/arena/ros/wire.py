@@ -46,7 +46,7 @@ class Wire:
         self._channels = 0
         with contextlib.suppress(OSError):  # smaller pipes only mean more writes
             fcntl.fcntl(fd, F_SETPIPE_SZ, PIPE_BYTES)
-        threading.Thread(target=self._write, daemon=True).start()
+        self._writes = False  # a process that is to enter namespaces has no other thread yet
 
     @property
     def congested(self):
@@ -90,6 +90,9 @@ class Wire:
         if size < WRITE_BYTES:
             parts = [b"".join(parts)]
         with self._changed:
+            if not self._writes:
+                self._writes = True
+                threading.Thread(target=self._write, daemon=True).start()
             self._changed.wait_for(lambda: self._bytes < QUEUE_BYTES_MAX)
             self._queue += parts
             self._bytes += size
