@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from grader.shown import line, visible
+from grader.shown import line, uncommanded, visible
 
 NOTE_CHARS = 300
 HEAD = """\
@@ -27,6 +27,15 @@ class _Dumper(yaml.SafeDumper):
     def increase_indent(self, flow: bool = False, indentless: bool = False) -> None:  # noqa: ARG002 - PyYAML's own
         """Indent the entries of lists."""
         super().increase_indent(flow, False)
+
+
+def _quoted(dumper: _Dumper, text: str) -> yaml.ScalarNode:
+    """What a CI's log could take for a command stands in double quotes, where `uncommanded` writes escapes."""
+    style = '"' if "##" in text or "::" in text else None
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+_Dumper.add_representer(str, _quoted)
 
 
 def rubric_text(
@@ -69,8 +78,8 @@ def _dumped(data: object, *, flow: bool | None) -> str:
             data, Dumper=_Dumper, sort_keys=False, allow_unicode=letters, width=110, default_flow_style=flow
         )
 
-    text = dump(letters=True)
-    return text if visible(text, lines=True) == text else dump(letters=False)
+    text = uncommanded(dump(letters=True))
+    return text if visible(text, lines=True) == text else uncommanded(dump(letters=False))
 
 
 def _one_line(text: str) -> str:
