@@ -3,10 +3,11 @@ LAB := leeds-comp3631-lab1
 LABS := $(basename $(notdir $(wildcard rubrics/mutants/*.yaml)))
 BIN := .venv/bin
 TIMES ?= 10
+MINUTES ?= 10
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test lint test-pure test-ros stress bench fixtures mutants fmt clean
+.PHONY: help setup demo test lint test-pure test-ros stress fuzz bench fixtures mutants fmt clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -35,6 +36,9 @@ test-ros: setup ## the tests that run real nodes
 
 stress: setup ## the reference solution and every fixture, TIMES times each
 	@$(BIN)/python -m tests.stress --times $(TIMES)
+
+fuzz: setup ## the parsers of foreign data at random, for MINUTES minutes; tests/fuzz/README.md
+	@$(BIN)/python -m tests.fuzz --minutes $(MINUTES)
 
 bench: setup ## the figures of benchmarks/README.md, measured here
 	@$(BIN)/python benchmarks/run.py --write

@@ -25,7 +25,7 @@ from grader.evidence.room import NoRoom, Room
 OWN_NODE = re.compile(r"/grader_(recorder|actor)_[0-9a-f]{8}(_knock)?")
 BARE_NAME = "/grader"
 DECODER_BYTES = 200_000
-LETTER_BYTES = 1_000
+LETTER_BYTES = 1_400
 """What a decoder takes, and for each letter of its definition: time more than memory."""
 
 

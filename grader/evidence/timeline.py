@@ -7,6 +7,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from grader.evidence import decode
 from grader.evidence.events import (
     ActorEvent,
@@ -69,7 +71,8 @@ def parse_timeline(timeline: Mapping[str, Any]) -> dict[str, TimelineRun]:
     if "runs" in top:
         if unknown := top.keys() - {"runs"}:
             raise ValueError(f"unknown beside `runs`: {', '.join(sorted(map(str, unknown)))}")
-        given = {str(name): dict(keys or {}) for name, keys in top["runs"].items()}
+        runs = TypeAdapter(dict[str, dict[str, Any] | None]).validate_python(top["runs"])
+        given = {name: dict(keys or {}) for name, keys in runs.items()}
     else:
         given = {str(top.get("scenario", "run")): top} if top else {}
     if package is not None:

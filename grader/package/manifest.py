@@ -17,6 +17,7 @@ from grader.package.xml import line_of, parse_xml
 
 MANIFEST = "package.xml"
 _TEXT_LETTERS = 4_000
+_TAGS = 600
 _CONDITIONS = 200
 _CONDITION_LETTERS = 300
 _CONDITION_BRACKETS = 20
@@ -85,8 +86,11 @@ def _meaning(root: etree._Element, said: list[str]) -> Package:
 def _shorten(root: etree._Element) -> None:
     """Cut what is too long for catkin_pkg: its patterns take time by the square of a text's length.
 
-    Raises ValueError for conditions that its parser could work on for years.
+    Raises ValueError for conditions that its parser could work on for years, and for more dependencies than it can
+    compare with each other.
     """
+    if len(root) > _TAGS:
+        raise ValueError(f"more than {_TAGS} tags")
     if sum("condition" in element.attrib for element in root.iter(etree.Element)) > _CONDITIONS:
         raise ValueError(f"more than {_CONDITIONS} conditions")
     for element in root.iter():
