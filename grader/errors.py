@@ -75,7 +75,7 @@ class RubricError(UsageError):
 
 class SubmissionError(GraderError):
     kind = "submission"
-    blame = "submission"
+    blame: Blame = "submission"
 
 
 class PackageNotFound(SubmissionError):

@@ -15,7 +15,7 @@ from pathlib import Path
 from platform import python_version
 
 from grader import __version__
-from grader.arena.recording import Recorder, Recording
+from grader.arena.recording import RETRIES, Recorder, Recording
 from grader.arena.sandbox import Mode
 from grader.errors import EvidenceError, SubmissionError, UsageError
 from grader.evidence.reader import load_evidence
@@ -42,8 +42,6 @@ from grader.results import EVIDENCE, Results, finish_killed
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_package, started
 from grader.temporary import temporary_folder
-
-RETRIES = 2
 
 
 @dataclass(frozen=True, kw_only=True)

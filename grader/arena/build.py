@@ -40,7 +40,12 @@ class BuildOutcome(Record):
 
 
 async def build(
-    place: Place, writer: EvidenceWriter, python_files: Iterable[str], answers: Iterable[str]
+    place: Place,
+    writer: EvidenceWriter,
+    python_files: Iterable[str],
+    answers: Iterable[str],
+    *,
+    last_run: bool = False,
 ) -> tuple[Place, BuildOutcome]:
     """Run `catkin_make`, then `rosrun` on each script of `answers` as handed in; what they print is evidence.
     `python_files` are compiled by ROS's own Python, and not run.
@@ -48,7 +53,7 @@ async def build(
     Returns the place with the built workspace's environment. Raises ArenaError where the arena fails.
     """
     (place.folder / "bin" / "python-files.json").write_text(json.dumps(list(python_files)))
-    async with ArenaSession(place, writer, master=False) as arena:
+    async with ArenaSession(place, writer, master=False, last_run=last_run) as arena:
         arena.course(ScenarioEvent(event="begin"))
         arena.start(place.spec("catkin_make", _catkin_make(place), role="build", build=True, collect=ARCHIVE))
         arena.start(place.spec("syntax", _syntax(place), role="grader", as_handed_in=True, collect=SYNTAX))

@@ -50,6 +50,16 @@ def find_cgroups() -> Cgroups:
     return Cgroups(memory=_find("memory"), pids=_find("pids"))
 
 
+def remove_groups(cgroups: Cgroups, arena: int) -> bool:
+    """Remove the groups that an arena left which was killed, by its process id. False while processes are in them."""
+    folders = [Path(found.folder) for found in (cgroups.memory, cgroups.pids) if found is not None]
+    groups = [group for folder in folders for group in folder.glob(f"grader-{arena}-*")]
+    for group in groups:
+        with suppress(OSError):
+            group.rmdir()
+    return not any(group.exists() for group in groups)
+
+
 def describe() -> str:
     """For `grader doctor`: what holds memory and tasks, and why it is no cgroup where it is none."""
     found = find_cgroups()

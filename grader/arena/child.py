@@ -40,6 +40,10 @@ class ArenaProcess:
         self._watch(self._popen.stdout, take)
         self._watch(self._popen.stderr, self._keep_errors)
 
+    @property
+    def pid(self) -> int:
+        return self._popen.pid
+
     def send(self, command: dict[str, Any]) -> None:
         """One command, as a line of JSON. That it has ended is told by its output's end."""
         if self._popen.stdin is not None:

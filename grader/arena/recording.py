@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ from grader import __version__
 from grader.arena.asynchronous import run_until_signal, side_by_side
 from grader.arena.build import BUILD_EXPECTED_S, BuildOutcome, build
 from grader.arena.inside import prepare
+from grader.arena.lanes import lanes
 from grader.arena.limits import Limits
 from grader.arena.place import Place
 from grader.arena.ros_env import RosInstallation, find_ros
@@ -36,8 +38,8 @@ from grader.rubric.model import Rubric, Scenario
 from grader.temporary import temporary_folder
 
 PACKAGE = "package"
-LONG_S = 3.0
-RATE = "rate"
+RETRIES = 2
+"""So often a run is recorded again that could not be judged."""
 ATTACHED_BYTES_MAX = 256 << 10
 ATTACHED_FILES_MAX = 60
 ATTACHED_SUFFIXES = (
@@ -100,6 +102,7 @@ class Recorder:
         self.recording = Recording(folder=folder, facts=facts, ros=ros, sandbox=choose(mode) if ros else None)
         self._place: Place | None = None
         self._stack = ExitStack()
+        self._runs: Counter[str] = Counter()
 
     def __enter__(self) -> Self:
         base = temporary_base(self.recording.sandbox)
@@ -166,7 +169,9 @@ class Recorder:
         recording = self.recording
         faulty = [script for script in self._scripts() if _needs_answer(recording.facts, script)]
         try:
-            self._place, outcome = await build(place, writer, python_paths(recording.facts), faulty)
+            self._place, outcome = await build(
+                place, writer, python_paths(recording.facts), faulty, last_run=last
+            )
         except ArenaError as error:
             if not last:
                 raise
@@ -232,8 +237,17 @@ class Recorder:
 
         path = self.recording.folder / f"{name}.mcap"
         self.recording.add(
-            await run_scenario(name, scenario, place, path=path, metadata=self._metadata(), tell=tell)
+            await run_scenario(
+                name,
+                scenario,
+                place,
+                path=path,
+                metadata=self._metadata(),
+                tell=tell,
+                last_run=self._runs[name] == RETRIES,
+            )
         )
+        self._runs[name] += 1
         if path not in self.recording.files:
             self.recording.files.append(path)
         self._progress.step(name, "done")
@@ -254,27 +268,6 @@ class Recorder:
         }
 
 
-def lanes(rubric: Rubric) -> tuple[tuple[str, ...], ...]:
-    """Names of the runs that go one after the other; the lanes go side by side.
-
-    Runs whose rates are judged have a lane of their own, and so have long ones that only watch. The others share one
-    where a rate is measured beside them, else two of about the same length: starting processes takes CPU.
-    """
-    scenarios = rubric.scenarios
-    rated = {c.scenario for c in rubric.criteria if c.check == RATE}
-    measuring = tuple(n for n, s in scenarios.items() if n in rated and s.clock == "real")
-    watching = tuple(n for n, s in scenarios.items() if n not in measuring and _watches(s))
-    others = [n for n in scenarios if n not in measuring and n not in watching]
-    if measuring:
-        return tuple(lane for lane in (measuring, watching, tuple(others)) if lane)
-    first: list[str] = []
-    second: list[str] = []
-    for name in others:
-        shorter = min(first, second, key=lambda lane: sum(expected_s(scenarios[n]) for n in lane))
-        shorter.append(name)
-    return tuple(lane for lane in (watching, tuple(first), tuple(second)) if lane)
-
-
 @contextmanager
 def _readable_by_all() -> Iterator[None]:
     """Whatever the user's umask: root's student is somebody else. The folder around it has a name that nobody knows."""
@@ -283,11 +276,6 @@ def _readable_by_all() -> Iterator[None]:
         yield
     finally:
         os.umask(before)
-
-
-def _watches(scenario: Scenario) -> bool:
-    until = scenario.until
-    return scenario.clock == "real" and max(until.window_s or 0, until.alive_s or 0) >= LONG_S
 
 
 def _needs_answer(facts: PackageFacts, path: str) -> bool:

@@ -53,13 +53,20 @@ def expected_s(scenario: Scenario) -> float:
 
 
 async def run_scenario(
-    name: str, scenario: Scenario, place: Place, *, path: Path, metadata: Mapping[str, str], tell: Tell
+    name: str,
+    scenario: Scenario,
+    place: Place,
+    *,
+    path: Path,
+    metadata: Mapping[str, str],
+    tell: Tell,
+    last_run: bool = False,
 ) -> ScenarioCost:
     """Record the scenario at `path`. An arena that fails still leaves evidence, with the outcome `host`."""
     warp = scenario.warp if scenario.clock == "warped" else 1.0
     starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place)]
     with EvidenceWriter(path, scenario=name, clock=scenario.clock, warp=warp, metadata=metadata) as writer:
-        session = ArenaSession(place, writer)
+        session = ArenaSession(place, writer, last_run=last_run)
         if not any(spec["role"] == "student" for _, spec in starts):
             session.course(ScenarioEvent(event="end", outcome="ended", detail="there was nothing to start"))
             return ScenarioCost(cpu_s=0, student_cpu_s=0)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import re
 import secrets
-import signal
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,8 +12,10 @@ from typing import Any
 
 from typing_extensions import Self
 
+from grader.arena.cgroups import remove_groups
 from grader.arena.child import ArenaProcess
 from grader.arena.frames import Frame, FrameReader
+from grader.arena.killed import Killed
 from grader.arena.live import Live
 from grader.arena.place import Place
 from grader.errors import ArenaError
@@ -28,19 +28,20 @@ ROSOUT = ("/usr/lib/rosout/rosout", "lib/rosout/rosout")
 LOG_FOLDER = ("/bin/sh", "-c", 'mkdir -p "$ROS_HOME/log" && exec "$0"')
 READY_S = 15.0
 END_S = 5.0
+GROUPS_S, LOOK_S = 2.0, 0.02
 PORT = 11311
-KILLED_BELOW = re.compile(r"Killed signal terminated program|process has died \[pid \d+, exit code -9,")
-"""What the compiler's driver and roslaunch say of a process of theirs that SIGKILL ended."""
 
 
 class ArenaSession:
     """`async with ArenaSession(…) as arena`: inside, the managed roscore runs (or, without `master`, only processes).
 
     Raises ArenaError when it does not start or dies. Times are those of its start plus monotonic time, as the arena's
-    own are: a clock that is set while it runs moves none of them.
+    own are: a clock that is set while it runs moves none of them. `last_run` says that it will not be run again.
     """
 
-    def __init__(self, place: Place, writer: EvidenceWriter, *, master: bool = True) -> None:
+    def __init__(
+        self, place: Place, writer: EvidenceWriter, *, master: bool = True, last_run: bool = False
+    ) -> None:
         self.live = Live()
         self.cpu_s = 0.0
         self.student_cpu_s = 0.0
@@ -55,9 +56,8 @@ class ArenaSession:
         self.rosout_up = False
         self._failure = ""
         self._error: Exception | None = None
-        self._killed: list[str] = []
-        self._limited: set[str] = set()
-        self._stopping: set[str] = set()
+        self._killed = Killed(sandboxed=place.sandbox.bubblewrap)
+        self._last_run = last_run
         self._offset_ns = time.time_ns() - time.monotonic_ns()
         self._frames = FrameReader()
         self._calls = 0
@@ -70,12 +70,21 @@ class ArenaSession:
             self.send(**self._config())
             await self._await_ready()
         except BaseException:
-            await self._process.end()
+            await self._end()
             raise
         return self
 
     async def __aexit__(self, *_: object) -> None:
+        await self._end()
+
+    async def _end(self) -> None:
+        """With what an arena that was killed could not remove itself."""
         await self._process.end()
+        until_s = time.monotonic() + GROUPS_S
+        while not self._done and not remove_groups(self.place.sandbox.cgroups, self._process.pid):
+            if time.monotonic() > until_s:
+                break
+            await asyncio.sleep(LOOK_S)
 
     async def _await_ready(self) -> None:
         if not await self.wait(lambda: self._ready, READY_S):
@@ -91,7 +100,7 @@ class ArenaSession:
 
     async def interrupt(self, name: str, *, int_s: float, term_s: float) -> None:
         """Ctrl-C; TERM after `int_s`, KILL after another `term_s`. Returns when the process has ended."""
-        self._stopping.add(name)
+        self._killed.stopping(name)
         self.send(do="interrupt", name=name, int_s=int_s, term_s=term_s)
         await self.wait(lambda: name in self.exit_codes, int_s + term_s + END_S)
 
@@ -141,10 +150,10 @@ class ArenaSession:
         self.send(do="finish")
         if not await self.wait(lambda: self._done, END_S):
             raise ArenaError("the managed roscore did not end in order", hint="grade again")
-        killed = [name for name in self._killed if name not in self._limited]
+        killed = self._killed.first(last_run=self._last_run)
         if killed:
             raise ArenaError(
-                f"{killed[0]} was killed (SIGKILL), and not by the grader: the machine may be out of memory",
+                f"{killed} was killed (SIGKILL), and not by the grader: the machine may be out of memory",
                 hint="grade again",
             )
 
@@ -211,8 +220,7 @@ class ArenaSession:
             self.live.graph(nodes, record["processes"], time.monotonic(), picture=picture)
             self.live.services = set(record["services"])
         elif topic == "/grader/console":
-            if KILLED_BELOW.search(record["line"]) and record["process"] not in self._stopping:
-                self._killed.append(record["process"])
+            self._killed.printed(record["process"], record["line"])
             if record["process"] not in self.live.helpers:
                 self.live.printed(record["line"], time.monotonic())
         elif topic == "/grader/process" and record["event"] == "exit":
@@ -220,7 +228,7 @@ class ArenaSession:
         elif topic == "/grader/param" and not is_grader_node(record["caller_id"]):
             self.live.active(time.monotonic())
         elif topic == "/grader/actor" and record["action"] == "limit":
-            self._limited.add(record["actor"])
+            self._killed.limited(record["actor"])
         elif topic == "/grader/actor" and record["action"] == "open":
             self.live.opened.add(record["actor"])
             self.live.active(time.monotonic())
@@ -232,9 +240,8 @@ class ArenaSession:
         else:
             self.student_cpu_s += record["cpu_s"]
         self.exit_codes[name] = record["exit_code"]
-        tried_out = record["role"] == "student" and not self._master  # what a build says of a script
-        if record["signal"] == signal.SIGKILL and record["stopped_by"] is None and not tried_out:
-            self._killed.append(name)
+        if self._master or record["role"] != "student":  # what a build only tries out may end as it likes
+            self._killed.ended(record)
         self.live.helpers.discard(name)
         if name in self.live.running:
             self.live.running.remove(name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.arena.recording import lanes
+from grader.arena.lanes import lanes
 from grader.rubric.model import Criterion, Rubric, Scenario, Start, Until
 
 
