@@ -8,11 +8,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from grader.errors import EvidenceError, SubmissionError
+from grader.evidence.bag import LESS
 from grader.evidence.events import RECORDING_MISSING, RECORDING_PROBLEM, ScenarioEvent
 from grader.evidence.reader import SUFFIXES, load_evidence
 from grader.evidence.writer import EvidenceWriter
 from grader.files import unwritable
-from grader.intake import find_recordings, safe_name
+from grader.intake import Limits, find_recordings, safe_name
 from grader.model.progress import Progress
 from grader.model.submission import RecordedSubmission, Submission
 from grader.rubric.model import Rubric
@@ -25,9 +26,7 @@ def keep_recording(path: Path, folder: Path) -> Path:
 
     Raises EvidenceError where it cannot be read, SubmissionError where it is evidence of the grader's own.
     """
-    name = safe_name(path.stem) + _suffix(path)
-    _check(path)
-    return _copied(path, folder / name)
+    return _taken(path, folder / (safe_name(path.stem) + _suffix(path)))
 
 
 def keep_scenarios(
@@ -39,25 +38,23 @@ def keep_scenarios(
             continue
         progress.step(name, "running", f"looking for {scenario.recording}")
         found = find_recordings(submission.root, scenario.recording)
-        reason = _reason(found, scenario.recording, submission.root)
+        reason = _reason(found, scenario.recording, submission.root, folder / name)
         if reason:
             _note(folder / f"{name}.mcap", name, reason, submission)
-        else:
-            _copied(found[0], folder / f"{name}{_suffix(found[0])}")
         progress.step(
             name, "failed" if reason else "done", next(iter(reason.values()), found[0].name if found else "")
         )
 
 
-def _reason(found: list[Path], pattern: str, root: Path) -> dict[str, str]:
-    """What keeps a scenario from having its recording; empty where nothing does."""
+def _reason(found: list[Path], pattern: str, root: Path, target: Path) -> dict[str, str]:
+    """What keeps a scenario from having its recording; empty where it is kept as `target`, with its own suffix."""
     if not found:
         return {RECORDING_MISSING: pattern}
     if len(found) > 1:
         names = ", ".join(path.relative_to(root).as_posix() for path in found[:NAMES_SHOWN])
         return {RECORDING_PROBLEM: f"{len(found)} recordings fit {pattern}: {names}"}
     try:
-        _check(found[0])
+        _taken(found[0], target.with_name(target.name + _suffix(found[0])))
     except (EvidenceError, SubmissionError) as error:
         return {RECORDING_PROBLEM: error.message.replace(f"{root}/", "")}
     return {}
@@ -81,11 +78,20 @@ def _suffix(path: Path) -> str:
         return ".mcap" if file.read(5) == b"\x89MCAP" else ".bag"
 
 
-def _copied(path: Path, target: Path) -> Path:
+def _taken(path: Path, target: Path) -> Path:
+    """Copy it, and keep the copy if that is a recording: what is judged is what was looked at."""
+    limit_bytes = Limits().recording_bytes
+    if path.stat().st_size > limit_bytes:
+        raise EvidenceError(f"{path}: larger than {limit_bytes >> 20} MiB", hint=LESS)
     try:
         shutil.copyfile(path, target)
     except OSError as error:
         raise unwritable(target, error) from error
+    try:
+        _check(target)
+    except (EvidenceError, SubmissionError) as error:
+        target.unlink()
+        raise type(error)(error.message.replace(str(target), str(path)), hint=error.hint) from error
     return target
 
 

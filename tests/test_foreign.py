@@ -173,15 +173,18 @@ def test_a_recording_that_cannot_be_read_is_one_line(tmp_path, rubric, capsys, c
     errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("grader: error:")]
     assert len(errors) == 1
     assert reason in errors[0]
-    assert not (tmp_path / "out").exists()
+    results = list((tmp_path / "out").rglob("result.json"))
+    assert len(results) == (command == "grade")
+    assert all(json.loads(path.read_text())["status"] == "error" for path in results)
+    assert not list((tmp_path / "out").rglob("*.bag"))
 
 
 def test_a_recording_that_is_too_large_is_refused_unread(tmp_path, rubric, capsys):
     with (tmp_path / "lab.bag").open("wb") as file:
         file.truncate((1 << 30) + 1)
-    for command in ("check", "judge"):
+    for command, most in (("check", "96 MiB"), ("judge", "1024 MiB")):
         assert grader([command, str(tmp_path / "lab.bag"), "--rubric", str(rubric)]) == 3
-        assert "larger than 1024 MiB" in capsys.readouterr().err
+        assert f"larger than {most}" in capsys.readouterr().err
 
 
 def test_evidence_of_the_grader_is_no_submission(tmp_path, rubric, capsys):
