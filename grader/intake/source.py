@@ -61,7 +61,7 @@ def parse_source(text: str) -> Source:
         return _from_scp(text, match)
     for left, ref in splits:
         if _existing(left):
-            raise UsageError(f"{ref!r} cannot be the name of a branch, tag or commit", hint=_SOURCES)
+            raise UsageError(f"'{brief(ref)}' cannot be the name of a branch, tag or commit", hint=_SOURCES)
     web = "A web address begins with https://. " if _HOST_AND_PATH.match(text) else ""
     raise UsageError(f"{printable(text) or 'an empty SOURCE'} does not exist", hint=web + _SOURCES)
 
@@ -178,7 +178,7 @@ def _split_remote(path: str) -> tuple[str, str | None]:
         return path, None
     path, ref = path[:cut], path[cut + 1 :]
     if not _is_ref(ref):
-        raise UsageError(f"{ref!r} cannot be the name of a branch, tag or commit", hint=_SOURCES)
+        raise UsageError(f"'{brief(ref)}' cannot be the name of a branch, tag or commit", hint=_SOURCES)
     return path, ref
 
 
