@@ -8,7 +8,11 @@ from pathlib import Path
 
 from mcap.reader import make_reader
 
-CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\udc80-\udcff]")
+CONTROL = re.compile(
+    r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\udc80-\udcff]"
+    r"|^\s*::[a-z]|##[A-Za-z]*\[",  # turned-around text, and what CI systems take for a command
+    re.MULTILINE,
+)
 SHOWN = (".md", ".xml", ".json", ".log", ".html", ".csv")
 
 
