@@ -26,6 +26,8 @@ class Malformed(ValueError):
 
 def read(data):
     """(values, method name or None) of a whole call or answer; raise Malformed, or the xmlrpc.client.Fault in it."""
+    if b"\0" in data:  # two bytes a character, too: what follows looks for one
+        raise Malformed("bytes that are no text")
     if b"<!" in data:
         raise Malformed("a document type, entities or comments")
     for start in range(0, len(data), PIECE_BYTES):
@@ -66,11 +68,16 @@ def _parse(data, target):
     target.xml(None, None)
     parser = expat.ParserCreate("UTF-8")
     parser.buffer_text = True
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = _refuse
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.CharacterDataHandler = target.data
     for piece in range(0, len(data), PIECE_BYTES):
         parser.Parse(data[piece : piece + PIECE_BYTES], False)
     parser.Parse(b"", True)
+
+
+def _refuse(*_):
+    raise Malformed("a document type, entities or comments")
 
 
 class _Unmarshaller(xmlrpc.client.Unmarshaller):

@@ -1,0 +1,246 @@
+"""The arena's bounds one by one, without ROS: reading calls, sharing the recording, who may call in whose name."""
+
+from __future__ import annotations
+
+import importlib
+import socket
+import threading
+import time
+import xmlrpc.client
+from types import ModuleType
+
+import pytest
+
+from grader.arena.session import ARENA
+
+MB = 1 << 20
+
+
+@pytest.fixture
+def module(monkeypatch):
+    """Modules of the arena, which run under ROS's Python as scripts beside each other."""
+    monkeypatch.syspath_prepend(str(ARENA))
+
+    def load(name: str) -> ModuleType:
+        return importlib.import_module(name)
+
+    return load
+
+
+def call(value: str) -> bytes:
+    return (
+        f"<methodCall><methodName>m</methodName><params><param>{value}</param></params></methodCall>".encode()
+    )
+
+
+@pytest.mark.parametrize(
+    "value", [1, -1.5, True, "<&>\u202e", [1, [2]], {"a": {"b": []}}, xmlrpc.client.Binary(b"\0\xff"), ""]
+)
+def test_calls_as_clients_write_them(module, value) -> None:
+    assert module("strict").read(xmlrpc.client.dumps((value,), "m").encode()) == ((value,), "m")
+
+
+@pytest.mark.parametrize(
+    ("data", "why"),
+    [
+        (b'<!DOCTYPE a [<!ENTITY a "b">]>' + call("<value>&a;</value>"), "a document type"),
+        (call("<value><!-- --></value>"), "comments"),
+        (call("<value>x</value>").decode().encode("utf-16"), "no text"),
+        (call('<value a="b">x</value>'), "more than a name"),
+        (call(f"<value {'a' * 200}>x</value>"), "more than a name"),
+        (call("<value><array><data>" * 60), "nested too deeply"),
+        (call("<value/>" * 200_001), "more than 200000 elements"),
+        (call("<value><int>2147483648</int></value>"), "too large"),
+        (call(f"<value><i8>{'9' * 1000}</i8></value>"), "too large"),
+        (
+            call("<value><struct><member><value><i4>1</i4></value><value/></member></struct></value>"),
+            "no text",
+        ),
+        (call("<value><nil/></value>"), "no XML-RPC"),
+        (call("<value>\0</value>"), "no text"),
+        (b"", "no XML-RPC"),
+        (b"<methodCall>", "no XML-RPC"),
+    ],
+)
+def test_calls_that_no_client_writes(module, data, why) -> None:
+    strict = module("strict")
+    with pytest.raises(strict.Malformed, match=why):
+        strict.read(data)
+
+
+def budget(module, **limits):
+    whole = {"channel_messages": 20_000, "channel_bytes": 64 * MB, "run_bytes": 64 * MB, "channels": 300}
+    return module("budget").Budget({**whole, **limits})
+
+
+def key(topic: str) -> tuple[str, ...]:
+    return topic, "/node", "std_msgs/String", "0" * 32, "string data\n"
+
+
+def test_one_flood_leaves_room_for_the_next_and_for_everybody(module) -> None:
+    shared = budget(module)
+    flood, second, talker = (shared.open(key(topic), "attack") for topic in ("/flood", "/second", "/talker"))
+    taken = [sum(account.take(MB) for _ in range(100)) for account in (flood, second)]
+    assert taken == [31, 16]
+    assert all(talker.take(8) for _ in range(300))
+    assert not any(one.take(MB) for one in (flood, second, talker))
+    assert flood.bytes + second.bytes + talker.bytes < 64 * MB
+
+
+def test_a_channel_has_so_many_messages(module) -> None:
+    account = budget(module, channel_messages=5).open(key("/a"), "p")
+    assert [account.take(1) for _ in range(7)] == [True] * 5 + [False] * 2
+
+
+def test_one_process_does_not_take_every_channel(module) -> None:
+    shared = budget(module, channels=20)
+    opened = [shared.open(key(f"/a{n}"), "attack") for n in range(40)]
+    assert 8 <= sum(account is not None for account in opened) <= 11
+    assert shared.open(key("/chatter"), "talker") is not None
+    assert shared.open(key("/a0"), "attack") is opened[0]
+
+
+class Fixed:
+    """Owners as a test says."""
+
+    def __init__(self, **owners: str) -> None:
+        self.owners = {f"http://127.0.0.1:{port[1:]}/": owner for port, owner in owners.items()}
+
+    def of(self, api: str) -> str | None:
+        return self.owners.get(api)
+
+    look = of
+
+
+class Caller:
+    def __init__(self, process: str | None) -> None:
+        self.process = process
+
+
+NEW, OLD, NOBODY, GRADER = (f"http://127.0.0.1:{port}/" for port in (1, 2, 3, 4))
+TYPE = "std_msgs/String"
+
+
+@pytest.mark.parametrize(
+    ("method", "args", "why"),
+    [
+        ("registerPublisher", ("/new", "/t", TYPE, NEW), ""),
+        ("registerPublisher", ("/old", "/t", TYPE, NEW), ""),
+        ("registerPublisher", ("/old", "/t", TYPE, OLD), "registered /old with an address of old"),
+        ("registerPublisher", ("/new", "/t", TYPE, OLD), "registered /new with an address of old"),
+        (
+            "registerPublisher",
+            ("/old", "/t", TYPE, NOBODY),
+            "for /old, a node of old, with an address of nobody",
+        ),
+        ("registerPublisher", ("/new", "/t", TYPE, NOBODY), ""),
+        ("registerPublisher", ("/new", "/t", TYPE, GRADER), "which is not its own"),
+        ("registerPublisher", ("/new", "/t", TYPE, "http://host/"), "which is not its own"),
+        ("registerPublisher", ("/new", "/t" * 200, TYPE, NEW), "no name"),
+        ("registerPublisher", ("/new", "/t", "a/\x1b[31m", NEW), "no name"),
+        ("registerPublisher", ("/new", "/my-topic with odd letters ä", TYPE, NEW), ""),
+        ("registerService", ("/new", "/s", "rosrpc://127.0.0.1:9", NEW), ""),
+        ("registerService", ("/new", "/s", OLD, NEW), "an address of old"),
+        ("subscribeParam", ("/old", NOBODY, "/p"), "with an address of nobody"),
+        ("unregisterPublisher", ("/old", "/t", OLD), "unregistered /t of /old, a node of old"),
+        ("unregisterPublisher", ("/old", "/t", NOBODY), ""),
+        ("unregisterPublisher", ("/old", "/t", NEW), ""),
+        ("unregisterParam", ("/old", OLD, "/p"), ""),
+        ("unsubscribeParam", ("/old", OLD, "/p"), "unregistered /p of /old"),
+        ("setParam", ("/rosout", "/p", 1), "in the name of /rosout"),
+        ("setParam", ("/grader_actor_0123abcd", "/p", 1), "the grader's node"),
+        ("setParam", ("/grader_recorder_0123abcd_knock", "/p", 1), "the grader's node"),
+        ("setParam", ("/grader", "/p", 1), ""),
+        ("setParam", ("/grader_helper", "/p", 1), ""),
+        ("setParam", (5, "/p", 1), "no text"),
+        ("setParam", ("/old", "/p", "\0" * 5000), ""),
+        ("shutdown", ("/new", "x"), "shut down"),
+        ("getPid", (), ""),
+    ],
+)
+def test_who_may_call_in_whose_name(module, method, args, why) -> None:
+    registered = {"/old": OLD}.get
+    rules = module("guard").Rules(Fixed(p1="new", p2="old"), registered, {4})
+    found = rules.why_not(method, args, Caller("new"))
+    assert (why in found) if why else found == ""
+
+
+def test_only_rosout_speaks_for_rosout(module) -> None:
+    rules = module("guard").Rules(Fixed(p1="rosout"), {}.get, set())
+    args = ("/rosout", "/rosout", "rosgraph_msgs/Log", NEW)
+    assert rules.why_not("registerSubscriber", args, Caller("rosout")) == ""
+    assert "/rosout" in rules.why_not("registerSubscriber", args, Caller(None))
+
+
+def test_who_takes_too_many_names(module) -> None:
+    rules = module("guard").Rules(Fixed(), {}.get, set())
+
+    def register(process: str, number: int) -> bool:
+        return rules.too_much("registerPublisher", ("/n", f"/t{number}", TYPE, NEW), Caller(process))
+
+    assert [register("attack", number) for number in range(1002)] == [False] * 1000 + [True] * 2
+    assert not register("attack", 5)
+    assert not register("talker", 2000)
+
+
+def test_events_are_told_once_and_not_for_ever(module) -> None:
+    told = []
+
+    class Wire:
+        def event(self, topic: str, record: dict[str, str]) -> None:
+            told.append((topic, record))
+
+    guard = module("guard").Guard(Wire())
+    for number in range(100):
+        guard.limit("p", f"limit {number // 2}")
+        guard.refused("p" * 1000, f"refused {number}")
+    assert [len([r for _, r in told if r["action"] == kind]) for kind in ("limit", "refused")] == [50, 50]
+    assert max(len(r["actor"]) for _, r in told) == 256
+
+
+def read_on(sock: socket.socket, size: int) -> None:
+    while True:
+        sock.recv(size)
+
+
+def test_a_socket_is_waited_for_once(module) -> None:
+    """A byte now and then buys no time, and endless bytes no memory."""
+    bounded = module("bounded")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        sock = bounded.connect(server.getsockname()[1], 0.5, 1000)
+        far, _ = server.accept()
+        stop = threading.Event()
+        drip = threading.Thread(target=lambda: [far.send(b"x") for _ in range(20) if not stop.wait(0.1)])
+        drip.start()
+        begin_s = time.monotonic()
+        with pytest.raises(TimeoutError):
+            read_on(sock, 1)
+        assert time.monotonic() - begin_s < 1.5
+        stop.set()
+        drip.join()
+        sock.allow(5, 1000)
+        far.sendall(b"x" * 2000)
+        with pytest.raises(ConnectionAbortedError):
+            read_on(sock, 600)
+        sock.close()
+        far.close()
+
+
+def test_who_never_answers_takes_no_more_than_its_share(module) -> None:
+    pool = module("pool").Pool(workers_max=10, each_max=2)
+    stuck, done = threading.Event(), threading.Event()
+    for _ in range(50):
+        assert pool.submit("mute", stuck.wait)
+    assert pool.submit("talker", done.set)
+    assert done.wait(5)
+    stuck.set()
+
+
+def test_values_of_any_kind_fit_into_the_evidence(module) -> None:
+    values = module("values")
+    strange = {"b": xmlrpc.client.Binary(b"\0"), "l": [{"d": xmlrpc.client.DateTime(0)}, None, 1.5]}
+    assert values.plain(strange, 10_000)["l"][1:] == [None, 1.5]
+    assert values.plain("x" * 1000, 500) is None
+    assert values.depth([[[]], {"a": [1]}], 10) == 3
+    assert values.weight(["x" * 1000] * 10, 1 << 30) > 10_000
+    assert values.weight(["x" * 1000] * 1000, 5000) < 10_000
