@@ -13,6 +13,7 @@ from grader.errors import SubmissionError, UsageError
 from grader.intake.names import archive_stem, brief, printable
 from grader.intake.tree import is_file, is_there
 
+_LONGEST = 4096
 _SCHEMES = ("https", "http", "ssh", "git", "file")
 _URL = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<authority>[^/]*)(?P<path>/.*)?", re.DOTALL)
 # As git reads it: a colon before any slash. One letter before it would be a drive of Windows.
@@ -48,6 +49,8 @@ def parse_source(text: str) -> Source:
 
     Raises UsageError for what is neither there nor a git URL, SubmissionError for what cannot be a source.
     """
+    if len(text) > _LONGEST:
+        raise UsageError(f"{printable(text[:40])}… is longer than any path or address", hint=_SOURCES)
     local = _existing(text)
     if local is not None:
         return _local(local, None, text)

@@ -12,8 +12,10 @@ from collections.abc import Callable
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
+from types import SimpleNamespace
 
 from grader.arena.parameters import settings
+from grader.arena.sandbox import Sandbox
 from grader.arena.session import ArenaSession
 from grader.errors import EvidenceError, GraderError, OutputError, RubricError, SubmissionError, UsageError
 from grader.evidence.decode import Decoder
@@ -49,6 +51,7 @@ PART = b"%%% "
 SMALL = Limits(total_bytes=8 << 20, entries=500)
 RECORD_BYTES_MAX = 24 << 20
 LINE_MAX = 2000
+PLACE = SimpleNamespace(sandbox=Sandbox(bubblewrap=True, uid=None))
 ENVELOPE = {"scenario": "talker", "clock": "real", "warp": 1.0, "metadata": {}}
 
 
@@ -223,7 +226,7 @@ def service(data: bytes) -> None:
 def frames(data: bytes) -> None:
     """What the arena sends never breaks the session: what is no frame becomes its failure."""
     writer = EvidenceStream(BytesIO(), **ENVELOPE)
-    session = ArenaSession(None, writer)  # type: ignore[arg-type] # nothing is started
+    session = ArenaSession(PLACE, writer)  # type: ignore[arg-type] # nothing is started
     cut = len(data) // 3
     session._read(data[:cut])
     session._read(data[cut:])
