@@ -119,7 +119,7 @@ def _measured(found: Rhythm, run: Run, params: RateParams) -> str:
     if not run.host or not found.gaps_ns:
         return seen
     _, _, max_ms = lateness_ms(run, found.times_ns[0], found.until_ns)
-    return f"{seen}; the grading machine was late by at most {max_ms:.0f} ms"
+    return f"{seen}, machine late by {max_ms:.0f} ms"
 
 
 def _flood(found: Rhythm, package: PackageFacts, params: RateParams) -> Verdict | None:
