@@ -11,7 +11,7 @@ from grader.errors import ArenaError
 
 HEADER = struct.Struct("<BIQ")
 CHANNEL_ID = struct.Struct("<I")
-FRAME_BYTES_MAX = 80 << 20
+FRAME_BYTES_MAX = 24 << 20
 
 
 class Frame(NamedTuple):

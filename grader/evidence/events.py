@@ -107,7 +107,8 @@ class ActorEvent(Record):
 
 
 class RecorderEvent(Record):
-    """`/grader/recorder`: the recorder's connections. `dropped` counts messages past a channel's limit."""
+    """`/grader/recorder`: the recorder's connections. `dropped` counts messages past the limits of a channel or of the
+    run; of a flood it is worked out from the bytes."""
 
     event: Literal["connected", "refused", "closed", "limit", "invalid"]
     topic: str

@@ -116,7 +116,7 @@ class Actor:
         self.host = "127.0.0.1"
         self._loop = loop
         self._wire = wire
-        self._server = socket.create_server((self.host, 0), backlog=64)
+        self._server = socket.create_server((self.host, 0), backlog=4096)
         self.port = self._server.getsockname()[1]
         self.uri = None
         loop.add_reader(self._server, self._accept)

@@ -43,7 +43,7 @@ class Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
 
     allow_reuse_address = True
     daemon_threads = True
-    request_queue_size = 128
+    request_queue_size = 4096  # where it is full, the kernel lets everybody wait for a second
 
     def __init__(self, port, answer, guard, owners, title):
         super().__init__((get_bind_address(), port), _Handler)
