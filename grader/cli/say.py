@@ -21,6 +21,7 @@ def say_json(data: object) -> None:
 
 
 def say_document(made: Callable[[bool], str]) -> None:
-    """Print JSON that is made for an encoding: in one that lacks a letter, only an escape can stand for it."""
+    """Print a whole document that is harmless already. `made` is told whether stdout takes ASCII only: in an encoding
+    that lacks a letter, only an escape of the document's own can stand for it."""
     encoding = (sys.stdout.encoding or "ascii").lower().replace("-", "")
     sys.stdout.write(made(encoding != "utf8"))

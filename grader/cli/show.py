@@ -45,7 +45,8 @@ def show(
 def _paths(folder: Path | None) -> None:
     if folder is None:
         return
-    print("\nReports:")
+    say("")
+    say("Reports:")
     for name in REPORTS:
         if (folder / name).is_file():
             say(f"  {folder / name}")

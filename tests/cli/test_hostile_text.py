@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import ast
 import io
 import json
 import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
+import grader
 from grader.cli.commands import inspect as inspect_command
 from grader.cli.display import LiveSteps, PlainSteps
 from grader.cli.errors import guarded, report
@@ -24,6 +27,8 @@ from grader.mutation.model import LostCriterion, MutantResult, ReferenceResult, 
 from tests.report.nasty import STEERING, TEXTS
 from tests.report.test_shown import TO_A_CI
 
+GRADER = Path(grader.__file__).parent
+MAY_PRINT = {"cli/say.py", "cli/errors.py", "cli/display.py", "checks/docs.py", "mutation/docs.py"}
 NASTY = "\x1b[2J\u202e\n::error::owned\n##[error]x\x9b31m\ud800" + "y" * 10**6
 SOME = settings(max_examples=40)
 
@@ -164,3 +169,16 @@ def test_what_is_printed_is_one_line_in_any_encoding(text, encoding):
     assert printed.count("\n") == 1
     assert json.loads(data) == [text.encode("utf-8", "backslashreplace").decode()]
     assert harmless(data)
+
+
+def test_nothing_else_prints():
+    """What prints must know whose text it prints; ROS's side has no terminal."""
+    found = {
+        path.relative_to(GRADER).as_posix()
+        for path in GRADER.rglob("*.py")
+        if not {"ros", "standins", "_data"} & set(path.relative_to(GRADER).parts)
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func) in {"print", "sys.stdout.write", "sys.stderr.write"}
+    }
+    assert found <= MAY_PRINT

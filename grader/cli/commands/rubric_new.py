@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from pathlib import Path
 
 from grader import pipeline
@@ -11,7 +10,7 @@ from grader.arena.sandbox import Mode
 from grader.authoring.new import propose_rubric
 from grader.cli.choice import only_package
 from grader.cli.display import open_progress
-from grader.cli.say import say
+from grader.cli.say import say, say_document
 from grader.errors import ExitCode, UsageError
 from grader.files import atomic_write
 from grader.rubric.model import NAME_PATTERN
@@ -35,7 +34,7 @@ def run(
     with open_progress() as progress:
         text = propose_rubric(solution, name, chosen, options, progress)
     if out == "-":
-        sys.stdout.write(text)
+        say_document(lambda _: text)
         return ExitCode.PASSED
     atomic_write(Path(out), text.encode())
     say(f"{out}: look through it, then `grader rubric validate {out}`")
