@@ -121,7 +121,7 @@ class Attack(Record):
     never: tuple[Pattern, ...] = ()
     shows: tuple[Pattern, ...] = ()
     user: Literal["root", "ordinary", "both"] = "root"
-    after: Literal["static", "full"] = "static"
+    after: Literal["none", "static", "full"] = "none"
     installed: bool = False
     wall_s: Annotated[float, Field(gt=0, le=200)] = 45
     finding: str | None = None

@@ -154,7 +154,7 @@ def faults(name: str, graded: Graded) -> list[str]:
         *_outputs(graded),
         *_statuses(attack, graded),
         *_words(attack, graded),
-        *_after(report["after"]),
+        *_after(report.get("after")),
     ]
 
 
@@ -259,7 +259,9 @@ def _missing(where: str, text: str, patterns: Iterable[str]) -> Iterator[str]:
             yield f"{where} says nothing like {pattern!r}: {text[-1000:]!r}"
 
 
-def _after(after: Mapping[str, Any]) -> Iterator[str]:
+def _after(after: Mapping[str, Any] | None) -> Iterator[str]:
+    if after is None:
+        return
     if after["exit_code"] != ExitCode.PASSED or after["late"]:
         said = after["stdout"][-1500:] + after["stderr"][-500:]
         yield f"the victim, graded next: exit code {after['exit_code']}: {said}"

@@ -15,7 +15,7 @@ SOUND = {
 }  # fmt: skip
 WITHOUT_SANDBOX = {
     "read-everything": [r"harm was done: .*marks\.csv", r"a secret is in an output: console\.log"],
-    "disk-outside": [r"harm was done: wrote into", r"files changed outside", r"left in \$TMPDIR"],
+    "disk-outside": [r"harm was done: .*wrote into", r"files changed outside", r"left in \$TMPDIR"],
     "net-services": [
         r"services of the machine were asked",
         r"packets were sent",

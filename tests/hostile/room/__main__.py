@@ -29,7 +29,8 @@ def main() -> None:
     with tarfile.open(fileobj=sys.stdout.buffer, mode="w|") as tar:
         report = room.grade_attack()
         _add_results(tar, room.results)
-        report["after"] = asdict(room.grade_victim())
+        if job["after"] != "none":
+            report["after"] = asdict(room.grade_victim())
         _add_report(tar, report)
 
 
