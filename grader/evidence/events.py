@@ -92,8 +92,8 @@ class ActorEvent(Record):
     `publish`: `value` is the field `data` as sent, or a map of the message's fields. `param`: `topic` is the
     parameter's name, `value` what it was set to. `call`: `topic` is the service, `value` the request's fields;
     `answer`: the response's fields, or None and the reason in `detail`. `open`: the stand-in for the program `actor`
-    was started with the arguments `value`. `refused`: `actor`, a process where it is known, else a node, was not allowed
-    what `detail` says; `limit`: it had too much of something. At most 50 of each a run, equal ones once.
+    was started with the arguments `value`. `refused`: `actor`, a process where it is known, else a node, was not
+    allowed what `detail` says; `limit`: it had too much of something. At most 50 of each a run, equal ones once.
     """
 
     action: Literal[

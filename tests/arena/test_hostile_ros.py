@@ -60,7 +60,7 @@ def attempt(name, work):
 
 
 def beside_a_talker(
-    tmp_path: Path, attack: str, *, window_s: float = 3.0, limits: Limits | None = None
+    tmp_path: Path, attack: str, *, window_s: float = 3.0, limits: Limits | None = None, sandbox: str = "auto"
 ) -> Run:
     """Run an attack in one process beside an honest 10 Hz talker in another."""
     scenario = Scenario(
@@ -69,7 +69,7 @@ def beside_a_talker(
         until=Until(window_s=window_s, topics=("/chatter",), first_message_s=15, limit_s=30),
     )
     files = {"scripts/attack.py": ATTACK + attack, "scripts/talker.py": TALKER}
-    with make_place(files, limits=limits) as place:
+    with make_place(files, limits=limits, sandbox=sandbox) as place:
         return run(place, scenario, tmp_path / "run.mcap")
 
 
@@ -274,8 +274,9 @@ time.sleep(60)
 """
 
 
-def test_calls_in_the_name_of_others(tmp_path: Path) -> None:
-    seen = beside_a_talker(tmp_path, IMPERSONATION)
+@pytest.mark.parametrize("sandbox", ["auto", "none"])
+def test_calls_in_the_name_of_others(tmp_path: Path, sandbox: str) -> None:
+    seen = beside_a_talker(tmp_path, IMPERSONATION, sandbox=sandbox)
     assert_unharmed(seen)
     lines = {line.split(" ")[0]: line for line in printed(seen, "attack")}
     assert "done" in lines

@@ -56,17 +56,25 @@ class Arena:
         from rpc import serve  # noqa: PLC0415
 
         name = "/grader_{}" + config["suffix"]
-        guard, owners = Guard(self._wire), Owners(self._trees)
-        self._recorder = Recorder(self.loop, self._wire, name.format("recorder"), self._limits, guard)
+        guard, owners, own_ports = Guard(self._wire), Owners(self._trees), set()
+        self._recorder = Recorder(
+            self.loop, self._wire, name.format("recorder"), self._limits, guard=guard, own_ports=own_ports
+        )
         self._actor = Actor(self.loop, self._wire, name.format("actor"), guard, owners)
         self._master = RecordingMaster(
-            self.loop, self._wire, self._recorder, self._actor.caller_id, guard=guard, owners=owners
+            self.loop,
+            self._wire,
+            self._recorder,
+            self._actor.caller_id,
+            guard=guard,
+            owners=owners,
+            own_ports=own_ports,
         )
         server = serve(config["port"], self._master.answer, guard, owners, title="the master")
         self._master.uri = os.environ["ROS_MASTER_URI"] = server.uri
         api = serve(0, SlaveApi(self._actor, guard).answer, guard, owners, title="the grader's node")
         self._actor.uri = api.uri
-        self._master.own_ports.update((server.port, api.port, self._actor.port))
+        own_ports.update((server.port, api.port, self._actor.port))
         if config["rosout"]:
             self._spawn(config["rosout"])
 

@@ -11,7 +11,7 @@ import time
 import rosmaster.master_api
 import rosmaster.registrations
 import services
-from bounded import ProtocolError, call, port_of, slave_api
+from bounded import ProtocolError, call, slave_api
 from graph import GraphLog
 from guard import NAME_CHARS_MAX, OWN_NODE, ROSOUT, Rules
 from params import ParamLog
@@ -46,7 +46,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
     while the node registers, when the process is sure to be there.
     """
 
-    def __init__(self, loop, wire, recorder, own, *, guard, owners):
+    def __init__(self, loop, wire, recorder, own, *, guard, owners, own_ports=()):
         super().__init__(0)
         self.thread_pool = self.reg_manager.thread_pool = Notifications()
         self._owners = owners
@@ -59,8 +59,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self._pool = Pool()
         self._calling = threading.local()
         self._guard = guard
-        self.own_ports = set()
-        self._rules = Rules(owners, self._registered, self.own_ports)
+        self._rules = Rules(owners, self._registered, own_ports)
         self._params = ParamLog(wire, self._guard)
         self._graph = GraphLog(loop, wire, self._guard, self.graph)
         # Unset, every rospy.loginfo asks the master for it, and a SIGINT during that call locks the node up for ever.
@@ -144,7 +143,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self._owners.of(caller_api)
         answer = super().registerService(caller_id, service, service_api, caller_api)
         if answer[0] == 1 and not service.endswith(EVERY_NODE_HAS):
-            self._pool.submit(port_of(service_api), lambda: self._learn_type(service, service_api))
+            self._pool.submit(self._process, lambda: self._learn_type(service, service_api))
         return self._arrived(answer)
 
     def getParam(self, caller_id, key):
@@ -260,7 +259,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
                     found[node] = list(self._connections(node, api))
                 answered.release()
 
-            asked += self._pool.submit(port_of(api), ask)
+            asked += self._pool.submit(self._owners.known(api), ask)
         for _ in range(asked):
             answered.acquire(timeout=max(0.0, deadline - time.monotonic()))
         return [c for node in apis for c in found.get(node, ())][:CONNECTIONS_MAX]

@@ -7,16 +7,15 @@ import threading
 from bounded import port_of
 from values import weight
 
-WORKERS_MAX = 256
-EACH_MAX = 8
+WORKERS_MAX, EACH_MAX = 256, 64
 WAITING_MAX = 5000
 IDLE_S = 5.0
 LARGE_BYTES = 64 << 10
 
 
 class Pool:
-    """At most `WORKERS_MAX` jobs at a time, and `EACH_MAX` of one key (a node's port): who never answers takes no
-    more than his own share. Jobs of one key start in order."""
+    """At most `workers_max` jobs at a time, and `each_max` of one key (a process): who never answers takes no more
+    than its own share. Jobs of one key start in order."""
 
     def __init__(self, workers_max=WORKERS_MAX, each_max=EACH_MAX):
         self._workers_max = workers_max

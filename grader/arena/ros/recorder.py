@@ -15,7 +15,7 @@ import contextlib
 import threading
 import time
 
-from bounded import ProtocolError, call, connect, port_of, slave_api
+from bounded import ProtocolError, call, connect, slave_api
 from budget import Budget
 from connection import MESSAGE_BYTES_MAX, Connection
 from guard import shown
@@ -36,11 +36,12 @@ NOTES_MAX = 3000
 
 
 class Recorder:
-    def __init__(self, loop, wire, caller_id, limits, guard):
+    def __init__(self, loop, wire, caller_id, limits, *, guard, own_ports):
         self.loop = loop
         self.wire = wire
         self._caller_id = caller_id
         self._guard = guard
+        self._own_ports = own_ports
         self._budget = Budget(limits)
         self._pool = Pool()
         self._pending_bytes = 0
@@ -65,7 +66,7 @@ class Recorder:
             self._connect(topic, caller_id, caller_api, deadline)
             self._answered(caller_id, connected)
 
-        if not self._pool.submit(port_of(caller_api), work):
+        if not self._pool.submit(process, work):
             self._guard.limit(process or caller_id, "registered publishers faster than they can be recorded")
             self._answered(caller_id, connected)
         if serving:
@@ -145,6 +146,8 @@ class Recorder:
         if not isinstance(protocol, list) or len(protocol) != 3 or not isinstance(protocol[2], int):
             raise ProtocolError("no TCPROS offered")
         port = protocol[2]
+        if port in self._own_ports:
+            raise ProtocolError("a port of the grader's")
         sock, header = self._subscribe(self._caller_id, topic, port, deadline - time.monotonic())
         try:
             self._subscribe(self._caller_id + KNOCK, topic, port, deadline - time.monotonic())[0].close()
@@ -182,7 +185,7 @@ class Recorder:
                 latching = header.get("latching") == "1"
             self.loop.call_soon(lambda: connection.open(latching=latching))
 
-        self._pool.submit(connection.port, work)
+        self._pool.submit(self._processes.get(connection.caller_id), work)
 
     def reserve(self, size):
         """Room in memory for a message that is still coming."""
