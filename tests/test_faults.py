@@ -151,6 +151,25 @@ def test_a_rosout_that_dies(out: Path) -> None:
     assert passed(result_in(out)) == ALL
 
 
+def test_a_sandbox_that_is_not_made(out: Path, tmp_path: Path) -> None:
+    """As where the kernel has no more namespaces to give: no process of the student's has run."""
+    (tmp_path / "real").touch()
+    (tmp_path / "bwrap").write_text(
+        f"""#!/bin/sh
+case "$*" in *src/talker.py*) echo "bwrap: Creating new namespace failed: No space left on device" >&2; exit 1;; esac
+exec {tmp_path}/real "$@"
+"""
+    )
+    (tmp_path / "bwrap").chmod(0o755)
+    setup = f"mount --bind /usr/bin/bwrap {tmp_path}/real; mount --bind {tmp_path}/bwrap /usr/bin/bwrap"
+    with grading(out, setup=setup) as short:
+        assert short.end() == 4, short.err
+    result = result_in(out)
+    assert marked_down(result) == []
+    assert passed(result) == {"manifest", "build", "hears"}
+    assert "could not be started" in next(c.message for c in result.criteria if c.id == "rate")
+
+
 def test_what_is_killed_once_is_done_once_more(out: Path) -> None:
     with grading(out) as hit:
         for line, process in ((("build", "running"), CATKIN_MAKE), (("talker", "running"), ARENA)):

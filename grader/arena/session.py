@@ -261,7 +261,8 @@ class ArenaSession:
             self.live.connections({c["topic"] for c in pairs}, time.monotonic())
             self.live.graphs += 1
         elif status == "spawn-failed":
-            self._failure = f"{fields['name']} could not be started: {fields['detail']}"
+            message = f"{fields['name']} could not be started: {fields['detail']}"
+            self._error = self._error or ArenaError(message, hint="grader doctor")
         elif status == "done":
             self._note_cost(fields)
             self._done = True

@@ -12,6 +12,7 @@ from streams import Collected, Lines
 from tree import cpu_s, descendants, resident_bytes
 
 WATCH_S = 0.5
+WORDS_BYTES = 200
 
 
 class Process:
@@ -31,6 +32,8 @@ class Process:
         self._lines = 0
         self._bytes = 0
         self._stopped_by = None
+        self._entered = False
+        self._last_line = ""
         self._peak_bytes = 0
         self._cpu_s = 0.0
         self._inner_pid = None
@@ -132,6 +135,7 @@ class Process:
             self.loop.remove_reader(lifeline)
             with contextlib.suppress(OSError):  # it has ended already
                 if lifeline.recv(1):
+                    self._entered = True
                     if self._groups is not None:
                         self._groups.take(self.tree())
                     lifeline.sendall(b"\n")
@@ -217,6 +221,8 @@ class Process:
 
     def line(self, stream, data, cut):
         """One line of output; past the limits, output is read and thrown away."""
+        if not self._entered:
+            self._last_line = data[:WORDS_BYTES].decode("utf-8", "replace")
         self._lines += 1
         self._bytes += len(data)
         if self._lines > self._limits["output_lines"] or self._bytes > self._limits["output_bytes"]:
@@ -252,6 +258,9 @@ class Process:
         if self._collected is not None:
             self._collected.close()
         self._leave_groups()
+        if not self._entered and self._stopped_by is None:
+            why = "its sandbox was not made: {}".format(self._last_line or "it said nothing")
+            self._wire.status("spawn-failed", name=self.name, detail=why)
         status = self._status
         code = os.WEXITSTATUS(status) if os.WIFEXITED(status) else None
         self._event(
