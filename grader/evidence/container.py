@@ -20,7 +20,7 @@ MAX_FILE_BYTES = 1 << 30
 MAX_CHUNK_BYTES = 32 << 20
 """Of any record, too. The arena records no message that comes near it."""
 MAX_UNPACKED_BYTES = 512 << 20
-MAX_RECORDS = 4_000_000
+MAX_RECORDS = 2_000_000
 
 MESSAGE_HEAD_BYTES = 22
 _HEAD = struct.Struct("<BQ")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict, deque
 from pathlib import Path
 from typing import Literal
 
@@ -144,19 +145,21 @@ def _nodes(run: Run) -> tuple[str, ...]:
 def _processes(run: Run) -> tuple[ProcessSummary, ...]:
     """Starts and exits of one name are paired in order."""
     found: list[ProcessSummary] = []
+    running: dict[str, deque[int]] = defaultdict(deque)
     for time_ns, event in run.processes:
         at_s = (time_ns - run.start_ns) / 1e9
         known = {"name": event.name, "role": event.role}
         if event.event == "start":
+            running[event.name].append(len(found))
             found.append(ProcessSummary(**known, start_s=at_s))
             continue
         how = ("exit_code", "signal", "stopped_by", "cpu_s", "max_rss_bytes")
         ended = ProcessSummary(
             **known, start_s=None, exit_s=at_s, **{name: getattr(event, name) for name in how}
         )
-        open_ = next((n for n, p in enumerate(found) if p.name == event.name and p.exit_s is None), None)
-        if open_ is None:
-            found.append(ended)
+        if running[event.name]:
+            started = running[event.name].popleft()
+            found[started] = ended.model_copy(update={"start_s": found[started].start_s})
         else:
-            found[open_] = ended.model_copy(update={"start_s": found[open_].start_s})
+            found.append(ended)
     return tuple(found)
