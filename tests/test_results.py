@@ -158,6 +158,18 @@ def test_a_second_grader_of_the_same_submission_is_told_so(tmp_path: Path) -> No
     assert state(tmp_path) == whole(2)
 
 
+def test_a_file_system_without_locks_is_used_and_never_swept(tmp_path: Path, monkeypatch) -> None:
+    def unknown(_descriptor: int) -> bool:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(results_module, "lock", unknown)
+    (tmp_path / "other" / NEW).mkdir(parents=True)
+    write(tmp_path / "ada", 1)
+    finish_killed(tmp_path)
+    assert state(tmp_path / "ada") == whole(1)
+    assert (tmp_path / "other" / NEW).is_dir()
+
+
 @pytest.mark.parametrize(
     ("number", "kind"),
     [

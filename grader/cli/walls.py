@@ -16,6 +16,7 @@ from grader.errors import HostError
 
 PROGRAMS = {"bwrap": "bubblewrap", "setpriv": "util-linux", "prlimit": "util-linux"}
 PROBE_S = 20
+SETTINGS = Path("/proc/sys")
 SWITCHES = {
     "kernel/unprivileged_userns_clone": ("0", "sysctl -w kernel.unprivileged_userns_clone=1"),
     "user/max_user_namespaces": ("0", "sysctl -w user.max_user_namespaces=10000"),
@@ -65,7 +66,7 @@ def _probe(name: str, command: Sequence[str], *, drop: bool) -> Row:
 def _switch() -> str:
     """The setting of the kernel that forbids it, where it is one."""
     for name, (forbidding, mend) in SWITCHES.items():
-        path = Path("/proc/sys", name)
+        path = SETTINGS / name
         if path.is_file() and path.read_text(errors="replace").strip() == forbidding:
             return mend
     return CONTAINER

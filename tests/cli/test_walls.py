@@ -1,0 +1,78 @@
+"""`grader doctor` on what is missing of the sandbox."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from grader.arena.cgroups import Cgroup, Cgroups
+from grader.cli import walls
+from grader.cli.row import Row
+from grader.errors import HostError
+
+
+def rows() -> dict[str, Row]:
+    return {row.name: row for row in walls.walls()}
+
+
+def test_every_part_has_a_row_and_what_is_missing_a_command() -> None:
+    found = rows()
+    assert list(found) == [
+        "bwrap", "setpriv", "prlimit", "user namespaces", "network", "limits", "ulimit", "sandbox"
+    ]  # fmt: skip
+    assert all(row.mend for row in found.values() if row.state != "ok")
+
+
+@pytest.mark.parametrize(("program", "package"), [("bwrap", "bubblewrap"), ("setpriv", "util-linux")])
+def test_a_program_that_is_not_installed(monkeypatch, program: str, package: str) -> None:
+    monkeypatch.setattr(walls.shutil, "which", lambda name: None if name == program else f"/usr/bin/{name}")
+    monkeypatch.setattr(walls, "why_not", lambda: f"{program} is not installed")
+    found = rows()
+    assert (found[program].state, found[program].mend) == ("limited", f"apt-get install {package}")
+    assert found["sandbox"].state == "limited"
+    assert "without a wall around it" in found["sandbox"].detail
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "mend"),
+    [
+        ("kernel/unprivileged_userns_clone", "0", "sysctl -w kernel.unprivileged_userns_clone=1"),
+        ("user/max_user_namespaces", "0", "sysctl -w user.max_user_namespaces=10000"),
+        (
+            "kernel/apparmor_restrict_unprivileged_userns",
+            "1",
+            "kernel.apparmor_restrict_unprivileged_userns=0",
+        ),
+        ("user/max_user_namespaces", "1000", "--security-opt seccomp=unconfined"),
+    ],
+)
+def test_namespaces_that_are_forbidden(monkeypatch, tmp_path: Path, name: str, value: str, mend: str) -> None:
+    (tmp_path / name).parent.mkdir()
+    (tmp_path / name).write_text(f"{value}\n")
+    refused = subprocess.CompletedProcess([], 1, b"", b"unshare: unshare failed: Operation not permitted\n")
+    monkeypatch.setattr(walls, "SETTINGS", tmp_path)
+    monkeypatch.setattr(walls.subprocess, "run", lambda *_args, **_more: refused)
+    row = walls._probe("user namespaces", ["unshare"], drop=False)
+    assert (row.state, row.detail) == ("limited", "unshare: unshare failed: Operation not permitted")
+    assert mend in row.mend
+
+
+def test_what_holds_memory_where_no_group_can_be_made(monkeypatch) -> None:
+    monkeypatch.setattr(walls, "find_cgroups", Cgroups)
+    assert (rows()["limits"].state, rows()["limits"].mend) == ("limited", walls.DELEGATE)
+    held = Cgroups(memory=Cgroup(version=2, folder="/sys/fs/cgroup"))
+    monkeypatch.setattr(walls, "find_cgroups", lambda: held)
+    assert rows()["limits"].state == "ok"
+
+
+def test_limits_that_cannot_be_set_keep_everything_from_being_graded(monkeypatch) -> None:
+    def refuses(_mode: str) -> None:
+        raise HostError("the limits cannot be set", hint="raise them")
+
+    monkeypatch.setattr(walls, "refused_limits", lambda: "prlimit: Operation not permitted")
+    monkeypatch.setattr(walls, "choose", refuses)
+    found = rows()
+    assert (found["ulimit"].state, found["ulimit"].detail) == ("missing", "prlimit: Operation not permitted")
+    assert (found["sandbox"].state, found["sandbox"].mend) == ("missing", "raise them")
