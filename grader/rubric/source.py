@@ -14,6 +14,7 @@ from grader.errors import RubricError
 MAX_BYTES = 1_000_000
 MAX_NODES = 100_000
 MAX_DEPTH = 50
+MAX_NUMBER = (1 << 63) - 1
 MERGE_TAG = "tag:yaml.org,2002:merge"
 PLAIN_TAGS = frozenset({"tag:yaml.org,2002:map", "tag:yaml.org,2002:seq"})
 
@@ -190,6 +191,8 @@ class _Reader:
         except (ValueError, OverflowError) as error:
             problem = f"{node.value[:40]} cannot be read"
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark) from error
+        if isinstance(value, int) and abs(value) > MAX_NUMBER:
+            return self._refuse(path, f"is too large a number: {node.value[:40]}", 0)
         if value is None or isinstance(value, bool | int | str):
             return value
         if isinstance(value, float):
