@@ -44,6 +44,7 @@ _TAGS = re.compile(
 _MESSAGE_LETTERS = 300
 _OPENERS_A_TAG = 20
 _MESSAGES = 50
+_LAST_LINE = 65_535
 
 
 def parse_xml(
@@ -95,6 +96,8 @@ def _set_first_lines(root: etree._Element, data: bytes) -> None:
     elements = list(root.iter(etree.Element))
     if len(lines) == len(elements):  # in UTF-16, say, they are not
         for element, number in zip(elements, lines, strict=True):
+            if number > _LAST_LINE:  # libxml2 keeps no larger number in an element
+                break
             element.sourceline = number  # type: ignore[assignment] # lxml-stubs say `...`
 
 
