@@ -114,7 +114,9 @@ class Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
             threading.Event().wait(pause_s)
 
     def handle_error(self, request, client_address):
-        """A connection that breaks is nothing to be told."""
+        """A connection that breaks is nothing to be told; what is wrong here goes where it can be read."""
+        if not isinstance(sys.exc_info()[1], OSError):
+            super().handle_error(request, client_address)
 
 
 class Pace:
@@ -249,6 +251,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         return [self._one_of_many(one) for one in calls]
 
     def _one_of_many(self, one):
+        self.server.slow_down(self.caller)
         one = one if isinstance(one, dict) else {}
         args = one.get("params")
         result = self._called(one.get("methodName"), args if isinstance(args, list) else [])

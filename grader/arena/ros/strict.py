@@ -1,8 +1,8 @@
 """Reads XML-RPC as ROS's clients write it, and nothing that is made to break a reader.
 
-What is left out no client of ROS sends: document types, entities, comments, attributes, other encodings than UTF-8,
-`nil`, numbers that do not fit into 32 bits, names that are no text. So that nothing is worked out twice: the parser
-is expat, the rest is Python's own `xmlrpc.client`.
+What is left out no client of ROS sends: document types, entities, comments, elements with long attributes, other
+encodings than UTF-8, `nil`, numbers that do not fit into 32 bits, names that are no text. The parser is expat, the rest
+Python's own `xmlrpc.client`.
 """
 
 import re
@@ -13,7 +13,7 @@ ELEMENTS_MAX = 200000
 DEPTH_MAX = 120
 """Of elements: a value inside of a value takes four or five."""
 DIGITS_MAX = 40
-TAG_BYTES_MAX = 100
+TAG_BYTES_MAX = 200
 PIECE_BYTES = 1 << 16
 """Read at once: other threads have their turn in between."""
 _LONG_TAG = re.compile(rb"<[^<>]{%d}" % TAG_BYTES_MAX)
@@ -54,8 +54,6 @@ def _parse(data, target):
         depth += 1
         if elements > ELEMENTS_MAX:
             raise Malformed("more than {} elements".format(ELEMENTS_MAX))
-        if attributes:
-            raise Malformed("an element with more than a name")
         if depth > DEPTH_MAX:
             raise Malformed("values nested too deeply")
         target.start(tag, attributes)
