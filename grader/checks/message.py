@@ -14,7 +14,7 @@ from grader.checks.support.ending import explain_end
 from grader.checks.support.growth import GET_TIME, WATCHED_S, wrong_growth
 from grader.checks.support.lockup import is_flood
 from grader.checks.support.process import early_end, observed_until_ns
-from grader.checks.support.text import plural, shown
+from grader.checks.support.text import in_one_line, plural
 from grader.checks.support.wording import NUMBER, SECONDS, in_words, message_pattern
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
@@ -65,7 +65,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
         or _wrong_time(package, run, heard, params)
         or passed(f"all {count} messages on {params.topic} are '{in_words(params.template)}'{grows}")
     )
-    measured = f"{shown(heard[0].data[0])!r} to {shown(heard[0].data[-1])!r} ({plural(count, 'message')})"
+    measured = f"{in_one_line(heard[0].data[0])!r} to {in_one_line(heard[0].data[-1])!r} ({plural(count, 'message')})"
     span = EvidenceCitation(
         evidence=run.evidence,
         topic=params.topic,
@@ -102,19 +102,17 @@ def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdic
     if not at_ns:
         return None
     found = loose.fullmatch(text)
-    part = shown(found[1]) if found and found.groups() else ""
+    part = in_one_line(found[1]) if found and found.groups() else ""
     wanted = in_words(params.template)
     form = params.template.replace(SECONDS, "%s")
     if any(mark in text for mark in UNFILLED):
-        message = f"a message reads {shown(text)!r}: its placeholder was never filled in"
+        message = f"a message reads {in_one_line(text)!r}: its placeholder was never filled in"
     elif more := _behind(part):
-        message = f"a message has {more!r} behind the time: {shown(text)!r}, not '{wanted}'"
+        message = f"a message has {more!r} behind the time: {in_one_line(text)!r}, not '{wanted}'"
     elif part:
-        message = (
-            f"a message says {part!r} where the time in seconds belongs: {shown(text)!r}, not '{wanted}'"
-        )
+        message = f"a message says {part!r} where the time in seconds belongs: {in_one_line(text)!r}, not '{wanted}'"
     else:
-        message = f"a message reads {shown(text)!r}, not '{wanted}'"
+        message = f"a message reads {in_one_line(text)!r}, not '{wanted}'"
     cited = EvidenceCitation(evidence=run.evidence, topic=params.topic, from_ns=at_ns, to_ns=at_ns)
     value = " % rospy.get_time()" if SECONDS in params.template else ""
     return failed(message, hint=f'publish "{form}"{value}', citations=(cited,))

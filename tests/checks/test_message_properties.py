@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -57,3 +58,19 @@ def test_one_message_with_other_words_fails(text: str, at: int) -> None:
 @given(values=st.lists(st.integers(0, 2**63), min_size=40, max_size=70, unique=True))
 def test_random_numbers_fail(values: list[int]) -> None:
     assert verdict([f"The time is {value}" for value in values], 10).status is Status.FAIL
+
+
+@pytest.mark.parametrize(
+    ("hidden", "shown"),
+    [
+        ("\u200b", "\\\\u200b"),
+        ("\x1b[31m", "\\\\x1b[31m"),
+        ("\x00", "\\\\x00"),
+        ("\u202e", "\\\\u202e"),
+        ("\ufeff", "\\\\ufeff"),
+    ],
+)
+def test_what_cannot_be_seen_in_a_message_is_named(hidden: str, shown: str) -> None:
+    found = verdict([f"The {hidden}time is {i / 10:.3f}" for i in range(60)], 10)
+    assert found.status is Status.FAIL
+    assert f"The {shown}time is 0.000" in found.message

@@ -6,8 +6,11 @@ import difflib
 import re
 from collections.abc import Iterable
 
+from grader.shown import visible
+
 SIMILARITY = 0.8
 SHOWN_CHARS = 160
+SHOWN_BEFORE_CHARS = 10_000
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
 
@@ -53,8 +56,13 @@ def bare(text: str) -> str:
 
 
 def shown(text: str) -> str:
-    """One line of somebody's output, without colours and control characters, cut to fit a report."""
-    line = " ".join("".join(c for c in bare(text) if c.isprintable() or c.isspace()).split())
+    """One line of somebody's output, without colours, what cannot be seen written out, cut to fit a report."""
+    return in_one_line(bare(text[:SHOWN_BEFORE_CHARS]))
+
+
+def in_one_line(text: str) -> str:
+    """The same of a message: its colours are part of it."""
+    line = visible(" ".join(text[:SHOWN_BEFORE_CHARS].split()))
     return line if len(line) <= SHOWN_CHARS else line[: SHOWN_CHARS - 1] + "…"
 
 
