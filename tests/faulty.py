@@ -22,6 +22,7 @@ RUBRIC = ROOT / "tests" / "faulty.yaml"
 ROOM = ("unshare", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc", "--propagation", "private")
 WAIT_S = 60.0
 LOOK_S = 0.01
+GRADER = r"\S*python\S* -m grader grade "
 TAKEN = {"fail", "partial", "blocked"}
 
 
@@ -97,7 +98,7 @@ def grading(
     *,
     setup: str = "",
     prefix: Sequence[str] = (),
-    source: Path = VICTIM,
+    source: Path | str = VICTIM,
     program: Sequence[str] = (),
     **env: str,
 ) -> Iterator[Grading]:

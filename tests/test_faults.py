@@ -19,7 +19,7 @@ import pytest
 
 from grader.model.result import GradingResult
 from grader.model.verdict import Status
-from tests.faulty import VICTIM, below, command, grading, marked_down, result_in, why_not
+from tests.faulty import GRADER, VICTIM, below, command, grading, marked_down, result_in, why_not
 
 pytestmark = [
     pytest.mark.ros,
@@ -30,7 +30,6 @@ STATIC = {"GRADER_ROS_SETUP": "none"}
 ARENA = r"\S+ -s -B \S*/grader/arena/ros $"
 BUBBLEWRAP = r"bwrap .*src/talker\.py"
 CATKIN_MAKE = r"\S*python3? \S*/catkin_make "
-GRADER = r"\S*python\S* -m grader grade "
 WRITER = """
 import sys
 from grader.cli.main import run

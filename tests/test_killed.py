@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import random
+import signal
 import subprocess
 import sys
 import time
@@ -11,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.faulty import ROOM, ROOT, grading, result_in, why_not
+from tests.faulty import GRADER, ROOM, ROOT, command, grading, result_in, why_not
 
 pytestmark = [
     pytest.mark.ros,
@@ -37,6 +39,21 @@ def test_killed_at_random_moments(tmp_path: Path, capsys: pytest.CaptureFixture[
         shown = " ".join(f"{moment_s:.2f}" for moment_s in moments_s)
         print(f"\nseed {seed}: a run takes {length_s:.2f} s, killed after {shown} s")
     assert wrong == [], f"seed {seed}"
+
+
+def test_git_ends_with_the_grader(tmp_path: Path) -> None:
+    (tmp_path / "bin").mkdir()
+    git = tmp_path / "bin" / "git"
+    git.write_text('#!/bin/sh\ncase "$*" in *ls-remote*) exec sleep 60;; esac\n')
+    git.chmod(0o755)
+    env = {"PATH": f"{tmp_path}/bin:{os.environ['PATH']}", "TMPDIR": str(tmp_path)}
+    alive = ("sh", "-c", '"$@"; echo and then >&2; exec sleep 30', "sh")
+    with grading(tmp_path / "out", source="https://example.invalid/lab.git", prefix=alive, **env) as one:
+        asking = one.await_process("sleep 60")
+        os.kill(one.await_process(GRADER), signal.SIGKILL)
+        one.await_line("and then")
+        assert command(asking) == ""
+    assert not (tmp_path / "out").exists()
 
 
 def lane(folder: Path, moments_s: list[float]) -> subprocess.Popen[bytes]:

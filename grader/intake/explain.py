@@ -18,6 +18,11 @@ _NOT_THEIRS = re.compile(r"this machine|name was not found|cannot be reached")
 # In this order: the first that fits what git said is the cause.
 _CAUSES: tuple[tuple[str, str, str], ...] = (
     (
+        r"^prlimit: ",
+        "the limits of git cannot be set on this machine",
+        "Raise what this shell allows (`ulimit -Ha` shows it).",
+    ),
+    (
         r"invalid path",
         "it holds a path that git itself does not write (`.git`, `..`)",
         "Take it out of the repository, commit and push.",

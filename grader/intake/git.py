@@ -221,10 +221,20 @@ def _place(repository: Repository | None) -> tuple[str, ...]:
 
 
 def _limits() -> tuple[str, ...]:
-    """For git and all that it starts. Where there is no `prlimit`, there is no ROS either, nor a sandbox."""
-    if shutil.which("prlimit") is None:
+    """For git and all that it starts, and git ends when the grader is killed. Where there is no `prlimit`, there is no
+    ROS either, nor a sandbox."""
+    if shutil.which("prlimit") is None or shutil.which("setpriv") is None:
         return ()
-    return ("prlimit", f"--fsize={_FILE_BYTES}", f"--as={_MEMORY_BYTES}", "--core=0", "--")
+    return (
+        "setpriv",
+        "--pdeathsig",
+        "KILL",
+        "prlimit",
+        f"--fsize={_FILE_BYTES}",
+        f"--as={_MEMORY_BYTES}",
+        "--core=0",
+        "--",
+    )
 
 
 def _configured_ssh(environment: dict[str, str], cwd: Path) -> str:
