@@ -47,7 +47,8 @@ class Inspection(Record):
     """`kind` says who wrote the file: the grader, another tool (`mcap`), or `rosbag`.
 
     `late_max_ms` is how late the machine's timer woke at worst, None where that was not recorded. `outcome`
-    is None for a file that is not the grader's and for a recording that was cut short.
+    is None for a file that is not the grader's and for a recording that was cut short. `noticed` says what processes
+    were not allowed or had too much of.
     """
 
     file: str
@@ -67,6 +68,7 @@ class Inspection(Record):
     late_max_ms: float | None
     outcome: str | None
     outcome_detail: str
+    noticed: tuple[str, ...] = ()
 
 
 def inspect_file(path: Path) -> Inspection:
@@ -103,6 +105,11 @@ def inspect_run(run: Run, *, kind: Literal["grader", "mcap", "bag"] = "grader") 
         late_max_ms=max((event.max_ms for _, event in run.host), default=None),
         outcome=end.outcome if end else None,
         outcome_detail=end.detail if end else "",
+        noticed=tuple(
+            f"{event.actor}: {event.detail}"
+            for _, event in run.actors
+            if event.action in {"refused", "limit"}
+        ),
     )
 
 

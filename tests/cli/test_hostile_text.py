@@ -20,6 +20,7 @@ from grader.cli.errors import guarded, report
 from grader.cli.mutants import print_test
 from grader.cli.say import say, say_json
 from grader.errors import RubricError, SubmissionError
+from grader.evidence.events import ActorEvent
 from grader.evidence.inspect import inspect_run
 from grader.evidence.run import Channel, Message, Run
 from grader.model.result import RubricInfo
@@ -95,6 +96,7 @@ def inspected(text: str) -> Run:
     return Run(
         evidence=text, scenario=text, clock=text, warp=float("inf"), metadata={text: text}, start_ns=0, end_ns=1,
         channels=(channel,), attachments={text: b""},
+        actors=((0, ActorEvent(action="refused", actor=text, detail=text)),),
     )  # fmt: skip
 
 
@@ -105,8 +107,10 @@ def test_inspect_shows_names_that_somebody_else_chose(as_json, monkeypatch, caps
     assert inspect_command.run(file=None, as_json=as_json) == 0
     shown = capsys.readouterr().out
     assert harmless(shown)
+    assert as_json or "\nnoticed:" in shown
     if as_json:
         data = json.loads(shown)
+        assert data["noticed"] == [f"{text}: {text}"]
         assert data["channels"][0]["topic"] == text
         assert data["metadata"] == {text: text}
         assert data["warp"] is None

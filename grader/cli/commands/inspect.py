@@ -46,6 +46,7 @@ def _head(inspection: Inspection) -> Iterator[str]:
         yield f"nodes: {' '.join(inspection.nodes)}"
     for process in (p for p in inspection.processes if p.role != "grader"):
         yield f"process {process.name}: {_end(process)}"
+    yield from (f"noticed: {text}" for text in inspection.noticed)
 
 
 def _end(process: ProcessSummary) -> str:
