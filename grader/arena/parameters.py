@@ -114,10 +114,11 @@ def _content(data: bytes | None) -> dict[Any, Any]:
     if len(data) > FILE_BYTES_MAX:
         raise _UnreadableError("too large")
     text = data.decode()
-    aliases = 0
+    aliases = depth = 0
     for count, event in enumerate(yaml.parse(text, _Loader)):
         aliases += isinstance(event, yaml.AliasEvent)
-        if count > EVENTS_MAX or aliases > ALIASES_MAX:
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if count > EVENTS_MAX or aliases > ALIASES_MAX or depth > 2 * DEPTH_MAX:
             raise _UnreadableError("too much in it")
     content = yaml.load(text, _Loader)  # noqa: S506 - a SafeLoader
     if not isinstance(content, dict):
