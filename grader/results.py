@@ -98,11 +98,11 @@ class Results:
 
 def finish_killed(out: Path) -> None:
     """Finish, or throw away, what graders that were killed left in the folders of `out`. Those of live ones stay."""
-    with suppress(
-        OSError
-    ):  # housekeeping: whatever cannot be done here is done when its own submission is graded
-        for folder in [p for p in out.iterdir() if (p / NEW).is_dir() or (p / READY).is_dir()]:
-            _finish(folder)
+    with suppress(OSError):  # there is no such folder yet
+        for folder in list(out.iterdir()):
+            with suppress(OSError):  # what cannot be done here is done when that submission is graded
+                if (folder / NEW).is_dir() or (folder / READY).is_dir():
+                    _finish(folder)
 
 
 def _finish(folder: Path) -> None:
@@ -110,9 +110,7 @@ def _finish(folder: Path) -> None:
     try:
         if lock(descriptor):
             _recover(folder)
-            folder.rmdir()
-    except OSError:  # not empty: it holds a result
-        return
+            folder.rmdir()  # where it holds nothing else
     finally:
         os.close(descriptor)
 

@@ -144,6 +144,22 @@ def test_leftovers_of_the_killed_are_swept_and_those_of_the_living_are_not(tmp_p
     assert (tmp_path / "alien" / ".new").read_text() == "not ours"
 
 
+def test_one_that_cannot_be_swept_keeps_no_other_from_it(tmp_path: Path, monkeypatch) -> None:
+    for name in "abc":
+        (tmp_path / name / NEW).mkdir(parents=True)
+    real = os.open
+
+    def closed(path, *args: object) -> int:
+        if Path(path).name == "b":
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return real(path, *args)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(results_module.os, "open", closed)
+        finish_killed(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["b"]
+
+
 def test_a_second_grader_of_the_same_submission_is_told_so(tmp_path: Path) -> None:
     code = f"from pathlib import Path; from grader.results import Results; Results(Path({str(tmp_path)!r})).__enter__()"
     with Results(tmp_path) as results:
