@@ -65,9 +65,10 @@ def linked_candidate(root: Path, wanted: str) -> Candidate | None:
     for folder in walk(root, tolerant=True):
         folder.folders[:] = [name for name in folder.folders if name not in NO_CONTENT]
         for entry in folder.others:
-            if entry.name.casefold() == wanted.casefold() and entry.is_symlink():
+            named = entry.name.casefold() == wanted.casefold() and entry.is_symlink()
+            if named and is_file(Path(entry.path, MANIFEST)):
                 place = Path(os.path.realpath(entry.path))
-                if place.is_relative_to(real_root) and is_file(place / MANIFEST):
+                if place.is_relative_to(real_root):
                     path = place.relative_to(real_root).as_posix()
                     if manifest_name(place, root=real_root) == wanted:
                         return Candidate(path=path, folder=place, manifest=wanted)

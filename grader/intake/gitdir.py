@@ -103,7 +103,7 @@ def _common(own: Path, within: Path) -> Path:
 def _real(path: Path) -> Path | None:
     try:
         return Path(os.path.realpath(path))
-    except ValueError:  # a null byte
+    except (ValueError, RecursionError):  # a null byte, a chain of links that no system follows
         return None
 
 

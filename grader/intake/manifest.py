@@ -21,10 +21,10 @@ def manifest_name(folder: Path, *, root: Path) -> str | None:
     link out of `root` is not read.
     """
     path = folder / MANIFEST
-    real = os.path.realpath(path)
-    if os.path.commonpath([real, os.path.realpath(root)]) != os.path.realpath(root):
-        return None
     try:
+        path.stat()  # before realpath, which follows chains of links that no system follows
+        if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(root)):
+            return None
         data = read_file(path, _LARGEST_BYTES + 1)
     except OSError:
         return None

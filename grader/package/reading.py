@@ -36,6 +36,7 @@ def regular_file(folder: Path, path: str) -> Path:
     Raises Unreadable.
     """
     try:
+        (folder / path).stat()  # before realpath, which follows chains of links that no system follows
         real = os.path.realpath(folder / path, strict=True)
         mode = Path(real).stat().st_mode
     except OSError as error:

@@ -246,6 +246,22 @@ def test_python_files_that_crash_or_never_end(tmp_path):
     assert facts.file("src/a.py").python_fault is None
 
 
+def test_links_that_no_system_follows(tmp_path):
+    package = make_package(tmp_path / "lab1", dict(GOOD))
+    for number in range(1500):
+        (package.folder / f"link{number}").symlink_to(f"link{number + 1}")
+    (package.folder / "link1500").symlink_to("src/a.py")
+    (package.folder / "package.xml").unlink()
+    (package.folder / "package.xml").symlink_to("link0")
+    with bounded():
+        facts = read_package(package)
+        submission = open_submission(str(tmp_path / "lab1"), package="lab1", workdir=tmp_path / "work")
+    assert facts.manifest_fault.kind == "LinkLoop"
+    assert "leads back to itself" in facts.file("link0").link_problem
+    assert facts.file("link1490").link_problem == ""
+    assert "no name can be read" in submission.hints[0]
+
+
 # Files that are none, or too large, or closed
 
 MATTER = ("package.xml", "CMakeLists.txt", "src/a.py", "launch/a.launch")
