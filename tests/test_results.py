@@ -149,10 +149,10 @@ def test_one_that_cannot_be_swept_keeps_no_other_from_it(tmp_path: Path, monkeyp
         (tmp_path / name / NEW).mkdir(parents=True)
     real = os.open
 
-    def closed(path, *args: object) -> int:
+    def closed(path, *args: object, **more: object) -> int:
         if Path(path).name == "b":
             raise PermissionError(errno.EACCES, "Permission denied", str(path))
-        return real(path, *args)
+        return real(path, *args, **more)
 
     with monkeypatch.context() as patch:
         patch.setattr(results_module.os, "open", closed)
