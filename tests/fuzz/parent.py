@@ -47,7 +47,7 @@ class Outcome:
     def signature(self) -> str:
         """The same for findings of one cause, as far as that can be told; fit for a file's name."""
         error = self.error.partition(":")[0] if self.kind == "raised" else ""
-        return re.sub(r"[^\w-]+", "-", "-".join(filter(None, (self.kind, error, self.where))))
+        return re.sub(r"\W+", "-", "-".join(filter(None, (self.kind, error, self.where))))
 
     @property
     def shape(self) -> str:
