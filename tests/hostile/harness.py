@@ -20,7 +20,7 @@ from typing import IO, Any
 
 from grader.arena.cgroups import find_cgroups
 from grader.errors import ExitCode
-from grader.model.result import GradingResult
+from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from tests.hostile.form import HERE, Attack, User, load_attack, rubric_path, submission_job
 from tests.hostile.outputs import control_characters, secrets_in
@@ -35,6 +35,8 @@ UNSHARE = (
 )  # fmt: skip
 NEEDED = ("unshare", "pivot_root", "ip", "useradd", "mount")
 HARM = re.compile(r"HARM")
+BUSY = (Status.PASS, Status.INCONCLUSIVE)
+RATE_ALONE = re.compile(r"^90 of 100 points.*^\? rate ", re.MULTILINE | re.DOTALL)
 
 
 @cache
@@ -205,10 +207,15 @@ def _statuses(attack: Attack, graded: Graded) -> Iterator[str]:
     if code not in _codes(result):
         yield f"exit code {code} for a result of status {result.status} and {result.points:g} points"
     for criterion in result.criteria:
-        wanted = attack.expect.get(criterion.id, Status.PASS)
+        wanted = attack.expect.get(criterion.id, BUSY if _was_busy(criterion) else Status.PASS)
         if criterion.status not in (wanted if isinstance(wanted, tuple) else (wanted,)):
             said = f"{criterion.message} [{criterion.measured}]"
             yield f"{criterion.id}: wanted {_shown(wanted)}, got {criterion.status.value}: {said}"
+
+
+def _was_busy(criterion: CriterionResult) -> bool:
+    """A rate is judged only where the machine that runs the tests had time for it."""
+    return criterion.check == "rate" and "machine was late" in criterion.message
 
 
 def _shown(wanted: Status | tuple[Status, ...]) -> str:
@@ -262,6 +269,7 @@ def _missing(where: str, text: str, patterns: Iterable[str]) -> Iterator[str]:
 def _after(after: Mapping[str, Any] | None) -> Iterator[str]:
     if after is None:
         return
-    if after["exit_code"] != ExitCode.PASSED or after["late"]:
+    busy = after["exit_code"] == ExitCode.INCONCLUSIVE and RATE_ALONE.search(after["stdout"])
+    if (after["exit_code"] != ExitCode.PASSED and not busy) or after["late"]:
         said = after["stdout"][-1500:] + after["stderr"][-500:]
         yield f"the victim, graded next: exit code {after['exit_code']}: {said}"
