@@ -12,6 +12,7 @@ from grader.model.record import Record
 
 ELF = b"\x7fELF"
 MEMBERS_MAX = 50_000
+_DAMAGED = (OSError, tarfile.TarError, ValueError, OverflowError)
 
 
 class Built(Record):
@@ -30,8 +31,7 @@ def read_archive(archive: Path, package: str) -> Built:
         if name == member.name or "/" in name or not member.isreg() or not member.mode & stat.S_IXUSR:
             continue
         programs.add(name)
-        content = tar.extractfile(member)
-        if content is not None and content.read(len(ELF)) == ELF:
+        if _content(tar, member, len(ELF)) == ELF:
             compiled.add(name)
     return Built(programs=frozenset(programs), compiled=frozenset(compiled))
 
@@ -51,9 +51,18 @@ def read_folder(devel: Path, package: str) -> Built:
 def read_member(archive: Path, name: str, limit_bytes: int) -> bytes | None:
     """The content of one regular file of the archive, cut at the limit, or None."""
     for tar, member in _members(archive):
-        if member.name == name and member.isreg() and (content := tar.extractfile(member)) is not None:
-            return content.read(limit_bytes)
+        if member.name == name and member.isreg():
+            return _content(tar, member, limit_bytes)
     return None
+
+
+def _content(tar: tarfile.TarFile, member: tarfile.TarInfo, limit_bytes: int) -> bytes | None:
+    """A member's bytes, cut at the limit; None where the archive ends before they do."""
+    try:
+        content = tar.extractfile(member)
+        return None if content is None else content.read(limit_bytes)
+    except _DAMAGED:
+        return None
 
 
 def _members(archive: Path) -> Iterator[tuple[tarfile.TarFile, tarfile.TarInfo]]:
@@ -64,7 +73,7 @@ def _members(archive: Path) -> Iterator[tuple[tarfile.TarFile, tarfile.TarInfo]]
                 if number >= MEMBERS_MAX:
                     return
                 yield tar, member
-    except (OSError, tarfile.TarError, ValueError, OverflowError):
+    except _DAMAGED:
         return
 
 

@@ -14,6 +14,7 @@ from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
 
+from grader.arena.built import read_archive, read_member
 from grader.arena.parameters import settings
 from grader.arena.sandbox import Sandbox
 from grader.arena.session import ArenaSession
@@ -180,6 +181,12 @@ def archive(data: bytes) -> None:
         assert path.resolve().is_relative_to(submission.root.resolve()), f"{path} leads out"
 
 
+def built(data: bytes) -> None:
+    left = write(Path("built.tar"), data)
+    comes_back(read_archive(left, PACKAGE))
+    read_member(left, "trace.json", 1000)
+
+
 def git_refs(data: bytes) -> None:
     wanted, _, text = data.decode("utf-8", "surrogateescape").partition("\n")
     try:
@@ -289,6 +296,7 @@ READERS: dict[str, tuple[Read, Promised]] = {
     "parameters": (parameters, NOTHING),
     "source": (source, (UsageError, SubmissionError)),
     "archive": (archive, (SubmissionError,)),
+    "built": (built, NOTHING),
     "git-refs": (git_refs, (SubmissionError,)),
     "rubric": (rubric, (RubricError,)),
     "mutants": (mutants, (RubricError,)),

@@ -20,6 +20,7 @@ GRAMMARS: dict[str, Callable[[], SearchStrategy[bytes]]] = {
     "parameters": text.any_yaml,
     "source": text.source,
     "archive": binary.archive,
+    "built": binary.built,
     "git-refs": text.git_refs,
     "rubric": text.rubric,
     "mutants": text.mutants,

@@ -9,7 +9,7 @@ import struct
 import tarfile
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import lz4.frame
 import zstandard
@@ -244,12 +244,25 @@ NAMES = (
     "lab1/package.xml", "lab1/CMakeLists.txt", "lab1/src/a.py", "lab1/", "../x", "/etc/passwd", "lab1/../../x", "a\\b",
     "C:/x", "lab1/src", "lab1/link", "é", "__MACOSX/x", ".git/config", "lab1/package.xml/x", "LAB1/PACKAGE.XML",
 )  # fmt: skip
+BUILT = (
+    "devel/lib/lab1/talker",
+    "devel/lib/lab1",
+    "devel/lib/lab1/../x",
+    "trace.json",
+    "devel/lib/other/x",
+    "/x",
+)
 XML = b"<package><name>lab1</name></package>"
 
 
 @st.composite
 def archive(draw: st.DrawFn) -> bytes:
-    return draw(st.one_of(_zip(), _tar()))
+    return draw(st.one_of(_zip(), _tar(NAMES, ("w", "w:gz", "w:bz2", "w:xz"))))
+
+
+def built() -> SearchStrategy[bytes]:
+    """What a build hands over."""
+    return _tar(BUILT, ("w",))
 
 
 @st.composite
@@ -268,17 +281,15 @@ def _zip(draw: st.DrawFn) -> bytes:
 
 
 @st.composite
-def _tar(draw: st.DrawFn) -> bytes:
+def _tar(draw: st.DrawFn, names: Sequence[str], modes: Sequence[str]) -> bytes:
     out = io.BytesIO()
     form = draw(st.sampled_from((tarfile.PAX_FORMAT, tarfile.GNU_FORMAT, tarfile.USTAR_FORMAT)))
-    with tarfile.open(
-        fileobj=out, mode=draw(st.sampled_from(("w", "w:gz", "w:bz2", "w:xz"))), format=form
-    ) as packed:
-        for name in draw(st.lists(st.sampled_from(NAMES), max_size=6)):
+    with tarfile.open(fileobj=out, mode=draw(st.sampled_from(modes)), format=form) as packed:
+        for name in draw(st.lists(st.sampled_from(names), max_size=6)):
             info = tarfile.TarInfo(name)
-            info.type = draw(st.sampled_from((b"0", b"0", b"1", b"2", b"5", b"3", b"6")))
+            info.type = draw(st.sampled_from((b"0", b"0", b"1", b"2", b"5", b"3", b"6", b"S", b"x")))
             info.mode = draw(st.sampled_from((0o755, 0o644, 0)))
-            info.linkname = draw(st.sampled_from(NAMES)) if info.type in b"12" else ""
+            info.linkname = draw(st.sampled_from(names)) if info.type in b"12" else ""
             data = draw(st.sampled_from((XML, b"", b"x" * 2000))) if info.isreg() else b""
             info.size = len(data)
             packed.addfile(info, io.BytesIO(data))
