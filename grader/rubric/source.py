@@ -15,6 +15,8 @@ MAX_BYTES = 1_000_000
 MAX_NODES = 100_000
 MAX_DEPTH = 50
 MAX_NUMBER = (1 << 63) - 1
+MAX_NUMBER_LETTERS = 100
+TEXT_TAG = "tag:yaml.org,2002:str"
 MERGE_TAG = "tag:yaml.org,2002:merge"
 PLAIN_TAGS = frozenset({"tag:yaml.org,2002:map", "tag:yaml.org,2002:seq"})
 
@@ -178,7 +180,7 @@ class _Reader:
     def _key(self, node: yaml.Node, path: KeyPath) -> str | None:
         if node.tag == MERGE_TAG:
             return None
-        if isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:str":
+        if isinstance(node, yaml.ScalarNode) and node.tag == TEXT_TAG:
             return str(node.value)
         shown = node.value if isinstance(node, yaml.ScalarNode) else "this"
         line = node.start_mark.line + 1
@@ -186,10 +188,12 @@ class _Reader:
         return None
 
     def _scalar(self, node: yaml.Node, path: KeyPath) -> Value:
+        problem = f"{node.value[:40]} cannot be read"
+        if node.tag != TEXT_TAG and len(node.value) > MAX_NUMBER_LETTERS:  # `1:1:…` takes time by the square
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
         try:
             value = self.loader.construct_object(node)
         except (ValueError, OverflowError) as error:
-            problem = f"{node.value[:40]} cannot be read"
             raise yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark) from error
         if isinstance(value, int) and abs(value) > MAX_NUMBER:
             return self._refuse(path, f"is too large a number: {node.value[:40]}", 0)
