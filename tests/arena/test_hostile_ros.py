@@ -118,7 +118,7 @@ NAMELESS = '<struct><member><value><i4>1</i4></value><value>x</value></member></
 attempt('names', lambda: post((CALL % NAMELESS).encode()))
 attempt('garbage', lambda: send(os.urandom(5000) + b'\\r\\n\\r\\n'))
 attempt('large', lambda: post((CALL % ('x' * (8000 << 10))).encode()))
-attempt('multicall', lambda: proxy().system.multicall([{'methodName': 'getParam', 'params': ['/x', '/']}] * 5000))
+attempt('multicall', lambda: proxy().system.multicall([{'methodName': 'getParam', 'params': ['/x', '/']}] * 1000))
 attempt('private', lambda: proxy()._shutdown('x'))
 attempt('inner', lambda: [proxy().param_update_task('/x', 'http://127.0.0.1:1/', '/x', 1)])
 idle = [send(b'POST / HTTP/1.1\\r\\n', wait=False) for _ in range(900)]
@@ -218,10 +218,10 @@ attempt('control', lambda: proxy().registerPublisher('/attack', '/a\\nb', 'std_m
 attempt('types', lambda: proxy().registerPublisher(5, ['/a'], {}, SILENT))
 one = proxy()
 for number in range(1100):
-    one.registerSubscriber('/attack', '/t%d' % number, 'std_msgs/Int8', SILENT)
+    one.registerSubscriber('/attack', '/t%d' % number + 'x' * 200, 'std_msgs/Int8', SILENT)
     one.registerService('/attack', '/s%d' % number, 'rosrpc://127.0.0.1:%d' % listener.getsockname()[1], SILENT)
     one.registerPublisher('/attack%d' % number, '/p%d' % number, 'std_msgs/Int8', SILENT)
-    one.unregisterSubscriber('/attack', '/t%d' % number, SILENT)
+    one.unregisterSubscriber('/attack', '/t%d' % number + 'x' * 200, SILENT)
 print('registered')
 time.sleep(60)
 """
@@ -419,7 +419,8 @@ attempt('field', lambda: send(struct.pack('<I', 8) + struct.pack('<I', 400000000
 attempt('bytes', lambda: send(header(topic='/said', md5sum='*', type='*', callerid='\\x1b[31m'), port))
 attempt('garbage', lambda: send(os.urandom(5000), port))
 attempt('large', lambda: post(b'x' * 100, 'Content-Length: 999999999'))
-deaf = [send(header(topic='/said', md5sum='*', type='*', callerid='/deaf%d' % n), port, wait=False) for n in range(100)]
+deaf = [send(header(topic='/said', md5sum='*', type='*', callerid='/deaf%d' % n), port, wait=False) for n in range(70)]
+assert all(sock.recv(1) for sock in deaf[:64])
 idle = [send(b'\\x10', port, wait=False) for _ in range(800)]
 print('done')
 rospy.spin()
@@ -454,7 +455,7 @@ def test_attacks_on_the_node_that_sends_messages(tmp_path: Path) -> None:
         told(seen, "refused"),
         ("told the grader's node to shut down", "no header: connection header of 4294967295"),
     )
-    assert_told(told(seen, "limit", "a subscriber"), ("more than 256 connections to the grader's node",))
+    assert_told(told(seen, "limit"), ("connections to the grader's node that said nothing", "64 subscribers"))
     assert exit_of(seen, "arena").max_rss_bytes < ARENA_BYTES_MAX
 
 

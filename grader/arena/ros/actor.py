@@ -5,20 +5,17 @@ moment of sending, not by a detour over the network.
 """
 
 import os
-import socket
 import struct
 import threading
 import time
 
-from bounded import BoundedSocket, ProtocolError
+from door import HOST, Door
 from guard import shown
-from tcpros import HEADER_BYTES_MAX, LENGTH, Closed, check_fields, read_header, write_header
+from tcpros import LENGTH, write_header
 from wire import now_ns
 
-HANDSHAKE_S = 2.0
-CONNECTIONS_MAX = 256
-"""Subscribers, and those that have yet to say what they want."""
-SOMEBODY = "a subscriber"
+SUBSCRIBERS_MAX = 64
+"""Of one process."""
 OTHER_TYPES_MAX = 100
 CLOCK = {
     "topic": "/clock",
@@ -56,7 +53,7 @@ class SlaveApi:
     def requestTopic(self, _caller_id, topic, protocols):
         if str(topic) not in self._actor.topics or ["TCPROS"] not in protocols:
             return 0, "no such topic or protocol", []
-        return 1, "ready", ["TCPROS", self._actor.host, self._actor.port]
+        return 1, "ready", ["TCPROS", HOST, self._actor.port]
 
     def getPid(self, _caller_id):
         return 1, "", os.getpid()
@@ -109,17 +106,12 @@ class Actor:
     def __init__(self, loop, wire, caller_id, guard, owners):
         self.topics = {}
         self._guard = guard
-        self._owners = owners
-        self._shaking = 0
+        self._whose = {}
         self._other_types = set()
         self.caller_id = caller_id
-        self.host = "127.0.0.1"
-        self._loop = loop
         self._wire = wire
-        self._server = socket.create_server((self.host, 0), backlog=4096)
-        self.port = self._server.getsockname()[1]
+        self.port = Door(loop, self._join, guard, owners).port
         self.uri = None
-        loop.add_reader(self._server, self._accept)
 
     def advertise(self, master, fields):
         """Register a topic; `fields` holds topic, type, md5sum, definition, latching."""
@@ -147,46 +139,18 @@ class Actor:
         except OSError:
             pass  # gone, or not reading any more: either way it is no subscriber
         topic.subscribers.pop(sock, None)
+        self._whose.pop(sock, None)
         sock.close()
 
-    def _accept(self):
-        sock, address = self._server.accept()
-        sock = BoundedSocket(fileno=sock.detach())
-        topics = list(self.topics.values())
-        if self._shaking + sum(len(topic.subscribers) for topic in topics) >= CONNECTIONS_MAX:
-            sock.close()
-            detail = "opened more than {} connections to the grader's node".format(CONNECTIONS_MAX)
-            self._guard.limit(SOMEBODY, detail)
-            return
-        self._shaking += 1
-        sock.allow(HANDSHAKE_S, HEADER_BYTES_MAX + LENGTH.size)
-        threading.Thread(target=self._handshake, args=(sock, address), daemon=True).start()
-
-    def _handshake(self, sock, address):
-        try:
-            self._join(sock)
-        except (OSError, Closed):
-            sock.close()
-        except ProtocolError as error:
-            self._guard.refused(
-                self._who(address), "sent the grader's node no header: {}".format(shown(error))
-            )
-            sock.close()
-        finally:
-            self._loop.call_soon(self._shaken)
-
-    def _who(self, address):
-        return self._owners.caller(address, (self.host, self.port)) or SOMEBODY
-
-    def _shaken(self):
-        self._shaking -= 1
-
-    def _join(self, sock):
+    def _join(self, sock, header, who):
         """Take a subscriber up, or tell it why not."""
-        header = read_header(sock)
-        check_fields(header)
         topic = self.topics.get(header.get("topic"))
         problem = self._mismatch(topic, header)
+        if not problem and list(self._whose.values()).count(who) >= SUBSCRIBERS_MAX:
+            problem = "too many subscribers"
+            self._guard.limit(
+                who, "has more than {} subscribers to the grader's node".format(SUBSCRIBERS_MAX)
+            )
         if problem:
             write_header(sock, {"error": problem})
             sock.close()
@@ -197,6 +161,7 @@ class Actor:
         sock.setblocking(False)
         with topic.lock:
             topic.subscribers[sock] = subscriber
+            self._whose[sock] = who
             if topic.latching and topic.last:
                 self._send(topic, sock, topic.last)
         self._wire.status("subscribed", topic=topic.name, subscriber=subscriber)

@@ -51,6 +51,13 @@ class Owners:
         """The name of the process whose connection goes from `near` to `far`, both (address, port), or None."""
         return self._holder(sockets.connected(near, far))
 
+    def callers(self, connections):
+        """The same of many connections, each (near, far)."""
+        inodes = [next(iter(sockets.connected(*ends)), None) for ends in connections]
+        with self._looking:
+            self._look_at_all()
+            return [self._holders.get("socket:[{}]".format(inode)) for inode in inodes]
+
     def _may_look(self, api):
         """An address that nobody listens on costs a few looks, not one at every change of the graph."""
         now_s = time.monotonic()

@@ -8,7 +8,8 @@ from bounded import port_of
 from values import weight
 
 WORKERS_MAX, EACH_MAX = 256, 64
-WAITING_MAX = 5000
+WAITING_MAX = 1000
+"""Jobs of one key."""
 IDLE_S = 5.0
 LARGE_BYTES = 64 << 10
 
@@ -22,17 +23,16 @@ class Pool:
         self._each_max = each_max
         self._changed = threading.Condition()
         self._waiting = collections.OrderedDict()
-        self._count = 0
         self._busy = collections.Counter()
         self._workers = self._idle = 0
 
     def submit(self, key, job):
-        """Run it beside the caller; False where too much waits already."""
+        """Run it beside the caller; False where too much of that key waits already."""
         with self._changed:
-            if self._count >= WAITING_MAX:
+            jobs = self._waiting.setdefault(key, collections.deque())
+            if len(jobs) >= WAITING_MAX:
                 return False
-            self._waiting.setdefault(key, collections.deque()).append(job)
-            self._count += 1
+            jobs.append(job)
             if self._idle:
                 self._changed.notify()
             elif self._workers < self._workers_max:
@@ -70,7 +70,6 @@ class Pool:
         for key, jobs in self._waiting.items():
             if self._busy[key] < self._each_max:
                 job = jobs.popleft()
-                self._count -= 1
                 self._busy[key] += 1
                 del self._waiting[key]
                 if jobs:

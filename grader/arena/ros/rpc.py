@@ -7,11 +7,11 @@ import socket
 import socketserver
 import sys
 import threading
-import time
 import xmlrpc.client
 
 import strict
 from bounded import BoundedSocket
+from callers import SOMEBODY, Caller, Pace
 from guard import shown
 from rosgraph.network import get_address_override, get_bind_address
 from values import weight
@@ -25,10 +25,15 @@ TURN_OF_THREADS_S = 0.001
 """What is read and recorded does not wait long for threads that work on calls."""
 REQUEST_S, IDLE_S, TURN_S = 8.0, 120.0, 8.0
 READ_AHEAD_BYTES = 8 << 10
-CALLS_HZ, CALLS_AT_ONCE = 1000.0, 2000
-LOOK_EVERY = 64
-MULTICALL, MULTICALLS_MAX = "system.multicall", 10000
+CALLS_HZ, CALLS_AT_ONCE, PAUSE_S = 1000.0, 2000, 3.0
+CLOSED_AT_ONCE = 64
+MULTICALL, MULTICALLS_MAX = "system.multicall", 5000
 REFUSED_CODE, NOT_KNOWN_CODE, TOO_LATE_CODE, TOO_LARGE_CODE = 400, 404, 408, 413
+BUSY_CODE = 503
+
+
+class Busy(Exception):
+    """Others have large calls, too."""
 
 
 class Refused(Exception):
@@ -55,8 +60,8 @@ class Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
         self.uri = "http://{}:{}/".format(get_address_override() or self.server_address[0], self.port)
         self.large = threading.Lock()
         self._paces = collections.defaultdict(lambda: Pace(CALLS_HZ, CALLS_AT_ONCE))
-        self._count = self._refused = 0
-        self._idle = collections.OrderedDict()
+        self._open = set()
+        self._waiting = collections.OrderedDict()
         self._lock = threading.Lock()
 
     def get_request(self):
@@ -64,49 +69,60 @@ class Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
         return BoundedSocket(fileno=sock.detach()), address
 
     def process_request(self, request, client_address):
-        """One thread a connection. Past the limit the one that has said nothing for longest makes way."""
-        with self._lock:
-            full = self._count >= CONNECTIONS_MAX
-            oldest = next(iter(self._idle), None) if full else None
-            self._idle.pop(oldest, None)
-            if not full or oldest is not None:
-                self._count += 1
-        if full:
-            self._note_flood(client_address, request.getsockname())
-        if full and oldest is None:
+        """One thread a connection; where there are too many, those make way of whom there are most."""
+        if self._admitted(request) or (self._make_room() and self._admitted(request)):
+            super().process_request(request, client_address)
+        else:
             self.shutdown_request(request)
-            return
-        if oldest is not None:
-            with contextlib.suppress(OSError):  # closed meanwhile
-                oldest.shutdown(socket.SHUT_RDWR)
-        super().process_request(request, client_address)
 
-    def _note_flood(self, *ends):
-        """Who it was is not asked for each of thousands."""
-        self._refused += 1
-        if self._refused % LOOK_EVERY == 1:
-            detail = "opened more than {} connections to {}".format(CONNECTIONS_MAX, self.title)
-            self.guard.limit(Caller(self.owners, *ends).name, detail)
+    def _admitted(self, request):
+        with self._lock:
+            if len(self._open) >= CONNECTIONS_MAX:
+                return False
+            self._open.add(request)
+            return True
+
+    def _make_room(self):
+        """Close the oldest of the process that has most connections, as far as they are not being answered."""
+        with self._lock:
+            waiting = list(self._waiting)
+        ends = [_ends(request) for request in waiting]
+        whose = self.owners.callers(ends)
+        ((most, _),) = collections.Counter(whose).most_common(1) or ((None, 0),)
+        theirs = [number for number, who in enumerate(whose) if who == most]
+        closed = [waiting[number] for number in theirs[:CLOSED_AT_ONCE]]
+        detail = "opened more than {} connections to {}".format(CONNECTIONS_MAX, self.title)
+        self.guard.limit(most or SOMEBODY, detail)
+        for request in closed:
+            self._forget(request)
+            with contextlib.suppress(OSError):  # closed meanwhile
+                request.shutdown(socket.SHUT_RDWR)
+        return bool(closed)
+
+    def _forget(self, request):
+        with self._lock:
+            self._open.discard(request)
+            self._waiting.pop(request, None)
 
     def process_request_thread(self, request, client_address):
         try:
             super().process_request_thread(request, client_address)
         finally:
-            with self._lock:
-                self._count -= 1
-                self._idle.pop(request, None)
+            self._forget(request)
 
     def waits(self, request, waiting):
-        """A connection waits for its next request, or got one."""
+        """A connection waits for its next call, or has one that is being answered."""
         with self._lock:
             if waiting:
-                self._idle[request] = True
+                self._waiting[request] = True
             else:
-                self._idle.pop(request, None)
+                self._waiting.pop(request, None)
 
-    def slow_down(self, caller):
+    def slow_down(self, caller, calls=1):
         """Let no process call so often that nobody else comes through."""
-        pause_s = self._paces[caller.process].wait_s()
+        pause_s = self._paces[caller.process].wait_s(calls)
+        if pause_s > PAUSE_S:
+            raise Refused(TOO_LARGE_CODE, "{} calls at once".format(calls))
         if pause_s > 0:
             self.guard.limit(
                 caller.name, "called {} more than {:g} times a second".format(self.title, CALLS_HZ)
@@ -117,44 +133,6 @@ class Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
         """A connection that breaks is nothing to be told; what is wrong here goes where it can be read."""
         if not isinstance(sys.exc_info()[1], OSError):
             super().handle_error(request, client_address)
-
-
-class Pace:
-    """At most so many a second, in the long run."""
-
-    def __init__(self, per_s, at_once):
-        self._per_s, self._at_once = per_s, at_once
-        self._next_s = 0.0
-        self._lock = threading.Lock()
-
-    def wait_s(self):
-        """How long this one has to wait (s)."""
-        now_s = time.monotonic()
-        with self._lock:
-            self._next_s = max(self._next_s, now_s - self._at_once / self._per_s) + 1 / self._per_s
-            return self._next_s - now_s
-
-
-class Caller:
-    """Who is at the other end of a connection; `process` is looked up when it is first asked for."""
-
-    def __init__(self, owners, near, far):
-        self._owners = owners
-        self._ends = near, far
-        self._found = None
-        self._looked = False
-
-    @property
-    def process(self):
-        """The name of the process of the run, or None."""
-        if not self._looked:
-            self._looked = True
-            self._found = self._owners.caller(*self._ends)
-        return self._found
-
-    @property
-    def name(self):
-        return self.process or "an unknown process"
 
 
 class _Handler(http.server.BaseHTTPRequestHandler):
@@ -171,27 +149,36 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         self.close_connection = True
         sock.allow(IDLE_S, HEAD_BYTES_MAX)
         self.server.waits(sock, True)
-        try:
-            begun = self.rfile.peek(1)
-        finally:
-            self.server.waits(sock, False)
-        if begun:
+        if self.rfile.peek(1):
             sock.allow(REQUEST_S, HEAD_BYTES_MAX)
             super().handle_one_request()
 
     def do_POST(self):
-        self.server.slow_down(self.caller)
         try:
+            self.server.slow_down(self.caller)
             self._answer()
         except Refused as refused:
             self._refuse(*refused.args)
+        except Busy:
+            self.close_connection = True
+            self._send(BUSY_CODE, b"")
         except socket.timeout:
             self._refuse(TOO_LATE_CODE, "a call that did not end")
 
     def _refuse(self, code, what):
-        self.server.guard.refused(self.caller.name, "sent {} {}".format(self.server.title, what))
+        if self.caller.process is not None or not self._gone():
+            self.server.guard.refused(self.caller.name, "sent {} {}".format(self.server.title, what))
         self.close_connection = True
         self._send(code, b"")
+
+    def _gone(self):
+        """Whether the other side has ended, perhaps in the middle of a call."""
+        try:
+            return not self.connection.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            return False
+        except OSError:
+            return True
 
     def send_error(self, code, message=None, explain=None):  # noqa: ARG002 - http.server calls it so
         self._refuse(code, "what is no call")
@@ -204,6 +191,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
             if len(body) < size:
                 self.close_connection = True
                 return
+            self.server.waits(self.connection, False)
             result = self._result(body)
             del body
             with self._turn(not turn and weight(result, LARGE_BYTES) > LARGE_BYTES):
@@ -231,7 +219,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
             yield False
             return
         if not self.server.large.acquire(timeout=TURN_S):
-            raise Refused(TOO_LARGE_CODE, "too many large calls at once")
+            raise Busy
         try:
             yield True
         finally:
@@ -248,10 +236,10 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         calls = args[0] if len(args) == 1 and isinstance(args[0], list) else []
         if len(calls) > MULTICALLS_MAX:
             raise Refused(TOO_LARGE_CODE, "more than {} calls at once".format(MULTICALLS_MAX))
+        self.server.slow_down(self.caller, len(calls))
         return [self._one_of_many(one) for one in calls]
 
     def _one_of_many(self, one):
-        self.server.slow_down(self.caller)
         one = one if isinstance(one, dict) else {}
         args = one.get("params")
         result = self._called(one.get("methodName"), args if isinstance(args, list) else [])
@@ -289,6 +277,14 @@ class _Handler(http.server.BaseHTTPRequestHandler):
 
     def log_message(self, *_):
         """Nobody reads it."""
+
+
+def _ends(request):
+    """Both ends of a connection, each (address, port); as good as none where it is closed."""
+    try:
+        return request.getpeername(), request.getsockname()
+    except OSError:
+        return ("0.0.0.0", 0), ("0.0.0.0", 0)  # noqa: S104 - nobody's address
 
 
 def serve(port, answer, guard, owners, title):
