@@ -100,8 +100,8 @@ class _Reader(Reader):
     """
 
     def __init__(self, path: Path) -> None:
-        self.file = _File(path)
-        super().__init__(self.file)  # type: ignore[arg-type] # as far as it needs a path
+        super().__init__(path)
+        self.path = self.file = _File(path)  # type: ignore[assignment] # as far as it is used as a path
         self._seen: set[int] = set()
         self._count = 0
 
@@ -144,9 +144,6 @@ class _File:
 
     def __str__(self) -> str:
         return str(self._path)
-
-    def exists(self) -> bool:
-        return self._path.exists()
 
     def open(self, mode: Literal["rb"]) -> _File:
         self._file = self._path.open(mode)

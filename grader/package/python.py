@@ -19,6 +19,7 @@ from grader.package.reading import printable
 
 SYNTAX_SCRIPT = Path(__file__).resolve().parents[1] / "arena" / "ros" / "syntax.py"
 _CRASHES_LIMIT = 3
+_MESSAGE_LETTERS = 500
 
 
 class SyntaxReport(Record):
@@ -77,12 +78,13 @@ def _entry(line: bytes | str) -> _RawEntry | None:
 
 def _fault(file: str, raw: _RawFault) -> Fault:
     cause = cause_of(raw.message, raw.text, column=raw.column, opened=raw.opened, mixed=raw.mixed)
+    kind = printable(raw.kind[:_MESSAGE_LETTERS])
     return Fault(
         file=file,
         line=raw.line,
         column=raw.column if raw.column and raw.column > 0 else None,
-        kind=raw.kind,
-        message=printable(raw.message) or raw.kind,
+        kind=kind,
+        message=printable(raw.message[:_MESSAGE_LETTERS]) or kind,
         cause=printable(cause),
     )
 
