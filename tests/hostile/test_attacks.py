@@ -44,11 +44,10 @@ def graded(request, tmp_path_factory) -> Iterator[dict[tuple[str, str], Future[G
         pytest.skip(reason)
     every = [getattr(getattr(item, "callspec", None), "params", {}) for item in request.session.items]
     chosen = [(params["attack"], params["user"]) for params in every if "user" in params]
+    longest_first = sorted(dict.fromkeys(chosen), key=lambda pair: -load_attack(pair[0]).wall_s)
     out = tmp_path_factory.mktemp("hostile")
     with ThreadPoolExecutor(SIDE_BY_SIDE) as pool:
-        yield {
-            pair: pool.submit(grade_in_room, *pair, out / "-".join(pair)) for pair in dict.fromkeys(chosen)
-        }
+        yield {pair: pool.submit(grade_in_room, *pair, out / "-".join(pair)) for pair in longest_first}
         pool.shutdown(cancel_futures=True)
 
 
