@@ -14,8 +14,8 @@ from tests.fuzz.parent import Runner
 from tests.fuzz.readers import READERS
 from tests.fuzz.targets import CORPUS, ROS_SIDE, TARGETS
 
-MUTATED, GROWN = 60, 25
-MUTATED_BYTES_MAX = 12_000
+MUTATED, GROWN = 40, 20
+MUTATED_BYTES_MAX = 6_000
 EACH = [
     pytest.param(name, marks=[pytest.mark.ros] if name in ROS_SIDE else [], id=name)
     for name in sorted(TARGETS)
