@@ -39,7 +39,7 @@ def _name(data: bytes) -> str | None:
         return None
     # An empty document gives no root at all in this mode.
     for child in root if root is not None else ():
-        if isinstance(child.tag, str) and etree.QName(child).localname == "name":
+        if isinstance(child.tag, str) and child.tag.rpartition("}")[2] == "name":
             text = [child.text or "", *(part.tail or "" for part in child)]
             name = " ".join("".join(text).split())
             return name if 0 < len(name) <= _LONGEST_NAME else None
