@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import select
 import shlex
 import shutil
 import signal
@@ -44,6 +45,7 @@ _NETWORK_KEPT = re.compile(
 
 
 _ANSWER_BYTES = 16 << 20
+_SILENCE_S = 20.0
 _SAID_BYTES = 64 << 10
 _TOO_MUCH = re.compile(r"File too large|signal 25\b|[Oo]ut of memory|cannot allocate|mmap failed")
 
@@ -122,13 +124,20 @@ class Git:
             assert stream is not None  # noqa: S101 - opened with PIPE
             rest = b""
             with stream:
-                while block := stream.read(1 << 16):
-                    if time.monotonic() > self._deadline:
-                        raise GitTimeout(f"no end within {self.timeout_s:g} s")
+                while block := self._read(stream.fileno()):
                     *ended, rest = (rest + block).split(b"\0")
                     yield from ended
             if process.wait() != 0:
                 raise GitFailed(f"git {args[0]} failed")
+
+    def _read(self, descriptor: int) -> bytes:
+        """What there is, as soon as there is something. git can look through empty folders for years, in silence."""
+        left_s = min(max(0.0, self._deadline - time.monotonic()), _SILENCE_S)
+        poll = select.poll()
+        poll.register(descriptor, select.POLLIN)
+        if not poll.poll(left_s * 1000):
+            raise GitTimeout(f"no end within {min(self.timeout_s, _SILENCE_S):g} s")
+        return os.read(descriptor, 1 << 16)
 
     @contextmanager
     def _started(

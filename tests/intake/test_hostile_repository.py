@@ -266,6 +266,21 @@ def test_trees_with_a_path_for_a_name(name, tmp_path):
     assert not list(tmp_path.rglob("evil"))
 
 
+@pytest.mark.parametrize("leaf", [b"", b"100644 x\0"])
+def test_a_tree_that_holds_itself_over_and_over(leaf, tmp_path, monkeypatch):
+    """Some hundred bytes that stand for ten thousand million folders, with files in them or without."""
+    monkeypatch.setattr("grader.intake.git._SILENCE_S", 2.0)
+    repo = repository(tmp_path / "student", lab())
+    content = leaf + bytes.fromhex(git(repo, "rev-parse", "HEAD:lab1/package.xml")) if leaf else b""
+    name = add_object(repo, b"tree", content)
+    for _ in range(10):
+        entries = (b"40000 %d\0%s" % (number, bytes.fromhex(name)) for number in range(10))
+        name = add_object(repo, b"tree", b"".join(entries))
+    with_tree_entry(repo, b"40000", b"a", name)
+    message = refused(f"{repo}@main", tmp_path, limits=Limits(entries=5000))
+    assert "more than 5000 files" in message if leaf else "no end within 2 s" in message
+
+
 def test_names_with_newlines_and_too_long_for_a_disk(tmp_path):
     repo = repository(tmp_path / "student", lab() | {"lab1/a\nb": "x"})
     blob = git(repo, "rev-parse", "HEAD:lab1/package.xml")
