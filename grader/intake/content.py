@@ -8,47 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from grader.errors import SubmissionError
-from grader.intake.limits import Limits, too_much
+from grader.intake.limits import NO_CODE, Limits, too_much
 from grader.intake.names import brief, listing
 from grader.intake.tree import Entry, list_entries
 
 # What a build or an editor leaves in a package; it is copied nowhere, so it counts for nothing.
 _MADE = frozenset({"build", "devel", "install", ".catkin_tools"})
-_NO_CODE = frozenset(
-    {
-        *(".bag", ".mcap", ".png", ".jpg", ".jpeg", ".gif", ".pgm", ".svg", ".pdf", ".mp4", ".webm", ".avi"),
-        *(
-            ".stl",
-            ".dae",
-            ".obj",
-            ".pcd",
-            ".ply",
-            ".npy",
-            ".npz",
-            ".pt",
-            ".pth",
-            ".onnx",
-            ".h5",
-            ".csv",
-            ".md",
-        ),
-        *(
-            ".zip",
-            ".tar",
-            ".gz",
-            ".xz",
-            ".bz2",
-            ".log",
-            ".db",
-            ".sqlite",
-            ".swp",
-            ".bak",
-            ".pyc",
-            ".key",
-            ".pem",
-        ),
-    }
-)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,7 +51,7 @@ def package_content(
 def _refuse_closed(paths: Iterable[str]) -> None:
     for path in paths:
         hidden = any(part.startswith(".") for part in path.split("/"))
-        if not hidden and PurePosixPath(path).suffix.lower() not in _NO_CODE:
+        if not hidden and PurePosixPath(path).suffix.lower() not in NO_CODE:
             raise SubmissionError(
                 f"{brief(path)} cannot be read: Permission denied", hint="Check its permissions (`ls -l`)."
             )

@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import PurePosixPath
 
 from grader.errors import SubmissionError
 from grader.intake.tree import MAX_DEPTH, too_deep
 
+# What is not run and not read: pictures, models, data, archives.
+NO_CODE = frozenset(
+    (
+        ".avi", ".bag", ".bak", ".bz2", ".csv", ".dae", ".db", ".gif", ".gz", ".h5", ".jpeg", ".jpg", ".key", ".log",
+        ".mcap", ".md", ".mp4", ".npy", ".npz", ".obj", ".onnx", ".pcd", ".pdf", ".pem", ".pgm", ".ply", ".png", ".pt",
+        ".pth", ".pyc", ".sqlite", ".stl", ".svg", ".swp", ".tar", ".webm", ".xz", ".zip",
+    )
+)  # fmt: skip
+_RECORDINGS = (".bag", ".mcap")
 # A file takes whole blocks of a disk, however little is in it.
 _BLOCK_BYTES = 4096
 
@@ -16,13 +26,15 @@ class Limits:
     """Of an archive: `packed_bytes` as it is handed in, `stream_bytes` that come out of a packed tar, kept or not.
 
     Of an archive or a commit: `entries`, and `total_bytes` on this machine's disk. A file of more than `file_bytes`
-    (`recording_bytes` for a bag or MCAP) is left out, and so are the largest of a package of more than
-    `package_bytes`, which is copied twice. `links` have a relative target: each is followed to see where it leads.
+    (`recording_bytes` for a bag or MCAP) is left out, and so are pictures, models and data once they are more than
+    `material_bytes` together, and the largest files of a package of more than `package_bytes`, which is copied twice.
+    `links` have a relative target: each is followed to see where it leads.
     """
 
     packed_bytes: int = 1 << 30
     stream_bytes: int = 1 << 30
     total_bytes: int = 100 << 20
+    material_bytes: int = 64 << 20
     file_bytes: int = 32 << 20
     recording_bytes: int = 96 << 20
     package_bytes: int = 48 << 20
@@ -33,7 +45,7 @@ class Limits:
 
     def largest_bytes(self, path: str) -> int:
         """How large the file of that name may be."""
-        return self.recording_bytes if path.lower().endswith((".bag", ".mcap")) else self.file_bytes
+        return self.recording_bytes if path.lower().endswith(_RECORDINGS) else self.file_bytes
 
 
 class Meter:
@@ -44,6 +56,7 @@ class Meter:
         self._name = name
         self._entries = 0
         self._bytes = 0
+        self._material_bytes = 0
         self._folders: set[str] = set()
 
     def entry(self, path: str) -> None:
@@ -63,6 +76,16 @@ class Meter:
             if len(self._folders) > self._limits.folders:
                 raise too_much(self._name, f"holds more than {self._limits.folders} folders")
             above = above.rpartition("/")[0]
+
+    def has_room(self, path: str, size_bytes: int) -> bool:
+        """Whether a file is taken: not one that is too large, nor one more picture where there are too many."""
+        if size_bytes > self._limits.largest_bytes(path):
+            return False
+        suffix = PurePosixPath(path).suffix.lower()
+        if suffix not in NO_CODE or suffix in _RECORDINGS:
+            return True
+        self._material_bytes += size_bytes
+        return self._material_bytes <= self._limits.material_bytes
 
     def data(self, size_bytes: int) -> None:
         """Count a file that is to be written; an empty one is not for nothing either."""

@@ -177,8 +177,8 @@ def _measured(source: Source, git: Git, into: Path, commit: str, limits: Limits)
                 git_links.append(path)
                 continue
             longest = max(len(part) for part in raw.split(b"/"))
-            size_limit = _LONGEST_LINK_BYTES if mode == _LINK else limits.largest_bytes(path)
-            if longest > _LONGEST_NAME_BYTES or int(size) > size_limit:
+            room = int(size) <= _LONGEST_LINK_BYTES if mode == _LINK else meter.has_room(path, int(size))
+            if longest > _LONGEST_NAME_BYTES or not room:
                 left_out.append(path)
             else:
                 meter.folders(path)

@@ -54,7 +54,7 @@ class Unpacker:
         if "\0" in name or any(len(os.fsencode(part)) > _LONGEST_NAME_BYTES for part in parts):
             self._unnamed.append(path)
             return None
-        if size_bytes > self._limits.largest_bytes(path):
+        if not self._meter.has_room(path, size_bytes):
             self._large.append(path)
             return None
         self._meter.folders(path)

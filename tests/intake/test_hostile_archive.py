@@ -413,3 +413,16 @@ def test_an_entry_encrypted_by_aes(tmp_path):
         struct.pack_into("<HH", data, data.rfind(magic) + offset, 1, 99)
     path.write_bytes(data)
     assert "password" in refused(path, tmp_path)
+
+
+def test_pictures_and_models_leave_room_for_code(tmp_path):
+    """A workspace full of meshes is no reason to refuse the package in it."""
+    path = tmp_path / "workspace.zip"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for number in range(6):
+            archive.writestr(f"ws/src/models/mesh{number}.dae", bytes(20 << 20))
+        archive.writestr("ws/src/lab1/package.xml", manifest("lab1"))
+        archive.writestr("ws/src/lab1/src/talker.py", "print('hello')\n")
+    submission = opened(path, tmp_path)
+    assert (submission.package.folder / "src" / "talker.py").is_file()
+    assert any("too large" in hint and "mesh5.dae" in hint for hint in submission.hints)
