@@ -27,11 +27,9 @@ class _Writer:
     def report(self, result: GradingResult, rubric: Rubric, hidden: int) -> str:
         view = arrange(result, rubric)
         lines = [*self._head(result, rubric, hidden)]
-        if result.error is not None:
-            error = result.error
-            lines += ["## Not graded", "", self._text(error.message), "", self._text(error.hint), ""]
-        lines += self._losses("What was lost", view.lost)
-        lines += self._losses("What is still open", view.open)
+        if result.error is None:
+            lines += self._losses("What was lost", view.lost)
+            lines += self._losses("What is still open", view.open)
         lines += self._advice(view.advice)
         lines += self._noticed(result.notes)
         lines += self._table(result.criteria)
@@ -40,14 +38,17 @@ class _Writer:
 
     def _head(self, result: GradingResult, rubric: Rubric, hidden: int) -> Iterator[str]:
         submission = result.submission
-        yield f"# {number(result.points)} of {number(result.max_points)} points"
+        graded = f"{number(result.points)} of {number(result.max_points)} points"
+        yield f"# {graded if result.error is None else 'Not graded'}"
         yield ""
+        if result.error is not None:
+            yield from (self._text(result.error.message), "", self._text(result.error.hint), "")
         version = self._text(result.rubric.version)
         yield f"{self._text(rubric.title)} ({self._code(result.rubric.id)}, version {version})"
         yield ""
         commit = f", commit {self._code(submission.commit[:12])}" if submission.commit else ""
-        kind = f"package {self._code(submission.package)}" if submission.package else "a recording"
-        yield f"Submission {self._code(submission.id)}, {kind}{commit}."
+        kind = f", package {self._code(submission.package)}" if submission.package else ", a recording"
+        yield f"Submission {self._code(submission.id)}{kind if result.error is None else ''}{commit}."
         yield ""
         if result.status == "inconclusive":
             yield "**Not settled yet:** some criteria could not be judged; no points are lost for good."

@@ -58,10 +58,13 @@ def arrange(result: GradingResult, rubric: Rubric) -> ReportView:
     return ReportView(
         lost=tuple(loss for loss in losses if loss.criterion.status not in OPEN),
         open=_folded([loss for loss in losses if loss.criterion.status in OPEN]),
-        advice=tuple(
-            c for c in result.criteria if c.id not in told and (c.hint or c.status is not Status.PASS)
-        ),
+        advice=tuple(c for c in result.criteria if c.id not in told and _advises(c)),
     )
+
+
+def _advises(criterion: CriterionResult) -> bool:
+    """What costs nothing and could not be judged is no advice."""
+    return criterion.status not in OPEN and bool(criterion.hint or criterion.status is not Status.PASS)
 
 
 def _folded(losses: list[Loss]) -> tuple[Loss, ...]:
