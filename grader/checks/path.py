@@ -22,6 +22,7 @@ from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
 
 LATE_MS = 100.0
+LATE_P95_MS = 15.0
 ORIGIN = (0.0, 0.0)
 
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -123,8 +124,8 @@ def _judged(found: Track, run: Run, params: PathParams) -> Verdict:
 
 def _excused(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
     """Where the machine itself was late, a robot that only just strays may have strayed with it."""
-    late_ms = lateness_ms(run, run.start_ns, run.end_ns)[2]
-    if late_ms < LATE_MS or not nearly:
+    _, p95_ms, late_ms = lateness_ms(run, run.start_ns, run.end_ns)
+    if not nearly or (late_ms < LATE_MS and p95_ms < LATE_P95_MS):
         return verdict
     message = f"{verdict.message}; but the grading machine was late itself, by up to {late_ms:.0f} ms"
     hint = "grade again while the machine has less to do"
