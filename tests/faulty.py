@@ -22,7 +22,7 @@ RUBRIC = ROOT / "tests" / "faulty.yaml"
 ROOM = ("unshare", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc", "--propagation", "private")
 WAIT_S = 60.0
 LOOK_S = 0.01
-GRADER = r"\S*python\S* -m grader grade "
+GRADER = r"(?!unshare |sh ).*python\S* -m grader grade "
 TAKEN = {"fail", "partial", "blocked"}
 
 

@@ -27,7 +27,7 @@ pytestmark = [
 ]
 ALL = {"manifest", "build", "node", "rate", "hears"}
 STATIC = {"GRADER_ROS_SETUP": "none"}
-ARENA = r"\S+ -s -B \S*/grader/arena/ros $"
+ARENA = r".+ -s -B .*/grader/arena/ros $"
 BUBBLEWRAP = r"bwrap .*src/talker\.py"
 CATKIN_MAKE = r"\S*python3? \S*/catkin_make "
 WRITER = """
@@ -49,10 +49,8 @@ sys.exit(run(sys.argv[1:]))
 
 
 @pytest.fixture
-def out(tmp_path: Path) -> Path:
-    for folder in (tmp_path, tmp_path.parent):  # the student's user has to pass
-        folder.chmod(0o755)
-    return tmp_path / "out"
+def out(open_path: Path) -> Path:
+    return open_path / "out"
 
 
 def passed(result: GradingResult) -> set[str]:
@@ -82,11 +80,11 @@ def test_a_disk_that_is_full_keeps_the_older_result(out: Path) -> None:
     }
 
 
-def test_temporary_files_without_room(out: Path, tmp_path: Path) -> None:
-    tmp = tmp_path / "tmp"
+def test_temporary_files_without_room(out: Path, open_path: Path) -> None:
+    tmp = open_path / "tmp"
     tmp.mkdir()
     mount = f"mount -t tmpfs -o size=64k,mode=1777 tmpfs {tmp}"
-    archive = shutil.make_archive(str(tmp_path / "lab"), "zip", VICTIM)
+    archive = shutil.make_archive(str(open_path / "lab"), "zip", VICTIM)
     for source in (VICTIM, Path(archive)):
         with grading(out, setup=mount, source=source, TMPDIR=str(tmp)) as full:
             assert full.end() == 3, full.err
@@ -133,9 +131,9 @@ def test_a_recording_that_cannot_be_written_on(out: Path) -> None:
     assert "Exception in callback" not in broken.err
 
 
-def test_a_roscore_that_does_not_start(out: Path, tmp_path: Path) -> None:
-    (tmp_path / "broken.py").write_text("raise RuntimeError('rosmaster is broken here')\n")
-    setup = f"mount --bind {tmp_path}/broken.py /usr/lib/python3/dist-packages/rosmaster/__init__.py"
+def test_a_roscore_that_does_not_start(out: Path, open_path: Path) -> None:
+    (open_path / "broken.py").write_text("raise RuntimeError('rosmaster is broken here')\n")
+    setup = f"mount --bind {open_path}/broken.py /usr/lib/python3/dist-packages/rosmaster/__init__.py"
     with grading(out, setup=setup) as broken:
         assert broken.end() == 4, broken.err
     result = result_in(out)
@@ -150,17 +148,17 @@ def test_a_rosout_that_dies(out: Path) -> None:
     assert passed(result_in(out)) == ALL
 
 
-def test_a_sandbox_that_is_not_made(out: Path, tmp_path: Path) -> None:
+def test_a_sandbox_that_is_not_made(out: Path, open_path: Path) -> None:
     """As where the kernel has no more namespaces to give: no process of the student's has run."""
-    (tmp_path / "real").touch()
-    (tmp_path / "bwrap").write_text(
+    (open_path / "real").touch()
+    (open_path / "bwrap").write_text(
         f"""#!/bin/sh
 case "$*" in *src/talker.py*) echo "bwrap: Creating new namespace failed: No space left on device" >&2; exit 1;; esac
-exec {tmp_path}/real "$@"
+exec {open_path}/real "$@"
 """
     )
-    (tmp_path / "bwrap").chmod(0o755)
-    setup = f"mount --bind /usr/bin/bwrap {tmp_path}/real; mount --bind {tmp_path}/bwrap /usr/bin/bwrap"
+    (open_path / "bwrap").chmod(0o755)
+    setup = f"mount --bind /usr/bin/bwrap {open_path}/real; mount --bind {open_path}/bwrap /usr/bin/bwrap"
     with grading(out, setup=setup) as short:
         assert short.end() == 4, short.err
     result = result_in(out)

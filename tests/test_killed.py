@@ -22,18 +22,16 @@ pytestmark = [
 KILLS, SIDE_BY_SIDE = 20, 4
 
 
-def test_killed_at_random_moments(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    tmp_path.chmod(0o755)
-    tmp_path.parent.chmod(0o755)
+def test_killed_at_random_moments(open_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     seed = random.SystemRandom().randrange(1 << 30)
     begun = time.monotonic()
-    with grading(tmp_path / "measured") as one:
+    with grading(open_path / "measured") as one:
         assert one.end() == 0, one.err
     length_s = time.monotonic() - begun
-    assert result_in(tmp_path / "measured").points == 100
+    assert result_in(open_path / "measured").points == 100
     chance = random.Random(seed)  # noqa: S311 - moments, no secrets
     moments_s = [length_s * (n + chance.random()) / KILLS for n in range(KILLS)]
-    lanes = [lane(tmp_path / str(n), moments_s[n::SIDE_BY_SIDE]) for n in range(SIDE_BY_SIDE)]
+    lanes = [lane(open_path / str(n), moments_s[n::SIDE_BY_SIDE]) for n in range(SIDE_BY_SIDE)]
     wrong = [what for process in lanes for what in finished(process)]
     with capsys.disabled():
         shown = " ".join(f"{moment_s:.2f}" for moment_s in moments_s)
@@ -41,19 +39,19 @@ def test_killed_at_random_moments(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert wrong == [], f"seed {seed}"
 
 
-def test_git_ends_with_the_grader(tmp_path: Path) -> None:
-    (tmp_path / "bin").mkdir()
-    git = tmp_path / "bin" / "git"
+def test_git_ends_with_the_grader(open_path: Path) -> None:
+    (open_path / "bin").mkdir()
+    git = open_path / "bin" / "git"
     git.write_text('#!/bin/sh\ncase "$*" in *ls-remote*) exec sleep 60;; esac\n')
     git.chmod(0o755)
-    env = {"PATH": f"{tmp_path}/bin:{os.environ['PATH']}", "TMPDIR": str(tmp_path)}
+    env = {"PATH": f"{open_path}/bin:{os.environ['PATH']}", "TMPDIR": str(open_path)}
     alive = ("sh", "-c", '"$@"; echo and then >&2; exec sleep 30', "sh")
-    with grading(tmp_path / "out", source="https://example.invalid/lab.git", prefix=alive, **env) as one:
+    with grading(open_path / "out", source="https://example.invalid/lab.git", prefix=alive, **env) as one:
         asking = one.await_process("sleep 60")
         os.kill(one.await_process(GRADER), signal.SIGKILL)
         one.await_line("and then")
         assert command(asking) == ""
-    assert not (tmp_path / "out").exists()
+    assert not (open_path / "out").exists()
 
 
 def lane(folder: Path, moments_s: list[float]) -> subprocess.Popen[bytes]:
