@@ -17,8 +17,8 @@ ros_extras=(
   ros-message-generation libnav-msgs-dev libsensor-msgs-dev libstd-srvs-dev
   ros-std-msgs ros-std-srvs ros-geometry-msgs ros-nav-msgs ros-sensor-msgs
 )
-# Program to find on PATH, and the package that has it.
-tools=(bwrap:bubblewrap git:git cmake:cmake make:make g++:g++)
+# Program to find on PATH, and the package that has it (`ip` is for the tests of hostile submissions).
+tools=(bwrap:bubblewrap git:git cmake:cmake make:make g++:g++ ip:iproute2)
 
 say() { printf 'setup: %s\n' "$*"; }
 
