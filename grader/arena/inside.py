@@ -31,7 +31,7 @@ BROWSERS = (
 
 
 def prepare(place: Path, ros: RosInstallation) -> None:
-    """Write what every inner layer binds: `etc/` with one user in it, `bin/` with `python` as ROS means it, stand-ins
+    """Write what every sandbox binds: `etc/` with one user in it, `bin/` with `python` as ROS means it, stand-ins
     for terminals, which launch files name as their `launch-prefix`, and for browsers, and `standins/` with the
     packages that this ROS lacks."""
     etc, shims = place / "etc", place / "bin"

@@ -162,7 +162,7 @@ class Place:
         step = (BUILD_STEP if build else COPY_STEP) if copy and boxed else PLAIN_STEP
         words = LIFELINE + self.sandbox.first_words(self.limits) + step
         kept = None if collect is None else str(self.workspace.kept / collect)
-        inner = self.sandbox.inner(
+        command = self.sandbox.command(
             ["/bin/bash", "-c", words, "bash", *argv],
             ros=self.ros,
             place=self.folder,
@@ -174,7 +174,7 @@ class Place:
         return {
             "name": name,
             "role": role,
-            "argv": inner,
+            "argv": command,
             "argv_shown": list(argv),
             "env": self._process_env(),
             "cwd": "/" if boxed else str(self.folder / "home"),

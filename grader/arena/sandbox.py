@@ -67,7 +67,7 @@ class Sandbox(Record):
         who = "as root for an unprivileged user" if self.uid else "unprivileged"
         return f"bubblewrap, {who}; memory held by {self.cgroups.label}"
 
-    def inner(
+    def command(
         self,
         argv: Sequence[str],
         *,
@@ -78,8 +78,9 @@ class Sandbox(Record):
         net: bool,
         info: bool,
     ) -> list[str]:
-        """One process tree's layer. `place` is the run's own folder (see `inside.prepare`), `binds` bubblewrap
-        arguments. Only tmpfs of fixed size can be written, and what `binds` give."""
+        """The command that runs `argv`, and all that it starts, inside of the walls. `place` is the run's own folder
+        (see `inside.prepare`), `binds` bubblewrap arguments. Only tmpfs of fixed size can be written, and what `binds`
+        give."""
         drop = ["setpriv", f"--reuid={self.uid}", f"--regid={self.uid}", "--clear-groups"] if self.uid else []
         drop += ["prlimit", *self.rlimits(limits), "--"]
         if not self.bubblewrap:
@@ -213,8 +214,8 @@ def why_not() -> str:
 def _refusal(*more: str) -> str:
     """What this machine says to a sandbox with these arguments; empty where it makes one."""
     drop = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"] if os.geteuid() == 0 else []
-    inner = ["bwrap", "--ro-bind", "/", "/", "--proc", "/proc", *WALLS, *more, "/bin/true"]
-    command = [sys.executable, "-I", str(NETWORK), *drop, *inner]
+    walled = ["bwrap", "--ro-bind", "/", "/", "--proc", "/proc", *WALLS, *more, "/bin/true"]
+    command = [sys.executable, "-I", str(NETWORK), *drop, *walled]
     try:
         done = subprocess.run(command, capture_output=True, check=False, timeout=20)
     except subprocess.TimeoutExpired:

@@ -32,8 +32,10 @@ class Groups:
         try:
             os.mkdir(folder)
             _write(folder, KEYS[controller, version], amount)
-        except OSError:
-            return  # then the watchdog is alone
+        except OSError:  # then the watchdog is alone
+            with contextlib.suppress(OSError):  # it was not made at all
+                os.rmdir(folder)
+            return
         self._made[controller] = (version, folder)
         if controller == "memory":
             with contextlib.suppress(OSError):  # a kernel without swap accounting
