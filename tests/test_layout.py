@@ -42,7 +42,8 @@ ALLOWED = {
     "authoring": {
         *BASE, "checks", "evidence", "intake", "package", "pipeline", "rubric", "temporary"
     },
-    "mutation": BASE | {"pipeline", "rubric", "temporary"},
+    "batch": BASE | {"pipeline", "rubric"},
+    "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
     "cli": {
         *BASE, "arena", "authoring", "checks", "evidence", "files", "instructor", "intake", "judge", "mutation",
         "package", "pipeline", "report", "rubric", "temporary"

@@ -9,6 +9,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
+from grader.batch.workers import Graded, Job, Sandbox, grade_all
 from grader.errors import HostError
 from grader.model.progress import Progress
 from grader.model.result import GradingResult, RubricInfo
@@ -19,7 +20,6 @@ from grader.mutation.operators import OPERATORS
 from grader.mutation.plan import Planned
 from grader.mutation.solution import Solution
 from grader.mutation.tree import Tree, unified_diff, write_tree
-from grader.mutation.workers import Graded, Job, Sandbox, grade_all
 from grader.rubric.load import LoadedRubric
 from grader.temporary import temporary_folder
 
