@@ -21,8 +21,9 @@ from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
 
-LATE_MS = 100.0
-LATE_P95_MS = 15.0
+LATE_MS = 25.0
+LATE_P95_MS = 5.0
+"""Each turn may be late: at 1.6 rad/s, 25 ms in each of four are 0.16 rad, and 0.3 m beside a line of 2 m."""
 ORIGIN = (0.0, 0.0)
 
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
