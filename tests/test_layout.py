@@ -21,6 +21,7 @@ ALLOWED = {
     "errors": set[str](),
     "shown": set[str](),
     "standins": set[str](),
+    "admission": set[str](),
     "files": {"errors"},
     "temporary": {"errors", "files"},
     "results": {"errors", "files"},
@@ -33,7 +34,7 @@ ALLOWED = {
     "rubric": BASE | {"checks", "evidence", "instructor"},
     "judge": BASE | {"checks", "evidence", "rubric"},
     "report": BASE | {"files", "rubric.model"},
-    "arena": BASE | {"evidence", "files", "package", "rubric.model", "temporary"},
+    "arena": BASE | {"admission", "evidence", "files", "package", "rubric.model", "temporary"},
     "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "pipeline": {
         *BASE, "arena", "evidence", "faults", "files", "intake", "judge", "package", "recordings", "report", "results",

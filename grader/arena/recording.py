@@ -1,6 +1,6 @@
 """Records everything that a rubric needs of one submission: the package, its build, and every scenario.
 
-Runs that do not disturb each other go side by side: a run that measures a rate has a lane of its own.
+The runs go side by side, as far as the machine admits them.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 
 from typing_extensions import Self
 
 from grader import __version__
+from grader.admission import Admission, shared_folder
 from grader.arena.asynchronous import run_until_signal, side_by_side
 from grader.arena.build import BUILD_EXPECTED_S, BuildOutcome, build
 from grader.arena.inside import prepare
-from grader.arena.lanes import lanes
 from grader.arena.limits import Limits
+from grader.arena.order import in_order
 from grader.arena.place import Place
 from grader.arena.ros_env import RosInstallation, find_ros
 from grader.arena.sandbox import Mode, Sandbox, choose, temporary_base
@@ -34,7 +34,7 @@ from grader.model.package import PackageFacts
 from grader.model.progress import Progress
 from grader.model.submission import Submission
 from grader.package import python_paths, read_package, read_syntax_report, with_build_facts
-from grader.rubric.model import Rubric, Scenario
+from grader.rubric.model import Rubric
 from grader.temporary import temporary_folder
 
 PACKAGE = "package"
@@ -57,6 +57,8 @@ ATTACHED_SUFFIXES = (
     ".srv",
 )
 NO_ROS = "no ROS 1 on this machine"
+WAITING = "for its turn"
+WAITING_ALONE = "to be run again, alone"
 STATIC_ONLY = "nothing was run: only the files were asked for"
 
 
@@ -102,6 +104,7 @@ class Recorder:
         self.recording = Recording(folder=folder, facts=facts, ros=ros, sandbox=choose(mode) if ros else None)
         self._place: Place | None = None
         self._stack = ExitStack()
+        self._admission = Admission(None)
         self._runs: Counter[str] = Counter()
 
     def __enter__(self) -> Self:
@@ -114,32 +117,34 @@ class Recorder:
         self._stack.close()
 
     def record_all(self) -> None:
-        """The package with its build, then every scenario in its lane."""
+        """The package with its build, then every scenario, side by side."""
         run_until_signal(self._record_all())
 
     def record_again(self, scenarios: Iterable[str]) -> None:
-        """These scenarios once more, one after the other, with nothing beside them."""
-        run_until_signal(self._lane(self._place, tuple(scenarios)))
+        """These scenarios once more, one after the other, with no other run on the machine."""
+        run_until_signal(self._record_alone(tuple(scenarios)))
 
     async def _record_all(self) -> None:
+        self._admission = Admission(shared_folder())
+        names = in_order(self._rubric)
         if not self._not_run:
             self._progress.step("build", "waiting", "", BUILD_EXPECTED_S)
-            for name, scenario in self._rubric.scenarios.items():
-                self._progress.step(name, "waiting", "for the build", expected_s(scenario))
+            for name in names:
+                self._progress.step(
+                    name, "waiting", "for the build", expected_s(self._rubric.scenarios[name])
+                )
         await self._record_package()
         if self._place is None:
-            for name in self._rubric.scenarios:
+            for name in names:
                 self._progress.step(name, "skipped", self._not_run)
             return
-        chosen = lanes(self._rubric)
-        for before, name in (pair for names in chosen for pair in pairwise(names)):
-            self._progress.step(name, "waiting", f"for {before}", expected_s(self._rubric.scenarios[name]))
-        await side_by_side(*(self._lane(self._place, names) for names in chosen))
+        await side_by_side(*(self._record_scenario(self._place, name) for name in names))
 
-    async def _lane(self, place: Place | None, names: tuple[str, ...]) -> None:
+    async def _record_alone(self, names: tuple[str, ...]) -> None:
+        self._admission = Admission(shared_folder())
         for name in names:
-            if place is not None:
-                await self._record_scenario(place, name, self._rubric.scenarios[name])
+            if self._place is not None:
+                await self._record_scenario(self._place, name, alone=True)
 
     async def _record_package(self) -> None:
         """Where the machine fails the build, it is built once more: without it, nothing can be run."""
@@ -165,7 +170,12 @@ class Recorder:
         recording.files.append(path)
 
     async def _build(self, place: Place, writer: EvidenceWriter, *, last: bool) -> None:
-        self._progress.step("build", "running", "catkin_make", BUILD_EXPECTED_S)
+        self._progress.step("build", "waiting", WAITING, BUILD_EXPECTED_S)
+        async with self._admission.run(), self._admission.start():
+            self._progress.step("build", "running", "catkin_make", BUILD_EXPECTED_S)
+            await self._built(place, writer, last=last)
+
+    async def _built(self, place: Place, writer: EvidenceWriter, *, last: bool) -> None:
         recording = self.recording
         faulty = [script for script in self._scripts() if _needs_answer(recording.facts, script)]
         try:
@@ -226,8 +236,8 @@ class Recorder:
                 found.append(match)
         return found
 
-    async def _record_scenario(self, place: Place, name: str, scenario: Scenario) -> None:
-        shown = ""
+    async def _record_scenario(self, place: Place, name: str, *, alone: bool = False) -> None:
+        scenario, shown = self._rubric.scenarios[name], ""
 
         def tell(detail: str) -> None:
             nonlocal shown
@@ -235,18 +245,21 @@ class Recorder:
                 shown = detail
                 self._progress.step(name, "running", detail, expected_s(scenario))
 
+        self._progress.step(name, "waiting", WAITING_ALONE if alone else WAITING, expected_s(scenario))
         path = self.recording.folder / f"{name}.mcap"
-        self.recording.add(
-            await run_scenario(
-                name,
-                scenario,
-                place,
-                path=path,
-                metadata=self._metadata(),
-                tell=tell,
-                last_run=self._runs[name] == RETRIES,
+        async with self._admission.run(alone=alone):
+            self.recording.add(
+                await run_scenario(
+                    name,
+                    scenario,
+                    place,
+                    path=path,
+                    metadata=self._metadata(),
+                    tell=tell,
+                    admission=self._admission,
+                    last_run=self._runs[name] == RETRIES,
+                )
             )
-        )
         self._runs[name] += 1
         if path not in self.recording.files:
             self.recording.files.append(path)

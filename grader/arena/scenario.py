@@ -7,12 +7,13 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from grader.admission import Admission
 from grader.arena.calls import call_services
 from grader.arena.live import next_look_s, settled, waiting_for
 from grader.arena.place import Place
 from grader.arena.probes import advertisement, make_shots, publication
 from grader.arena.session import ArenaSession
-from grader.arena.starting import Spec, process_specs, set_params, stop
+from grader.arena.starting import Spec, given_back, process_specs, set_params, stop
 from grader.errors import ArenaError
 from grader.evidence.events import ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
@@ -60,20 +61,26 @@ async def run_scenario(
     path: Path,
     metadata: Mapping[str, str],
     tell: Tell,
+    admission: Admission | None = None,
     last_run: bool = False,
 ) -> ScenarioCost:
-    """Record the scenario at `path`. An arena that fails still leaves evidence, with the outcome `host`."""
+    """Record the scenario at `path`. An arena that fails still leaves evidence, with the outcome `host`.
+
+    Processes are started when `admission` lets them: others wait until they are up.
+    """
+    admission = admission or Admission(None)
     warp = scenario.warp if scenario.clock == "warped" else 1.0
     starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place)]
     with EvidenceWriter(path, scenario=name, clock=scenario.clock, warp=warp, metadata=metadata) as writer:
-        session = ArenaSession(place, writer, last_run=last_run)
+        session = ArenaSession(place, writer, last_run=last_run, on_lateness=admission.note_lateness)
         if not any(spec["role"] == "student" for _, spec in starts):
             session.course(ScenarioEvent(event="end", outcome="ended", detail="there was nothing to start"))
             return ScenarioCost(cpu_s=0, student_cpu_s=0)
         try:
-            async with session as arena:
+            async with admission.start() as leave, session as arena:
                 arena.course(ScenarioEvent(event="begin"))
-                outcome, detail = await _run(scenario, starts, arena, tell)
+                async with given_back(leave, {spec["name"] for _, spec in starts}, arena):
+                    outcome, detail = await _run(scenario, starts, arena, tell)
                 await stop(scenario.start, arena)
                 await arena.finish()
                 arena.course(ScenarioEvent(event="end", outcome=outcome, detail=detail))

@@ -37,10 +37,17 @@ class ArenaSession:
 
     Raises ArenaError when it does not start or dies. Times are those of its start plus monotonic time, as the arena's
     own are: a clock that is set while it runs moves none of them. `last_run` says that it will not be run again.
+    `on_lateness` is told how late the machine is (ms, 95th percentile) as the arena measures it.
     """
 
     def __init__(
-        self, place: Place, writer: EvidenceWriter, *, master: bool = True, last_run: bool = False
+        self,
+        place: Place,
+        writer: EvidenceWriter,
+        *,
+        master: bool = True,
+        last_run: bool = False,
+        on_lateness: Callable[[float], None] = lambda _: None,
     ) -> None:
         self.live = Live()
         self.cpu_s = 0.0
@@ -58,6 +65,7 @@ class ArenaSession:
         self._error: Exception | None = None
         self._killed = Killed(sandboxed=place.sandbox.bubblewrap)
         self._last_run = last_run
+        self._on_lateness = on_lateness
         self._offset_ns = time.time_ns() - time.monotonic_ns()
         self._frames = FrameReader()
         self._calls = 0
@@ -225,6 +233,8 @@ class ArenaSession:
                 self.live.printed(record["line"], time.monotonic())
         elif topic == "/grader/process" and record["event"] == "exit":
             self._exited(record)
+        elif topic == "/grader/host":
+            self._on_lateness(record["p95_ms"])
         elif topic == "/grader/param" and not is_grader_node(record["caller_id"]):
             self.live.active(time.monotonic())
         elif topic == "/grader/actor" and record["action"] == "limit":

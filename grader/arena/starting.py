@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator
+import time
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from typing import Any, TypeAlias
 
+from grader.admission import Leave
 from grader.arena.parameters import settings
 from grader.arena.place import Place
 from grader.arena.session import ArenaSession
+from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent
 from grader.rubric.model import Param, Start
 
 CTRL_C_S = 5.0
 LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
 TERM_S = 2.0
+UP_S, SETTLE_S = 5.0, 0.2
+"""A process is up when its nodes have registered and nothing changes for a moment; some never are."""
 BUILT_PROGRAMS_MAX = 20
 
 Spec: TypeAlias = dict[str, Any]
@@ -72,6 +78,26 @@ def set_params(params: tuple[Param, ...], arena: ArenaSession) -> None:
             "detail": one.detail,
         }
         arena.send(do="set_param", name=one.name, value=one.value, record=record)
+
+
+@asynccontextmanager
+async def given_back(leave: Leave, names: set[str], arena: ArenaSession) -> AsyncIterator[None]:
+    """Inside, the leave to start is given back as soon as these processes are up."""
+
+    async def give_back() -> None:
+        live = arena.live
+        await arena.wait(lambda: names <= live.registered | live.ended, UP_S)
+        await arena.wait(lambda: time.monotonic() > live.graph_changed_s + SETTLE_S, SETTLE_S)
+        leave.release()
+
+    task = asyncio.ensure_future(give_back())
+    try:
+        yield
+    finally:
+        task.cancel()
+        with suppress(asyncio.CancelledError, ArenaError):  # the block meets the same error itself
+            await task
+        leave.release()
 
 
 async def stop(starts: tuple[Start, ...], arena: ArenaSession) -> None:

@@ -1,8 +1,8 @@
-"""Which runs go side by side."""
+"""Who begins first."""
 
 from __future__ import annotations
 
-from grader.arena.lanes import lanes
+from grader.arena.order import in_order
 from grader.rubric.model import Criterion, Rubric, Scenario, Start, Until
 
 
@@ -28,23 +28,16 @@ WARPED = scenario("warped", messages={"/x": 258})
 SHORT = scenario(quiet_s=1)
 
 
-def test_a_rate_is_measured_beside_one_other_lane() -> None:
-    runs = rubric("rate", "again", rate=LONG, wraps=WARPED, hears=SHORT, again=LONG)
-    assert lanes(runs) == (("rate", "again"), ("wraps", "hears"))
+def test_what_measures_a_rate_begins_first() -> None:
+    runs = rubric(
+        "rate", "again", lives=scenario(alive_s=20), hears=SHORT, rate=LONG, wraps=WARPED, again=LONG
+    )
+    assert in_order(runs) == ("rate", "again", "lives", "wraps", "hears")
 
 
-def test_watching_holds_nothing_up() -> None:
-    runs = rubric("rate", rate=LONG, lives=WATCHING, short=SHORT, two=LONG)
-    assert lanes(runs) == (("rate",), ("lives", "two"), ("short",))
-
-
-def test_two_lanes_where_no_rate_is_measured() -> None:
-    runs = rubric(a=scenario(alive_s=2.5), b=SHORT, c=SHORT, d=SHORT, lives=WATCHING)
-    found = lanes(runs)
-    assert found[0] == ("lives",)
-    assert sorted(name for lane in found for name in lane) == sorted(runs.scenarios)
-    assert len(found) == 3
+def test_then_the_longest() -> None:
+    assert in_order(rubric(a=SHORT, b=SHORT, lives=WATCHING)) == ("lives", "a", "b")
 
 
 def test_a_warped_run_measures_no_rate() -> None:
-    assert lanes(rubric("slow", slow=scenario("warped", window_s=9))) == (("slow",),)
+    assert in_order(rubric("slow", long=LONG, slow=scenario("warped", window_s=1))) == ("long", "slow")
