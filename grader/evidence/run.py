@@ -6,10 +6,9 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from grader.errors import EvidenceError
-from grader.evidence.decode import Decoder
 from grader.evidence.events import (
     ActorEvent,
     ConsoleLine,
@@ -22,7 +21,10 @@ from grader.evidence.events import (
 )
 from grader.evidence.room import NoRoom, Room
 
-OWN_NODE = re.compile(r"/grader_(recorder|actor)_[0-9a-f]{8}(_knock)?")
+if TYPE_CHECKING:
+    from grader.evidence.decode import Decoder
+
+OWN_NODE = re.compile(r"/grader_(recorder|actor|calibration)_[0-9a-f]{8}(_knock)?")
 BARE_NAME = "/grader"
 DECODER_BYTES = 200_000
 LETTER_BYTES = 1_400
@@ -80,6 +82,8 @@ class Channel:
 
     def decoder(self, room: Room) -> Decoder:
         """What decodes its messages; that takes room too. Raises NoRoom."""
+        from grader.evidence.decode import Decoder  # noqa: PLC0415 - numpy, which no file but a message needs
+
         room.decode(DECODER_BYTES + LETTER_BYTES * len(self.definition))
         return Decoder(self.type, self.definition)
 

@@ -17,7 +17,7 @@ KEY_CHARS_MAX = 1024
 SHOWN_CHARS = 80
 NAMES_MAX, NAME_BYTES_MAX = 2000, 256 << 10
 """Of one process: topics and services with the nodes that have them."""
-OWN_NODE = re.compile(r"/grader_(recorder|actor)_[0-9a-f]{8}(_knock)?")
+OWN_NODE = re.compile(r"/grader_(recorder|actor|calibration)_[0-9a-f]{8}(_knock)?")
 ROSOUT, ROSOUT_PROCESS = "/rosout", "rosout"
 REGISTER = {
     "registerPublisher": (3,),
