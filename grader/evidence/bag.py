@@ -18,10 +18,9 @@ from rosbags.rosbag1.reader import ChunkInfo, Header, RecordType, read_bytes, re
 from grader.errors import EvidenceError
 from grader.evidence.channels import merged
 from grader.evidence.container import MAX_CHUNK_BYTES, MAX_UNPACKED_BYTES
-from grader.evidence.room import NoRoom, Room
+from grader.evidence.room import LESS, NoRoom, Room
 from grader.evidence.run import Channel, Message, Run
 
-MAGIC = b"#ROSBAG V"
 BZ2 = b"BZh"
 LZ4 = b"\x04\x22\x4d\x18"
 MAX_CONNECTIONS = 4_096
@@ -31,7 +30,6 @@ MAX_HEADER_BYTES = 1 << 20
 MAX_LINE_BYTES = 64
 READ_TIMES = 4
 """No sound bag's bytes are read as often as this."""
-LESS = "record the lab's topics only: `rosbag record /topic …`, or cut it with `rosbag filter`"
 _LENGTH = struct.Struct("<I")
 _DAMAGE = (
     AssertionError,

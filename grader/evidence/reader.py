@@ -15,15 +15,15 @@ from pydantic import ValidationError
 from zstandard import ZstdError
 
 from grader.errors import EvidenceError
-from grader.evidence import bag
 from grader.evidence.container import MAX_FILE_BYTES, ContainerError
 from grader.evidence.loading import Loading
-from grader.evidence.room import NoRoom, Room
+from grader.evidence.room import LESS, NoRoom, Room
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 
 SUFFIXES = {".mcap", ".bag"}
 MAGIC = b"\x89MCAP0\r\n"
+BAG_MAGIC = b"#ROSBAG V"
 _DAMAGE = (
     McapError,
     ZstdError,
@@ -48,10 +48,12 @@ def load_run(source: Path | BinaryIO, room: Room | None = None) -> Run:
         name = Path(str(getattr(source, "name", "evidence.mcap"))).name
         return _load(name, BytesIO(source.read(MAX_FILE_BYTES + 1)), room)
     with _readable(source), source.open("rb") as file:
-        head = file.read(len(bag.MAGIC))
+        head = file.read(len(BAG_MAGIC))
         file.seek(0)
-        if head == bag.MAGIC:
-            return bag.load_bag(source, room)
+        if head == BAG_MAGIC:
+            from grader.evidence.bag import load_bag  # noqa: PLC0415 - few submissions hold a bag
+
+            return load_bag(source, room)
         return _load(source.name, file, room, shown=str(source))
 
 
@@ -104,7 +106,7 @@ def _load(name: str, stream: BinaryIO, room: Room, *, shown: str = "") -> Run:
             f"{shown}: a record of the grader's own cannot be read: {_first(error)}"
         ) from error
     except NoRoom as error:
-        raise EvidenceError(f"{shown}: {error}", hint=bag.LESS) from error
+        raise EvidenceError(f"{shown}: {error}", hint=LESS) from error
     except ContainerError as error:
         raise EvidenceError(f"{shown}: not sound MCAP: {error}") from error
     except _DAMAGE as error:

@@ -9,6 +9,8 @@ FOREIGN_BYTES_MAX = 96 << 20
 DECODED_BYTES_MAX = 96 << 20
 RECORD_BYTES = 150
 """What a message takes beside its own bytes, about."""
+LESS = "record the lab's topics only: `rosbag record /topic …`, or cut it with `rosbag filter`"
+"""What to do about a recording that is too large."""
 
 
 class NoRoom(ValueError):
