@@ -10,17 +10,17 @@ from typing import Any, NamedTuple
 from grader.errors import ArenaError
 
 HEADER = struct.Struct("<BIQ")
-CHANNEL_ID = struct.Struct("<I")
+CHANNEL_ID = LENGTH = struct.Struct("<I")
 FRAME_BYTES_MAX = 24 << 20
 
 
 class Frame(NamedTuple):
-    """`kind` is one of C, M, E, S; `channel` and `data` belong to M, `fields` to the others."""
+    """`kind` is one of C, M, E, S; `channel` and `datas` (messages) belong to M, `fields` to the others."""
 
     kind: str
     time_ns: int
     channel: int
-    data: bytes
+    datas: list[bytes]
     fields: dict[str, Any]
 
 
@@ -28,31 +28,51 @@ class FrameReader:
     """Bytes in, whole frames out. Raises ArenaError for what is none."""
 
     def __init__(self) -> None:
-        self._buffer = bytearray()
+        self._pieces: list[bytes] = []
+        self._size = 0
+        self._needed = HEADER.size
 
     def feed(self, chunk: bytes) -> Iterator[Frame]:
-        self._buffer += chunk
-        start = 0
-        while len(self._buffer) - start >= HEADER.size:
-            kind, length, time_ns = HEADER.unpack_from(self._buffer, start)
+        self._pieces.append(chunk)
+        self._size += len(chunk)
+        if self._size < self._needed:
+            return
+        data, start = b"".join(self._pieces), 0
+        self._needed = HEADER.size
+        while len(data) - start >= HEADER.size:
+            kind, length, time_ns = HEADER.unpack_from(data, start)
             if length > FRAME_BYTES_MAX:
                 raise ArenaError("the arena sent bytes that are no frame")
             end = start + HEADER.size + length
-            if end > len(self._buffer):
+            if end > len(data):
+                self._needed = end - start
                 break
-            yield _frame(chr(kind), time_ns, bytes(self._buffer[start + HEADER.size : end]))
+            yield _frame(chr(kind), time_ns, data, start + HEADER.size, end)
             start = end
-        del self._buffer[:start]
+        self._pieces = [data[start:]]
+        self._size = len(data) - start
 
 
-def _frame(kind: str, time_ns: int, payload: bytes) -> Frame:
+def _frame(kind: str, time_ns: int, data: bytes, start: int, end: int) -> Frame:
     try:
         if kind == "M":
-            (channel,) = CHANNEL_ID.unpack_from(payload)
-            return Frame(kind, time_ns, channel, payload[CHANNEL_ID.size :], {})
-        return Frame(kind, time_ns, 0, b"", _fields(payload))
+            (channel,) = CHANNEL_ID.unpack_from(data[start : min(end, start + CHANNEL_ID.size)])
+            return Frame(kind, time_ns, channel, _messages(data, start + CHANNEL_ID.size, end), {})
+        return Frame(kind, time_ns, 0, [], _fields(data[start:end]))
     except (struct.error, ValueError, TypeError, RecursionError) as error:
         raise ArenaError("the arena sent bytes that are no frame") from error
+
+
+def _messages(data: bytes, start: int, end: int) -> list[bytes]:
+    found, unpack_from = [], LENGTH.unpack_from
+    while start < end:
+        (length,) = unpack_from(data, start)
+        start += LENGTH.size
+        found.append(data[start : start + length])
+        start += length
+    if start != end:
+        raise ValueError("a message that is not whole")
+    return found
 
 
 def _fields(payload: bytes) -> dict[str, Any]:

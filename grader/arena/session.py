@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from typing_extensions import Self
 
@@ -21,7 +21,7 @@ from grader.arena.place import Place
 from grader.errors import ArenaError
 from grader.evidence.events import TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
 from grader.evidence.run import is_grader_node
-from grader.evidence.writer import EvidenceWriter
+from grader.evidence.writer import EvidenceChannel, EvidenceWriter
 
 ARENA = Path(__file__).parent / "ros"
 ROSOUT = ("/usr/lib/rosout/rosout", "lib/rosout/rosout")
@@ -30,6 +30,12 @@ READY_S = 15.0
 END_S = 5.0
 GROUPS_S, LOOK_S = 2.0, 0.02
 PORT = 11311
+
+
+class _Channel(NamedTuple):
+    topic: str
+    callerid: str
+    evidence: EvidenceChannel
 
 
 class ArenaSession:
@@ -57,7 +63,7 @@ class ArenaSession:
         self._writer = writer
         self._master = master
         self._changed = asyncio.Event()
-        self._channels: dict[int, dict[str, Any]] = {}
+        self._channels: dict[int, _Channel] = {}
         self._ready = False
         self._done = False
         self.rosout_up = False
@@ -201,22 +207,23 @@ class ArenaSession:
 
     def _take(self, frame: Frame) -> None:
         if frame.kind == "M":
-            self._message(frame)
+            self._messages(frame)
         elif frame.kind == "E":
             self._event(frame)
         elif frame.kind == "S":
             self._status(frame.fields)
         else:
             fields = frame.fields
-            self._channels[fields.pop("id")] = fields
-            self._writer.register_channel(**fields)
+            number, topic, caller_id = fields.pop("id"), fields["topic"], fields["callerid"]
+            self._channels[number] = _Channel(topic, caller_id, self._writer.register_channel(**fields))
 
-    def _message(self, frame: Frame) -> None:
-        fields = self._channels[frame.channel]
-        self._writer.message(**fields, log_time_ns=frame.time_ns, data=frame.data)
-        if not is_grader_node(fields["callerid"]):
-            own = fields["callerid"] not in self.live.helper_nodes
-            self.live.message(fields["topic"], 1, time.monotonic(), active=own)
+    def _messages(self, frame: Frame) -> None:
+        channel = self._channels[frame.channel]
+        for data in frame.datas:
+            channel.evidence.message(frame.time_ns, data)
+        if frame.datas and not is_grader_node(channel.callerid):
+            own = channel.callerid not in self.live.helper_nodes
+            self.live.message(channel.topic, len(frame.datas), time.monotonic(), active=own)
 
     def _event(self, frame: Frame) -> None:
         topic, record = frame.fields["topic"], frame.fields["record"]

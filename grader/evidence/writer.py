@@ -28,6 +28,20 @@ CHUNK_BYTES = 256 * 1024
 MAX_DEPTH = 32
 
 
+class EvidenceChannel:
+    """One publisher's messages on one topic, numbered from 0."""
+
+    def __init__(self, mcap: Writer, number: int) -> None:
+        self._mcap = mcap
+        self._number = number
+        self._sequence = 0
+
+    def message(self, log_time_ns: int, data: bytes) -> None:
+        """One message as sent, with its arrival (ns)."""
+        self._mcap.add_message(self._number, log_time_ns, data, log_time_ns, self._sequence)
+        self._sequence += 1
+
+
 class EvidenceStream:
     """Evidence into any binary stream. Not for several threads at once. `finish` must come last."""
 
@@ -42,7 +56,7 @@ class EvidenceStream:
         entries = {**metadata, **own}
         self._mcap.add_metadata(METADATA_NAME, {_text(k): _text(v) for k, v in entries.items()})
         self._schemas: dict[tuple[str, str, bytes], int] = {}
-        self._channels: dict[tuple[str, str, str, str], list[int]] = {}
+        self._channels: dict[tuple[str, str, str, str], EvidenceChannel] = {}
         self._events: dict[str, list[int]] = {}
 
     def register_channel(
@@ -54,17 +68,18 @@ class EvidenceStream:
         md5sum: str,
         definition: str,
         latching: bool,
-    ) -> None:
-        """Makes a publisher's channel, which is there even if no message ever comes. Again: no effect."""
+    ) -> EvidenceChannel:
+        """A publisher's channel, made on first use: it is there even if no message ever comes."""
         key = (topic, callerid, type, md5sum)
         if key in self._channels:
-            return
+            return self._channels[key]
         schema = self._schema(_text(type), "ros1msg", definition.encode(errors="replace"))
         about = {"callerid": callerid, "md5sum": md5sum, "latching": "1" if latching else "0", "topic": topic}
         number = self._mcap.register_channel(
             _text(topic), "ros1", schema, {name: _text(value) for name, value in about.items()}
         )
-        self._channels[key] = [number, 0]
+        self._channels[key] = EvidenceChannel(self._mcap, number)
+        return self._channels[key]
 
     def message(
         self,
@@ -79,19 +94,10 @@ class EvidenceStream:
         data: bytes,
     ) -> None:
         """One message as sent, with its arrival (ns). The channel is made on first use."""
-        channel = self._channels.get((topic, callerid, type, md5sum))
-        if channel is None:
-            self.register_channel(
-                topic=topic,
-                callerid=callerid,
-                type=type,
-                md5sum=md5sum,
-                definition=definition,
-                latching=latching,
-            )
-            channel = self._channels[topic, callerid, type, md5sum]
-        self._mcap.add_message(channel[0], log_time_ns, data, log_time_ns, channel[1])
-        channel[1] += 1
+        channel = self.register_channel(
+            topic=topic, callerid=callerid, type=type, md5sum=md5sum, definition=definition, latching=latching
+        )
+        channel.message(log_time_ns, data)
 
     def event(self, topic: str, log_time_ns: int, record: Record) -> None:
         """One event on the JSON channel `topic` (one of `events.TOPICS`), whose record it must be."""

@@ -31,6 +31,11 @@ class Socket:
     def recv(self, size, *_):
         return self._stream.read(min(size, PIECE_BYTES))
 
+    def recv_into(self, buffer, *_):
+        piece = self.recv(len(buffer))
+        buffer[: len(piece)] = piece
+        return len(piece)
+
     def sendall(self, data):
         """Nobody hears it."""
 

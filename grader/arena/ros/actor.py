@@ -125,7 +125,7 @@ class Actor:
         frame = LENGTH.pack(len(data)) + data
         with topic.lock:
             topic.last = frame
-            self._wire.messages(topic.channel, [data], now_ns())
+            self._wire.messages(topic.channel, [frame], now_ns())
             for sock in list(topic.subscribers):
                 self._send(topic, sock, frame)
 

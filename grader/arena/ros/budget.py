@@ -41,11 +41,12 @@ class Budget:
                 self._channels[key] = Account(self)
             return self._channels[key]
 
-    def take(self, account, size):
-        """Whether one more message of so many bytes is recorded."""
-        size += MESSAGE_BYTES
+    def take(self, account, size, messages):
+        """Whether so many more messages, of so many bytes together, are recorded."""
+        size += MESSAGE_BYTES * messages
         with self._lock:
-            if account.messages >= self.channel_messages or account.bytes + size > self.channel_bytes:
+            total = account.messages + messages
+            if total > self.channel_messages or account.bytes + size > self.channel_bytes:
                 return False
             if account.bytes + size > self.own_share:
                 self._heavy.add(account)
@@ -54,7 +55,7 @@ class Budget:
                     return False
                 self._shared_left -= size
             account.bytes += size
-            account.messages += 1
+            account.messages = total
         return True
 
 
@@ -71,5 +72,5 @@ class Account:
         """Whether it has more than was set apart for it."""
         return self.bytes > self.budget.own_share
 
-    def take(self, size):
-        return self.budget.take(self, size)
+    def take(self, size, messages=1):
+        return self.budget.take(self, size, messages)

@@ -53,10 +53,9 @@ class Calibration:
             self._loop.remove_reader(self._sock)
             return
         whole = len(chunk) - len(chunk) % FRAME_BYTES
-        frames = [chunk[at + LENGTH.size : at + FRAME_BYTES] for at in range(0, whole, FRAME_BYTES)]
         self._rest = chunk[whole:]
-        if frames:
-            self._wire.messages(self._channel, frames, time_ns)
+        if whole:
+            self._wire.messages(self._channel, [chunk[:whole]], time_ns)
 
     def stop(self):
         """End it, with what it used: CPU seconds."""

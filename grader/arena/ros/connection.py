@@ -1,26 +1,29 @@
 """One publisher's connection: cuts the stream into messages and hands them on, as far as there is room for them."""
 
+from cutting import Waste, message_ends
 from tcpros import LENGTH
 from wire import now_ns
 
 READ_BYTES = 1 << 16
-FEW_BYTES, MANY_FRAMES = 1 << 13, 500
-"""Small messages take more time than their bytes: after a piece with so many, the next one is shorter."""
-MESSAGE_BYTES_MAX = 16 << 20
-HELD_BYTES_MAX = 4 << 20
+LARGE_BYTES, LARGE_READ_BYTES = 1 << 14, 1 << 19
+"""Longer messages are read into their own place, in pieces of so much."""
+HELD_BYTES_MAX = 16 << 20
 LATCHING_S = 1.5
 REST_S = 0.01
+BUSY_NS, BUSY_MESSAGES, BUSY_LOOKS = 250000, 4, 16
+BREATH_S = 0.001
+"""Where so many looks in a row find messages at more than 4 kHz, the next ones come together."""
 DROPPED_MAX = 2000
-"""After so many that were dropped, what comes is thrown away unread: its bytes say about how many they were."""
-_WASTE = bytearray(1 << 20)
+"""After so many that were dropped nothing is kept any more, only counted."""
+_WASTE = memoryview(bytearray(1 << 20))
 
 
 class Connection:
     """Its channel opens with the first message, when the publisher can say whether it latches; until then messages
     are held, with the times of their arrival.
 
-    Each look takes no more than `READ_BYTES`, so that others have their turn, and what is not recorded is never kept:
-    it is skipped as it comes. Without an `account` nothing is recorded.
+    Each look takes one piece, so that others have their turn, and what is not recorded is never kept: it is skipped
+    as it comes. Without an `account` nothing is recorded.
     """
 
     def __init__(self, recorder, sock, *, topic, caller_id, header, account):
@@ -31,14 +34,13 @@ class Connection:
         self._recorder = recorder
         self._header = header
         self._account = account
-        self._buffer = bytearray()
-        self._reserved = 0
-        self._accepted = False
-        self._skip = 0
-        self._messages = self._dropped = self._wasted_bytes = 0
-        self._length = 0
-        self._piece_bytes = FEW_BYTES
-        self._closed = self._opened = self._broken = False
+        self._rest = b""
+        self._message = None
+        self._filled = self._skip = 0
+        self._messages = self._dropped = 0
+        self._waste = None
+        self._looked_ns = self._busy = 0
+        self._closed = self._opened = self._broken = self._behind = False
         self._watched = self._paused = False
         self._held = []
         self._held_bytes = 0
@@ -49,117 +51,158 @@ class Connection:
             self._watched = True
             self._recorder.loop.add_reader(self.sock, self._look)
 
-    def _rest(self):
+    def _rests(self):
         self._watched = False
         self._recorder.loop.remove_reader(self.sock)
 
     def _look(self):
         """Who sends much waits while the grader is behind; all others are read in time."""
         if self._account is not None and self._account.heavy and self._recorder.wire.congested:
-            self._rest()
+            self._falls_behind()
+            self._rests()
             self._recorder.loop.call_later(REST_S, self.watch)
-        else:
-            self.readable()
+        elif self.readable() and self._busy > BUSY_LOOKS:
+            self._rests()
+            self._recorder.loop.call_later(BREATH_S, self.watch)
+
+    def _falls_behind(self):
+        """Its publisher may have to drop messages that nobody takes: whoever judges them should know."""
+        if not self._behind:
+            self._behind = True
+            self._recorder.note("behind", self.topic, self.caller_id, messages=self._messages)
 
     def readable(self):
         """Take one piece of what the socket holds; False where there was none."""
         if self._closed:
             return False
-        if self._dropped >= DROPPED_MAX:
-            return self._throw_away()
         try:
-            chunk = self.sock.recv(self._piece_bytes)
-        except BlockingIOError:
-            return False
-        except OSError:
-            chunk = b""
-        if not chunk:
-            self.close()
-            return False
-        frames = self._frames(chunk)
-        self._piece_bytes = FEW_BYTES if len(frames) > MANY_FRAMES else READ_BYTES
-        if frames:
-            self._messages += len(frames)
-            self._hand_on(frames, now_ns())
-        if self._broken:
-            self.close()
-        return True
-
-    def _throw_away(self):
-        try:
-            count = self.sock.recv_into(_WASTE)
+            count = self._read()
         except BlockingIOError:
             return False
         except OSError:
             count = 0
-        self._wasted_bytes += count
-        if not count:
+        if not count or self._broken:
             self.close()
         return count > 0
 
-    def _frames(self, chunk):
-        """Cut whole messages off the stream, those for which there is room."""
-        frames = []
-        skipped = min(self._skip, len(chunk))
-        self._skip -= skipped
-        buffer = self._buffer
-        buffer += chunk[skipped:]
-        start, size = 0, len(buffer)
-        while size - start >= LENGTH.size:
-            (length,) = LENGTH.unpack_from(buffer, start)
-            if length > MESSAGE_BYTES_MAX:
-                self._invalid(length)
-                break
-            end = start + LENGTH.size + length
-            self._length = length
-            if not self._accepted and not self._has_room(length, end > size):
-                self._skip = max(0, end - size)
-                start = min(end, size)
-                continue
-            self._accepted = end > size
-            if self._accepted:
-                break
-            frames.append(bytes(buffer[start + LENGTH.size : end]))
-            self._release()
-            start = end
-        del buffer[:start]
-        return frames
+    def _read(self):
+        """Read once, and say how many bytes that were."""
+        if self._waste is not None:
+            return self._throw_away()
+        if self._skip:
+            count = self.sock.recv_into(_WASTE[: self._skip])
+            self._skip -= count
+            return count
+        if self._message is not None:
+            return self._fill()
+        chunk = self.sock.recv(READ_BYTES)
+        if chunk:
+            self._cut(chunk, now_ns())
+        return len(chunk)
 
-    def _has_room(self, length, waits):
-        """Whether a message is recorded; one that is not yet here as a whole (`waits`) needs room in memory, too."""
-        reserved = length if waits else 0
-        if self._account is not None and (not reserved or self._recorder.reserve(reserved)):
-            self._reserved = reserved
-            if self._account.take(length):
-                return True
-            self._release()
+    def _throw_away(self):
+        self._waste.counts = self._recorder.counts or not self._waste.begun
+        count = self.sock.recv_into(_WASTE[:READ_BYTES] if self._waste.counts else _WASTE)
+        self._count(_WASTE[:count])
+        return count
+
+    def _count(self, data):
+        found, too_long = self._waste.feed(data)
+        self._recorder.count(found)
+        if too_long:
+            self._invalid(too_long)
+
+    def _fill(self):
+        """More of a large message."""
+        end = min(len(self._message), self._filled + LARGE_READ_BYTES)
+        with memoryview(self._message) as view:
+            count = self.sock.recv_into(view[self._filled : end])
+        self._filled += count
+        if self._filled == len(self._message):
+            message, self._message = self._message, None
+            self._recorder.release(len(message))
+            self._hand_on([message], 1, now_ns())
+        return count
+
+    def _cut(self, chunk, time_ns):
+        """Cut whole messages off the stream, those for which there is room."""
+        data = self._rest + chunk if self._rest else chunk
+        ends, too_long = message_ends(data)
+        beyond = ends.pop() if ends and ends[-1] > len(data) else 0
+        at = ends[-1] if ends else 0
+        self._note_pace(len(ends), time_ns)
+        self._rest = b""
+        if ends:
+            self._take(data, ends, time_ns)
+        if too_long:
+            self._invalid(too_long)
+        elif self._dropped >= DROPPED_MAX:
+            self._waste = Waste()
+            self._count(data[at:])
+        elif beyond - at > LARGE_BYTES:
+            self._begin(data[at:], beyond - at)
+        else:
+            self._rest = data[at:]
+
+    def _note_pace(self, messages, time_ns):
+        quick = messages >= BUSY_MESSAGES or time_ns - self._looked_ns < BUSY_NS
+        self._busy = self._busy + 1 if quick else 0
+        self._looked_ns = time_ns
+
+    def _take(self, data, ends, time_ns):
+        """Hand on whole messages in one piece, or, where there is not room for all, one by one."""
+        if self._has_room(ends[-1] - LENGTH.size * len(ends), len(ends)):
+            self._hand_on([data[: ends[-1]]], len(ends), time_ns)
+            return
+        pieces, start = [], 0
+        for end in ends:
+            if self._has_room(end - start - LENGTH.size, 1):
+                pieces.append(data[start:end])
+            else:
+                self._drop()
+            start = end
+        if pieces:
+            self._hand_on(pieces, len(pieces), time_ns)
+
+    def _begin(self, part, size):
+        """A large message of which more is to come: room for all of it, or none is kept."""
+        if self._account is not None and self._recorder.reserve(size):
+            if self._has_room(size - LENGTH.size, 1):
+                self._message = bytearray(size)
+                self._message[: len(part)] = part
+                self._filled = len(part)
+                return
+            self._recorder.release(size)
+        self._drop()
+        self._skip = size - len(part)
+
+    def _has_room(self, size, messages):
+        return self._account is not None and self._account.take(size, messages)
+
+    def _drop(self):
         self._dropped += 1
         if self._dropped == 1:
             self._recorder.overflows(self, self._messages)
-        return False
-
-    def _release(self):
-        if self._reserved:
-            self._recorder.release(self._reserved)
-            self._reserved = 0
 
     def _invalid(self, length):
         self._recorder.note("invalid", self.topic, self.caller_id, detail="{} bytes".format(length))
         self._recorder.too_large(self, length)
         self._broken = True
 
-    def _hand_on(self, frames, time_ns):
+    def _hand_on(self, pieces, messages, time_ns):
+        self._messages += messages
         if self._opened:
-            self._recorder.wire.messages(self._account.channel, frames, time_ns)
+            self._recorder.wire.messages(self._account.channel, pieces, time_ns)
             return
         if not self._held:
             self._recorder.ask_latching(self)
             self._recorder.loop.call_later(LATCHING_S, lambda: self.open(latching=False))
-        self._held.append((frames, time_ns))
-        self._held_bytes += sum(map(len, frames))
+        self._held.append((pieces, time_ns))
+        self._held_bytes += sum(map(len, pieces))
         if self._held_bytes > HELD_BYTES_MAX and not self._paused:
+            self._falls_behind()
             self._paused = True
-            self._rest()
+            self._rests()
 
     def open(self, *, latching):
         """Hand on what was held; the channel is made where it is not there from an earlier connection."""
@@ -175,8 +218,8 @@ class Connection:
                 definition=self._header.get("message_definition", ""),
                 latching=latching or self._header.get("latching") == "1",
             )
-        for frames, time_ns in self._held:
-            self._recorder.wire.messages(self._account.channel, frames, time_ns)
+        for pieces, time_ns in self._held:
+            self._recorder.wire.messages(self._account.channel, pieces, time_ns)
         self._held = []
         if self._paused:
             self._paused = False
@@ -186,9 +229,19 @@ class Connection:
         if self._closed:
             return
         self._closed = True
-        self._release()
+        if self._message is not None:
+            self._recorder.release(len(self._message))
+            self._message = None
         self.open(latching=False)
         self._recorder.closed(self)
         self.sock.close()
-        dropped = self._dropped + self._wasted_bytes // (LENGTH.size + self._length)
-        self._recorder.note("closed", self.topic, self.caller_id, messages=self._messages, dropped=dropped)
+        self._tell_totals()
+
+    def _tell_totals(self):
+        dropped, exact = self._dropped, True
+        if self._waste is not None:
+            dropped, exact = dropped + self._waste.messages, self._waste.exact
+        detail = "" if exact else "as many as its bytes say"
+        self._recorder.note(
+            "closed", self.topic, self.caller_id, messages=self._messages, dropped=dropped, detail=detail
+        )

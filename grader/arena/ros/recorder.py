@@ -17,7 +17,8 @@ import time
 
 from bounded import ProtocolError, call, connect, slave_api
 from budget import Budget
-from connection import MESSAGE_BYTES_MAX, Connection
+from connection import Connection
+from cutting import MESSAGE_BYTES_MAX
 from guard import shown
 from pool import Pool
 from tcpros import HEADER_BYTES_MAX, LENGTH, check_fields, read_header, write_header
@@ -33,6 +34,8 @@ LAST_READS_S = 0.5
 OPEN_MAX, SAME_MAX = 600, 4
 """Connections at a time: of all publishers, and to one node for one topic."""
 NOTES_MAX = 3000
+COUNTED_MAX = 2000000
+"""So many messages that are not recorded are counted one by one, of all publishers together."""
 
 
 class Recorder:
@@ -46,6 +49,7 @@ class Recorder:
         self._pool = Pool()
         self._pending_bytes = 0
         self._notes = 0
+        self._to_count = COUNTED_MAX
         self._open = {}
         self._same = collections.Counter()
         self._pending = {}
@@ -198,6 +202,14 @@ class Recorder:
     def release(self, size):
         with self._lock:
             self._pending_bytes -= size
+
+    @property
+    def counts(self):
+        """Whether messages that are not recorded are still counted one by one."""
+        return self._to_count > 0
+
+    def count(self, messages):
+        self._to_count -= messages
 
     def overflows(self, connection, messages):
         """Its first message that is not recorded."""

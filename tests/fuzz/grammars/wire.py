@@ -48,6 +48,12 @@ def _event() -> SearchStrategy[object]:
     return st.sampled_from(TOPICS).flatmap(spoiled)
 
 
+def _messages() -> SearchStrategy[bytes]:
+    """Of the first channel, each behind its length."""
+    several = st.lists(st.binary(max_size=8).flatmap(sized), max_size=3)
+    return several.map(lambda datas: struct.pack("<I", 1) + b"".join(datas))
+
+
 _STATUS = st.fixed_dictionaries(
     {"status": st.sampled_from(STATUSES)},
     optional=dict.fromkeys(
@@ -61,9 +67,7 @@ _PAYLOADS: dict[str, SearchStrategy[bytes]] = {
     "E": st.one_of(_event(), _event(), JSON_VALUES).map(lambda value: json.dumps(value).encode()),
     "C": st.one_of(st.just(CHANNEL), _CHANNEL).map(lambda value: json.dumps(value).encode()),
     "S": st.one_of(_STATUS, JSON_VALUES).map(lambda value: json.dumps(value).encode()),
-    "M": st.one_of(
-        st.binary(max_size=8).map(lambda data: struct.pack("<I", 1) + data), st.binary(max_size=6)
-    ),
+    "M": st.one_of(_messages(), _messages(), st.binary(max_size=10)),
     "x": st.binary(max_size=10),
 }
 
