@@ -10,8 +10,8 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import check
 from grader.checks.support.absence import no_message
-from grader.checks.support.gaps import lateness_ms
 from grader.checks.support.geometry import followed, relative
+from grader.checks.support.lateness import lateness
 from grader.checks.support.names import GlobalName
 from grader.checks.support.straying import Way, measured, metres, spot, stands, what_is_wrong
 from grader.checks.support.text import listed, number
@@ -125,9 +125,9 @@ def _judged(found: Track, run: Run, params: PathParams) -> Verdict:
 
 def _excused(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
     """Where the machine itself was late, a robot that only just strays may have strayed with it."""
-    _, p95_ms, late_ms = lateness_ms(run, run.start_ns, run.end_ns)
-    if not nearly or (late_ms < LATE_MS and p95_ms < LATE_P95_MS):
+    late = lateness(run, run.start_ns, run.end_ns)
+    if not nearly or late is None or (late.max_ms < LATE_MS and late.p95_ms < LATE_P95_MS):
         return verdict
-    message = f"{verdict.message}; but the grading machine was late itself, by up to {late_ms:.0f} ms"
+    message = f"{verdict.message}; but the grading machine was late itself, by up to {late.max_ms:.0f} ms"
     hint = "grade again while the machine has less to do"
     return inconclusive(message, hint=hint, measured=verdict.measured)

@@ -8,7 +8,8 @@ from pydantic import Field
 
 from grader.checks.registry import check
 from grader.checks.support.ending import explain_end
-from grader.checks.support.gaps import ROUNDING, Rhythm, lateness_ms, limit_reached, rhythm
+from grader.checks.support.gaps import ROUNDING, Rhythm, limit_reached, rhythm
+from grader.checks.support.lateness import Lateness, lateness
 from grader.checks.support.process import early_end, observed_until_ns
 from grader.checks.support.text import hertz, number, plural, seconds
 from grader.evidence.run import Run
@@ -116,10 +117,8 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
 def _measured(found: Rhythm, run: Run, params: RateParams) -> str:
     """What came, and how late the machine was meanwhile."""
     seen = found.described(*params.bounds_ns)
-    if not run.host or not found.gaps_ns:
-        return seen
-    _, _, max_ms = lateness_ms(run, found.times_ns[0], found.until_ns)
-    return f"{seen}, machine late by {max_ms:.0f} ms"
+    late = lateness(run, found.times_ns[0], found.until_ns) if found.gaps_ns else None
+    return seen if late is None else f"{seen}, {late.described}"
 
 
 def _flood(found: Rhythm, package: PackageFacts, params: RateParams) -> Verdict | None:
@@ -201,20 +200,33 @@ def _rate_hint(ratio: float, nominal: str) -> str:
 
 def _excused(verdict: Verdict | None, found: Rhythm, run: Run, params: RateParams) -> Verdict | None:
     """A rate that fails while the host was late costs nobody anything, unless it is too far off for that."""
-    if verdict is None:
-        return None
-    mean_ms, p95_ms, max_ms = lateness_ms(run, found.times_ns[0], found.until_ns)
-    period_ms = params.period_ns / 1e6
-    late = (
-        mean_ms >= max(params.tolerance, 0.02) / 2 * period_ms
-        or p95_ms >= LATE_P95_SHARE * period_ms
-        or max_ms >= LATE_MAX_SHARE * period_ms
+    late = None if verdict is None else lateness(run, found.times_ns[0], found.until_ns)
+    if verdict is None or late is None:
+        return verdict
+    beyond = found.mean_hz >= 2 * params.rate_hz or found.tail_ns / 2e6 > max(
+        late.max_ms, params.period_ns / 1e6
     )
-    beyond = found.mean_hz >= 2 * params.rate_hz or found.tail_ns / 2e6 > max(max_ms, period_ms)
-    if not late or beyond:
+    if beyond or not (_was_late(late, params) or _sleeps_explain(found, late, params)):
         return verdict
     message = (
         f"{verdict.message}; but the grading machine was late itself "
-        f"(by up to {max_ms:.0f} ms, 95 % within {p95_ms:.0f} ms), so nothing follows from it"
+        f"(by up to {late.max_ms:.0f} ms, 95 % within {late.p95_ms:.0f} ms), so nothing follows from it"
     )
     return inconclusive(message, hint="grade again while the machine has less to do")
+
+
+def _was_late(late: Lateness, params: RateParams) -> bool:
+    period_ms = params.period_ns / 1e6
+    return (
+        late.mean_ms >= max(params.tolerance, 0.02) / 2 * period_ms
+        or late.p95_ms >= LATE_P95_SHARE * period_ms
+        or late.max_ms >= LATE_MAX_SHARE * period_ms
+    )
+
+
+def _sleeps_explain(found: Rhythm, late: Lateness, params: RateParams) -> bool:
+    """A loop of plain sleeps would have the right rate if its sleeps had not been too long."""
+    if late.sleep_ms is None or not 0 < found.mean_hz < params.low_hz:
+        return False
+    own_ms = 1e3 / found.mean_hz - late.sleep_ms
+    return own_ms <= 1e3 / params.low_hz

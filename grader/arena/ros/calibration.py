@@ -1,7 +1,8 @@
-"""A publisher that is known to keep its rate: what is wrong with what the recorder sees of it, is the machine's doing.
+"""A publisher whose loop is known: what is wrong with what the recorder sees of it, is the machine's doing.
 
-It is a process of its own, as a student's node is, and sleeps until absolute times, as `rospy.Rate` does. Its messages
-come to the recorder's loop over a socket in the form of TCPROS, and are recorded with the times of their arrival.
+It is a process of its own, as a student's node is, and sleeps for a tenth of a second in each turn, as a student's
+loop may. Each message says when it was sent: what a sleep took too long shows in two that follow each other. They
+come to the recorder's loop over TCP, in the form of TCPROS, and are recorded with the times of their arrival.
 """
 
 import contextlib
@@ -12,11 +13,12 @@ import socket
 import struct
 import time
 
+from arrival import note_arrivals, receive
 from tcpros import LENGTH
 from wire import now_ns
 
 TOPIC = "/grader/calibration"
-RATE_HZ = 10.0
+PERIOD_S = 0.1
 TYPE, MD5SUM = "std_msgs/Header", "2176decaecbce78abc3b96ef049fabed"
 DEFINITION = "uint32 seq\ntime stamp\nstring frame_id\n"
 HEADER = struct.Struct("<IIII")
@@ -28,13 +30,14 @@ class Calibration:
     """Make it before the first thread: its process is a copy of this one, which it outlives by nothing."""
 
     def __init__(self):
-        self._sock, theirs = socket.socketpair()
+        self._sock, theirs = _connection()
         parent = os.getpid()
         self._pid = os.fork()
         if self._pid == 0:
             _live(theirs, parent)
         theirs.close()
         self._sock.setblocking(False)
+        note_arrivals(self._sock)
         self._rest = b""
 
     def record(self, loop, wire, caller_id):
@@ -47,11 +50,11 @@ class Calibration:
         self._sock.send(b"\n")
 
     def _readable(self):
-        chunk = self._rest + self._sock.recv(1 << 12)
-        time_ns = now_ns()
-        if not chunk:
+        data, time_ns = receive(self._sock, FRAME_BYTES)
+        if not data:
             self._loop.remove_reader(self._sock)
             return
+        chunk = self._rest + data
         whole = len(chunk) - len(chunk) % FRAME_BYTES
         self._rest = chunk[whole:]
         if whole:
@@ -82,11 +85,23 @@ def _live(sock, parent):
 
 
 def _publish(descriptor):
-    began_s, number = time.monotonic(), 0
+    number = 0
     with contextlib.suppress(OSError):  # nobody listens any more
         while True:
             stamp_ns = now_ns()
             header = HEADER.pack(number, stamp_ns // 10**9, stamp_ns % 10**9, 0)
             os.write(descriptor, LENGTH.pack(len(header)) + header)
             number += 1
-            time.sleep(max(0.0, began_s + number / RATE_HZ - time.monotonic()))
+            time.sleep(PERIOD_S)
+
+
+def _connection():
+    """Both ends of a connection over the loopback; nobody else's is taken for the other end."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        theirs = socket.create_connection(server.getsockname())
+        theirs.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        while True:
+            mine, address = server.accept()
+            if address == theirs.getsockname():
+                return mine, theirs
+            mine.close()

@@ -115,15 +115,3 @@ def rhythm(channels: Sequence[Channel], until_ns: int | None, period_ns: float) 
 def limit_reached(run: Run, topic: str) -> bool:
     """The recorder stopped taking messages of this topic, because there were too many."""
     return any(e.topic == topic and (e.event == "limit" or e.dropped) for _, e in run.recorder)
-
-
-def lateness_ms(run: Run, from_ns: int, to_ns: int) -> tuple[float, float, float]:
-    """The worst mean, 95th percentile and maximum of the timer's lateness in this stretch of time."""
-    before = max((t for t, _ in run.host if t <= from_ns), default=from_ns)
-    after = min((t for t, _ in run.host if t >= to_ns), default=to_ns)
-    events = [e for t, e in run.host if before < t <= after]
-    return (
-        max((e.mean_ms for e in events), default=0.0),
-        max((e.p95_ms for e in events), default=0.0),
-        max((e.max_ms for e in events), default=0.0),
-    )
