@@ -41,7 +41,7 @@ fuzz: setup ## the parsers of foreign data at random, for MINUTES minutes; tests
 	@$(BIN)/python -m tests.fuzz --minutes $(MINUTES)
 
 bench: setup ## the figures of benchmarks/README.md, measured here
-	@$(BIN)/python benchmarks/run.py --write
+	@$(BIN)/python -m benchmarks.run --write
 
 fixtures: setup ## write fixtures/<lab>/ anew from fixtures/<lab>.yaml
 	@$(BIN)/python fixtures/make.py

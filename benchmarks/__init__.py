@@ -1,0 +1,1 @@
+"""Measures what the grader promises; `python -m benchmarks.run --help`."""

@@ -1,0 +1,82 @@
+"""Seconds of the wall and of the CPU, and the machine that they were measured on."""
+
+from __future__ import annotations
+
+import os
+import platform
+import resource
+import subprocess
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+
+from benchmarks.figures import NotMeasured
+
+TIMEOUT_S = 600.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cost:
+    """`cpu_s` is that of a process with all its children; `text` is what it printed."""
+
+    wall_s: float
+    cpu_s: float
+    code: int = 0
+    text: str = ""
+
+
+class Meter:
+    """Counts from its making on: wall, own CPU, and the CPU of all children that have ended since."""
+
+    def __init__(self) -> None:
+        self._wall_s, self._own_s, self._children_s = time.monotonic(), time.process_time(), children_cpu_s()
+
+    def wall_s(self) -> float:
+        return time.monotonic() - self._wall_s
+
+    def own_cpu_s(self) -> float:
+        return time.process_time() - self._own_s
+
+    def children_cpu_s(self) -> float:
+        return children_cpu_s() - self._children_s
+
+
+def children_cpu_s() -> float:
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
+def timed(
+    argv: Sequence[str],
+    *,
+    env: Mapping[str, str] | None = None,
+    cwd: Path | None = None,
+    codes: Sequence[int] = (0,),
+) -> Cost:
+    """Run it to its end. Raises NotMeasured where its exit code is another one."""
+    meter = Meter()
+    done = subprocess.run(
+        argv, env=env, cwd=cwd, capture_output=True, text=True, check=False, timeout=TIMEOUT_S
+    )
+    cost = Cost(wall_s=meter.wall_s(), cpu_s=meter.children_cpu_s(), code=done.returncode, text=done.stdout)
+    if done.returncode not in codes:
+        last = (done.stderr + done.stdout).strip()[-400:]
+        raise NotMeasured(f"{' '.join(argv[:5])} ended with {done.returncode}: {last}")
+    return cost
+
+
+def machine() -> str:
+    lines = Path("/proc/cpuinfo").read_text().splitlines()
+    cpu = next((line.split(":")[1].strip() for line in lines if line.startswith("model name")), "unknown CPU")
+    day = datetime.now(timezone.utc).date().isoformat()
+    return (
+        f"{day}, {os.cpu_count()} cores ({cpu}), Linux {platform.release()}, "
+        f"Python {platform.python_version()}"
+    )
+
+
+def load() -> float:
+    """The load average of the last minute."""
+    return os.getloadavg()[0]
