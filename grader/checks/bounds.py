@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from grader.checks.registry import check
 from grader.checks.support.absence import no_message
 from grader.checks.support.fields import FieldPath, NoField, values_at
+from grader.checks.support.losses import losses
 from grader.checks.support.names import GlobalName, plain_type
 from grader.checks.support.text import number, plural, seconds
 from grader.evidence.run import Run
@@ -65,7 +66,7 @@ class Reading(NamedTuple):
     fault: str
 
 
-@check("field-bounds", params=FieldBoundsParams, messages_only=True)
+@check("field-bounds", params=FieldBoundsParams, messages_only=True, heeds_losses=True)
 def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> Verdict:
     """A field of the messages stays within its bounds.
 
@@ -95,6 +96,8 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
         verdict = _no_field(missing, run, params)
     elif len(readings) - len(outside) < params.share * len(readings) - ROUNDING:
         verdict = _outside(outside, readings, params)
+        if params.share < 1 and losses(run, params.topic):
+            verdict = inconclusive(verdict.message, hint="grade again")
     else:
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {_share(readings, outside)}")
     spans = outside or readings

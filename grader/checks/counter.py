@@ -9,6 +9,7 @@ from pydantic import Field
 from grader.checks.registry import check
 from grader.checks.support.counting import Count, Step, cite, counts, first_values, longest
 from grader.checks.support.ending import explain_end
+from grader.checks.support.losses import losses
 from grader.checks.support.process import early_end
 from grader.checks.support.text import listed, number, plural, seconds
 from grader.checks.support.wrapping import WrapParams, judge_wraps
@@ -34,7 +35,7 @@ class StepParams(Record):
     min_steps: Annotated[int, Field(ge=1)] = 10
 
 
-@check("counter-start", params=StartParams, messages_only=True)
+@check("counter-start", params=StartParams, messages_only=True, heeds_losses=True)
 def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdict:
     """The counter begins with the right value.
 
@@ -76,7 +77,7 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
     return failed(message, hint=hint, **fields)
 
 
-@check("counter-step", params=StepParams, messages_only=True)
+@check("counter-step", params=StepParams, messages_only=True, heeds_losses=True)
 def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict:
     """The counter goes up by one.
 
@@ -119,7 +120,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     )
 
 
-@check("counter-wrap", params=WrapParams, messages_only=True)
+@check("counter-wrap", params=WrapParams, messages_only=True, heeds_losses=True)
 def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict:
     """The counter starts again at its maximum.
 
@@ -156,6 +157,8 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
 
 def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
     """There is no counter on the topic."""
+    if losses(run, topic):
+        return inconclusive(f"too little is recorded of {topic}", measured="no number", hint="grade again")
     if any(c.messages for c in run.student_channels(topic)):
         hint = "publish the counter itself, as an Int8"
         return unjudged(f"{topic} carries no numbers", measured="no number", hint=hint)
@@ -224,4 +227,6 @@ def _too_few(steps: int, run: Run, package: PackageFacts, params: StepParams) ->
     ended = early_end(run)
     cause = f": the node ended ({explain_end(ended, run, package).cause})" if ended else ""
     message = f"only {plural(steps + 1, 'value')} came on {params.topic}{cause}"
+    if losses(run, params.topic):
+        return inconclusive(message, hint="grade again")
     return unjudged(message, hint="publish in a loop `while not rospy.is_shutdown():`")

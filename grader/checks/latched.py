@@ -18,7 +18,7 @@ class LatchedParams(Record):
     topic: GlobalName
 
 
-@check("latched", params=LatchedParams, messages_only=True)
+@check("latched", params=LatchedParams, messages_only=True, heeds_losses=True)
 def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
     """The topic is latched.
 

@@ -13,6 +13,7 @@ from grader.checks.support.clocks import clocks_at
 from grader.checks.support.ending import explain_end
 from grader.checks.support.growth import GET_TIME, WATCHED_S, wrong_growth
 from grader.checks.support.lockup import is_flood
+from grader.checks.support.losses import all_lost, losses
 from grader.checks.support.process import early_end, observed_until_ns
 from grader.checks.support.text import in_one_line, plural
 from grader.checks.support.wording import NUMBER, SECONDS, in_words, message_pattern
@@ -32,7 +33,7 @@ class MessageParams(Record):
     template: Annotated[str, Field(min_length=1)]
 
 
-@check("message", params=MessageParams, messages_only=True)
+@check("message", params=MessageParams, messages_only=True, heeds_losses=True)
 def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
     """Each message says what the handout asks, and tells the time.
 
@@ -80,6 +81,8 @@ def _no_text(package: PackageFacts, run: Run, heard: Sequence[Channel], params: 
     if heard:
         message = f"{params.topic} carries {heard[0].type}, and no text that could be compared"
         return unjudged(message, hint="publish std_msgs/String", measured=heard[0].type)
+    if lost := all_lost(run, params.topic):
+        return lost
     ended = early_end(run)
     if ended is not None:
         end = explain_end(ended, run, package)
@@ -156,6 +159,8 @@ def _watched_ns(run: Run, heard: Sequence[Channel]) -> int:
 def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict:
     """Too little came: the node's own fault where it died, or was watched long enough."""
     few = f"only {plural(sum(len(c.messages) for c in heard), 'message')} came on {params.topic}"
+    if losses(run, params.topic):
+        return inconclusive(f"{few}: too few to see the time grow", hint="grade again")
     ended = early_end(run)
     if ended is not None:
         end = explain_end(ended, run, package)

@@ -8,8 +8,9 @@ from pydantic import Field
 
 from grader.checks.registry import check
 from grader.checks.support.ending import explain_end
-from grader.checks.support.gaps import ROUNDING, Rhythm, limit_reached, rhythm
+from grader.checks.support.gaps import ROUNDING, Rhythm, rhythm
 from grader.checks.support.lateness import Lateness, lateness
+from grader.checks.support.losses import all_lost, whole_until_ns
 from grader.checks.support.process import early_end, observed_until_ns
 from grader.checks.support.text import hertz, number, plural, seconds
 from grader.evidence.run import Run
@@ -67,7 +68,7 @@ class RateParams(Record):
         return self.period_ns * (1 - self.gap_tolerance), self.period_ns * (1 + self.gap_tolerance)
 
 
-@check("rate", params=RateParams, messages_only=True)
+@check("rate", params=RateParams, messages_only=True, heeds_losses=True)
 def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     """The topic has the right rate, evenly.
 
@@ -93,12 +94,12 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     if run.clock != "real":
         message = "rates are judged in real time only, and this run was warped"
         return inconclusive(message, expected=expected, hint="give the criterion a scenario with clock: real")
-    full = limit_reached(run, params.topic)
-    until_ns = None if full else observed_until_ns(run)
+    until_ns = whole_until_ns(run, params.topic, observed_until_ns(run))
     found = rhythm(run.student_channels(params.topic), until_ns, params.period_ns)
     if found is None:
         message, hint = f"no message came on {params.topic}", f"look at rostopic hz {params.topic}"
-        return unjudged(message, expected=expected, measured="no message", hint=hint)
+        absent = unjudged(message, measured="no message", hint=hint)
+        return (all_lost(run, params.topic) or absent).model_copy(update={"expected": expected})
     verdict = (
         _flood(found, package, params)
         or _short(found, run, package, params)

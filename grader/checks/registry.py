@@ -30,7 +30,8 @@ class Check:
     """One check: function, record of its parameters, the facts it asks for, its docstring in parts.
 
     `messages_only` checks ask a run for its messages alone, so they judge another tool's recording too. For such a
-    run `package` is empty where there is none. `source` is the file of an instructor's own check.
+    run `package` is empty where there is none. `heeds_losses` checks look for themselves at what the recorder lost.
+    `source` is the file of an instructor's own check.
     """
 
     name: str
@@ -40,6 +41,7 @@ class Check:
     title: str
     sections: dict[str, str]
     messages_only: bool = False
+    heeds_losses: bool = False
     source: str = ""
 
     @property
@@ -79,7 +81,11 @@ def collecting(source: str) -> Iterator[Collection]:
 
 
 def check(
-    name: str, *, params: type[Record] = NoParams, messages_only: bool = False
+    name: str,
+    *,
+    params: type[Record] = NoParams,
+    messages_only: bool = False,
+    heeds_losses: bool = False,
 ) -> Callable[[Callable[..., Verdict]], Callable[..., Verdict]]:
     """Register a function under a name. Raises ValueError for a name that is taken or a fact that nobody has."""
 
@@ -101,6 +107,7 @@ def check(
             title=title,
             sections=sections,
             messages_only=messages_only,
+            heeds_losses=heeds_losses,
             source=own.source if own else "",
         )
         return function

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from grader.checks.registry import check
 from grader.checks.support.ending import explain_end
+from grader.checks.support.losses import all_lost
 from grader.checks.support.process import early_end
 from grader.checks.support.text import listed, near_names, plural
 from grader.evidence.run import Channel, Run
@@ -21,7 +22,7 @@ class TopicTypeParams(Record):
     type: str
 
 
-@check("topic-type", params=TopicTypeParams, messages_only=True)
+@check("topic-type", params=TopicTypeParams, messages_only=True, heeds_losses=True)
 def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verdict:
     """The topic carries the right type of message.
 
@@ -47,7 +48,8 @@ def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verd
     if wrong:
         verdict = _wrong_type(wrong[0], params)
     elif not heard:
-        verdict = _not_recorded(run, params.topic) if run.foreign else _silent(package, run, params)
+        silent = _not_recorded(run, params.topic) if run.foreign else _silent(package, run, params)
+        verdict = all_lost(run, params.topic) or silent
     else:
         count = sum(len(c.messages) for c in heard)
         publishers = listed(dict.fromkeys(c.publisher for c in heard))

@@ -108,9 +108,10 @@ class ActorEvent(Record):
 
 class RecorderEvent(Record):
     """`/grader/recorder`: the recorder's connections. `dropped` counts messages past the limits of a channel or of the
-    run; of a flood it is worked out from the bytes."""
+    run; of a flood of millions it is worked out from the bytes, and `detail` says so. `behind`: the recorder could not
+    keep up, and from then on the publisher may have dropped messages."""
 
-    event: Literal["connected", "refused", "closed", "limit", "invalid"]
+    event: Literal["connected", "refused", "closed", "limit", "behind", "invalid"]
     topic: str
     callerid: str
     messages: int = 0

@@ -9,6 +9,7 @@ from traceback import extract_tb
 
 from grader.checks import CHECKS, Check
 from grader.checks.evidence import NotRecorded
+from grader.checks.support.losses import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
 from grader.judge.facts import Facts, try_facts
@@ -37,8 +38,8 @@ def judge(
     roots: dict[str, str] = {}
     for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():
         verdict = verdict_of(criteria[name], facts, checks)
-        verdicts[name] = _settled(criteria[name], verdict, verdicts, roots)
-    return tuple(_result(c, verdicts[c.id], rubric.digits) for c in rubric.criteria)
+        verdicts[name] = settled(criteria[name], verdict, verdicts, roots)
+    return tuple(result_of(c, verdicts[c.id], rubric.digits) for c in rubric.criteria)
 
 
 def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> Verdict:
@@ -53,7 +54,11 @@ def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] =
         )
     try:
         asked = facts.of(check, criterion, check.params.model_validate(criterion.parameters))
-        return asked if isinstance(asked, Verdict) else _sound(check.function(**asked))
+        return (
+            asked
+            if isinstance(asked, Verdict)
+            else heed_losses(check, asked, _sound(check.function(**asked)))
+        )
     except NotRecorded as missing:
         return missing.verdict
     except EvidenceError as error:
@@ -82,7 +87,7 @@ def _broken(check: Check, error: Exception) -> Verdict:
     return Verdict(status=Status.ERROR, score=0.0, message=message, hint=hint)
 
 
-def _settled(
+def settled(
     criterion: Criterion, verdict: Verdict, verdicts: Mapping[str, Verdict], roots: dict[str, str]
 ) -> Verdict:
     """`blocked` where there was nothing to judge and a required criterion explains it, named by its root."""
@@ -101,7 +106,8 @@ def _settled(
     return verdict
 
 
-def _result(criterion: Criterion, verdict: Verdict, digits: int) -> CriterionResult:
+def result_of(criterion: Criterion, verdict: Verdict, digits: int) -> CriterionResult:
+    """The report's line of a criterion, with the points of its verdict."""
     lost = verdict.status in WITH_HINT
     return CriterionResult(
         id=criterion.id,

@@ -10,6 +10,7 @@ from typing import Any
 import yaml
 
 from grader.checks import CHECKS
+from grader.checks.support.losses import heed_losses
 from grader.evidence.run import Run
 from grader.evidence.timeline import build_runs
 from grader.model.package import PackageFacts
@@ -75,7 +76,8 @@ def judge_runs(name: str, params: dict[str, Any], runs: dict[str, Run]) -> Verdi
         "package": PackageFacts.model_validate_json(runs["package"].package_json or b""),
         "params": check.params.model_validate(params),
     }
-    return check.function(**{fact: facts[fact] for fact in check.facts})
+    asked = {fact: facts[fact] for fact in check.facts}
+    return heed_losses(check, asked, check.function(**asked))
 
 
 def differences(verdict: Verdict, expect: dict[str, Any]) -> list[str]:

@@ -36,6 +36,12 @@ class Socket:
         buffer[: len(piece)] = piece
         return len(piece)
 
+    def recvmsg(self, size, _room):
+        return self.recv(size), [], 0, None
+
+    def recvmsg_into(self, buffers, _room):
+        return self.recv_into(*buffers), [], 0, None
+
     def sendall(self, data):
         """Nobody hears it."""
 

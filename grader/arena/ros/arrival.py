@@ -28,6 +28,12 @@ def receive(sock, size):
     return data, now_ns() - _age_ns(notes)
 
 
+def receive_into(sock, view):
+    """(how many bytes, when the last of them arrived)."""
+    count, notes, _, _ = sock.recvmsg_into([view], SPACE)
+    return count, now_ns() - _age_ns(notes)
+
+
 def _age_ns(notes):
     for level, kind, value in notes:
         if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS and len(value) >= TIMESPEC.size:

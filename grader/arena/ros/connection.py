@@ -1,8 +1,8 @@
 """One publisher's connection: cuts the stream into messages and hands them on, as far as there is room for them."""
 
+from arrival import receive, receive_into
 from cutting import Waste, message_ends
 from tcpros import LENGTH
-from wire import now_ns
 
 READ_BYTES = 1 << 16
 LARGE_BYTES, LARGE_READ_BYTES = 1 << 14, 1 << 19
@@ -95,9 +95,9 @@ class Connection:
             return count
         if self._message is not None:
             return self._fill()
-        chunk = self.sock.recv(READ_BYTES)
+        chunk, time_ns = receive(self.sock, READ_BYTES)
         if chunk:
-            self._cut(chunk, now_ns())
+            self._cut(chunk, time_ns)
         return len(chunk)
 
     def _throw_away(self):
@@ -116,12 +116,12 @@ class Connection:
         """More of a large message."""
         end = min(len(self._message), self._filled + LARGE_READ_BYTES)
         with memoryview(self._message) as view:
-            count = self.sock.recv_into(view[self._filled : end])
+            count, time_ns = receive_into(self.sock, view[self._filled : end])
         self._filled += count
         if self._filled == len(self._message):
             message, self._message = self._message, None
             self._recorder.release(len(message))
-            self._hand_on([message], 1, now_ns())
+            self._hand_on([message], 1, time_ns)
         return count
 
     def _cut(self, chunk, time_ns):
@@ -182,7 +182,7 @@ class Connection:
     def _drop(self):
         self._dropped += 1
         if self._dropped == 1:
-            self._recorder.overflows(self, self._messages)
+            self._recorder.overflows(self, self._messages, self._looked_ns)
 
     def _invalid(self, length):
         self._recorder.note("invalid", self.topic, self.caller_id, detail="{} bytes".format(length))

@@ -15,6 +15,7 @@ import contextlib
 import threading
 import time
 
+from arrival import note_arrivals
 from bounded import ProtocolError, call, connect, slave_api
 from budget import Budget
 from connection import Connection
@@ -160,6 +161,7 @@ class Recorder:
             raise
         sock.allow(None, 0)
         sock.setblocking(False)
+        note_arrivals(sock)
         return sock, header
 
     def _subscribe(self, caller_id, topic, port, seconds):
@@ -211,10 +213,10 @@ class Recorder:
     def count(self, messages):
         self._to_count -= messages
 
-    def overflows(self, connection, messages):
+    def overflows(self, connection, messages, time_ns):
         """Its first message that is not recorded."""
         topic, caller_id = connection.topic, connection.caller_id
-        self.note("limit", topic, caller_id, messages=messages)
+        self.note("limit", topic, caller_id, time_ns, messages=messages)
         detail = "sent more on {} than is recorded".format(shown(topic))
         self._guard.limit(self._processes.get(caller_id) or caller_id, detail)
 
@@ -225,13 +227,13 @@ class Recorder:
         caller_id = connection.caller_id
         self._guard.limit(self._processes.get(caller_id) or caller_id, detail)
 
-    def note(self, event, topic, caller_id, **fields):
+    def note(self, event, topic, caller_id, time_ns=None, **fields):
         self._notes += 1
         if self._notes > (2 * NOTES_MAX if event == "closed" else NOTES_MAX):
             return
         record = {"event": event, "topic": topic, "callerid": caller_id}
         record.update(fields)
-        self.wire.event("/grader/recorder", record)
+        self.wire.event("/grader/recorder", record, time_ns)
 
     def closed(self, connection):
         with self._lock:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from grader.checks.support.ending import explain_end
+from grader.checks.support.losses import all_lost
 from grader.checks.support.process import Life, early_end, life, lives
 from grader.checks.support.text import listed, near_names
 from grader.checks.support.unheard import HAND_IN
@@ -31,6 +32,8 @@ def no_node(package: PackageFacts, run: Run, what: str) -> Verdict | None:
 
 def no_message(package: PackageFacts, run: Run, topic: str) -> Verdict:
     """Why nothing that can be judged came on a topic."""
+    if lost := all_lost(run, topic):
+        return lost
     published = published_topics(run)
     measured = listed(published) or "no topic"
     near = near_names(topic, published)

@@ -9,6 +9,7 @@ from itertools import pairwise
 from statistics import median
 from typing import NamedTuple
 
+from grader.checks.support.losses import whole_until_ns
 from grader.evidence.run import Channel, Run
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation
@@ -105,8 +106,10 @@ class Count(Record):
 
 
 def counts(run: Run, topic: str) -> tuple[Count, ...]:
-    """What the student's publishers counted on a topic, the earliest first; what is no number is left out."""
-    found = [_count(c) for c in run.student_channels(topic)]
+    """What the student's publishers counted on a topic, the earliest first; what is no number is left out, and what
+    came after the recorder had lost something."""
+    until_ns = whole_until_ns(run, topic)
+    found = [_count(c, until_ns) for c in run.student_channels(topic)]
     return tuple(sorted((c for c in found if c is not None), key=lambda c: c.times_ns[0]))
 
 
@@ -118,11 +121,11 @@ def cite(run: Run, topic: str, from_ns: int, to_ns: int) -> tuple[EvidenceCitati
     return (EvidenceCitation(evidence=run.evidence, topic=topic, from_ns=from_ns, to_ns=to_ns),)
 
 
-def _count(channel: Channel) -> Count | None:
+def _count(channel: Channel, until_ns: int | None) -> Count | None:
     rows = [
         (number, message.log_time_ns, message.sequence)
         for message, value in zip(channel.messages, channel.data, strict=True)
-        if (number := _number(value)) is not None
+        if (number := _number(value)) is not None and (until_ns is None or message.log_time_ns <= until_ns)
     ]
     if not rows:
         return None

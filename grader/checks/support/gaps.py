@@ -11,7 +11,7 @@ from itertools import pairwise
 from pydantic import model_validator
 
 from grader.checks.support.text import hertz, plural
-from grader.evidence.run import Channel, Run
+from grader.evidence.run import Channel
 from grader.model.record import Record
 
 ROUNDING = 1e-6
@@ -110,8 +110,3 @@ def rhythm(channels: Sequence[Channel], until_ns: int | None, period_ns: float) 
     silent_ns = 0 if until_ns is None else until_ns - times[-1]
     end_ns = times[-1] + silent_ns if silent_ns > 1.5 * period_ns else times[-1]
     return Rhythm(times_ns=tuple(times), until_ns=end_ns)
-
-
-def limit_reached(run: Run, topic: str) -> bool:
-    """The recorder stopped taking messages of this topic, because there were too many."""
-    return any(e.topic == topic and (e.event == "limit" or e.dropped) for _, e in run.recorder)

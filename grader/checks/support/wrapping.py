@@ -8,7 +8,7 @@ from pydantic import Field
 
 from grader.checks.support.counting import STUCK_COUNT, Count, Step
 from grader.checks.support.ending import explain_end, explain_traceback, process_tracebacks
-from grader.checks.support.gaps import limit_reached
+from grader.checks.support.losses import losses
 from grader.checks.support.process import early_end, lives, observed_until_ns
 from grader.checks.support.text import number, plural
 from grader.evidence.run import Run
@@ -53,6 +53,9 @@ def judge_wraps(
     if len(good) >= params.wraps:
         message = f"after {number(good[0].before)} comes {params.minimum}, {plural(len(good), 'time')}"
         return passed(message), last
+    if losses(run, params.topic) and not count.is_flood(run, params.rate_hz):
+        message = f"only {plural(len(good), 'reset')} of {params.wraps} is recorded"
+        return inconclusive(message, hint="grade again"), last
     verdict = _died(count, run, package, params) or _stuck(count, params)
     return verdict or _silent(count, run, package, params) or _too_few(count, good, run, params), last
 
@@ -125,7 +128,7 @@ def _stuck(count: Count, params: WrapParams) -> Verdict | None:
 def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> Verdict | None:
     """The node lives, and has stopped to publish."""
     until_ns = observed_until_ns(run)
-    if until_ns is None or limit_reached(run, params.topic):
+    if until_ns is None or losses(run, params.topic):
         return None
     if until_ns - count.times_ns[-1] < max(SILENT_PERIODS * count.period_ns, SILENT_NS):
         return None
