@@ -11,23 +11,25 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from platform import python_version
+from typing import TYPE_CHECKING
 
 from grader import __version__
-from grader.arena.recording import RETRIES, Recorder, Recording
-from grader.arena.sandbox import Mode
 from grader.errors import EvidenceError, SubmissionError, UsageError
-from grader.evidence.reader import load_evidence
 from grader.evidence.run import Run
 from grader.faults import Attempt, told_apart
 from grader.intake import open_recorded, open_recording, open_submission
 from grader.judge import judge
+from grader.judge.early import judge_files
 from grader.judge.notes import notes_of
 from grader.judge.summary import overall_status, total_points
+from grader.model.package import PackageFacts
 from grader.model.progress import Progress
 from grader.model.result import (
     CriterionResult,
+    EarlyVerdict,
     EnvironmentInfo,
     GradingResult,
     RubricInfo,
@@ -36,12 +38,20 @@ from grader.model.result import (
 )
 from grader.model.submission import RecordedSubmission, Submission
 from grader.model.verdict import Status
-from grader.recordings import keep_recording, keep_scenarios
+from grader.package import read_package
 from grader.report.files import write_reports
+from grader.report.hidden import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_package, started
 from grader.temporary import temporary_folder
+
+if TYPE_CHECKING:
+    from grader.arena.recording import Recorder, Recording
+    from grader.arena.sandbox import Mode
+
+LATER = ("grader.evidence.decode", "grader.evidence.reader")
+"""Slow to load, and needed by no verdict that the files alone decide. The arena is loaded when it is begun."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +91,7 @@ def grade(
                 recording, criteria = _recorded_and_judged(
                     submission, rubric, results.evidence, options, progress
                 )
-            runs = load_evidence([results.evidence])
+            runs = _load(results.evidence)
             graded = _result(submission, rubric, recording, criteria, clock)
             result = graded.model_copy(update={"notes": notes_of(runs)})
             console = console_log(runs)
@@ -102,10 +112,13 @@ def record(
             raise UsageError(
                 f"{submission.source}: there is nothing to run in it", hint="grade it, or judge it"
             )
+        facts = _facts(submission, progress)
         with Results(out / submission.id) as results:
-            with _recorder(submission, rubric, results.evidence, options, progress) as recorder:
-                recorder.record_all()
-                keep_scenarios(rubric.rubric, submission, results.evidence, progress)
+            with _recorder(
+                submission, facts, rubric, results.evidence, options=options, progress=progress
+            ) as recorder:
+                recorder.record_all(_load_modules)
+                _keep_scenarios(rubric, submission, results.evidence, progress)
                 names = [path.name for path in recorder.recording.files]
             results.commit()
     return [out / submission.id / EVIDENCE / name for name in names]
@@ -166,25 +179,68 @@ def _kept_and_judged(
     submission: RecordedSubmission, rubric: LoadedRubric, evidence: Path, progress: Progress
 ) -> tuple[CriterionResult, ...]:
     if submission.file is None:
-        keep_scenarios(rubric.rubric, submission, evidence, progress)
+        _keep_scenarios(rubric, submission, evidence, progress)
     else:
         _keep_recording(submission.file, evidence)
-    return judge(rubric.rubric, load_evidence([evidence]), rubric.checks)
+    return judge(rubric.rubric, _load(evidence), rubric.checks)
 
 
 def _keep_recording(file: Path, evidence: Path) -> None:
     """A recording that was handed in and cannot be read is the submission's fault."""
+    from grader.recordings import keep_recording  # noqa: PLC0415 - see LATER
+
     try:
         keep_recording(file, evidence)
     except EvidenceError as error:
         raise SubmissionError(error.message, hint=error.hint) from error
 
 
+def _keep_scenarios(
+    rubric: LoadedRubric, submission: Submission | RecordedSubmission, evidence: Path, progress: Progress
+) -> None:
+    from grader.recordings import keep_scenarios  # noqa: PLC0415 - see LATER
+
+    keep_scenarios(rubric.rubric, submission, evidence, progress)
+
+
+def _load(evidence: Path) -> dict[str, Run]:
+    from grader.evidence.reader import load_evidence  # noqa: PLC0415 - see LATER
+
+    return load_evidence([evidence])
+
+
+def _load_modules() -> None:
+    for name in LATER:
+        import_module(name)
+
+
+def _facts(submission: Submission, progress: Progress) -> PackageFacts:
+    progress.step("package", "running", "reading its files")
+    facts = read_package(submission.package, hints=submission.hints)
+    progress.step("package", "done")
+    return facts
+
+
+def _early(facts: PackageFacts, rubric: LoadedRubric, options: GradeOptions) -> tuple[EarlyVerdict, ...]:
+    hidden = frozenset[str]() if options.keep_hidden else hidden_ids(rubric.rubric)
+    found = judge_files(rubric.rubric, facts, rubric.checks)
+    return tuple(verdict for verdict in found if verdict.criterion.id not in hidden)
+
+
 def _recorder(
-    submission: Submission, rubric: LoadedRubric, evidence: Path, options: GradeOptions, progress: Progress
+    submission: Submission,
+    facts: PackageFacts,
+    rubric: LoadedRubric,
+    evidence: Path,
+    *,
+    options: GradeOptions,
+    progress: Progress,
 ) -> Recorder:
+    from grader.arena.recording import Recorder  # noqa: PLC0415 - see LATER
+
     return Recorder(
         submission,
+        facts,
         started(rubric.rubric),
         evidence,
         mode=options.sandbox,
@@ -197,16 +253,20 @@ def _recorded_and_judged(
     submission: Submission, rubric: LoadedRubric, evidence: Path, options: GradeOptions, progress: Progress
 ) -> tuple[Recording, tuple[CriterionResult, ...]]:
     """What the evidence cannot say because the machine was late is recorded again, alone, at most twice."""
-    with _recorder(submission, rubric, evidence, options, progress) as recorder:
-        recorder.record_all()
-        keep_scenarios(rubric.rubric, submission, evidence, progress)
-        criteria = judge(rubric.rubric, load_evidence([evidence]), rubric.checks)
+    facts = _facts(submission, progress)
+    progress.early(lambda: _early(facts, rubric, options))
+    from grader.arena.recording import RETRIES  # noqa: PLC0415 - see LATER
+
+    with _recorder(submission, facts, rubric, evidence, options=options, progress=progress) as recorder:
+        recorder.record_all(_load_modules)
+        _keep_scenarios(rubric, submission, evidence, progress)
+        criteria = judge(rubric.rubric, _load(evidence), rubric.checks)
         for _ in range(RETRIES):
             again = _inconclusive_scenarios(criteria, recorder.recording)
             if not again:
                 break
             recorder.record_again(again)
-            criteria = judge(rubric.rubric, load_evidence([evidence]), rubric.checks)
+            criteria = judge(rubric.rubric, _load(evidence), rubric.checks)
     return recorder.recording, criteria
 
 

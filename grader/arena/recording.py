@@ -5,10 +5,11 @@ The runs go side by side, as far as the machine admits them.
 
 from __future__ import annotations
 
+import asyncio
 import os
 import time
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,7 +34,7 @@ from grader.evidence.writer import EvidenceWriter
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
 from grader.model.submission import Submission
-from grader.package import python_paths, read_package, read_syntax_report, with_build_facts
+from grader.package import python_paths, read_syntax_report, with_build_facts
 from grader.rubric.model import Rubric
 from grader.temporary import temporary_folder
 
@@ -85,6 +86,7 @@ class Recorder:
     def __init__(
         self,
         submission: Submission,
+        facts: PackageFacts,
         rubric: Rubric,
         folder: Path,
         *,
@@ -98,9 +100,6 @@ class Recorder:
         self._limits = Limits().shared_by(len(rubric.scenarios))
         ros = None if static_only else find_ros()
         self._not_run = STATIC_ONLY if static_only else "" if ros else NO_ROS
-        progress.step("package", "running", "reading its files")
-        facts = read_package(submission.package, hints=submission.hints)
-        progress.step("package", "done")
         self.recording = Recording(folder=folder, facts=facts, ros=ros, sandbox=choose(mode) if ros else None)
         self._place: Place | None = None
         self._stack = ExitStack()
@@ -116,15 +115,16 @@ class Recorder:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def record_all(self) -> None:
-        """The package with its build, then every scenario, side by side."""
-        run_until_signal(self._record_all())
+    def record_all(self, meanwhile: Callable[[], None]) -> None:
+        """The package with its build, then every scenario, side by side. Where there is a build to wait for,
+        `meanwhile` is called beside it, in another thread."""
+        run_until_signal(self._record_all(meanwhile))
 
     def record_again(self, scenarios: Iterable[str]) -> None:
         """These scenarios once more, one after the other, with no other run on the machine."""
         run_until_signal(self._record_alone(tuple(scenarios)))
 
-    async def _record_all(self) -> None:
+    async def _record_all(self, meanwhile: Callable[[], None]) -> None:
         self._admission = Admission(shared_folder())
         names = in_order(self._rubric)
         if not self._not_run:
@@ -133,7 +133,8 @@ class Recorder:
                 self._progress.step(
                     name, "waiting", "for the build", expected_s(self._rubric.scenarios[name])
                 )
-        await self._record_package()
+        beside = () if self._not_run else (asyncio.to_thread(meanwhile),)
+        await side_by_side(self._record_package(), *beside)
         if self._place is None:
             for name in names:
                 self._progress.step(name, "skipped", self._not_run)

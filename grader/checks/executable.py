@@ -68,6 +68,9 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
     line = (FileCitation(file=found.path, line=1),)
     elsewhere = found.path != params.path
     hint = f"the handout puts it at {params.path}; move it there" if elsewhere else "; ".join(remarks)
+    if found.executable and not obstacles:
+        message = f"{found.path} is executable and names {_interpreter(found)}"
+        return passed(message, expected=expected, measured=measured, hint=hint, citations=line)
     if has_wrapper(package, build, found.path):
         advice = f" (without it: {obstacles[0].why})" if obstacles else ""
         message = f"the build makes an executable wrapper of {found.path}{advice}"
@@ -80,14 +83,9 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
             hint="; ".join(o.mend for o in obstacles),
             citations=line,
         )
-    if found.executable is None:
-        message = (
-            f"whether {found.path} is executable cannot be seen: what was handed in carries no file modes"
-        )
-        mend = "hand in a git repository or a .tar.gz, which keep the executable bit"
-        return inconclusive(message, expected=expected, measured=measured, hint=mend, citations=line)
-    message = f"{found.path} is executable and names {_interpreter(found)}"
-    return passed(message, expected=expected, measured=measured, hint=hint, citations=line)
+    message = f"whether {found.path} is executable cannot be seen: what was handed in carries no file modes"
+    mend = "hand in a git repository or a .tar.gz, which keep the executable bit"
+    return inconclusive(message, expected=expected, measured=measured, hint=mend, citations=line)
 
 
 def find_script(package: PackageFacts, path: str) -> SourceFile | None:

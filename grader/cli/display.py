@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import partial
 from typing import IO
 
 from rich.console import Console
@@ -16,7 +17,9 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
+from grader.cli.early import print_early
 from grader.model.progress import Progress, StepState
+from grader.model.result import EarlyVerdict
 from grader.shown import line
 
 REFRESH_HZ = 8
@@ -30,6 +33,7 @@ WORDS = {
     "skipped": ("-", "dim"),
 }
 ENDED = frozenset({"done", "failed", "skipped"})
+Tell = Callable[[tuple[EarlyVerdict, ...]], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,13 +54,14 @@ class Step:
 
 
 class Steps:
-    """The steps in order of appearance. Any thread may tell of one."""
+    """The steps in order of appearance. Any thread may tell of one. `tell` shows what the files alone decide."""
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic, tell: Tell | None = None) -> None:
         self.clock = clock
         self.lock = threading.Lock()
         self.steps: dict[str, Step] = {}
         self.begun_s = clock()
+        self.tell = tell
 
     def step(self, name: str, state: StepState, detail: str = "", expected_s: float | None = None) -> None:
         """Take note (see `grader.model.progress.Progress`)."""
@@ -72,6 +77,13 @@ class Steps:
             self.steps[name] = after
             self.told(before, after, now_s)
 
+    def early(self, verdicts: Callable[[], tuple[EarlyVerdict, ...]]) -> None:
+        """Show what the files alone decide, where that is asked for."""
+        if self.tell is not None:
+            found = verdicts()
+            with self.lock:
+                self.tell(found)
+
     def told(self, before: Step | None, after: Step, now_s: float) -> None:
         """For those who show something at each call."""
 
@@ -83,8 +95,10 @@ class Steps:
 class PlainSteps(Steps):
     """A line with the time of day whenever a step's state changes."""
 
-    def __init__(self, stream: IO[str], clock: Callable[[], float] = time.monotonic) -> None:
-        super().__init__(clock)
+    def __init__(
+        self, stream: IO[str], clock: Callable[[], float] = time.monotonic, tell: Tell | None = None
+    ) -> None:
+        super().__init__(clock, tell)
         self.stream = stream
 
     def told(self, before: Step | None, after: Step, now_s: float) -> None:
@@ -102,8 +116,10 @@ class LiveSteps(Steps):
     It has at most `rows` lines: of more steps, those that run are shown, and the last that came to an end.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic, *, rows: int = 100) -> None:
-        super().__init__(clock)
+    def __init__(
+        self, clock: Callable[[], float] = time.monotonic, *, rows: int = 100, tell: Tell | None = None
+    ) -> None:
+        super().__init__(clock, tell)
         self.rows = max(rows, 3)
 
     def __rich__(self) -> Table:
@@ -126,13 +142,18 @@ class LiveSteps(Steps):
 
 
 @contextmanager
-def open_progress() -> Iterator[Progress]:
-    """Show what is told, on stderr, until the block is left; then the display is cleared away."""
+def open_progress(*, early: bool = False) -> Iterator[Progress]:
+    """Show what is told, on stderr, until the block is left; then the display is cleared away.
+
+    With `early`, what the files alone decide is printed to stdout as soon as it is known, and stays there.
+    """
     console = Console(file=sys.stderr, markup=False, emoji=False, highlight=False)
     if not console.is_terminal or console.is_dumb_terminal or console.encoding != "utf-8":
-        yield PlainSteps(sys.stderr)
+        yield PlainSteps(sys.stderr, tell=print_early if early else None)
         return
-    steps = LiveSteps(rows=console.height - 1)
+    above = console.print if sys.stdout.isatty() else None
+    tell = partial(print_early, above=above)
+    steps = LiveSteps(rows=console.height - 1, tell=tell if early else None)
     with Live(
         steps,
         console=console,

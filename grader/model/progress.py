@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal, Protocol
+
+from grader.model.result import EarlyVerdict
 
 StepState = Literal["waiting", "running", "done", "failed", "skipped"]
 
@@ -22,6 +25,9 @@ class Progress(Protocol):
         `detail` says what it does or waits for; `expected_s` is how long the whole step is likely to take.
         """
 
+    def early(self, verdicts: Callable[[], tuple[EarlyVerdict, ...]]) -> None:
+        """The files are read: `verdicts` works out what they alone decide. Who shows none of it need not call it."""
+
 
 class Silence:
     """Shows nothing."""
@@ -34,3 +40,6 @@ class Silence:
         expected_s: float | None = None,
     ) -> None:
         """Take note of nothing."""
+
+    def early(self, verdicts: Callable[[], tuple[EarlyVerdict, ...]]) -> None:
+        """Work nothing out."""

@@ -28,6 +28,13 @@ class CriterionResult(Record):
     citations: tuple[FileCitation | EvidenceCitation, ...]
 
 
+class EarlyVerdict(Record):
+    """What a criterion's verdict is before anything is built or run. One that is not `final` may still change."""
+
+    criterion: CriterionResult
+    final: bool
+
+
 class SubmissionInfo(Record):
     """Whose work it is: `commit` for a repository, `digest` (sha256 of the package's tree) always."""
 

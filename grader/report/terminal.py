@@ -180,6 +180,11 @@ class Terminal:
         return text.encode(self.console.encoding, "backslashreplace").decode(self.console.encoding)
 
 
+def mark(status: Status, encoding: str) -> str:
+    """The sign of a status, a plain one where the encoding has no ✓."""
+    return MARKS[status][0 if _has_marks(encoding) else 1]
+
+
 def _has_marks(encoding: str) -> bool:
     try:
         "".join(mark for mark, _ in MARKS.values()).encode(encoding)

@@ -59,9 +59,10 @@ def unreadable(package: PackageFacts, file: LaunchFile | None, launch: str) -> V
 
 def has_program(package: PackageFacts, name: str) -> bool:
     """A file of that name, or a program that CMake builds under it."""
+    if "/" not in name and find_script(package, name) is not None:
+        return True
     calls = package.cmake.calls if package.cmake else ()
-    built = any(c.name == "add_executable" and c.args[:1] == (name,) for c in calls)
-    return built or ("/" not in name and find_script(package, name) is not None)
+    return any(c.name == "add_executable" and c.args[:1] == (name,) for c in calls)
 
 
 def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip | None:

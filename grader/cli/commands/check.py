@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from grader import pipeline
-from grader.arena.sandbox import Mode
 from grader.cli.choice import choose
 from grader.cli.display import open_progress
 from grader.cli.show import show
@@ -14,6 +14,9 @@ from grader.errors import ExitCode
 from grader.files import check_writable
 from grader.report.hidden import hidden_ids, without_hidden
 from grader.temporary import temporary_folder
+
+if TYPE_CHECKING:
+    from grader.arena.sandbox import Mode
 
 
 def run(
@@ -34,7 +37,7 @@ def run(
     )
     with ExitStack() as stack:
         folder = out or stack.enter_context(temporary_folder("check"))
-        with open_progress() as progress:
+        with open_progress(early=not (as_json or static)) as progress:
             result = pipeline.grade(source, loaded, folder, options, progress)
         shown = without_hidden(result, loaded.rubric)
         kept = folder / result.submission.id if out is not None else None

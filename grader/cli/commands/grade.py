@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from grader import pipeline
-from grader.arena.sandbox import Mode
 from grader.cli.display import open_progress
 from grader.cli.show import show
 from grader.errors import ExitCode
 from grader.files import check_writable
 from grader.rubric.load import load_rubric
+
+if TYPE_CHECKING:
+    from grader.arena.sandbox import Mode
 
 DEFAULT_OUT = Path("grader-results")
 
@@ -31,6 +35,6 @@ def run(
     options = pipeline.GradeOptions(
         sandbox=sandbox, submission_id=submission_id, static_only=False, keep_hidden=True
     )
-    with open_progress() as progress:
+    with open_progress(early=sys.stdout.isatty() and not as_json) as progress:
         result = pipeline.grade(source, loaded, folder, options, progress)
     return show(result, loaded.rubric, folder / result.submission.id, as_json=as_json)

@@ -1,0 +1,96 @@
+"""What a package's files alone decide, before anything is built or run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from graphlib import TopologicalSorter
+from typing import Any, cast
+
+from grader.checks import CHECKS, Check
+from grader.evidence.run import Run
+from grader.judge.facts import NOT_RUN, Facts
+from grader.judge.judge import OPEN, result_of, settled, verdict_of
+from grader.judge.recordings import PACKAGE_RUN
+from grader.model.package import PackageFacts
+from grader.model.result import EarlyVerdict
+from grader.model.verdict import Verdict
+from grader.rubric.model import Rubric
+
+FROM_FILES = {"package", "build", "params"}
+REFINED = frozenset({"cmake", "slips"})
+REFINED_OF_FILES = frozenset({"python_fault"})
+"""What the build makes more precise (`package.facts.with_build_facts`)."""
+UNBUILT = Run(
+    evidence=f"{PACKAGE_RUN}.mcap",
+    scenario=PACKAGE_RUN,
+    clock="real",
+    warp=1.0,
+    metadata={NOT_RUN: "it is not built yet"},
+    start_ns=0,
+    end_ns=0,
+)
+
+
+def judge_files(
+    rubric: Rubric, package: PackageFacts, checks: Mapping[str, Check] = CHECKS
+) -> tuple[EarlyVerdict, ...]:
+    """The criteria that need no run, as far as the files decide them, in the rubric's order.
+
+    What needs the build, or a criterion that is not decided yet, is left out. A verdict is final where nothing that
+    the build makes more precise was looked at for it.
+    """
+    judging = _Judging(rubric, package, checks)
+    for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():
+        judging.judge(name)
+    return tuple(judging.results[c.id] for c in rubric.criteria if c.id in judging.results)
+
+
+class _Judging:
+    """Goes through the criteria, each after those that it requires."""
+
+    def __init__(self, rubric: Rubric, package: PackageFacts, checks: Mapping[str, Check]) -> None:
+        self._rubric = rubric
+        self._package = package
+        self._checks = checks
+        self._criteria = {c.id: c for c in rubric.criteria}
+        self._verdicts: dict[str, Verdict] = {}
+        self._roots: dict[str, str] = {}
+        self.results: dict[str, EarlyVerdict] = {}
+
+    def judge(self, name: str) -> None:
+        criterion = self._criteria[name]
+        check = self._checks.get(criterion.check)
+        if check is None or not FROM_FILES.issuperset(check.facts):
+            return
+        asked: set[str] = set()
+        verdict = verdict_of(criterion, self._facts(asked), self._checks)
+        final = not asked
+        if verdict.unjudged:
+            if not self.results.keys() >= set(criterion.requires):
+                return
+            final = final and all(self.results[r].final for r in criterion.requires)
+            verdict = settled(criterion, verdict, self._verdicts, self._roots)
+        if verdict.status not in OPEN:
+            self._verdicts[name] = verdict
+            result = result_of(criterion, verdict, self._rubric.digits)
+            self.results[name] = EarlyVerdict(criterion=result, final=final)
+
+    def _facts(self, asked: set[str]) -> Facts:
+        """`asked` comes to hold what was looked at that the build makes more precise, or that only a build gives."""
+        files = tuple(_Watched(file, asked, REFINED_OF_FILES) for file in self._package.files)
+        package = _Watched(self._package.model_copy(update={"files": files}), asked, REFINED)
+        runs = {PACKAGE_RUN: cast("Run", _Watched(UNBUILT, asked))}
+        return Facts(rubric=self._rubric, runs=runs, package=cast("PackageFacts", package))
+
+
+class _Watched:
+    """A record that notes in `asked` which of its attributes it was asked for: of these, or of all."""
+
+    def __init__(self, record: object, asked: set[str], noted: frozenset[str] | None = None) -> None:
+        self._watched = record, asked, noted
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever the record has
+        record, asked, noted = self._watched
+        if noted is None or name in noted:
+            asked.add(name)
+        return getattr(record, name)

@@ -1,0 +1,155 @@
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from grader.checks.registry import collecting
+from grader.intake import open_submission
+from grader.judge.early import judge_files
+from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts, PythonSlip
+from grader.model.result import EarlyVerdict
+from grader.model.submission import SourcePackage
+from grader.model.verdict import Status, passed
+from grader.package import read_package
+from tests.fixture_runs import loaded, source_of
+from tests.judge.rubrics import EXECUTABLE, NODE, rubric
+from tests.package.trees import CMAKE, MANIFEST, make_package
+from tests.package.trees import NODE as SCRIPT
+
+SAMPLES = [
+    ("leeds-comp3631-lab1", "reference"),
+    ("leeds-comp3631-lab1", "ok-install-python"),
+    ("leeds-comp3631-lab1", "manifest-malformed"),
+    ("leeds-comp3631-lab1", "listener-syntax-error"),
+    ("sheffield-com2009-week1", "reference"),
+    ("sheffield-com2009-week1", "subscriber-missing"),
+    ("sheffield-com2009-week1", "layout-scripts-folder"),
+    ("mcr2-basic-comms", "launch-wrong-package"),
+    ("york-ele00118m-lab7", "maintainer-todo"),
+    ("eyantra-ros-basics", "ok-cpp-nodes"),
+]
+MANIFEST_CHECK = {"id": "manifest", "check": "manifest", "with": {"name": "lab1"}}
+CMAKE_CHECK = {"id": "cmake", "check": "cmake", "with": {"name": "lab1"}}
+DEPENDENCIES = {
+    "id": "dependencies",
+    "check": "dependencies",
+    "with": {"names": ["rospy"]},
+    "requires": ["manifest"],
+}
+
+
+def facts_of(folder: Path, **files: str) -> PackageFacts:
+    """A sound package, with these files changed."""
+    tree = {"package.xml": MANIFEST, "CMakeLists.txt": CMAKE, "src/numeric_talker.py": SCRIPT, **files}
+    package: SourcePackage = make_package(folder / "lab1", tree, executable={"src/numeric_talker.py": True})
+    return read_package(package)
+
+
+@cache
+def facts_of_fixture(lab: str, name: str, folder: Path) -> PackageFacts:
+    submission = open_submission(
+        str(source_of(lab, name)), package=loaded(lab).rubric.package, workdir=folder
+    )
+    return read_package(submission.package, hints=submission.hints)
+
+
+def early_of(lab: str, facts: PackageFacts) -> dict[str, EarlyVerdict]:
+    return {v.criterion.id: v for v in judge_files(loaded(lab).rubric, facts, loaded(lab).checks)}
+
+
+def after_a_build(facts: PackageFacts) -> PackageFacts:
+    """As the build never leaves them: everything that it makes more precise is another."""
+    call = CMakeCall(name="add_executable", args=("numeric_talker.py",), file="CMakeLists.txt", line=1)
+    fault = Fault(file="x", line=1, kind="SyntaxError", message="no")
+    slip = PythonSlip(file="x", line=1, kind="not-called", message="no")
+    return facts.model_copy(
+        update={
+            "cmake": CMakeFacts(file="CMakeLists.txt", source="trace", calls=(call,), fault=fault),
+            "slips": (slip,),
+            "files": tuple(f.model_copy(update={"python_fault": fault}) for f in facts.files),
+        }
+    )
+
+
+@pytest.mark.parametrize(("lab", "name"), SAMPLES)
+def test_what_is_final_stays_whatever_the_build_finds_out(lab, name, tmp_path) -> None:
+    facts = facts_of_fixture(lab, name, tmp_path)
+    before, after = early_of(lab, facts), early_of(lab, after_a_build(facts))
+    final = {key: verdict for key, verdict in before.items() if verdict.final}
+    assert len(final) >= 2
+    assert final == {key: after.get(key) for key in final}
+
+
+def test_every_file_criterion_of_a_lab_is_decided_in_the_rubrics_order(tmp_path) -> None:
+    found = early_of("leeds-comp3631-lab1", facts_of_fixture("leeds-comp3631-lab1", "reference", tmp_path))
+    assert [(key, verdict.final) for key, verdict in found.items()] == [
+        ("manifest", True),
+        ("cmake", False),
+        ("talker-executable", True),
+        ("listener-executable", True),
+        ("dependencies", True),
+    ]
+    assert {verdict.criterion.status for verdict in found.values()} == {Status.PASS}
+
+
+def test_the_build_may_still_make_a_wrapper_of_a_script_without_its_bit(tmp_path) -> None:
+    found = early_of(
+        "leeds-comp3631-lab1", facts_of_fixture("leeds-comp3631-lab1", "ok-install-python", tmp_path)
+    )
+    assert found["talker-executable"].criterion.status is Status.FAIL
+    assert not found["talker-executable"].final
+
+
+def test_what_a_required_criterion_explains_is_blocked_at_once(tmp_path) -> None:
+    facts = facts_of(tmp_path, **{"package.xml": "<package>"})
+    manifest, dependencies = judge_files(rubric(MANIFEST_CHECK, DEPENDENCIES), facts)
+    assert manifest.criterion.status is Status.FAIL
+    assert dependencies.criterion.status is Status.BLOCKED
+    assert dependencies.final
+
+
+def test_it_waits_where_what_it_requires_is_not_decided(tmp_path) -> None:
+    facts = facts_of(tmp_path, **{"package.xml": "<package>"})
+    needy = {**DEPENDENCIES, "requires": ["node"]}
+    found = judge_files(rubric(EXECUTABLE, NODE, needy), facts)
+    assert [verdict.criterion.id for verdict in found] == ["executable"]
+
+
+def test_what_rests_on_something_unsettled_is_unsettled(tmp_path) -> None:
+    facts = facts_of(tmp_path, **{"package.xml": "<package>", "CMakeLists.txt": "project(other)"})
+    found = judge_files(rubric(CMAKE_CHECK, {**DEPENDENCIES, "requires": ["cmake"]}), facts)
+    assert [(v.criterion.id, v.criterion.status, v.final) for v in found] == [
+        ("cmake", Status.FAIL, False),
+        ("dependencies", Status.BLOCKED, False),
+    ]
+
+
+def test_an_instructors_own_check_is_final_unless_it_looks_at_what_the_build_refines(tmp_path) -> None:
+    from grader.checks import CHECKS, check  # noqa: PLC0415 - registered in here only
+
+    with collecting("own.py") as own:
+
+        @check("many-files")
+        def many_files(package: PackageFacts):
+            """There are files."""
+            return passed(f"{len(package.files)} files")
+
+        @check("compiles")
+        def compiles(package: PackageFacts):
+            """All Python compiles."""
+            return passed(f"{sum(f.python_fault is not None for f in package.files)} faults")
+
+    found = judge_files(
+        rubric({"id": "many", "check": "many-files"}, {"id": "compiles", "check": "compiles"}),
+        facts_of(tmp_path),
+        {**CHECKS, **own.checks},
+    )
+    assert [(v.criterion.id, v.final) for v in found] == [("many", True), ("compiles", False)]
+
+
+def test_nothing_that_needs_a_run_or_a_person_or_a_mended_check_is_decided(tmp_path) -> None:
+    manual = {"id": "style", "check": "manual"}
+    unknown = {"id": "unknown", "check": "no-such-check"}
+    assert judge_files(rubric(NODE | {"requires": []}, manual, unknown), facts_of(tmp_path)) == ()
