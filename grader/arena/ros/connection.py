@@ -1,5 +1,6 @@
 """One publisher's connection: cuts the stream into messages and hands them on, as far as there is room for them."""
 
+from arrival import receive
 from cutting import Waste, message_ends
 from tcpros import LENGTH
 from wire import now_ns
@@ -95,9 +96,9 @@ class Connection:
             return count
         if self._message is not None:
             return self._fill()
-        chunk = self.sock.recv(READ_BYTES)
+        chunk, time_ns = receive(self.sock, READ_BYTES)
         if chunk:
-            self._cut(chunk, now_ns())
+            self._cut(chunk, time_ns)
         return len(chunk)
 
     def _throw_away(self):

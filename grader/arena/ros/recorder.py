@@ -15,6 +15,7 @@ import contextlib
 import threading
 import time
 
+from arrival import note_arrivals
 from bounded import ProtocolError, call, connect, slave_api
 from budget import Budget
 from connection import Connection
@@ -160,6 +161,7 @@ class Recorder:
             raise
         sock.allow(None, 0)
         sock.setblocking(False)
+        note_arrivals(sock)
         return sock, header
 
     def _subscribe(self, caller_id, topic, port, seconds):
