@@ -41,6 +41,7 @@ from grader.report.files import write_reports
 from grader.results import EVIDENCE, Results, finish_killed
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_package, started
+from grader.rubric.rates import rates_of
 from grader.temporary import temporary_folder
 
 
@@ -187,6 +188,7 @@ def _recorder(
         submission,
         started(rubric.rubric),
         evidence,
+        rates=rates_of(rubric.rubric),
         mode=options.sandbox,
         static_only=options.static_only,
         progress=progress,
