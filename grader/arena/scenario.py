@@ -85,7 +85,7 @@ async def run_scenario(
                 arena.course(ScenarioEvent(event="begin"))
                 async with given_back(leave, {spec["name"] for _, spec in starts}, arena):
                     outcome, detail = await _run(scenario, starts, arena, tell)
-                await stop(scenario.start, arena)
+                await stop(scenario.start, arena, warped=scenario.clock == "warped")
                 await arena.finish()
                 arena.course(ScenarioEvent(event="end", outcome=outcome, detail=detail))
         except ArenaError as error:
