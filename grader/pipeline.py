@@ -44,6 +44,7 @@ from grader.report.hidden import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_package, started
+from grader.rubric.rates import rates_of
 from grader.temporary import temporary_folder
 
 if TYPE_CHECKING:
@@ -243,6 +244,7 @@ def _recorder(
         facts,
         started(rubric.rubric),
         evidence,
+        rates=rates_of(rubric.rubric),
         mode=options.sandbox,
         static_only=options.static_only,
         progress=progress,

@@ -7,9 +7,11 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from grader.model.rhythm import RateBounds
 from grader.rubric.model import Until
 
 Outcome = tuple[str, str]
+ARRIVALS_MAX = 2000
 HEARD_S = 2.0
 CONNECTED_S = 1.0
 """So long after the last probe and the last line, a value that is not printed will not be."""
@@ -50,6 +52,22 @@ class Live:
     graph_picture: object = None
     graphs: int = 0
     last_line_s: float = 0.0
+    rates: dict[str, list[RateBounds]] = field(default_factory=lambda: defaultdict(list))
+    arrivals_ns: dict[str, list[int]] = field(default_factory=dict)
+
+    def rate(self, rates: Iterable[RateBounds]) -> None:
+        """These rates are to be seen: when their messages arrive is kept."""
+        for bounds in rates:
+            self.rates[bounds.topic].append(bounds)
+            self.arrivals_ns[bounds.topic] = []
+
+    def arrived(self, topic: str, count: int, time_ns: int) -> None:
+        """Messages of a student's, together. Of a flood, only the first ones and the latest are kept."""
+        times_ns = self.arrivals_ns.get(topic)
+        if times_ns is not None:
+            room = ARRIVALS_MAX - len(times_ns)
+            times_ns += [time_ns] * min(count, room)
+            times_ns[-1] = time_ns
 
     def message(self, topic: str, count: int, now_s: float, *, active: bool = True) -> None:
         """Messages came, of the student's (`active`) or of a program that runs beside."""
@@ -181,6 +199,8 @@ def _window(live: Live, until: Until, now_s: float) -> bool:
     seen = _seen(live, topics)
     if not seen:
         return _talks_elsewhere(live, until, now_s)
+    if _rates_are_clear(live, until.topics):
+        return True
     if len(seen) == len(topics):
         return now_s >= max(s.first_s for s in seen) + until.window_s
     return now_s >= max(s.first_s for s in seen) + max(until.window_s, until.silent_s)
@@ -190,6 +210,15 @@ def _talks_elsewhere(live: Live, until: Until, now_s: float) -> bool:
     """The nodes have talked for so long on topics that nobody waits for: no more will come of them."""
     first_s = min((seen.first_s for seen in _talking(live)), default=now_s)
     return now_s > first_s + max(until.window_s or 0, until.silent_s)
+
+
+def _rates_are_clear(live: Live, topics: tuple[str, ...]) -> bool:
+    """Whether each topic is there to show a rate, and its rate is known well enough."""
+    return bool(topics) and all(
+        topic in live.rates
+        and all(bounds.settled_by(live.arrivals_ns[topic]) for bounds in live.rates[topic])
+        for topic in topics
+    )
 
 
 def _messages(live: Live, until: Until) -> bool:

@@ -9,7 +9,7 @@ import asyncio
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,6 +33,7 @@ from grader.evidence.events import ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
+from grader.model.rhythm import RateBounds
 from grader.model.submission import Submission
 from grader.package import python_paths, read_syntax_report, with_build_facts
 from grader.rubric.model import Rubric
@@ -81,7 +82,10 @@ class Recording:
 
 
 class Recorder:
-    """Records one submission into a folder. Use as a context: its workspaces live as long as it does."""
+    """Records one submission into a folder. Use as a context: its workspaces live as long as it does.
+
+    `rates` are judged, by scenario: a run that is to show them ends when they are clear.
+    """
 
     def __init__(
         self,
@@ -93,8 +97,10 @@ class Recorder:
         mode: Mode,
         static_only: bool,
         progress: Progress,
+        rates: Mapping[str, tuple[RateBounds, ...]] | None = None,
     ) -> None:
         self._submission = submission
+        self._rates = rates or {}
         self._rubric = rubric
         self._progress = progress
         self._limits = Limits().shared_by(len(rubric.scenarios))
@@ -257,6 +263,7 @@ class Recorder:
                     path=path,
                     metadata=self._metadata(),
                     tell=tell,
+                    rates=self._rates.get(name, ()),
                     admission=self._admission,
                     last_run=self._runs[name] == RETRIES,
                 )

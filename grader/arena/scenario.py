@@ -18,6 +18,7 @@ from grader.errors import ArenaError
 from grader.evidence.events import ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.record import Record
+from grader.model.rhythm import RateBounds
 from grader.rubric.model import Scenario, Start
 
 CLOCK_STEP_S = 0.05
@@ -61,12 +62,14 @@ async def run_scenario(
     path: Path,
     metadata: Mapping[str, str],
     tell: Tell,
+    rates: tuple[RateBounds, ...] = (),
     admission: Admission | None = None,
     last_run: bool = False,
 ) -> ScenarioCost:
     """Record the scenario at `path`. An arena that fails still leaves evidence, with the outcome `host`.
 
-    Processes are started when `admission` lets them: others wait until they are up.
+    Processes are started when `admission` lets them: others wait until they are up. A window in which nothing but
+    `rates` is to be seen ends when they are clear.
     """
     admission = admission or Admission(None)
     warp = scenario.warp if scenario.clock == "warped" else 1.0
@@ -77,11 +80,12 @@ async def run_scenario(
             session.course(ScenarioEvent(event="end", outcome="ended", detail="there was nothing to start"))
             return ScenarioCost(cpu_s=0, student_cpu_s=0)
         try:
+            session.live.rate(rates)
             async with admission.start() as leave, session as arena:
                 arena.course(ScenarioEvent(event="begin"))
                 async with given_back(leave, {spec["name"] for _, spec in starts}, arena):
                     outcome, detail = await _run(scenario, starts, arena, tell)
-                await stop(scenario.start, arena)
+                await stop(scenario.start, arena, warped=scenario.clock == "warped")
                 await arena.finish()
                 arena.course(ScenarioEvent(event="end", outcome=outcome, detail=detail))
         except ArenaError as error:

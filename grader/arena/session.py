@@ -224,6 +224,7 @@ class ArenaSession:
         if frame.datas and not is_grader_node(channel.callerid):
             own = channel.callerid not in self.live.helper_nodes
             self.live.message(channel.topic, len(frame.datas), time.monotonic(), active=own)
+            self.live.arrived(channel.topic, len(frame.datas), frame.time_ns)
 
     def _event(self, frame: Frame) -> None:
         topic, record = frame.fields["topic"], frame.fields["record"]

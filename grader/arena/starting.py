@@ -20,6 +20,7 @@ from grader.rubric.model import Param, Start
 CTRL_C_S = 5.0
 LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
 TERM_S = 2.0
+HELD_S = 0.1
 UP_S, SETTLE_S = 5.0, 0.2
 """A process is up when its nodes have registered and nothing changes for a moment; some never are."""
 BUILT_PROGRAMS_MAX = 20
@@ -100,8 +101,15 @@ async def given_back(leave: Leave, names: set[str], arena: ArenaSession) -> Asyn
         leave.release()
 
 
-async def stop(starts: tuple[Start, ...], arena: ArenaSession) -> None:
-    """Take a last look at the graph, then Ctrl-C for everything that runs, the grader's own programs last."""
+async def stop(starts: tuple[Start, ...], arena: ArenaSession, *, warped: bool) -> None:
+    """Take a last look at the graph, then Ctrl-C for everything that runs, the grader's own programs last.
+
+    A clock that runs fast stands still first: Ctrl-C in the middle of a message locks rospy up, and nodes that sleep
+    send none.
+    """
+    if warped:
+        arena.send(do="hold_clock")
+        await arena.wait(lambda: not arena.live.running, HELD_S)
     if arena.live.running:
         looks = arena.live.graphs
         arena.send(do="graph")

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from grader.checks.registry import check
 from grader.checks.support.ending import explain_end
-from grader.checks.support.gaps import ROUNDING, Rhythm, rhythm
+from grader.checks.support.gaps import described, rhythm
 from grader.checks.support.lateness import Lateness, lateness
 from grader.checks.support.losses import all_lost, whole_until_ns
 from grader.checks.support.process import early_end, observed_until_ns
@@ -16,6 +16,7 @@ from grader.checks.support.text import hertz, number, plural, seconds
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
+from grader.model.rhythm import ROUNDING, RateBounds, Rhythm
 from grader.model.verdict import (
     Citation,
     EvidenceCitation,
@@ -67,6 +68,19 @@ class RateParams(Record):
         """Within which a gap is as it should be."""
         return self.period_ns * (1 - self.gap_tolerance), self.period_ns * (1 + self.gap_tolerance)
 
+    @property
+    def bounds(self) -> RateBounds:
+        """What whoever records it has to know of it."""
+        low_ns, high_ns = self.bounds_ns
+        return RateBounds(
+            topic=self.topic,
+            low_hz=self.low_hz,
+            high_hz=self.high_hz,
+            low_gap_ns=low_ns,
+            high_gap_ns=high_ns,
+            min_window_s=self.min_window_s,
+        )
+
 
 @check("rate", params=RateParams, messages_only=True, heeds_losses=True)
 def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
@@ -117,7 +131,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
 
 def _measured(found: Rhythm, run: Run, params: RateParams) -> str:
     """What came, and how late the machine was meanwhile."""
-    seen = found.described(*params.bounds_ns)
+    seen = described(found, *params.bounds_ns)
     late = lateness(run, found.times_ns[0], found.until_ns) if found.gaps_ns else None
     return seen if late is None else f"{seen}, {late.described}"
 

@@ -85,8 +85,9 @@ class Call(Record):
 class Until(Record):
     """When a run has seen enough. All conditions that are given must hold.
 
-    `window_s`: that long after the first message on every topic of `topics` (a topic that stays silent stops
-    being waited for when `silent_s` have passed since the first message on another). `messages`: so many
+    `window_s`: that long after the first message on every topic of `topics`, or until the rates that are judged there
+    are clear (a topic that stays silent stops being waited for when `silent_s` have passed since the first message on
+    another). `messages`: so many
     messages on each topic. `connected`: a student's publisher and a student's subscriber are connected over
     the topic, for a second. `heard`: every probe's value was printed. `nodes`: so many nodes of the student's have
     registered. `alive_s`: that long after the student's first node registered. `opened`: these programs (`firefox`)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import accumulate
+
 import pytest
 
 from grader.arena.live import Live, next_look_s, settled, waiting_for
+from grader.model.rhythm import RateBounds
 from grader.rubric.model import Until
 
 
@@ -53,6 +56,55 @@ def test_ended_comes_before_all_else() -> None:
     live = _live(a=(10, 1.0, 2.0))
     live.running, live.ended = set(), {"node"}
     assert settled(live, COUNT, 2.0) == ("ended", "")
+
+
+TEN_HZ = RateBounds(
+    topic="/a", low_hz=9.5, high_hz=10.5, low_gap_ns=50e6, high_gap_ns=150e6, min_window_s=5.0
+)
+
+
+def _rated(gaps_s: list[float], *topics: str, chosen: tuple[str, ...] = ("/a",)) -> bool:
+    """Whether a window of 60 s ends early for these topics, all with the same gaps."""
+    live = _live(**{topic: (len(gaps_s), 1.0, 9.0) for topic in topics})
+    live.rate([TEN_HZ])
+    times_ns = [1_000_000_000 + round(t * 1e9) for t in accumulate([0.0, *gaps_s])]
+    for topic in topics:
+        for time_ns in times_ns:
+            live.arrived("/" + topic, 1, time_ns)
+    return settled(live, Until(window_s=60, topics=chosen, limit_s=90), 10.0) is not None
+
+
+@pytest.mark.parametrize(
+    ("gaps_s", "early"),
+    [
+        ([0.1] * 51, True),
+        ([0.1] * 49, False),  # not yet 5 s
+        ([0.108, 0.11] * 25, True),  # 9.2 Hz, and it will stay so
+        ([0.09] * 60, True),  # 11 Hz
+        ([0.095, 0.115] * 25, False),  # 9.52 Hz: too near to the bound
+        ([0.1] * 50 + [0.2], False),  # a gap that another one may show to be a rule
+        ([0.0] * 9 + [1.0], False),
+        (([0.0] * 9 + [1.0]) * 6, False),  # bursts: the mean is right
+        ([0.3] * 18, False),  # too few to say anything
+        ([0.3] * 21, True),
+    ],
+)
+def test_a_window_ends_when_its_rates_are_clear(gaps_s: list[float], early: bool) -> None:
+    assert _rated(gaps_s, "a") is early
+
+
+def test_a_window_that_shows_more_than_rates_does_not_end_early() -> None:
+    assert not _rated([0.1] * 60, "a", chosen=())
+    assert not _rated([0.1] * 60, "a", "b", chosen=("/a", "/b"))
+
+
+def test_of_a_flood_few_arrivals_are_kept() -> None:
+    live = _live(a=(1, 1.0, 9.0))
+    live.rate([TEN_HZ])
+    for number in range(100):
+        live.arrived("/a", 1000, number)
+    assert len(live.arrivals_ns["/a"]) < 5000
+    assert live.arrivals_ns["/a"][-1] == 99
 
 
 def test_heard_takes_numbers_as_words_of_their_own() -> None:

@@ -70,7 +70,7 @@ def test_the_calibration_tells_how_long_sleeps_took() -> None:
     assert found.sleep_ms == pytest.approx(2.0, abs=0.02)
     assert found.max_ms == pytest.approx(3.0, abs=0.02)
     assert found.calibration_hz == pytest.approx(1000 / 102, abs=0.01)
-    assert found.described == "machine late by 3 ms, calibration 9.80 Hz"
+    assert found.described == "machine late by 3 ms, calibration 9.81 Hz"
 
 
 def test_only_the_stretch_that_is_asked_for_counts() -> None:

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.checks.support.gaps import Rhythm
 from grader.evidence.timeline import build_runs
+from grader.model.rhythm import Rhythm
 from grader.model.verdict import Status
 from tests.checks.examples import judge_runs
 

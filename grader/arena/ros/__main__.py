@@ -187,6 +187,10 @@ class Arena:
         record["detail"] = command["detail"]
         self._wire.event("/grader/actor", record)
 
+    def _hold_clock(self, _command):
+        if self._clock:
+            self._clock.stop()
+
     def _graph(self, _command):
         """Ask the nodes for their connections, beside the loop: a node that never answers must not stop it."""
 

@@ -1,105 +1,31 @@
-"""The rate of a stream of messages: mean, gaps, and the silence at its end. Times in ns."""
+"""The messages of a run as a rhythm, and a rhythm in words."""
 
 from __future__ import annotations
 
 import math
-import statistics
 from collections.abc import Sequence
-from functools import cached_property
-from itertools import pairwise
-
-from pydantic import model_validator
 
 from grader.checks.support.text import hertz, plural
 from grader.evidence.run import Channel
-from grader.model.record import Record
-
-ROUNDING = 1e-6
-CONFIDENCE = 1.96
-LEAST_GAPS = 5
+from grader.model.rhythm import Rhythm
 
 
-class Rhythm(Record):
-    """`times_ns` in order; `until_ns` is up to when the publisher was watched, the last message or later."""
+def described(found: Rhythm, low_ns: float, high_ns: float) -> str:
+    """`9.98 ± 0.02 Hz over 6.0 s: 60 messages, 98 % of gaps in 0.05 to 0.15 s, longest 0.162 s`."""
+    count = plural(len(found.times_ns), "message")
+    if not found.gaps_ns:
+        return count
+    share = 1 - len(found.outside(low_ns, high_ns)) / len(found.gaps_ns)
+    within = f"{math.floor(share * 100)} % of gaps in {low_ns / 1e9:.3g} to {high_ns / 1e9:.3g} s"
+    longest_s = max(found.gaps_ns) / 1e9
+    longest = f"longest {longest_s:.{3 if longest_s >= 0.01 else 6}f} s"
+    return f"{_mean(found)} over {found.span_ns / 1e9:.1f} s: {count}, {within}, {longest}"
 
-    times_ns: tuple[int, ...]
-    until_ns: int
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Rhythm:
-        if not self.times_ns or self.until_ns < self.times_ns[-1]:
-            raise ValueError("a rhythm has at least one message, and ends with it or later")
-        return self
-
-    @cached_property
-    def gaps_ns(self) -> tuple[int, ...]:
-        """Between messages, and the silence at the end where it lasted."""
-        tail = (self.tail_ns,) if self.tail_ns else ()
-        return (*(b - a for a, b in pairwise(self.times_ns)), *tail)
-
-    @property
-    def tail_ns(self) -> int:
-        return self.until_ns - self.times_ns[-1]
-
-    @property
-    def span_ns(self) -> int:
-        return self.until_ns - self.times_ns[0]
-
-    @property
-    def mean_hz(self) -> float:
-        """Gaps over time; 0 where there is no gap."""
-        return len(self.gaps_ns) * 1e9 / self.span_ns if self.span_ns > 0 else 0.0
-
-    def outside(self, low_ns: float, high_ns: float) -> list[int]:
-        """Indices of the gaps shorter than `low_ns` or longer than `high_ns`; a bound itself is inside."""
-        slack = high_ns * ROUNDING
-        return [i for i, gap in enumerate(self.gaps_ns) if not low_ns - slack <= gap <= high_ns + slack]
-
-    @property
-    def comes_in_bursts(self) -> bool:
-        """Many gaps are far shorter than the mean one, and some far longer."""
-        mean_ns = self.span_ns / len(self.gaps_ns)
-        short = sum(gap < 0.3 * mean_ns for gap in self.gaps_ns)
-        return short >= 0.25 * len(self.gaps_ns) and max(self.gaps_ns) > 1.5 * mean_ns
-
-    def is_single_stall(self, outside: Sequence[int], period_ns: float) -> bool:
-        """One message came late and the next on its schedule again: one long gap, then one short one."""
-        match outside:
-            case [late]:
-                return self.gaps_ns[late] > period_ns and late < len(self.gaps_ns) - bool(self.tail_ns)
-            case [late, early]:
-                together = self.gaps_ns[late] + self.gaps_ns[early]
-                return early == late + 1 and abs(together - 2 * period_ns) <= period_ns / 2
-        return False
-
-    @property
-    def interval_hz(self) -> float:
-        """Half the width of the mean's 95 % confidence interval, from how much the gaps differ among themselves.
-
-        Gaps of a loop that keeps a schedule make up for each other, so this is rather too wide than too narrow.
-        """
-        count = len(self.gaps_ns)
-        if count < LEAST_GAPS:
-            return math.inf
-        error = CONFIDENCE * statistics.stdev(self.gaps_ns) / math.sqrt(count)
-        return self.mean_hz * error / statistics.fmean(self.gaps_ns)
-
-    def described(self, low_ns: float, high_ns: float) -> str:
-        """`9.98 ± 0.02 Hz over 6.0 s: 60 messages, 98 % of gaps in 0.05 to 0.15 s, longest 0.162 s`."""
-        count = plural(len(self.times_ns), "message")
-        if not self.gaps_ns:
-            return count
-        share = 1 - len(self.outside(low_ns, high_ns)) / len(self.gaps_ns)
-        within = f"{math.floor(share * 100)} % of gaps in {low_ns / 1e9:.3g} to {high_ns / 1e9:.3g} s"
-        longest_s = max(self.gaps_ns) / 1e9
-        longest = f"longest {longest_s:.{3 if longest_s >= 0.01 else 6}f} s"
-        return f"{self._mean} over {self.span_ns / 1e9:.1f} s: {count}, {within}, {longest}"
-
-    @property
-    def _mean(self) -> str:
-        if not math.isfinite(self.interval_hz):
-            return hertz(self.mean_hz)
-        return f"{hertz(self.mean_hz).removesuffix(' Hz')} ± {self.interval_hz:.2f} Hz"
+def _mean(found: Rhythm) -> str:
+    if not math.isfinite(found.interval_hz):
+        return hertz(found.mean_hz)
+    return f"{hertz(found.mean_hz).removesuffix(' Hz')} ± {found.interval_hz:.2f} Hz"
 
 
 def rhythm(channels: Sequence[Channel], until_ns: int | None, period_ns: float) -> Rhythm | None:

@@ -1,0 +1,178 @@
+"""The base workspace: what CMake learns of the machine in a workspace without packages, learnt once and kept.
+
+Every build unpacks it in its own memory before `catkin_make` runs, as if that had run there once before.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import shutil
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from grader import __version__
+from grader.arena.asynchronous import run_until_signal
+from grader.arena.built import read_member
+from grader.arena.cache import keep, read_kept
+from grader.arena.inside import ANSWERS, INSIDE_WORKSPACE, QUESTIONS, prepare
+from grader.arena.limits import Limits
+from grader.arena.place import BASE, Place
+from grader.arena.ros_env import find_ros
+from grader.arena.sandbox import Mode, choose, temporary_base
+from grader.arena.session import ArenaSession
+from grader.arena.workspace import Workspace
+from grader.errors import ArenaError
+from grader.evidence.writer import EvidenceWriter
+from grader.temporary import temporary_folder
+
+NAME = "base workspace"
+MAKE_S = 60.0
+ANSWER_BYTES = 1000
+ASK = "".join(
+    f"answer=$({question} 2>/dev/null) && echo \"$answer\" >'{ANSWERS}/{question}'; "
+    for question in QUESTIONS
+)
+SCRIPT = (
+    f'mkdir -p {INSIDE_WORKSPACE}/src && cd "$HOME" && "$@" >/dev/null 2>&1 && cd {INSIDE_WORKSPACE}'
+    f" && mkdir {ANSWERS} && shopt -s nullglob || exit 1; {ASK}"
+    f"exec tar -cf - {ANSWERS} build/CMakeCache.txt build/CMakeFiles/{{*.log,*/CMake*.cmake}} >&{{collect}}"
+)
+"""CMake's cache, and what it knows of system and compilers: all else it makes again. And answers, by question."""
+PROGRAMS = (
+    "as", "bash", "c++", "catkin_find_pkg", "catkin_make", "cc", "cmake", "empy", "g++", "gcc", "ld", "lsb_release",
+    "make", "python3", "tar",
+)  # fmt: skip
+SYSTEM = (
+    "/etc/alternatives", "/etc/ld.so.cache", "/etc/os-release", "/usr/include", "/usr/lib", "/usr/lib/cmake",
+    "/usr/local", "/usr/share", "/usr/src", "/var/lib/dpkg/status",
+)  # fmt: skip
+BELOW = (
+    "bin",
+    "conda-meta",
+    "include",
+    "lib",
+    "lib/cmake",
+    "share",
+    "share/catkin/cmake",
+    "share/roslaunch/package.xml",
+    "src",
+)
+
+
+def provide_base(mode: Mode) -> None:
+    """Have a base before many submissions are graded; where it cannot be made, each is built without.
+
+    Raises GraderError where this machine lets nothing be run in this `mode`.
+    """
+    ros = find_ros()
+    sandbox = choose(mode) if ros else None
+    if ros is None or sandbox is None or not sandbox.bubblewrap:
+        return
+    with temporary_folder("run", temporary_base(sandbox)) as folder:
+        folder.chmod(0o711)
+        inner = folder / "base"
+        inner.mkdir()
+        inner.chmod(0o711)
+        prepare(inner, ros)
+        place = Place(
+            folder=inner, ros=ros, sandbox=sandbox, limits=Limits(), workspace=_empty(inner), package=""
+        )
+        if not has_base(place):
+            with suppress(ArenaError):
+                run_until_signal(_make(place))
+
+
+def has_base(place: Place) -> bool:
+    """Hand this place the base that fits it, if there is one."""
+    kept = read_kept(_file_name(place)) if place.sandbox.bubblewrap else None
+    if kept is None:
+        return False
+    place.base.write_bytes(kept)
+    place.base.chmod(0o644)
+    _hand_answers(place)
+    return True
+
+
+def base_spec(place: Place) -> dict[str, Any]:
+    """The process that makes one: in a sandbox as the build's, with nothing of a submission's in it."""
+    argv = ["/bin/bash", "-c", SCRIPT, "bash", *catkin_make(place)]
+    bare = replace(place, env={})
+    return bare.spec(NAME, argv, role="grader", copy=False, as_handed_in=True, collect=BASE)
+
+
+def keep_base(place: Place, exit_code: int | None) -> None:
+    """Keep what that process handed over, if it came to its end."""
+    if exit_code == 0 and place.base.is_file():
+        keep(_file_name(place), place.base.read_bytes())
+        _hand_answers(place)
+
+
+def catkin_make(place: Place) -> list[str]:
+    return [
+        "catkin_make", "-C", place.inside_workspace, "-j2", "--no-color", "--cmake-args",
+        f"-DPYTHON_EXECUTABLE={place.ros.python}",
+    ]  # fmt: skip
+
+
+def _hand_answers(place: Place) -> None:
+    """To the programs that stand before the real ones (`ros/known.sh`)."""
+    for question in QUESTIONS:
+        answer = read_member(place.base, f"{ANSWERS}/{question}", ANSWER_BYTES)
+        if answer is not None:
+            path = place.folder / "bin" / ANSWERS / question
+            path.write_bytes(answer)
+            path.chmod(0o644)
+
+
+async def _make(place: Place) -> None:
+    with EvidenceWriter(
+        place.folder / "base.mcap", scenario="base", clock="real", warp=1.0, metadata={}
+    ) as writer:
+        async with ArenaSession(place, writer, master=False) as arena:
+            arena.start(base_spec(place))
+            await arena.wait(lambda: NAME in arena.exit_codes, MAKE_S)
+            await arena.finish()
+    keep_base(place, arena.exit_codes.get(NAME))
+
+
+def _empty(folder: Path) -> Workspace:
+    kept = folder / "kept"
+    kept.mkdir()
+    nothing = folder / "nothing"
+    return Workspace(built=nothing, repaired=nothing, large=nothing, kept=kept, folder="", repairs={})
+
+
+def _file_name(place: Place) -> str:
+    """Another one for whatever else CMake could find: another machine, other programs, another ROS."""
+    spec = base_spec(place)
+    known = {
+        "grader": __version__,
+        "kernel": [platform.system(), platform.release(), platform.machine()],
+        "argv": spec["argv_shown"],
+        "env": spec["env"],
+        "shims": sorted(path.name for path in (place.folder / "bin").iterdir()),
+        "files": list(_looks(place)),
+    }
+    return f"workspace-{hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()[:32]}.tar"
+
+
+def _looks(place: Place) -> Iterator[tuple[str, int, int, int]]:
+    """The files and folders in which a change of the machine shows.."""
+    path = place.ros.env["PATH"]
+    programs = [shutil.which(name, path=path) for name in PROGRAMS]
+    roots = ("/usr", "/usr/local", *place.ros.prefixes, *_entries(place.ros.env.get("CMAKE_PREFIX_PATH", "")))
+    folders = [*SYSTEM, *_entries(path), *(f"{root}/{name}" for root in roots for name in BELOW)]
+    for name in dict.fromkeys([place.ros.python, *filter(None, programs), *folders]):
+        with suppress(OSError):
+            status = Path(name).stat()
+            yield name, status.st_ino, status.st_mtime_ns, status.st_size
+
+
+def _entries(path: str) -> list[str]:
+    return [entry for entry in path.split(os.pathsep) if entry]

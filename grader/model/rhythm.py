@@ -1,0 +1,106 @@
+"""The rate of a stream of messages: mean, gaps, and the silence at its end. Times in ns."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import pairwise
+
+from pydantic import model_validator
+
+from grader.model.record import Record
+
+ROUNDING = 1e-6
+CONFIDENCE = 1.96
+LEAST_GAPS = 5
+CLEAR_GAPS = 20
+
+
+class Rhythm(Record):
+    """`times_ns` in order; `until_ns` is up to when the publisher was watched, the last message or later."""
+
+    times_ns: tuple[int, ...]
+    until_ns: int
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Rhythm:
+        if not self.times_ns or self.until_ns < self.times_ns[-1]:
+            raise ValueError("a rhythm has at least one message, and ends with it or later")
+        return self
+
+    @cached_property
+    def gaps_ns(self) -> tuple[int, ...]:
+        """Between messages, and the silence at the end where it lasted."""
+        tail = (self.tail_ns,) if self.tail_ns else ()
+        return (*(b - a for a, b in pairwise(self.times_ns)), *tail)
+
+    @property
+    def tail_ns(self) -> int:
+        return self.until_ns - self.times_ns[-1]
+
+    @property
+    def span_ns(self) -> int:
+        return self.until_ns - self.times_ns[0]
+
+    @property
+    def mean_hz(self) -> float:
+        """Gaps over time; 0 where there is no gap."""
+        return len(self.gaps_ns) * 1e9 / self.span_ns if self.span_ns > 0 else 0.0
+
+    def outside(self, low_ns: float, high_ns: float) -> list[int]:
+        """Indices of the gaps shorter than `low_ns` or longer than `high_ns`; a bound itself is inside."""
+        slack = high_ns * ROUNDING
+        return [i for i, gap in enumerate(self.gaps_ns) if not low_ns - slack <= gap <= high_ns + slack]
+
+    @property
+    def comes_in_bursts(self) -> bool:
+        """Many gaps are far shorter than the mean one, and some far longer."""
+        mean_ns = self.span_ns / len(self.gaps_ns)
+        short = sum(gap < 0.3 * mean_ns for gap in self.gaps_ns)
+        return short >= 0.25 * len(self.gaps_ns) and max(self.gaps_ns) > 1.5 * mean_ns
+
+    def is_single_stall(self, outside: Sequence[int], period_ns: float) -> bool:
+        """One message came late and the next on its schedule again: one long gap, then one short one."""
+        match outside:
+            case [late]:
+                return self.gaps_ns[late] > period_ns and late < len(self.gaps_ns) - bool(self.tail_ns)
+            case [late, early]:
+                together = self.gaps_ns[late] + self.gaps_ns[early]
+                return early == late + 1 and abs(together - 2 * period_ns) <= period_ns / 2
+        return False
+
+    @property
+    def interval_hz(self) -> float:
+        """Half the width of the mean's 95 % confidence interval, from how much the gaps differ among themselves.
+
+        Gaps of a loop that keeps a schedule make up for each other, so this is rather too wide than too narrow.
+        """
+        count = len(self.gaps_ns)
+        if count < LEAST_GAPS:
+            return math.inf
+        error = CONFIDENCE * statistics.stdev(self.gaps_ns) / math.sqrt(count)
+        return self.mean_hz * error / statistics.fmean(self.gaps_ns)
+
+
+class RateBounds(Record):
+    """What a rubric asks of a topic's rate, and over how long a time at least."""
+
+    topic: str
+    low_hz: float
+    high_hz: float
+    low_gap_ns: float
+    high_gap_ns: float
+    min_window_s: float
+
+    def settled_by(self, times_ns: Sequence[int]) -> bool:
+        """Whether a longer look would change nothing: the mean's confidence interval lies inside of the bounds and so
+        does every gap, or it lies outside of them."""
+        if len(times_ns) <= CLEAR_GAPS or times_ns[-1] - times_ns[0] < self.min_window_s * 1e9:
+            return False
+        found = Rhythm(times_ns=tuple(times_ns), until_ns=times_ns[-1])
+        least_hz, most_hz = found.mean_hz - found.interval_hz, found.mean_hz + found.interval_hz
+        right = self.low_hz <= least_hz and most_hz <= self.high_hz
+        even = right and not found.outside(self.low_gap_ns, self.high_gap_ns)
+        return even or most_hz < self.low_hz or least_hz > self.high_hz
