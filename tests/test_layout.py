@@ -43,11 +43,11 @@ ALLOWED = {
     "authoring": {
         *BASE, "checks", "evidence", "intake", "package", "pipeline", "rubric", "temporary"
     },
-    "batch": BASE | {"pipeline", "rubric"},
+    "batch": BASE | {"evidence", "judge", "pipeline", "rubric"},
     "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
     "cli": {
-        *BASE, "arena", "authoring", "checks", "evidence", "files", "instructor", "intake", "judge", "mutation",
-        "package", "pipeline", "report", "rubric", "temporary"
+        *BASE, "arena", "authoring", "batch", "checks", "evidence", "files", "instructor", "intake", "judge",
+        "mutation", "package", "pipeline", "report", "rubric", "temporary"
     },
     "__main__": {"cli"},
 }  # fmt: skip

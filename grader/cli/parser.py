@@ -106,11 +106,18 @@ def _grading(add: _Adder) -> None:
 def _evidence(add: _Adder) -> None:
     judge = add("judge", "judge recorded evidence again; needs no ROS")
     judge.add_argument(
-        "evidence", metavar="EVIDENCE", nargs="+", type=Path, help=".mcap and .bag files, or folders of them"
+        "evidence",
+        metavar="EVIDENCE",
+        nargs="+",
+        type=Path,
+        help=".mcap and .bag files, or folders of them; of a folder of results, every submission in it",
     )
     _rubric(judge, required=True)
     judge.add_argument(
         "--out", metavar="FILE", default="-", help="where the criteria go as JSON (default: -)"
+    )
+    judge.add_argument(
+        "--jobs", metavar="N", type=_count, help="how many submissions side by side (default: one a core)"
     )
 
     record = add("record", "record evidence without grading")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from decimal import Decimal
 from typing import Literal
 
@@ -44,8 +44,31 @@ def reached_pass_mark(rubric: Rubric, results: Sequence[CriterionResult]) -> boo
 
 def criteria_text(results: Sequence[CriterionResult], *, ascii_only: bool = False) -> str:
     """The criteria as canonical JSON in the rubric's order: the same from `grader grade` and `grader judge`."""
+    return json_text(_criteria(results), ascii_only=ascii_only)
+
+
+def judged_text(
+    rubric: Rubric, judged: Iterable[tuple[str, Sequence[CriterionResult] | str]], *, ascii_only: bool = False
+) -> str:
+    """Several submissions as JSON, each with its points and criteria, or with the error that kept it from them."""
+    return json_text([_about(rubric, name, found) for name, found in judged], ascii_only=ascii_only)
+
+
+def _about(rubric: Rubric, name: str, found: Sequence[CriterionResult] | str) -> dict[str, object]:
+    if isinstance(found, str):
+        return {"submission": name, "status": "error", "error": found[:LIMIT]}
+    return {
+        "submission": name,
+        "status": overall_status(found),
+        "points": total_points(rubric, found),
+        "max_points": rubric.max_points,
+        "criteria": _criteria(found),
+    }
+
+
+def _criteria(results: Sequence[CriterionResult]) -> object:
     data = [result.model_dump(mode="json") for result in results]
-    return json_text(clipped(data, text_limit(len(results), LIMIT)), ascii_only=ascii_only)
+    return clipped(data, text_limit(len(results), LIMIT))
 
 
 def criteria_bytes(results: Sequence[CriterionResult]) -> bytes:

@@ -1,0 +1,111 @@
+"""Recorded submissions judged again, many at a time, in worker processes. Needs no ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from grader.batch.pool import side_by_side, workers, working
+from grader.errors import EvidenceError, GraderError
+from grader.evidence.reader import SUFFIXES, load_evidence
+from grader.judge import judge
+from grader.model.result import CriterionResult
+from grader.rubric.load import LoadedRubric
+
+EVIDENCE, RESULT, PACKAGE = "evidence", "result.json", "package.mcap"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """One submission's criteria, or in one line why there are none, and what to do about it."""
+
+    folder: Path
+    criteria: tuple[CriterionResult, ...] | None
+    error: str = ""
+    hint: str = ""
+
+
+def judge_all(folders: Sequence[Path], rubric: LoadedRubric, jobs: int) -> Iterator[Judged]:
+    """Every submission's evidence judged again, each as it comes, `jobs` at a time.
+
+    What is wrong with one of them is in its `error` and stops no other, not even where it ends the worker.
+    """
+    left = dict.fromkeys(folders)
+    while left:
+        begun: list[Path] = []
+        for judged in _until_broken(tuple(left), rubric, jobs, begun.append):
+            del left[judged.folder]
+            yield judged
+        for suspect in [folder for folder in begun if folder in left]:
+            del left[suspect]
+            yield from tuple(_until_broken([suspect], rubric, 1)) or [_ended(suspect)]
+
+
+def _until_broken(
+    folders: Sequence[Path], rubric: LoadedRubric, jobs: int, begun: Callable[[Path], None] = lambda _: None
+) -> Iterator[Judged]:
+    """Ends early where a worker ends: on one of those that were begun, nobody knows which."""
+    count = max(1, min(jobs, len(folders)))
+    try:
+        with workers(count) as pool:
+            yield from side_by_side(pool, partial(_judged, rubric), folders, most=2 * count, begun=begun)
+    except BrokenProcessPool:
+        return
+
+
+def _ended(folder: Path) -> Judged:
+    hint = "look whether the machine has too little memory, and judge it by itself"
+    return Judged(folder=folder, criteria=None, error=f"{folder}: judging it ended the process", hint=hint)
+
+
+def _judged(rubric: LoadedRubric, folder: Path) -> Judged:
+    """In a worker."""
+    with working():
+        try:
+            criteria = judge(rubric.rubric, load_evidence([folder]), rubric.checks)
+        except GraderError as error:
+            return Judged(folder=folder, criteria=None, error=error.message, hint=error.hint)
+        except Exception as error:  # noqa: BLE001 - whatever it is, the others are judged
+            message = f"{folder}: internal error: {type(error).__name__}: {error}"
+            return Judged(folder=folder, criteria=None, error=message, hint="judge it by itself with --debug")
+        return Judged(folder=folder, criteria=criteria)
+
+
+def submissions_in(paths: Sequence[Path]) -> tuple[Path, ...]:
+    """The submissions' folders that these paths stand for, where they stand for several submissions; else none.
+
+    A folder of results stands for every submission in it. Raises EvidenceError where something else is among them.
+    """
+    whole = [path for path in paths if _is_result(path)]
+    held = {path: _held(path) for path in paths if path not in whole}
+    found = [*whole, *(folder for folders in held.values() for folder in folders)]
+    if len(whole) < 2 and len(found) == len(whole):
+        return ()
+    for path, folders in held.items():
+        if not folders:
+            message = f"{path}: not the folder of a submission's results, as the others are"
+            raise EvidenceError(message, hint="judge it by itself")
+    return tuple(dict.fromkeys(found))
+
+
+def _held(folder: Path) -> list[Path]:
+    """The submissions in a folder of results; a folder of recordings is none."""
+    try:
+        if not folder.is_dir() or _has_recordings(folder):
+            return []
+        inside = [path for path in sorted(folder.iterdir()) if not path.name.startswith(".")]
+        return [path for path in inside if _is_result(path) or _has_recordings(path)]
+    except OSError as error:
+        raise EvidenceError(f"{folder}: {error.strerror or type(error).__name__}") from error
+
+
+def _is_result(folder: Path) -> bool:
+    """What `grade` leaves of one submission, or its evidence alone."""
+    return (folder / RESULT).is_file() or (folder / PACKAGE).is_file() or _has_recordings(folder / EVIDENCE)
+
+
+def _has_recordings(folder: Path) -> bool:
+    return folder.is_dir() and any(path.suffix in SUFFIXES for path in folder.iterdir())
