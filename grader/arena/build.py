@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
+from grader.arena.base import NAME as BASE_NAME
+from grader.arena.base import base_spec, catkin_make, has_base, keep_base
 from grader.arena.built import read_member
 from grader.arena.place import ARCHIVE, Place
 from grader.arena.ros_env import keep_ros_variables, parse_env
@@ -52,11 +55,14 @@ async def build(
 
     Returns the place with the built workspace's environment. Raises ArenaError where the arena fails.
     """
+    wants_base = place.sandbox.bubblewrap and not has_base(place) and len(os.sched_getaffinity(0)) > 1
     (place.folder / "bin" / "python-files.json").write_text(json.dumps(list(python_files)))
     async with ArenaSession(place, writer, master=False, last_run=last_run) as arena:
         arena.course(ScenarioEvent(event="begin"))
         arena.start(place.spec("catkin_make", _catkin_make(place), role="build", build=True, collect=ARCHIVE))
         arena.start(place.spec("syntax", _syntax(place), role="grader", as_handed_in=True, collect=SYNTAX))
+        if wants_base:  # beside the build, on another core, and not waited for
+            arena.start(base_spec(place))
         ended = await arena.wait(lambda: "catkin_make" in arena.exit_codes, BUILD_S)
         if not ended:
             await arena.interrupt("catkin_make", int_s=2.0, term_s=1.0)
@@ -70,6 +76,8 @@ async def build(
             ScenarioEvent(event="end", outcome=outcome, detail="" if ended else f"build over {BUILD_S:g} s")
         )
         await arena.finish()
+    if wants_base:
+        keep_base(place, arena.exit_codes.get(BASE_NAME))
     if not place.sandbox.bubblewrap:
         run_in_place(place.workspace, place.sandbox)
     return built, BuildOutcome(
@@ -88,8 +96,7 @@ def _catkin_make(place: Place) -> list[str]:
     package = place.workspace.repaired / place.workspace.folder
     included = sorted(p.relative_to(package).as_posix() for p in package.rglob("*.cmake"))[:INCLUDED_MAX]
     return [
-        "catkin_make", "-C", place.inside_workspace, "-j2", "--no-color", "--cmake-args",
-        f"-DPYTHON_EXECUTABLE={place.ros.python}", "--trace-expand", "--trace-format=json-v1",
+        *catkin_make(place), "--trace-expand", "--trace-format=json-v1",
         *(f"--trace-source={name}" for name in ("CMakeLists.txt", *included)),
         f"--trace-redirect={place.output}/{TRACE}",
     ]  # fmt: skip

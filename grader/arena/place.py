@@ -10,7 +10,17 @@ from pathlib import Path
 from typing import Any
 
 from grader.arena.built import Built, read_archive, read_folder
-from grader.arena.inside import BUILT, HOME, INSIDE_WORKSPACE, LARGE, OUTPUT, SHIMS, SOURCES, STANDINS
+from grader.arena.inside import (
+    BASE_WORKSPACE,
+    BUILT,
+    HOME,
+    INSIDE_WORKSPACE,
+    LARGE,
+    OUTPUT,
+    SHIMS,
+    SOURCES,
+    STANDINS,
+)
 from grader.arena.limits import Limits
 from grader.arena.ros_env import SYSTEM_PATH, RosInstallation
 from grader.arena.sandbox import Sandbox
@@ -32,11 +42,14 @@ COPY_STEP = (
 """Each process tree has a workspace of its own: the sources, and what the build made of them."""
 BUILD_STEP = (
     f"mkdir {INSIDE_WORKSPACE} && cp -R --preserve=mode,links {SOURCES} {INSIDE_WORKSPACE}/"
+    f" && {{ [ ! -e {BASE_WORKSPACE} ] || tar -xmf {BASE_WORKSPACE} -C {INSIDE_WORKSPACE} build"
+    f" || rm -rf {INSIDE_WORKSPACE}/build; }}"
     ' && cd "$HOME" && { "$@" {collect}>&-; code=$?; }; '
     f"tar -cf - -C {INSIDE_WORKSPACE} --ignore-failed-read devel -C {OUTPUT} . >&{{collect}} 2>/dev/null; exit $code"
 )
-"""What the build made is handed over through a pipe, whatever came of it."""
+"""What the build made is handed over through a pipe, whatever came of it. The base workspace is as old as the build."""
 ARCHIVE = "built.tar"
+BASE = "base.tar"
 OWN_VARIABLES = (
     "ROS_MASTER_URI",
     "ROS_IP",
@@ -64,6 +77,11 @@ class Place:
     def archive(self) -> Path:
         """What the build handed over, where it ran in a sandbox."""
         return self.workspace.kept / ARCHIVE
+
+    @property
+    def base(self) -> Path:
+        """The base workspace for this place's build (`base.py`), where there is one."""
+        return self.workspace.kept / BASE
 
     @cached_property
     def built(self) -> Built:
@@ -197,7 +215,8 @@ class Place:
         sources = workspace.built / "src" if as_handed_in else workspace.repaired
         binds = ["--ro-bind", str(workspace.large), LARGE, "--ro-bind", str(sources), SOURCES]
         if output:
-            return [*binds, "--size", str(self.limits.tmp_bytes), "--tmpfs", OUTPUT]
+            base = ["--ro-bind", str(self.base), BASE_WORKSPACE] if self.base.is_file() else []
+            return [*binds, *base, "--size", str(self.limits.tmp_bytes), "--tmpfs", OUTPUT]
         return [*binds, "--ro-bind", str(self.archive), BUILT] if self.archive.is_file() else binds
 
     def _process_env(self) -> dict[str, str]:
