@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks import arena
-from benchmarks.arena import PREFIX, PUBLISHER, Load
+from benchmarks.arena import PREFIX, PUBLISHER, Load, publisher_told
 from benchmarks.figures import Found, NotMeasured, Options, mid, table
 from benchmarks.gradings import folder_for
 from benchmarks.ros import master, program, running
@@ -22,12 +22,12 @@ RATES_HZ = (10.0, 100.0)
 TIME = struct.Struct("<Q")
 AVERAGE = re.compile(r"average rate: ([\d.]+)")
 DEVIATION = re.compile(r"std dev: ([\d.]+)s")
-READY_S = 1.0
+READY_S = 1.5
 
 
 class Seen(NamedTuple):
-    """Of one run: delays from sending to the recorded arrival (µs), error of the mean rate (ppm), and the gaps'
-    standard deviation (ms)."""
+    """Of one run: delays from sending to the recorded arrival (µs), error of the mean rate against that of sending
+    (ppm), and the gaps' standard deviation (ms)."""
 
     delays_us: list[float]
     error_ppm: float
@@ -65,14 +65,14 @@ def measure(options: Options) -> Found:
 
 
 def _recorded(load: Load, path: Path) -> Seen:
-    _, offset_ns = arena.record(load, path)
+    taken, offset_ns = arena.record(load, path)
     seen = arena.arrivals(path, f"{PREFIX}0")
     path.unlink()
     times_ns = [time_ns for time_ns, _ in seen]
     delays_us = [(time_ns - offset_ns - TIME.unpack(data)[0]) / 1e3 for time_ns, data in seen]
     mean_hz = (len(times_ns) - 1) / (times_ns[-1] - times_ns[0]) * 1e9
     gaps_ms = [(after - before) / 1e6 for before, after in pairwise(times_ns)]
-    return Seen(delays_us, _ppm(mean_hz, load.rate_hz), statistics.pstdev(gaps_ms))
+    return Seen(delays_us, _ppm(mean_hz, taken.sent_hz), statistics.pstdev(gaps_ms))
 
 
 def _rostopic(load: Load, folder: Path) -> Seen:
@@ -85,18 +85,18 @@ def _rostopic(load: Load, folder: Path) -> Seen:
         ):
             if node.stdout is None or watcher.stdout is None:
                 raise NotMeasured("no pipe")
-            node.stdout.readline()
+            told = publisher_told([node.stdout.readline()])
             time.sleep(READY_S)  # it says what it saw once a second
             watcher.terminate()
             text = watcher.stdout.read()
     averages, deviations = AVERAGE.findall(text), DEVIATION.findall(text)
     if not averages or not deviations:
         raise NotMeasured(f"rostopic hz said nothing: {text[-300:]}")
-    return Seen([], _ppm(float(averages[-1]), load.rate_hz), float(deviations[-1]) * 1e3)
+    return Seen([], _ppm(float(averages[-1]), told["mean_hz"]), float(deviations[-1]) * 1e3)
 
 
-def _ppm(mean_hz: float, nominal_hz: float) -> float:
-    return abs(mean_hz / nominal_hz - 1) * 1e6
+def _ppm(mean_hz: float, sent_hz: float) -> float:
+    return abs(mean_hz / sent_hz - 1) * 1e6
 
 
 def _delay_cells(rate_hz: float, runs: list[Seen]) -> list[str]:

@@ -54,13 +54,15 @@ class Load:
 @dataclass(frozen=True, kw_only=True)
 class Taken:
     """What became of a load. `late_s` is how much longer sending took than it should have, `behind_s` how long after
-    the last message was sent it was with the grader (None: not known). CPU seconds are the recorder's own."""
+    the last message was sent it was with the grader (None: not known), `sent_hz` the rate at which it was really sent.
+    CPU seconds are the recorder's own."""
 
     sent: int
     recorded: int
     told_dropped: int
     late_s: float
     behind_s: float | None
+    sent_hz: float
     cpu_s: float
 
 
@@ -92,6 +94,7 @@ async def _record(load: Load, specs: Sequence[dict[str, Any]], place: Place, pat
         told_dropped=_dropped(path),
         late_s=told["end_s"] - told["begin_s"] - load.seconds,
         behind_s=last_s - told["end_s"],
+        sent_hz=told["mean_hz"],
         cpu_s=cpu_s,
     )
     return taken, offset_ns

@@ -12,7 +12,7 @@ from pathlib import Path
 from benchmarks.figures import NotMeasured, Options
 from grader.batch.workers import Graded, Job, grade_all
 from grader.evidence.reader import load_evidence
-from grader.model.result import GradingResult
+from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -58,8 +58,8 @@ def graded(jobs: Sequence[Job], side_by_side: int) -> Iterator[tuple[str, Gradin
     print(file=sys.stderr)
 
 
-def verdicts(result: GradingResult) -> Verdicts:
-    return {criterion.id: (criterion.status, criterion.points) for criterion in result.criteria}
+def verdicts_of(criteria: Sequence[CriterionResult]) -> Verdicts:
+    return {criterion.id: (criterion.status, criterion.points) for criterion in criteria}
 
 
 def build_cpu_s(evidence: Path) -> float:

@@ -16,7 +16,7 @@ from benchmarks.gradings import (
     cores,
     folder_for,
     graded,
-    verdicts,
+    verdicts_of,
 )
 from benchmarks.machine import Meter
 from grader.batch.workers import Job
@@ -85,7 +85,7 @@ def _batch(out: Path, count: int, side_by_side: int, alone: dict[str, GradingRes
 
 def _differing(name: str, result: GradingResult, alone: GradingResult) -> Iterable[str]:
     """Where a verdict is not that of the same kind alone, unless it says that it cannot say."""
-    expected, found = verdicts(alone), verdicts(result)
+    expected, found = verdicts_of(alone.criteria), verdicts_of(result.criteria)
     messages = {criterion.id: criterion.message for criterion in result.criteria}
     for criterion, (status, points) in expected.items():
         if found[criterion] != (status, points) and found[criterion][0] is not Status.INCONCLUSIVE:

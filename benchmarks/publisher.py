@@ -154,12 +154,17 @@ def _publish(topics: list[Topic], asked: dict[str, object]) -> dict[str, float]:
     pulse = asked["type"] == "std_msgs/UInt64"
     frame = b"" if pulse else _frame(str(asked["type"]), int(str(asked["bytes"])))
     begin_s = time.monotonic() + period_s
+    first_s = last_s = 0.0
     for number in range(count):
         _await(begin_s + number * period_s, spin_s=SPIN_S if pulse else 0.0)
         if pulse:
             frame = LENGTH.pack(TIME.size) + TIME.pack(time.monotonic_ns())
+        last_s = time.monotonic()
+        first_s = first_s or last_s
         topics[number % len(topics)].send(frame)
-    return {"sent": sum(topic.sent for topic in topics), "begin_s": begin_s, "end_s": time.monotonic()}
+    sent = sum(topic.sent for topic in topics)
+    mean_hz = (count - 1) / (last_s - first_s)
+    return {"sent": sent, "begin_s": begin_s, "end_s": time.monotonic(), "mean_hz": mean_hz}
 
 
 def _await(due_s: float, *, spin_s: float) -> None:

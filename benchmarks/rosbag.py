@@ -44,6 +44,7 @@ def record(load: Load, folder: Path) -> Taken:
         told_dropped=0,
         late_s=told["end_s"] - told["begin_s"] - load.seconds,
         behind_s=None,
+        sent_hz=told["mean_hz"],
         cpu_s=cpu_s,
     )
 

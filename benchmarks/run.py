@@ -7,6 +7,7 @@ Each benchmark is a module of this folder with `measure(options)`. Ends with 1 w
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -63,5 +64,13 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _interrupted(_number: int, _frame: object) -> None:
+    raise KeyboardInterrupt
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    signal.signal(signal.SIGTERM, _interrupted)  # what runs beside is ended either way
+    try:
+        sys.exit(main())
+    except KeyboardInterrupt:
+        sys.exit(130)
