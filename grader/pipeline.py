@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -17,7 +17,7 @@ from platform import python_version
 from typing import TYPE_CHECKING
 
 from grader import __version__
-from grader.errors import EvidenceError, SubmissionError, UsageError
+from grader.errors import EvidenceError, GraderError, SubmissionError, UsageError
 from grader.evidence.run import Run
 from grader.faults import Attempt, told_apart
 from grader.intake import open_recorded, open_recording, open_submission
@@ -63,6 +63,15 @@ class GradeOptions:
     submission_id: str | None = None
     static_only: bool = False
     keep_hidden: bool = True
+
+
+def prepare(options: GradeOptions) -> None:
+    """Before many gradings: make what they share. What keeps it from being made, each of them says for itself."""
+    from grader.arena.base import provide_base  # noqa: PLC0415 - see LATER
+
+    if not options.static_only:
+        with suppress(GraderError):
+            provide_base(options.sandbox)
 
 
 def grade(

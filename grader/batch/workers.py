@@ -11,7 +11,7 @@ from grader.batch.pool import side_by_side, workers, working
 from grader.errors import GraderError
 from grader.model.progress import Silence
 from grader.model.result import GradingResult
-from grader.pipeline import GradeOptions, grade
+from grader.pipeline import GradeOptions, grade, prepare
 from grader.rubric.load import load_rubric
 
 Sandbox = Literal["auto", "require", "none"]
@@ -39,6 +39,8 @@ class Graded:
 
 def grade_all(jobs: Sequence[Job], most: int, begun: Callable[[str], None]) -> Iterator[Graded]:
     """Each job's result as it comes, `most` at a time. `begun` is told each job's name when it starts."""
+    for sandbox in {job.sandbox for job in jobs}:
+        prepare(GradeOptions(sandbox=sandbox))
     with workers(min(most, len(jobs))) as pool:
         yield from side_by_side(pool, _graded, jobs, most=most, begun=lambda job: begun(job.name))
 
