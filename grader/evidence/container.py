@@ -22,8 +22,9 @@ MAX_CHUNK_BYTES = 32 << 20
 MAX_UNPACKED_BYTES = 512 << 20
 MAX_RECORDS = 2_000_000
 
-MESSAGE_HEAD_BYTES = 22
 _HEAD = struct.Struct("<BQ")
+_MESSAGE_HEAD = struct.Struct("<HIQQ")
+MESSAGE_HEAD_BYTES = _MESSAGE_HEAD.size
 _Read = Callable[[bytes], McapRecord]
 
 
@@ -108,16 +109,26 @@ def _next(source: ReadDataStream, meter: _Meter) -> tuple[int, bytes | Message]:
 
 
 def _inside(chunk: Chunk, meter: _Meter) -> Iterator[McapRecord]:
+    """Most of a file's records are messages in chunks: they are taken from the unpacked bytes where they lie."""
     plain = _unpacked(chunk)
     meter.unpacked(len(plain))
     _verify(chunk.uncompressed_crc, zlib.crc32(plain), "a chunk")
-    source = ReadDataStream(BytesIO(plain))
-    while source.count < len(plain):
-        opcode, body = _next(source, meter)
-        if isinstance(body, Message):
-            yield body
+    begin, size_bytes = _HEAD.size, len(plain)
+    while begin <= size_bytes:
+        opcode, length = _HEAD.unpack_from(plain, begin - _HEAD.size)
+        meter.record(length)
+        end = begin + length
+        if end > size_bytes:
+            raise EndOfFile
+        if opcode == Opcode.MESSAGE and length >= MESSAGE_HEAD_BYTES:
+            channel_id, sequence, log_time, publish_time = _MESSAGE_HEAD.unpack_from(plain, begin)
+            data = plain[begin + MESSAGE_HEAD_BYTES : end]
+            yield Message(channel_id, log_time, data, publish_time, sequence)
         elif opcode in _IN_CHUNK:
-            yield _IN_CHUNK[opcode](body)
+            yield _IN_CHUNK[opcode](plain[begin:end])
+        begin = end + _HEAD.size
+    if begin != size_bytes + _HEAD.size:
+        raise EndOfFile
 
 
 def _verify(said: int, found: int, what: str) -> None:
