@@ -1,26 +1,25 @@
-"""Three hundred recorded submissions judged again on all cores, beside judging one."""
+"""Three hundred recorded submissions judged again on all cores by `grader judge`, beside judging one."""
 
 from __future__ import annotations
 
-import os
+import json
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from benchmarks.figures import Found, Options, Row, spread
 from benchmarks.gradings import KINDS, RUBRIC, Verdicts, cores, folder_for, graded, verdicts_of
-from benchmarks.machine import Cost, Meter, timed
-from grader.batch.judging import judge_all
+from benchmarks.machine import timed
 from grader.batch.workers import Job
-from grader.rubric.load import load_rubric
 
 COUNT, TIMES = 300, 5
+GRADER = (sys.executable, "-m", "grader")
 
 
 class Judged(NamedTuple):
-    """Wall and CPU seconds of judging some submissions, workers included, and what came out otherwise than recorded."""
+    """Wall and CPU seconds of the whole command, and what came out otherwise than recorded."""
 
     wall_s: float
     cpu_s: float
@@ -29,31 +28,38 @@ class Judged(NamedTuple):
 
 def measure(options: Options) -> Found:
     count, times, jobs = options.count or COUNT, options.times or TIMES, options.jobs or cores()
-    many, single, alone = [], [], []
+    many, single = [], []
     with folder_for("judging", options) as folder:
-        expected = _recorded(folder / "kinds")
-        copies = _copied(folder, list(expected), count)
+        recorded = _recorded(folder / "kinds")
+        everything, one = folder / "all", folder / "one"
+        expected = _copied(everything, recorded, count)
+        alone = _copied(one, recorded, 1)
         for _ in range(times):
-            many.append(_judged(copies, expected, jobs))
-            single.append(_judged(copies[:1], expected, 1))
-            alone.append(_grader_judge(copies[0]))
-    per_one = [m.wall_s / count * 1e3 for m in many]
-    ratio = [m.wall_s / (count * s.wall_s) for m, s in zip(many, single, strict=True)]
-    rows = [
-        Row(
-            f"{count} submissions, wall", "s", [m.wall_s for m in many], "at most 6" if count == COUNT else ""
-        ),
-        Row(f"{count} submissions, CPU", "s", [m.cpu_s for m in many]),
-        Row("of that for each, wall", "ms", per_one, "", 1),
-        Row("one submission, wall", "s", [s.wall_s for s in single]),
-        Row("one submission, CPU", "s", [s.cpu_s for s in single]),
-        Row("one submission by `grader judge`, wall", "s", [a.wall_s for a in alone]),
-        Row(f"wall of {count} / {count} times that of one", "", ratio, "", 3),
-    ]
+            many.append(_judged(everything, expected, jobs, folder / "judged.json"))
+            single.append(_judged(one, alone, 1, folder / "judged.json"))
     return Found(
         runs=f"{count} submissions on {jobs} workers, {times} times in turn",
-        tables=(spread(rows),),
+        tables=(_table(many, single, count),),
         faults=tuple(dict.fromkeys(fault for judged in (*many, *single) for fault in judged.faults)),
+    )
+
+
+def _table(many: list[Judged], single: list[Judged], count: int) -> str:
+    ratio = [m.wall_s / (count * s.wall_s) for m, s in zip(many, single, strict=True)]
+    return spread(
+        [
+            Row(
+                f"{count} submissions, wall",
+                "s",
+                [m.wall_s for m in many],
+                "at most 6" if count == COUNT else "",
+            ),
+            Row(f"{count} submissions, CPU", "s", [m.cpu_s for m in many]),
+            Row("of that for each, wall", "ms", [m.wall_s / count * 1e3 for m in many], "", 1),
+            Row("one submission, wall", "s", [s.wall_s for s in single]),
+            Row("one submission, CPU", "s", [s.cpu_s for s in single]),
+            Row(f"wall of {count} / {count} times that of one", "", ratio, "", 3),
+        ]
     )
 
 
@@ -63,41 +69,30 @@ def _recorded(out: Path) -> dict[Path, Verdicts]:
     return {out / name: verdicts_of(result.criteria) for name, result in graded(jobs, 1)}
 
 
-def _copied(folder: Path, kinds: Sequence[Path], count: int) -> list[Path]:
-    """So many submissions, the kinds in turn."""
-    copies = []
+def _copied(folder: Path, recorded: dict[Path, Verdicts], count: int) -> dict[str, Verdicts]:
+    """So many submissions in this folder, the kinds in turn, and what each has to get."""
+    kinds, expected = list(recorded), {}
     for number in range(count):
         kind = kinds[number % len(kinds)]
-        copies.append(folder / "all" / f"{number:03}-{kind.name}")
-        shutil.copytree(kind, copies[-1], dirs_exist_ok=True)
-    return copies
+        copy = folder / f"{number:03}-{kind.name}"
+        shutil.copytree(kind, copy, dirs_exist_ok=True)
+        expected[copy.name] = recorded[kind]
+    return expected
 
 
-def _judged(folders: Sequence[Path], expected: dict[Path, Verdicts], jobs: int) -> Judged:
-    rubric, faults, by_kind = load_rubric(str(RUBRIC)), [], {kind.name: v for kind, v in expected.items()}
-    meter = Meter()
-    results = list(judge_all(folders, rubric, jobs))
-    wall_s, cpu_s = meter.wall_s(), meter.own_cpu_s() + meter.children_cpu_s()
-    for one in results:
-        if one.criteria is None:
-            faults.append(f"{one.folder.name} was not judged: {one.error}")
-        elif verdicts_of(one.criteria) != by_kind[one.folder.name[4:]]:
-            faults.append(f"{one.folder.name} is judged otherwise than when it was recorded")
-    if len(results) != len(folders):
-        faults.append(f"{len(results)} of {len(folders)} were judged")
-    return Judged(wall_s, cpu_s, tuple(faults))
+def _judged(folder: Path, expected: dict[str, Verdicts], jobs: int, out: Path) -> Judged:
+    """`grader judge`, in a process of its own, on a folder of submissions."""
+    argv = [*GRADER, "judge", str(folder), "--rubric", str(RUBRIC), "--jobs", str(jobs), "--out", str(out)]
+    cost = timed(argv, codes=(0, 1))
+    return Judged(cost.wall_s, cost.cpu_s, tuple(_wrong(json.loads(out.read_text()), expected)))
 
 
-def _grader_judge(folder: Path) -> Cost:
-    argv = [
-        sys.executable,
-        "-m",
-        "grader",
-        "judge",
-        str(folder),
-        "--rubric",
-        str(RUBRIC),
-        "--out",
-        os.devnull,
-    ]
-    return timed(argv, codes=(0, 1))
+def _wrong(found: list[dict[str, Any]], expected: dict[str, Verdicts]) -> Iterator[str]:
+    """What is missing, or judged otherwise than when it was recorded."""
+    judged = {one["submission"]: one.get("criteria") for one in found}
+    for name, verdicts in expected.items():
+        criteria = judged.get(name)
+        if criteria is None:
+            yield f"{name} was not judged"
+        elif {one["id"]: (one["status"], one["points"]) for one in criteria} != verdicts:
+            yield f"{name} is judged otherwise than when it was recorded"
