@@ -22,7 +22,7 @@ CHANNEL_ID = struct.Struct("<I")
 F_SETPIPE_SZ = 1031
 PIPE_BYTES = 1 << 20
 WRITE_BYTES = 256 << 10
-CONGESTED_BYTES, QUEUE_BYTES_MAX = 16 << 20, 32 << 20
+CONGESTED_BYTES, QUEUE_BYTES_MAX = 40 << 20, 48 << 20
 GATHER_S = 0.01
 """Messages wait so long for others to be written with them: their times are those of their arrival."""
 PATIENT = ("/grader/console", "/grader/host")
