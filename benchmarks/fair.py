@@ -32,9 +32,10 @@ TAKEN = (Status.FAIL, Status.PARTIAL, Status.BLOCKED, Status.ERROR)
 
 
 class Series(NamedTuple):
-    """Gradings of many packages, and how long all took (s)."""
+    """Gradings of many packages, how many of their runs were made again, and how long all took (s)."""
 
     results: dict[str, GradingResult]
+    again: int
     wall_s: float
 
 
@@ -53,6 +54,7 @@ def measure(options: Options) -> Found:
             str(loops),
             share(len({name for name, _ in lost}), count),
             share(len(doubtful[0]), count),
+            str(right.again),
             f"{right.wall_s:.0f}",
         ],
         [
@@ -60,6 +62,7 @@ def measure(options: Options) -> Found:
             "0",
             share(len(slipped), count),
             share(len(doubtful[1]), count),
+            str(wrong.again),
             f"{wrong.wall_s:.0f}",
         ],
     ]
@@ -68,6 +71,7 @@ def measure(options: Options) -> Found:
         "busy loops",
         "judged wrongly (asked: 0)",
         "inconclusive (asked: at most 5 %)",
+        "runs made again",
         "wall, s",
     ]
     return Found(
@@ -120,8 +124,9 @@ def _at_rate(hz: float, style: str, folder: Path) -> Path:
 
 def _graded(jobs: list[Job], side_by_side: int) -> Series:
     meter = Meter()
-    results = dict(graded(jobs, side_by_side))
-    return Series(results, meter.wall_s())
+    gradings = list(graded(jobs, side_by_side))
+    results = {one.name: one.result for one in gradings}
+    return Series(results, sum(one.again for one in gradings), meter.wall_s())
 
 
 def _lost(series: Series) -> Iterator[tuple[str, str]]:

@@ -8,9 +8,10 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 from benchmarks.figures import NotMeasured, Options
-from grader.batch.workers import Graded, Job, grade_all
+from grader.batch.workers import Job, grade_all
 from grader.evidence.reader import load_evidence
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
@@ -30,12 +31,26 @@ KINDS = {
 }
 """A correct submission, a counter that starts again wrongly, a wrong rate, a listener that prints nothing."""
 
+
+class Grading(NamedTuple):
+    """A result, and how many of its runs were made again."""
+
+    name: str
+    result: GradingResult
+    again: int
+
+
 Verdicts = dict[str, tuple[Status, float]]
 """Status and points of each criterion."""
 
 
 def cores() -> int:
     return len(os.sched_getaffinity(0))
+
+
+def in_flight() -> int:
+    """How many gradings keep all cores at work: they wait most of the time."""
+    return 4 * cores()
 
 
 @contextmanager
@@ -50,11 +65,13 @@ def folder_for(name: str, options: Options) -> Iterator[Path]:
         yield Path(folder)
 
 
-def graded(jobs: Sequence[Job], side_by_side: int) -> Iterator[tuple[str, GradingResult]]:
-    """Each result as it comes. Raises NotMeasured where there is none."""
-    for number, one in enumerate(grade_all(jobs, side_by_side, lambda _: None), 1):
+def graded(jobs: Sequence[Job], most: int) -> Iterator[Grading]:
+    """Each grading as it ends, `most` at a time. Raises NotMeasured where there is no result."""
+    for number, one in enumerate(grade_all(jobs, most, lambda _: None), 1):
         print(f"\r{number} of {len(jobs)} graded", end="", file=sys.stderr, flush=True)
-        yield one.name, _result(one)
+        if one.result is None:
+            raise NotMeasured(f"{one.name} was not graded: {one.error}")
+        yield Grading(one.name, one.result, one.again)
     print(file=sys.stderr)
 
 
@@ -66,9 +83,3 @@ def build_cpu_s(evidence: Path) -> float:
     """CPU seconds of the build, by the arena's own accounting."""
     events = [event for _, event in load_evidence([evidence / "package.mcap"])["package"].processes]
     return sum(event.cpu_s or 0.0 for event in events if event.role == "build" and event.event == "exit")
-
-
-def _result(one: Graded) -> GradingResult:
-    if one.result is None:
-        raise NotMeasured(f"{one.name} was not graded: {one.error}")
-    return one.result

@@ -13,9 +13,9 @@ from benchmarks.gradings import (
     LAB_POINTS,
     RUBRIC,
     build_cpu_s,
-    cores,
     folder_for,
     graded,
+    in_flight,
     verdicts_of,
 )
 from benchmarks.machine import Meter
@@ -33,6 +33,7 @@ class Batch(NamedTuple):
     own_cpu_s: float
     student_cpu_s: float
     build_cpu_s: float
+    again: int
     inconclusive: int
     faults: tuple[str, ...]
 
@@ -42,7 +43,7 @@ class Batch(NamedTuple):
 
 
 def measure(options: Options) -> Found:
-    count, times, side_by_side = options.count or COUNT, options.times or TIMES, options.jobs or cores()
+    count, times, side_by_side = options.count or COUNT, options.times or TIMES, options.jobs or in_flight()
     with folder_for("hundred", options) as folder:
         alone = _alone(folder / "alone")
         batches = [_batch(folder / str(turn), count, side_by_side, alone) for turn in range(times)]
@@ -58,7 +59,7 @@ def measure(options: Options) -> Found:
 def _alone(out: Path) -> dict[str, GradingResult]:
     """Each kind, one at a time."""
     jobs = [Job(name=kind, source=source, rubric=RUBRIC, out=out) for kind, source in KINDS.items()]
-    return dict(graded(jobs, 1))
+    return {one.name: one.result for one in graded(jobs, 1)}
 
 
 def _batch(out: Path, count: int, side_by_side: int, alone: dict[str, GradingResult]) -> Batch:
@@ -68,8 +69,9 @@ def _batch(out: Path, count: int, side_by_side: int, alone: dict[str, GradingRes
         for number, kind in enumerate(kinds)
     ]
     meter = Meter()
-    results = dict(graded(jobs, side_by_side))
+    gradings = list(graded(jobs, side_by_side))
     wall_s, all_s = meter.wall_s(), meter.own_cpu_s() + meter.children_cpu_s()
+    results = {one.name: one.result for one in gradings}
     others_s = sum(result.timing.student_cpu_s for result in results.values())
     build_s = sum(build_cpu_s(out / name / "evidence") for name in results)
     differing = [_differing(name, result, alone[name[4:]]) for name, result in sorted(results.items())]
@@ -78,6 +80,7 @@ def _batch(out: Path, count: int, side_by_side: int, alone: dict[str, GradingRes
         own_cpu_s=all_s - others_s,
         student_cpu_s=others_s - build_s,
         build_cpu_s=build_s,
+        again=sum(one.again for one in gradings),
         inconclusive=sum(_is_inconclusive(result) for result in results.values()),
         faults=tuple(fault for faults in differing for fault in faults),
     )
@@ -119,6 +122,7 @@ def _table(batches: list[Batch], count: int, wall_alone_s: float) -> str:
             Row("CPU of the builds", "s", [b.build_cpu_s for b in batches], "", 1),
             Row("the grader's own CPU / processes and builds", "", [b.ratio for b in batches], "at most 0.6"),
             Row("submissions with other verdicts than alone", "", [_others(b) for b in batches], "0", 0),
+            Row("runs made again", "", [b.again for b in batches], "", 0),
             Row("submissions left inconclusive", "", [b.inconclusive for b in batches], "", 0),
         ]
     )

@@ -66,7 +66,7 @@ def _table(many: list[Judged], single: list[Judged], count: int) -> str:
 def _recorded(out: Path) -> dict[Path, Verdicts]:
     """Each kind's folder of results, with what it got when it was recorded."""
     jobs = [Job(name=kind, source=source, rubric=RUBRIC, out=out) for kind, source in KINDS.items()]
-    return {out / name: verdicts_of(result.criteria) for name, result in graded(jobs, 1)}
+    return {out / one.name: verdicts_of(one.result.criteria) for one in graded(jobs, 1)}
 
 
 def _copied(folder: Path, recorded: dict[Path, Verdicts], count: int) -> dict[str, Verdicts]:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 
 
 def main() -> int:
     from grader.cli.main import run  # noqa: PLC0415 - keeps `python -m grader --help` quick to import
 
-    return run(sys.argv[1:])
+    code = run(sys.argv[1:])
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is said: a late Ctrl-C does not change how it ended
+    return code
 
 
 if __name__ == "__main__":

@@ -11,10 +11,11 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from platform import python_version
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from grader import __version__
 from grader.errors import EvidenceError, GraderError, SubmissionError, UsageError
@@ -51,6 +52,8 @@ if TYPE_CHECKING:
     from grader.arena.recording import Recorder, Recording
     from grader.arena.sandbox import Mode
 
+Judged: TypeAlias = tuple[dict[str, Run], tuple[CriterionResult, ...]]
+ROS_TYPES = "rosbags.typesys.stores.ros1_noetic"
 LATER = ("grader.evidence.decode", "grader.evidence.reader")
 """Slow to load, and needed by no verdict that the files alone decide. The arena is loaded when it is begun."""
 
@@ -96,12 +99,11 @@ def grade(
         with Results(out / submission.id) as results:
             if isinstance(submission, RecordedSubmission):
                 recording = None
-                criteria = _kept_and_judged(submission, rubric, results.evidence, progress)
+                runs, criteria = _kept_and_judged(submission, rubric, results.evidence, progress)
             else:
-                recording, criteria = _recorded_and_judged(
+                recording, runs, criteria = _recorded_and_judged(
                     submission, rubric, results.evidence, options, progress
                 )
-            runs = _load(results.evidence)
             graded = _result(submission, rubric, recording, criteria, clock)
             result = graded.model_copy(update={"notes": notes_of(runs)})
             console = console_log(runs)
@@ -127,7 +129,7 @@ def record(
             with _recorder(
                 submission, facts, rubric, results.evidence, options=options, progress=progress
             ) as recorder:
-                recorder.record_all(_load_modules)
+                recorder.record_all(partial(_load_modules, rubric))
                 _keep_scenarios(rubric, submission, results.evidence, progress)
                 names = [path.name for path in recorder.recording.files]
             results.commit()
@@ -187,12 +189,12 @@ def _opened_tree(
 
 def _kept_and_judged(
     submission: RecordedSubmission, rubric: LoadedRubric, evidence: Path, progress: Progress
-) -> tuple[CriterionResult, ...]:
+) -> Judged:
     if submission.file is None:
         _keep_scenarios(rubric, submission, evidence, progress)
     else:
         _keep_recording(submission.file, evidence)
-    return judge(rubric.rubric, _load(evidence), rubric.checks)
+    return _judged(evidence, rubric)
 
 
 def _keep_recording(file: Path, evidence: Path) -> None:
@@ -213,14 +215,17 @@ def _keep_scenarios(
     keep_scenarios(rubric.rubric, submission, evidence, progress)
 
 
-def _load(evidence: Path) -> dict[str, Run]:
+def _judged(evidence: Path, rubric: LoadedRubric) -> Judged:
     from grader.evidence.reader import load_evidence  # noqa: PLC0415 - see LATER
 
-    return load_evidence([evidence])
+    runs = load_evidence([evidence])
+    return runs, judge(rubric.rubric, runs, rubric.checks)
 
 
-def _load_modules() -> None:
-    for name in LATER:
+def _load_modules(rubric: LoadedRubric) -> None:
+    """Before it is needed. Only probes need ROS's own message types, hundreds of them."""
+    probes = any(scenario.probes for scenario in rubric.rubric.scenarios.values())
+    for name in (*LATER, *([ROS_TYPES] if probes else [])):
         import_module(name)
 
 
@@ -262,23 +267,23 @@ def _recorder(
 
 def _recorded_and_judged(
     submission: Submission, rubric: LoadedRubric, evidence: Path, options: GradeOptions, progress: Progress
-) -> tuple[Recording, tuple[CriterionResult, ...]]:
+) -> tuple[Recording, dict[str, Run], tuple[CriterionResult, ...]]:
     """What the evidence cannot say because the machine was late is recorded again, alone, at most twice."""
     facts = _facts(submission, progress)
     progress.early(lambda: _early(facts, rubric, options))
     from grader.arena.recording import RETRIES  # noqa: PLC0415 - see LATER
 
     with _recorder(submission, facts, rubric, evidence, options=options, progress=progress) as recorder:
-        recorder.record_all(_load_modules)
+        recorder.record_all(partial(_load_modules, rubric))
         _keep_scenarios(rubric, submission, evidence, progress)
-        criteria = judge(rubric.rubric, _load(evidence), rubric.checks)
+        runs, criteria = _judged(evidence, rubric)
         for _ in range(RETRIES):
             again = _inconclusive_scenarios(criteria, recorder.recording)
             if not again:
                 break
             recorder.record_again(again)
-            criteria = judge(rubric.rubric, _load(evidence), rubric.checks)
-    return recorder.recording, criteria
+            runs, criteria = _judged(evidence, rubric)
+    return recorder.recording, runs, criteria
 
 
 def _inconclusive_scenarios(criteria: tuple[CriterionResult, ...], recording: Recording) -> list[str]:

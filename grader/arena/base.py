@@ -156,7 +156,7 @@ def _file_name(place: Place) -> str:
         "kernel": [platform.system(), platform.release(), platform.machine()],
         "argv": spec["argv_shown"],
         "env": spec["env"],
-        "shims": sorted(path.name for path in (place.folder / "bin").iterdir()),
+        "shims": [name for name in PROGRAMS if (place.folder / "bin" / name).exists()],
         "files": list(_looks(place)),
     }
     return f"workspace-{hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()[:32]}.tar"

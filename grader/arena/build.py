@@ -23,6 +23,8 @@ from grader.package.cmake_written import written_calls
 
 BUILD_S = 120.0
 BUILD_EXPECTED_S = 2.0
+BASE_S = 1.0
+"""What is made beside the build is nearly there when that ends: lost, it would be made in every grading again."""
 STEP_S = 20.0
 ROSRUN_S = 4.0
 INCLUDED_MAX = 20
@@ -61,7 +63,7 @@ async def build(
         arena.course(ScenarioEvent(event="begin"))
         arena.start(place.spec("catkin_make", _catkin_make(place), role="build", build=True, collect=ARCHIVE))
         arena.start(place.spec("syntax", _syntax(place), role="grader", as_handed_in=True, collect=SYNTAX))
-        if wants_base:  # beside the build, on another core, and not waited for
+        if wants_base:  # beside the build, on another core
             arena.start(base_spec(place))
         ended = await arena.wait(lambda: "catkin_make" in arena.exit_codes, BUILD_S)
         if not ended:
@@ -71,6 +73,8 @@ async def build(
         built = await _with_setup(place, arena) if ok else place.from_source()
         for script in answers:
             await _answer(built, arena, script)
+        if wants_base and ended:
+            await arena.wait(lambda: BASE_NAME in arena.exit_codes, BASE_S)
         outcome = "complete" if ended else "timeout"
         arena.course(
             ScenarioEvent(event="end", outcome=outcome, detail="" if ended else f"build over {BUILD_S:g} s")

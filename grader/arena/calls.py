@@ -10,7 +10,6 @@ from grader.arena.place import Place
 from grader.arena.session import ArenaSession
 from grader.arena.workspace import read_untrusted
 from grader.evidence.events import ActorEvent
-from grader.evidence.services import ServiceType
 from grader.rubric.model import Call, Scenario
 
 ANSWER_S = 10.0
@@ -36,6 +35,8 @@ async def _offered(service: str, arena: ArenaSession, patience_s: float) -> bool
 
 
 async def _call(call: Call, arena: ArenaSession) -> None:
+    from grader.evidence.services import ServiceType  # noqa: PLC0415 - numpy, which not every run needs
+
     try:
         type_ = ServiceType(call.type, _text(call.type, "srv", arena.place) or "", _messages(arena.place))
         data = base64.b64encode(type_.encode_request(call.request)).decode()

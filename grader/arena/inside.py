@@ -38,6 +38,7 @@ QUESTIONS = (
 FIND_PKG = Path(__file__).parent / "ros" / "find_pkg.sh"
 EMPY = Path(__file__).parent / "ros" / "empy.py"
 EM = "lib/python3/dist-packages/em.py"
+ROSLAUNCH = Path(__file__).parent / "ros" / "roslaunch.py"
 
 
 def prepare(place: Path, ros: RosInstallation) -> None:
@@ -70,8 +71,19 @@ def _quicker(shims: Path, ros: RosInstallation) -> None:
     empy, modules = ros.program("empy"), [Path(prefix) / EM for prefix in (*ros.prefixes, "/usr")]
     module = next((path for path in modules if path.is_file()), None)
     if empy and module and _below_shebang(Path(empy)) == _below_shebang(module):
-        (shims / "empy").write_text(EMPY.read_text().replace("@EM@", str(module)))
-        (shims / "empy").chmod(0o755)
+        _filled_in(shims / "empy", EMPY, "@EM@", str(module))
+    roslaunch = ros.program("roslaunch")
+    if roslaunch and _starts_python(Path(roslaunch)):
+        _filled_in(shims / "roslaunch", ROSLAUNCH, "@PROGRAM@", roslaunch)
+
+
+def _filled_in(program: Path, source: Path, name: str, value: str) -> None:
+    program.write_text(source.read_text().replace(name, value))
+    program.chmod(0o755)
+
+
+def _starts_python(path: Path) -> bool:
+    return b"python" in path.read_bytes().partition(b"\n")[0]
 
 
 def _below_shebang(path: Path) -> bytes:

@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise, zip_longest
 from typing import Any, NamedTuple
 
-from grader.evidence.decode import definition, encode, md5sum
 from grader.rubric.model import Probe
 
 WORD_LETTERS = 6
@@ -63,6 +62,8 @@ def _before(shot: Shot, following: Shot) -> Shot:
 
 def advertisement(probe: Probe) -> dict[str, Any]:
     """The fields of the arena's command `advertise`."""
+    from grader.evidence.decode import definition, md5sum  # noqa: PLC0415 - numpy, which not every run needs
+
     return {
         "topic": probe.topic,
         "type": probe.type,
@@ -74,6 +75,8 @@ def advertisement(probe: Probe) -> dict[str, Any]:
 
 def publication(shot: Shot) -> dict[str, Any]:
     """The fields of the arena's command `publish`."""
+    from grader.evidence.decode import encode  # noqa: PLC0415 - as above
+
     record = {
         "action": "publish",
         "actor": "grader",

@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import cache
 from io import BufferedIOBase
 from pathlib import Path
 from types import TracebackType
@@ -121,8 +122,7 @@ class EvidenceStream:
         data = _encoded(record)
         channel = self._events.get(topic)
         if channel is None:
-            model = json.dumps(type(record).model_json_schema(), sort_keys=True).encode()
-            schema = self._schema(f"grader.{type(record).__name__}", "jsonschema", model)
+            schema = self._schema(f"grader.{type(record).__name__}", "jsonschema", _described(type(record)))
             channel = self._events[topic] = [self._mcap.register_channel(topic, "json", schema), 0]
         self._mcap.add_message(channel[0], log_time_ns, data, log_time_ns, channel[1])
         channel[1] += 1
@@ -132,6 +132,12 @@ class EvidenceStream:
         if key not in self._schemas:
             self._schemas[key] = self._mcap.register_schema(name, encoding, data)
         return self._schemas[key]
+
+
+@cache
+def _described(record: type[Record]) -> bytes:
+    """Its JSON schema, which pydantic takes its time to make."""
+    return json.dumps(record.model_json_schema(), sort_keys=True).encode()
 
 
 class EvidenceWriter(EvidenceStream):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from functools import cache
 from pathlib import Path
 
 from grader.checks import Check
@@ -16,7 +17,7 @@ from grader.rubric.faults import model_faults
 from grader.rubric.find import locate, rubric_ids, rubrics_folder
 from grader.rubric.instructor import Beside, read_instructor
 from grader.rubric.model import Rubric
-from grader.rubric.source import Source, read_source
+from grader.rubric.source import Source, read_source, text_at
 
 
 class LoadedRubric(Record):
@@ -70,13 +71,24 @@ def all_rubrics() -> tuple[LoadedRubric, ...]:
 
 def find_rubric_for_package(name: str) -> str | None:
     """The id of the rubric for a package of that name, or None. Raises UsageError where there are several."""
-    found = [r.rubric.id for r in all_rubrics() if r.rubric.package.lower() == name.lower()]
+    found = [
+        rubric_id
+        for rubric_id, package in _packages(rubrics_folder()).items()
+        if package.lower() == name.lower()
+    ]
     if len(found) > 1:
         raise UsageError(
             f"{len(found)} rubrics are for a package named {name}: {', '.join(found)}",
             hint="choose one with --rubric",
         )
     return found[0] if found else None
+
+
+@cache
+def _packages(folder: Path) -> dict[str, str]:
+    """The package of each rubric that comes with the grader: one line of its file, so the rest is not read."""
+    files = {name: folder / f"{name}.yaml" for name in rubric_ids()}
+    return {name: text_at(path, path.name, "package") for name, path in files.items()}
 
 
 def _faults(source: Source, beside: Beside) -> list[str]:

@@ -66,6 +66,29 @@ def read_source(path: Path, name: str) -> Source:
     return _compose(text, raw, name)
 
 
+def text_at(path: Path, name: str, key: str) -> str:
+    """What a file says at one key of its first level, read no further; empty where it says nothing there.
+
+    Raises RubricError where the file cannot be read up to there.
+    """
+    found, is_key, depth = "", False, 0
+    try:
+        for event in yaml.parse(_read(path, name), Loader=yaml.SafeLoader):
+            begins = isinstance(event, yaml.CollectionStartEvent)
+            if depth == 0 and isinstance(event, yaml.SequenceStartEvent):
+                break
+            if depth == 1 and isinstance(event, yaml.NodeEvent):
+                is_key = not is_key
+                value = str(event.value) if isinstance(event, yaml.ScalarEvent) else ""
+                if found == key and not is_key:
+                    return value
+                found = value
+            depth += begins - isinstance(event, yaml.CollectionEndEvent)
+    except yaml.YAMLError as error:
+        raise RubricError([f"{name}: is not YAML"]) from error
+    return ""
+
+
 def _read(path: Path, name: str) -> bytes:
     try:
         with path.open("rb") as file:

@@ -151,8 +151,8 @@ def test_a_first_build_makes_it_beside(tmp_path: Path, monkeypatch: pytest.Monke
         assert ok
         assert base.NAME in {event.name for _, event in run.processes}
         assert place.base.read_bytes() == b"learnt\n"
-        place.base.unlink()
-        assert has_base(place)
+    with make_place({"src/another.py": SCRIPT}) as another:
+        assert has_base(another)
 
 
 @pytest.mark.ros
@@ -225,3 +225,25 @@ def test_the_base_is_of_this_machine_as_it_is(
         assert spec["collect"]["file"] == str(place.base)
         monkeypatch.setattr(base, "SYSTEM", (*base.SYSTEM, str(tmp_path)))
         assert not has_base(place)
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("arguments", [["--help"], [], ["no_such_package", "lab.launch"]])
+def test_roslaunch_is_the_real_one(arguments: list[str], tmp_path: Path) -> None:
+    with make_place({}) as place:
+        real, shim = place.ros.program("roslaunch"), place.folder / "bin" / "roslaunch"
+        assert shim.is_file()
+        environment = {
+            "PATH": f"{place.folder / 'bin'}:{place.ros.env['PATH']}",
+            "HOME": str(tmp_path),
+            **{name: value for name, value in place.ros.env.items() if name != "PATH"},
+        }
+        done = [
+            subprocess.run([program, *arguments], env=environment, capture_output=True, check=False)
+            for program in (str(real), str(shim))
+        ]
+    assert (done[1].returncode, done[1].stdout, done[1].stderr) == (
+        done[0].returncode,
+        done[0].stdout,
+        done[0].stderr,
+    )

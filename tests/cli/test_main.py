@@ -199,7 +199,7 @@ def test_diagnosis_without_ros_names_the_command_that_mends_it(monkeypatch):
 @pytest.mark.parametrize("delay_s", [0.05, 0.1, 0.15, 0.2, 0.3])
 def test_an_interrupt_while_the_program_loads_is_quiet(delay_s, tmp_path):
     """Started is what has its handlers in place: the Python that runs before them is not ours."""
-    code = "import sys; from grader.cli.main import run; print(1, flush=True); sys.exit(run(sys.argv[1:]))"
+    code = "import sys, grader.cli.main; from grader.__main__ import main; print(1, flush=True); sys.exit(main())"
     command = [sys.executable, "-c", code, "grade", "/nonexistent/x", "--rubric", str(spoiled(tmp_path))]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path) as child:
         assert child.stdout.readline() == b"1\n"

@@ -8,6 +8,7 @@ from grader.errors import RubricError
 from grader.judge.judge import MANUAL
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import all_rubrics, find_rubric_for_package, load_rubric
+from grader.rubric.source import text_at
 from tests.rubric.samples import SOUND, faults, spoiled
 
 NAME = "must be lower-case letters, digits and hyphens, beginning with a letter"
@@ -247,6 +248,29 @@ def test_the_rubric_of_a_package():
     for loaded in all_rubrics():
         assert find_rubric_for_package(loaded.rubric.package.upper()) == loaded.rubric.id
     assert find_rubric_for_package("no_such_package") is None
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("a: {package: no}\nb: [package, x]\nc: package\npackage: lab1\nrest: {", "lab1"),
+        ("package: {name: lab1}\n", ""),
+        ("? [package]\n: x\n? package\n: lab1\n", "lab1"),
+        ("- package\n- lab1\n", ""),
+        ("", ""),
+    ],
+)
+def test_one_key_is_read_without_the_rest_of_the_file(text, found, tmp_path):
+    path = tmp_path / "lab.yaml"
+    path.write_text(text)
+    assert text_at(path, path.name, "package") == found
+
+
+def test_a_file_that_is_no_yaml_up_to_the_key_says_so(tmp_path):
+    path = tmp_path / "lab.yaml"
+    path.write_text("a: [\n")
+    with pytest.raises(RubricError, match=r"lab\.yaml: is not YAML"):
+        text_at(path, path.name, "package")
 
 
 def test_a_person_may_give_the_points(tmp_path):

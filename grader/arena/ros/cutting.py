@@ -1,7 +1,8 @@
 """Cuts what comes over a TCPROS connection into messages, each behind its length."""
 
-from tcpros import LENGTH
+import struct
 
+LENGTH = struct.Struct("<I")
 MESSAGE_BYTES_MAX = 16 << 20
 
 

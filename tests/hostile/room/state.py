@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import os
+import re
 import stat
+import tarfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from tests.hostile.room.canaries import OTHER, RESULTS
-from tests.hostile.room.world import World
+from tests.hostile.room.world import ORDINARY_UID, World
 
 Entry = tuple[object, ...]
 HASHED_BYTES_MAX = 32 << 20
@@ -21,6 +24,8 @@ SETTINGS = (
     "kernel/sysrq",
 )
 LISTENS, TIME_WAIT = "0A", "06"
+KEPT = re.compile(r"(?:root|home/[^/]+)/\.cache(?:/grader(?P<base>/workspace-[0-9a-f]{32}\.tar)?)?")
+BASE_MEMBERS = re.compile(r"grader-known(/[a-z_]+ [a-z-]+)?|build/CMakeCache\.txt|build/CMakeFiles/[\w./]+")
 
 
 def files(world: World) -> dict[str, Entry]:
@@ -36,6 +41,8 @@ def _walk(world: World) -> Iterator[tuple[str, Entry]]:
         for name in (*folders, *names):
             path = _join(here, name)
             found = os.stat(name, dir_fd=descriptor, follow_symlinks=False)
+            if _keeps(path, name, descriptor, found):
+                continue
             owner = (stat.filemode(found.st_mode), found.st_uid, found.st_gid)
             if stat.S_ISDIR(found.st_mode):
                 if not _same_folder(world, path, found):
@@ -51,6 +58,19 @@ def _walk(world: World) -> Iterator[tuple[str, Entry]]:
                         _content(name, descriptor, found),
                     ),
                 )
+
+
+def _keeps(path: str, name: str, descriptor: int, found: os.stat_result) -> bool:
+    """The base workspace that the grader keeps, with nothing else in it than what belongs there."""
+    kept = KEPT.fullmatch(path)
+    if kept is None or found.st_uid not in {0, ORDINARY_UID}:
+        return False
+    if kept["base"] is None or not stat.S_ISREG(found.st_mode):
+        return stat.S_ISDIR(found.st_mode)
+    with os.fdopen(os.open(name, os.O_RDONLY | os.O_NOFOLLOW, dir_fd=descriptor), "rb") as file:
+        data = file.read()[hashlib.sha256().digest_size :]
+    with tarfile.open(fileobj=io.BytesIO(data)) as tar:
+        return all(BASE_MEMBERS.fullmatch(member) for member in tar.getnames()) and b"HARM" not in data
 
 
 def _join(folder: str, name: str) -> str:

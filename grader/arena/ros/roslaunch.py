@@ -1,0 +1,29 @@
+#!/usr/bin/env python3
+"""Stands before `roslaunch`, and runs it. It asks distutils for one function; where setuptools gives its own distutils
+in place of Python's (`_distutils_hack`), all of setuptools would be loaded for that on every start."""
+
+import os
+import runpy
+import sys
+import warnings
+
+PROGRAM = "@PROGRAM@"
+
+
+def load_pythons_own_distutils():
+    hack = sys.modules.get("_distutils_hack")
+    if hasattr(hack, "remove_shim"):
+        hack.remove_shim()
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", DeprecationWarning)
+                import distutils.spawn  # noqa: F401, PLC0415 - by whoever asks first
+        except ImportError:  # a Python without: then it is setuptools' after all
+            hack.add_shim()
+
+
+if __name__ == "__main__":
+    load_pythons_own_distutils()
+    sys.argv[0] = PROGRAM
+    sys.path[0] = os.path.dirname(PROGRAM)
+    runpy.run_path(PROGRAM, run_name="__main__")
