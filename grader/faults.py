@@ -52,6 +52,8 @@ MACHINE = FULL | {
 AGAIN = "mend that (`grader doctor` looks at this machine), then grade again"
 NUMBER = re.compile(r"\[Errno (\d+)\]")
 UNEXPECTED = {EvidenceError.kind, GraderError.kind}
+NO_THREAD = "can't start new thread"
+"""What Python says where there is no memory for its stack, or too many run."""
 MEMORY = "grade fewer submissions side by side, or on a machine with more memory"
 REPORT = "run with --debug for the traceback, and report it; the submission can be graded again"
 
@@ -90,7 +92,7 @@ def told_apart(attempt: Attempt) -> Iterator[None]:
 
 def fault_of(error: BaseException) -> GraderError:
     """The error with its kind: the student's, the machine's or the grader's own."""
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or (isinstance(error, RuntimeError) and str(error) == NO_THREAD):
         return HostError("the grader ran out of memory", hint=MEMORY)
     if isinstance(error, GraderError) and not isinstance(error, (OutputError, SubmissionError)):
         return error if error.kind not in UNEXPECTED else _internal(error)

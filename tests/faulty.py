@@ -60,22 +60,25 @@ class Grading:
                 assert chunk, f"it ended without {words}: {self.err}"
                 self.err += chunk.decode(errors="replace")
 
-    def await_process(self, pattern: str) -> int:
-        """The id of the first process below it whose command line begins with what fits the pattern."""
+    def await_process(self, pattern: str, *, copy: bool = False) -> int:
+        """The id of the first process below it whose command line begins with what fits the pattern; with `copy`, of
+        the first that such a process has made of itself."""
         deadline = time.monotonic() + WAIT_S
         while time.monotonic() < deadline:
             for pid in below(self.process.pid):
                 if re.match(pattern, command(pid)):
-                    return pid
+                    copies = [child for child in below(pid) if re.match(pattern, command(child))]
+                    if not copy or copies:
+                        return copies[0] if copy else pid
             with suppress(subprocess.TimeoutExpired):
                 code = self.process.wait(LOOK_S)
                 raise AssertionError(f"it ended with {code} and never ran {pattern}")
         raise AssertionError(f"no process like {pattern}")
 
-    def kill(self, pattern: str) -> None:
+    def kill(self, pattern: str, *, copy: bool = False) -> None:
         """Kill such a process, as soon as there is one."""
         with suppress(ProcessLookupError):
-            os.kill(self.await_process(pattern), signal.SIGKILL)
+            os.kill(self.await_process(pattern, copy=copy), signal.SIGKILL)
 
     def end(self) -> int:
         """Its exit code."""

@@ -33,9 +33,9 @@ CATKIN_MAKE = r"\S*python3? \S*/catkin_make "
 WRITER = """
 import sys
 from grader.cli.main import run
-from grader.evidence.writer import EvidenceStream
-def message(self, **fields): raise MemoryError
-EvidenceStream.message = message
+from grader.evidence.writer import EvidenceChannel
+def message(*_): raise MemoryError
+EvidenceChannel.message = message
 sys.exit(run(sys.argv[1:]))
 """
 CLOCK = """
@@ -169,12 +169,24 @@ exec {open_path}/real "$@"
 
 def test_what_is_killed_once_is_done_once_more(out: Path) -> None:
     with grading(out) as hit:
-        for line, process in ((("build", "running"), CATKIN_MAKE), (("talker", "running"), ARENA)):
-            hit.await_line(*line)
-            hit.kill(process)
+        hit.await_line("build", "running")
+        hit.kill(CATKIN_MAKE)
+        hit.await_line("talker", "running")
+        hit.kill(ARENA, copy=True)
         hit.kill(BUBBLEWRAP)
         assert hit.end() == 0, hit.err
     assert "once more: catkin_make was killed" in hit.err
+    assert passed(result_in(out)) == ALL
+
+
+def test_the_template_of_the_arenas_is_killed(out: Path) -> None:
+    """What runs already runs on; what comes later has a new one."""
+    with grading(out) as hit:
+        hit.await_line("build", "running")
+        hit.kill(ARENA)
+        hit.await_line("talker", "running")
+        hit.kill(ARENA)
+        assert hit.end() == 0, hit.err
     assert passed(result_in(out)) == ALL
 
 

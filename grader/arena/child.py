@@ -7,9 +7,10 @@ import contextlib
 import json
 import os
 import signal
-import subprocess
 from collections.abc import Callable, Sequence
-from typing import IO, Any
+from typing import Any
+
+from grader.arena.template import start_arena
 
 READ_BYTES = 1 << 18
 STDERR_BYTES = 4096
@@ -17,9 +18,9 @@ CLOSE_S = 1.5
 
 
 class ArenaProcess:
-    """`take` gets each piece of its output, and empty bytes at the end.
+    """`take` gets each piece of its output, and empty bytes at the end. `cpu_s` is what making it took.
 
-    Started from the calling thread, because a sandbox ends with the thread that made it.
+    Raises ArenaError where it cannot be started.
     """
 
     def __init__(self, argv: Sequence[str], env: dict[str, str], take: Callable[[bytes], None]) -> None:
@@ -27,28 +28,26 @@ class ArenaProcess:
         self._ended = asyncio.Event()
         self._open: set[int] = set()
         self._errors = b""
-        self._popen = subprocess.Popen(
-            argv,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            bufsize=0,
-            env=env,
-            cwd="/",
-            start_new_session=True,
-        )
-        self._watch(self._popen.stdout, take)
-        self._watch(self._popen.stderr, self._keep_errors)
-
-    @property
-    def pid(self) -> int:
-        return self._popen.pid
+        pipes = [os.pipe() for _ in range(3)]
+        (commands_r, self._commands), (self._output, output_w), (self._words, words_w) = pipes
+        try:
+            self._template, self.pid, self.cpu_s = start_arena(argv, env, [commands_r, output_w, words_w])
+        except BaseException:
+            for number in (self._commands, self._output, self._words):
+                os.close(number)
+            raise
+        finally:
+            for number in (commands_r, output_w, words_w):
+                os.close(number)
+        self._watch(self._output, take)
+        self._watch(self._words, self._keep_errors)
 
     def send(self, command: dict[str, Any]) -> None:
         """One command, as a line of JSON. That it has ended is told by its output's end."""
-        if self._popen.stdin is not None:
-            with contextlib.suppress(BrokenPipeError):
-                self._popen.stdin.write(json.dumps(command).encode() + b"\n")
+        data = memoryview(json.dumps(command).encode() + b"\n")
+        with contextlib.suppress(BrokenPipeError):
+            while data:
+                data = data[os.write(self._commands, data) :]
 
     def last_words(self) -> str:
         """The last line that it wrote to stderr."""
@@ -57,29 +56,24 @@ class ArenaProcess:
     async def end(self) -> None:
         """End it: closed commands first, so that it ends what it started; then by force."""
         try:
-            if self._popen.stdin is not None:
-                self._popen.stdin.close()
+            os.close(self._commands)
             timer = self._loop.call_later(CLOSE_S, self._ended.set)
             await self._ended.wait()
             timer.cancel()
         finally:
             self._kill()
-            self._popen.wait()
+            self._template.forget(self.pid)
             for descriptor in self._open:
                 self._loop.remove_reader(descriptor)
-            for pipe in (self._popen.stdout, self._popen.stderr):
-                if pipe is not None:
-                    pipe.close()
+            for descriptor in (self._output, self._words):
+                os.close(descriptor)
 
     def _kill(self) -> None:
         """With its group: a bubblewrap that is killed while it starts leaves a second process that waits for ever."""
-        if self._popen.poll() is None:
-            os.killpg(self._popen.pid, signal.SIGKILL)
+        with contextlib.suppress(ProcessLookupError):  # all of it has ended
+            os.killpg(self.pid, signal.SIGKILL)
 
-    def _watch(self, pipe: IO[bytes] | None, take: Callable[[bytes], None]) -> None:
-        if pipe is None:
-            return
-        descriptor = pipe.fileno()
+    def _watch(self, descriptor: int, take: Callable[[bytes], None]) -> None:
         os.set_blocking(descriptor, False)
         self._open.add(descriptor)
 

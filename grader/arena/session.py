@@ -80,6 +80,7 @@ class ArenaSession:
     async def __aenter__(self) -> Self:
         argv = [self.place.ros.python, "-s", "-B", str(ARENA)]
         self._process = ArenaProcess(argv, self.place.arena_env(), self._read)
+        self.cpu_s += self._process.cpu_s
         try:
             self.send(**self._config())
             await self._await_ready()

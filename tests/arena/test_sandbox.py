@@ -163,7 +163,11 @@ def test_what_a_build_leaves_is_bounded(tmp_path: Path) -> None:
         with EvidenceWriter(path, scenario="package", clock="real", warp=1.0, metadata={}) as writer:
             asyncio.run(build(place, writer, [], []))
         assert not place.archive.exists()
-        assert {path.name for path in place.workspace.kept.iterdir()} <= {"base.tar", "syntax.jsonl", "environment"}
+        assert {path.name for path in place.workspace.kept.iterdir()} <= {
+            "base.tar",
+            "syntax.jsonl",
+            "environment",
+        }
         assert [path.name for path in place.workspace.built.iterdir()] == ["src"]
     assert limits_met(load_run(path)) == ["what the build left is more than 16 MB"]
 

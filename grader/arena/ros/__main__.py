@@ -20,9 +20,12 @@ from keys import leave_keys_behind
 from loop import Loop
 from network import enter_own_network
 from processes import Process, kill_orphans, reap_all
-from wire import Wire
+from template import stand_by
+from wire import Wire, set_clock
 
 PR_SET_CHILD_SUBREAPER = 36
+ROS = ("actor", "guard", "master", "owners", "recorder", "rpc", "services")
+"""What a run needs, and a build does not."""
 FINISH_S = 2.0
 REAP_S = 1.0
 
@@ -235,7 +238,9 @@ class Arena:
             process.reap()
 
 
-def main():
+def live():
+    """One arena's whole life."""
+    set_clock()
     libc = ctypes.CDLL(None, use_errno=True)
     libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     signal.signal(signal.SIGINT, lambda *_: None)  # ignored, it would be ignored by all that is started
@@ -262,4 +267,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    stand_by(live, ROS)

@@ -71,7 +71,7 @@ def _arenas(pid: int, depth: int) -> Iterator[int]:
     for child in _children(pid):
         command = _read(child, "cmdline")
         if ARENA in command and b"python" in command.partition(b"\0")[0]:
-            yield child
+            yield from _children(child)  # it is the template, of which the arenas are copies
         elif depth:
             yield from _arenas(child, depth - 1)
 
