@@ -77,7 +77,8 @@ class ParamEvent(Record):
 
 
 class HostEvent(Record):
-    """`/grader/host`: how late a timer of 20 ms (formerly 10) woke since the last such event (ms), and the load average."""
+    """`/grader/host`: how late a timer woke that asked for 20 ms each time, since the last such event (ms), and the
+    load average."""
 
     samples: int
     mean_ms: float
