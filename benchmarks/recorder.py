@@ -85,8 +85,9 @@ def _recorded(load: Load, folder: Path) -> Taken:
 
 
 def _climb(kind: Kind, seconds: float, record: Record) -> Measured:
-    asked = record(kind.load(kind.asked_hz, seconds))
-    if _kept(kind.load(kind.asked_hz, seconds), asked):
+    load = kind.load(kind.asked_hz, seconds)
+    asked = record(load)
+    if _kept(load, asked) or _keeps(load, record):
         return Measured(_up(kind, seconds, record), asked)
     return Measured(_down(kind, seconds, record), asked)
 
@@ -103,9 +104,9 @@ def _up(kind: Kind, seconds: float, record: Record) -> float:
 def _down(kind: Kind, seconds: float, record: Record) -> float:
     rate_hz = kind.asked_hz
     for _ in range(STEPS_MAX):
+        rate_hz /= STEP
         if _keeps(kind.load(rate_hz, seconds), record):
             return rate_hz
-        rate_hz /= STEP
     return 0.0
 
 
