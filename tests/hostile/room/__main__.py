@@ -110,6 +110,7 @@ class Room:
         env = {
             **{name: os.environ[name] for name in KEPT if name in os.environ},
             "HOME": str(self._home), "LANG": "C.UTF-8", "TMPDIR": str(canaries.SCRATCH),
+            "XDG_RUNTIME_DIR": str(canaries.RUNTIME),
             "PYTHONPATH": str(self._python_path), "PYTHONDONTWRITEBYTECODE": "1",
             "GITHUB_TOKEN": f"{secret}-environment", "ROS_MARKS_PASSWORD": f"{secret}-environment-ros",
             **env,

@@ -13,6 +13,7 @@ TOP = Path("/srv/grading")
 HANDED_IN = TOP / "handed-in"
 RESULTS = TOP / "results"
 SCRATCH = TOP / "scratch"
+RUNTIME = TOP / "runtime"
 RUBRIC = TOP / "course" / "rubric.yaml"
 OTHER = HANDED_IN / "other-student"
 PORT = 8080
@@ -25,6 +26,8 @@ def place(secret: str, rubric: str, home: Path) -> None:
     for folder in (HANDED_IN, RESULTS, SCRATCH, RUBRIC.parent, OTHER):
         folder.mkdir(parents=True)
     SCRATCH.chmod(0o1777)
+    RUNTIME.mkdir(mode=0o700)
+    os.chown(RUNTIME, home.stat().st_uid, home.stat().st_gid)
     shadow = Path("/etc/shadow")
     shadow.write_text(f"root:{secret}-shadow:19000:0:99999:7:::\n", encoding="utf-8")
     shadow.chmod(0o640)

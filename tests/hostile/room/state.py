@@ -11,7 +11,7 @@ import tarfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from tests.hostile.room.canaries import OTHER, RESULTS
+from tests.hostile.room.canaries import OTHER, RESULTS, RUNTIME
 from tests.hostile.room.world import ORDINARY_UID, World
 
 Entry = tuple[object, ...]
@@ -25,6 +25,8 @@ SETTINGS = (
 )
 LISTENS, TIME_WAIT = "0A", "06"
 KEPT = re.compile(r"(?:root|home/[^/]+)/\.cache(?:/grader(?P<base>/workspace-[0-9a-f]{32}\.tar)?)?")
+LOCKS = re.compile(str(RUNTIME).lstrip("/") + r"/ros-lab-grader(?P<file>/(turn|runs|lateness|start-\d+))?")
+LOCK_BYTES_MAX = 1024
 BASE_MEMBERS = re.compile(r"grader-known(/[a-z_]+ [a-z-]+)?|build/CMakeCache\.txt|build/CMakeFiles/[\w./]+")
 
 
@@ -61,8 +63,15 @@ def _walk(world: World) -> Iterator[tuple[str, Entry]]:
 
 
 def _keeps(path: str, name: str, descriptor: int, found: os.stat_result) -> bool:
-    """The base workspace that the grader keeps, with nothing else in it than what belongs there."""
-    kept = KEPT.fullmatch(path)
+    """What graders share: locks without content, and the base workspace with nothing in it but what belongs there."""
+    kept, lock = KEPT.fullmatch(path), LOCKS.fullmatch(path)
+    if lock is not None:
+        plain = stat.S_ISREG(found.st_mode) if lock["file"] else stat.S_ISDIR(found.st_mode)
+        return (
+            plain
+            and found.st_uid in {0, ORDINARY_UID}
+            and (not lock["file"] or found.st_size <= LOCK_BYTES_MAX)
+        )
     if kept is None or found.st_uid not in {0, ORDINARY_UID}:
         return False
     if kept["base"] is None or not stat.S_ISREG(found.st_mode):
