@@ -80,9 +80,7 @@ class Steps:
     def early(self, verdicts: Callable[[], tuple[EarlyVerdict, ...]]) -> None:
         """Show what the files alone decide, where that is asked for."""
         if self.tell is not None:
-            found = verdicts()
-            with self.lock:
-                self.tell(found)
+            self.tell(verdicts())
 
     def told(self, before: Step | None, after: Step, now_s: float) -> None:
         """For those who show something at each call."""

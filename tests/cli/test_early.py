@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import io
 import sys
+from functools import partial
 
 import pytest
 from hypothesis import given, settings
 from rich.console import Console
+from rich.live import Live
 
+from grader.cli.display import LiveSteps
 from grader.cli.early import print_early
 from grader.cli.main import run
 from grader.model.progress import Silence
@@ -99,6 +102,17 @@ def test_above_a_display_they_look_the_same(capsys) -> None:
     print_early((PASSED, FAILED), above=console.print)
     assert [row.rstrip() for row in out.getvalue().splitlines()][:3] == SHOWN.splitlines()[:3]
     assert capsys.readouterr().out == ""
+
+
+def test_a_live_display_goes_on_below_them() -> None:
+    out = Terminal()
+    console = Console(file=out, width=80, force_terminal=True, color_system=None)
+    steps = LiveSteps(tell=partial(print_early, above=console.print))
+    with Live(steps, console=console, auto_refresh=False):
+        steps.step("package", "done")
+        steps.early(lambda: (PASSED, FAILED))
+    assert "names lab1" in out.getvalue()
+    assert "package" in out.getvalue()[out.getvalue().rindex("so far:") :]
 
 
 def test_without_a_verdict_there_is_no_title(capsys) -> None:
