@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from benchmarks.busy import busy_loops
 from benchmarks.figures import Found, NotMeasured, Options, share, table
-from benchmarks.gradings import DATA, cores, folder_for, graded
+from benchmarks.gradings import DATA, folder_for, graded, in_flight
 from benchmarks.machine import Meter
 from grader.batch.workers import Job
 from grader.model.result import CriterionResult, GradingResult
@@ -40,7 +40,7 @@ class Series(NamedTuple):
 
 
 def measure(options: Options) -> Found:
-    count, side_by_side = options.count or COUNT, options.jobs or cores()
+    count, side_by_side = options.count or COUNT, options.jobs or in_flight()
     loops = LOOPS if options.loops is None else options.loops[0]
     with folder_for("fair", options) as folder:
         with busy_loops(loops):

@@ -12,7 +12,7 @@ from benchmarks.ros import hztest, hztest_workspace
 from grader.batch.workers import Job
 from grader.model.verdict import Status
 
-COUNT, LOOPS = 10, (0, 4, 8, 16)
+COUNT, LOOPS = 5, (0, 4, 8, 16)
 PACKAGE = DATA / "pulse" / "rate"
 CRITERION = "rate"
 

@@ -17,7 +17,7 @@ from benchmarks.arena import Load, Taken
 from benchmarks.figures import Found, Options, mid, table
 from benchmarks.gradings import folder_for
 
-TIMES, SECONDS = 3, 5.0
+TIMES, SECONDS = 3, 3.0
 STEP, STEPS_MAX = 1.5, 6
 LATE_SHARE, BEHIND_S = 0.02, 0.5
 BYTES_MAX = 600_000_000
