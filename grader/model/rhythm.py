@@ -16,6 +16,8 @@ ROUNDING = 1e-6
 CONFIDENCE = 1.96
 LEAST_GAPS = 5
 CLEAR_GAPS = 20
+FLOOD = 5
+"""So many times too fast, nothing that comes later helps."""
 
 
 class Rhythm(Record):
@@ -103,4 +105,5 @@ class RateBounds(Record):
         least_hz, most_hz = found.mean_hz - found.interval_hz, found.mean_hz + found.interval_hz
         right = self.low_hz <= least_hz and most_hz <= self.high_hz
         even = right and not found.outside(self.low_gap_ns, self.high_gap_ns)
-        return even or most_hz < self.low_hz or least_hz > self.high_hz
+        flood = found.mean_hz > FLOOD * self.high_hz
+        return even or flood or most_hz < self.low_hz or least_hz > self.high_hz

@@ -85,6 +85,7 @@ def _rated(gaps_s: list[float], *topics: str, chosen: tuple[str, ...] = ("/a",))
         ([0.1] * 50 + [0.2], False),  # a gap that another one may show to be a rule
         ([0.0] * 9 + [1.0], False),
         (([0.0] * 9 + [1.0]) * 6, False),  # bursts: the mean is right
+        ([0.0, 0.001, 0.01] * 500, True),  # a flood, and an uneven one
         ([0.3] * 18, False),  # too few to say anything
         ([0.3] * 21, True),
     ],
