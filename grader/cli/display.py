@@ -150,7 +150,7 @@ def open_progress(*, early: bool = False) -> Iterator[Progress]:
         yield PlainSteps(sys.stderr, tell=print_early if early else None)
         return
     above = console.print if sys.stdout.isatty() else None
-    tell = partial(print_early, above=above)
+    tell = partial(print_early, above=above, width=console.width)
     steps = LiveSteps(rows=console.height - 1, tell=tell if early else None)
     with Live(
         steps,

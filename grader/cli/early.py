@@ -5,28 +5,38 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 
+from rich.console import Console
 from rich.text import Text
 
 from grader.cli.say import say
 from grader.model.result import EarlyVerdict
 from grader.report.terminal import STYLES, mark
 from grader.report.text import line, visible
+from grader.shown import uncommanded
 
 TITLE = "Your files, before anything is built or run:"
 SO_FAR = "so far: the build may still settle it otherwise"
 MESSAGE_CHARS = 300
 INDENT = 2
+ESCAPE = 8
+"""So much longer may a line become that is written out."""
 
 
-def print_early(verdicts: tuple[EarlyVerdict, ...], above: Callable[[Text], None] | None = None) -> None:
-    """Print to stdout at once, or by `above` where a display is in the way: a line each, and what mends a loss."""
+def print_early(
+    verdicts: tuple[EarlyVerdict, ...], above: Callable[[Text], None] | None = None, *, width: int = 80
+) -> None:
+    """Print to stdout at once, or by `above` where a display is in the way: a line each, and what mends a loss.
+
+    Lines for a display are at most `width` columns wide.
+    """
     if not verdicts:
         return
     for row in _rows(verdicts, sys.stdout.encoding or "ascii"):
         if above is None:
             say(row.plain)
         else:
-            above(row)
+            for part in _wrapped(row, width):
+                above(part)
     sys.stdout.flush()
 
 
@@ -46,6 +56,13 @@ def _rows(verdicts: tuple[EarlyVerdict, ...], encoding: str) -> Iterator[Text]:
     if not all(verdict.final for verdict in verdicts):
         yield Text(f"{' ' * INDENT}({SO_FAR})", "dim")
     yield Text()
+
+
+def _wrapped(row: Text, width: int) -> Iterator[Text]:
+    """Its lines as a terminal shows them, none of which a CI system takes for a command."""
+    for part in row.wrap(Console(width=width), width - ESCAPE, overflow="fold") or [row]:
+        harmless = uncommanded(part.plain)
+        yield part if harmless == part.plain else Text(harmless, part.style)
 
 
 def _word(verdict: EarlyVerdict) -> str:

@@ -7,7 +7,7 @@ import sys
 from functools import partial
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from rich.console import Console
 from rich.live import Live
 
@@ -122,6 +122,8 @@ def test_without_a_verdict_there_is_no_title(capsys) -> None:
 
 @settings(max_examples=40)
 @given(TEXTS, TEXTS)
+@example("0" * 60 + " ::error::x", "")
+@example("0" * 49 + "::" * 40, "::" * 120)
 def test_a_students_words_steer_nothing(message, hint) -> None:
     hostile = criterion("talker", "fail", 0, 5, message=message, hint=hint)
     above, out = io.StringIO(), io.StringIO()
