@@ -28,7 +28,7 @@ from grader.rubric.model import Rubric
 ROOT = Path(__file__).resolve().parent.parent
 GIT = shutil.which("git") or "git"
 REFERENCE = "reference"
-SIDE_BY_SIDE = 8  # they wait most of the time, and take turns at starting
+SIDE_BY_SIDE = 4  # they wait most of the time, and take turns at starting
 
 
 class Fixture(Record):

@@ -163,7 +163,7 @@ def _file_name(place: Place) -> str:
 
 
 def _looks(place: Place) -> Iterator[tuple[str, int, int, int]]:
-    """The files and folders in which a change of the machine shows.."""
+    """The files and folders in which a change of the machine shows."""
     path = place.ros.env["PATH"]
     programs = [shutil.which(name, path=path) for name in PROGRAMS]
     roots = ("/usr", "/usr/local", *place.ros.prefixes, *_entries(place.ros.env.get("CMAKE_PREFIX_PATH", "")))

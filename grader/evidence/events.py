@@ -77,14 +77,15 @@ class ParamEvent(Record):
 
 
 class HostEvent(Record):
-    """`/grader/host`: how late a timer woke that asked for 20 ms each time, since the last such event (ms), and the
-    load average."""
+    """`/grader/host`: how late a timer woke that asked for 20 ms each time, since the last such event (ms), the load
+    average, and the share of the processors' time that was busy (0 to 1)."""
 
     samples: int
     mean_ms: float
     p95_ms: float
     max_ms: float
     load_1min: float
+    busy: float | None = None
 
 
 class ActorEvent(Record):

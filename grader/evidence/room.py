@@ -6,7 +6,7 @@ HELD_BYTES_MAX = 192 << 20
 """More than the arena records of one submission (`arena/limits.py`)."""
 FOREIGN_BYTES_MAX = 96 << 20
 """Of another tool's recordings, which have to be unpacked beside it."""
-DECODED_BYTES_MAX = 96 << 20
+DECODED_BYTES_MAX = 160 << 20
 RECORD_BYTES = 150
 """What a message takes beside its own bytes, about."""
 LESS = "record the lab's topics only: `rosbag record /topic …`, or cut it with `rosbag filter`"

@@ -43,7 +43,11 @@ def _two(anonymous: bool) -> tuple[dict[str, str], Scenario]:
         Start(name="second", script="sender.py", after="first"),
     )
     scenario = Scenario(
-        title="two", start=starts, until=Until(messages={"/data": 50}, silent_s=3, first_message_s=10)
+        title="two",
+        start=starts,
+        until=Until(
+            messages={"/data": 50}, ended=() if anonymous else ("first",), silent_s=3, first_message_s=10
+        ),
     )
     return {"scripts/sender.py": SENDER.format(anonymous)}, scenario
 

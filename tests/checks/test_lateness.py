@@ -130,3 +130,13 @@ def test_the_verdict_says_what_the_machine_did() -> None:
     verdict = rate(NO_FACTS, run_of([107] * 60, BUSY), RateParams(topic="/chatter", rate_hz=10))
     assert "machine late by 7 ms, calibration 9.35 Hz" in str(verdict.measured)
     assert "the grading machine was late itself" in verdict.message
+
+
+def test_how_busy_the_machine_was_is_said() -> None:
+    run = run_of([100] * 60, IDLE)
+    host = tuple((t, e.model_copy(update={"busy": 0.5 + 0.5 * (i % 2)})) for i, (t, e) in enumerate(run.host))
+    found = lateness(Run(**{**run.__dict__, "host": host}), START_NS, run.end_ns)
+    assert found is not None
+    assert found.busy == pytest.approx(0.75, abs=0.05)
+    assert found.described.startswith("machine 7")
+    assert "% busy and late by 0 ms, calibration 9.99 Hz" in found.described

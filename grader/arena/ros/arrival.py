@@ -9,6 +9,7 @@ from wire import now_ns
 SO_TIMESTAMPNS = 35
 TIMESPEC = struct.Struct("@ll")
 SPACE = socket.CMSG_SPACE(TIMESPEC.size)
+APART_NS_MAX = 100_000
 AGE_NS_MAX = 5 * 10**9
 """Older ones come from a clock that was set meanwhile."""
 
@@ -25,19 +26,23 @@ def note_arrivals(sock):
 def receive(sock, size):
     """(bytes, when the last of them arrived, on the arena's clock). Raises what `recv` raises."""
     data, notes, _, _ = sock.recvmsg(size, SPACE)
-    return data, now_ns() - _age_ns(notes)
+    return data, _arrived_ns(notes)
 
 
 def receive_into(sock, view):
     """(how many bytes, when the last of them arrived)."""
     count, notes, _, _ = sock.recvmsg_into([view], SPACE)
-    return count, now_ns() - _age_ns(notes)
+    return count, _arrived_ns(notes)
 
 
-def _age_ns(notes):
+def _arrived_ns(notes):
+    """The kernel's time is the wall clock's: how long ago that was tells it on the arena's clock."""
     for level, kind, value in notes:
         if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS and len(value) >= TIMESPEC.size:
             seconds, nanoseconds = TIMESPEC.unpack_from(value)
-            age_ns = time.time_ns() - seconds * 10**9 - nanoseconds
-            return age_ns if 0 <= age_ns < AGE_NS_MAX else 0
-    return 0
+            before_ns, wall_ns, after_ns = now_ns(), time.time_ns(), now_ns()
+            if after_ns - before_ns > APART_NS_MAX:  # somebody else had the processor between the two clocks
+                before_ns, wall_ns = now_ns(), time.time_ns()
+            age_ns = wall_ns - seconds * 10**9 - nanoseconds
+            return before_ns - age_ns if 0 <= age_ns < AGE_NS_MAX else before_ns
+    return now_ns()

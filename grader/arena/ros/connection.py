@@ -38,7 +38,7 @@ class Connection:
         self._filled = self._skip = 0
         self._messages = self._dropped = 0
         self._waste = None
-        self._looked_ns = self._busy = 0
+        self._looked_ns = self._handed_on_ns = self._busy = 0
         self._closed = self._opened = self._broken = self._behind = False
         self._watched = self._paused = False
         self._held = []
@@ -189,6 +189,8 @@ class Connection:
         self._broken = True
 
     def _hand_on(self, pieces, messages, time_ns):
+        """None of them is earlier than those before it."""
+        time_ns = self._handed_on_ns = max(self._handed_on_ns, time_ns)
         self._messages += messages
         if self._opened:
             self._recorder.wire.messages(self._account.channel, pieces, time_ns)

@@ -15,10 +15,19 @@ def peak_bytes():
     return int(found[0]) * 1024 if found else 0
 
 
+def processor_ticks():
+    """(busy, all) of all processors since the machine started (man 5 proc_stat)."""
+    with open("/proc/stat") as file:
+        user, nice, system, idle, iowait, *rest = [int(word) for word in file.readline().split()[1:9]]
+    busy = user + nice + system + sum(rest)
+    return busy, busy + idle + iowait
+
+
 class Lateness:
     def __init__(self, wire):
         self._wire = wire
         self._stopping = False
+        self._ticks = processor_ticks()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def start(self):
@@ -44,11 +53,14 @@ class Lateness:
 
     def _report(self, late_ms):
         late_ms.sort()
+        (busy_before, all_before), self._ticks = self._ticks, processor_ticks()
+        busy, ticks = self._ticks
         record = {
             "samples": len(late_ms),
             "mean_ms": round(sum(late_ms) / len(late_ms), 3),
             "p95_ms": round(late_ms[int(0.95 * (len(late_ms) - 1))], 3),
             "max_ms": round(late_ms[-1], 3),
             "load_1min": round(os.getloadavg()[0], 2),
+            "busy": round((busy - busy_before) / max(1, ticks - all_before), 3),
         }
         self._wire.event("/grader/host", record)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -20,7 +20,7 @@ class Lateness(NamedTuple):
     """In ms: the mean, the 95th percentile and the most, the larger of what timer and calibration say.
 
     `sleep_ms` is what a sleep of 0.1 s took too long in the mean, `calibration_hz` the rate of a loop of such sleeps;
-    None where no calibration was recorded.
+    None where no calibration was recorded. `busy` is the share of the processors' time that was taken.
     """
 
     mean_ms: float
@@ -28,11 +28,13 @@ class Lateness(NamedTuple):
     max_ms: float
     sleep_ms: float | None = None
     calibration_hz: float | None = None
+    busy: float | None = None
 
     @property
     def described(self) -> str:
-        """`machine late by 3 ms, calibration 9.97 Hz`."""
-        late = f"machine late by {self.max_ms:.0f} ms"
+        """`machine 97 % busy and late by 3 ms, calibration 9.97 Hz`."""
+        busy = "" if self.busy is None else f" {self.busy * 100:.0f} % busy and"
+        late = f"machine{busy} late by {self.max_ms:.0f} ms"
         return late if self.calibration_hz is None else f"{late}, calibration {self.calibration_hz:.2f} Hz"
 
 
@@ -49,6 +51,7 @@ def lateness(run: Run, from_ns: int, to_ns: int) -> Lateness | None:
         max(timer.max_ms, *sleeps),
         sleep_ms=mean_ms,
         calibration_hz=1e3 / (PERIOD_NS / 1e6 + mean_ms),
+        busy=timer.busy,
     )
 
 
@@ -61,7 +64,12 @@ def _timer(run: Run, from_ns: int, to_ns: int) -> Lateness:
         max((e.mean_ms for e in events), default=0.0),
         max((e.p95_ms for e in events), default=0.0),
         max((e.max_ms for e in events), default=0.0),
+        busy=_mean([e.busy for e in events if e.busy is not None]),
     )
+
+
+def _mean(shares: Sequence[float]) -> float | None:
+    return statistics.fmean(shares) if shares else None
 
 
 def _sleeps_ms(channel: Channel, from_ns: int, to_ns: int) -> Iterator[float]:
