@@ -135,6 +135,14 @@ def below(pid: int) -> list[int]:
     return found
 
 
+def ended(pid: int) -> bool:
+    """Whether it ends in good time: one that has been killed is there for a moment yet."""
+    deadline = time.monotonic() + WAIT_S
+    while command(pid) and time.monotonic() < deadline:
+        time.sleep(LOOK_S)
+    return not command(pid)
+
+
 def command(pid: int) -> str:
     try:
         return Path("/proc", str(pid), "cmdline").read_bytes().decode(errors="replace").replace("\0", " ")

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.faulty import GRADER, ROOM, ROOT, command, grading, result_in, why_not
+from tests.faulty import GRADER, ROOM, ROOT, ended, grading, result_in, why_not
 
 pytestmark = [
     pytest.mark.ros,
@@ -50,7 +50,7 @@ def test_git_ends_with_the_grader(open_path: Path) -> None:
         asking = one.await_process("sleep 60")
         os.kill(one.await_process(GRADER), signal.SIGKILL)
         one.await_line("and then")
-        assert command(asking) == ""
+        assert ended(asking)
     assert not (open_path / "out").exists()
 
 
