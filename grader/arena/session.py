@@ -238,7 +238,7 @@ class ArenaSession:
             self.live.services = set(record["services"])
         elif topic == "/grader/console":
             self._killed.printed(record["process"], record["line"])
-            if record["process"] not in self.live.helpers:
+            if record["process"] in self.live.running | self.live.ended:
                 self.live.printed(record["line"], time.monotonic())
         elif topic == "/grader/process" and record["event"] == "exit":
             self._exited(record)
