@@ -76,14 +76,17 @@ def test_as_many_starts_as_there_are_cores_in_the_order_of_asking(tmp_path: Path
 
 
 def test_a_start_that_is_over_makes_room_before_its_run_ends(tmp_path: Path) -> None:
-    async def main() -> None:
+    async def main() -> list[str]:
         admission = Admission(tmp_path, starts=1)
         async with admission.start() as first:
             first.release()
             first.release()
+            order = ["released"]
             await asyncio.wait_for(once(admission), PATIENCE_S)
+            order.append("another started")
+        return [*order, "the run ended"]
 
-    asyncio.run(main())
+    assert asyncio.run(main()) == ["released", "another started", "the run ended"]
 
 
 def test_a_late_machine_starts_fewer_but_always_one(tmp_path: Path) -> None:
