@@ -21,7 +21,7 @@ ALLOWED = {
     "errors": set[str](),
     "shown": set[str](),
     "standins": set[str](),
-    "admission": set[str](),
+    "admission": {"files"},
     "files": {"errors"},
     "temporary": {"errors", "files"},
     "results": {"errors", "files"},

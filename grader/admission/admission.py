@@ -45,7 +45,7 @@ class Admission:
 
     def __init__(self, folder: Path | None, *, starts: int | None = None) -> None:
         self._folder = folder
-        self._starts = starts or os.cpu_count() or 1
+        self._starts = starts or len(os.sched_getaffinity(0))
         self._next = asyncio.Lock()
 
     @asynccontextmanager

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 from pathlib import Path
 
 from typing_extensions import Self
+
+from grader.files import lock
 
 
 class FileLock:
@@ -27,12 +28,7 @@ class FileLock:
 
     def take(self, *, shared: bool = False) -> bool:
         """Lock it, or change how it is locked; False, and not locked, where somebody else's lock is in the way."""
-        kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
-        try:
-            fcntl.flock(self._descriptor, kind | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return False
-        return True
+        return lock(self._descriptor, shared=shared)
 
     def close(self) -> None:
         """Give it free; a second time without effect."""
