@@ -43,6 +43,7 @@ ALLOWED = {
     "authoring": {
         *BASE, "checks", "evidence", "intake", "package", "pipeline", "rubric", "temporary"
     },
+    "roster": BASE | {"intake"},
     "batch": BASE | {"evidence", "judge", "pipeline", "rubric"},
     "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
     "cli": {

@@ -1,0 +1,34 @@
+"""A roster from what an instructor has: a CSV file, a folder, or an export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from grader.errors import UsageError
+from grader.roster.entries import entries_of
+from grader.roster.exports import from_gitlab, is_classroom, with_classroom_columns
+from grader.roster.folder import from_folder
+from grader.roster.model import Roster
+from grader.roster.table import read_table
+
+
+def read_roster(path: Path) -> Roster:
+    """Every submission that the roster names, and every fault that it has.
+
+    `path` is a CSV file with the columns `id,source[,ref][,name][,group][,submitted_at][,extension_days]`, an export of
+    GitHub Classroom (CSV) or of a GitLab group (the JSON of its projects), or a folder with a submission in each of its
+    entries. Raises UsageError where it is none of these, or names no submission at all.
+    """
+    if path.is_dir():
+        roster = from_folder(path)
+    elif path.suffix.lower() == ".json":
+        roster = from_gitlab(path)
+    else:
+        table = read_table(path)
+        table = with_classroom_columns(table, path.name) if is_classroom(table) else table
+        roster = entries_of(table, path)
+    if not roster.entries and not roster.faults:
+        raise UsageError(
+            f"{path}: no submission in it", hint="each is a row with id and source, or an entry of a folder"
+        )
+    return roster
