@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from grader.model.handed_in import AppliedOverride, Lateness
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, FileCitation, Status
 
@@ -85,6 +86,8 @@ class ErrorInfo(Record):
 
 
 class GradingResult(Record):
+    """`points` are those that count in the end: with what a person decided, and without what being late cost."""
+
     schema_: Literal["grader.result/1"] = Field(default="grader.result/1", alias="schema")
     submission: SubmissionInfo
     rubric: RubricInfo
@@ -95,4 +98,6 @@ class GradingResult(Record):
     environment: EnvironmentInfo
     timing: TimingInfo
     notes: tuple[Note, ...] = ()
+    overrides: tuple[AppliedOverride, ...] = ()
+    late: Lateness | None = None
     error: ErrorInfo | None = None

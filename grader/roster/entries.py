@@ -10,7 +10,7 @@ from pathlib import Path
 
 from grader.errors import UsageError
 from grader.intake.names import safe_name
-from grader.roster.model import Entry, Roster
+from grader.model.roster import Entry, Roster
 from grader.roster.table import Row, Table
 
 REQUIRED = ("id", "source")

@@ -8,7 +8,7 @@ from typing import Any
 
 from grader.errors import UsageError
 from grader.intake.names import printable, safe_name
-from grader.roster.model import Entry, Roster
+from grader.model.roster import Entry, Roster
 from grader.roster.table import Row, Table
 
 CLASSROOM = {

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from grader.errors import UsageError
 from grader.intake.names import archive_stem, is_archive_name, printable, safe_name
-from grader.roster.model import Entry, Roster
+from grader.model.roster import Entry, Roster
 from grader.roster.platforms import Named, platform_name
 
 IGNORED = {"__MACOSX", "Thumbs.db", "desktop.ini"}

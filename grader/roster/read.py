@@ -8,7 +8,7 @@ from grader.errors import UsageError
 from grader.roster.entries import entries_of
 from grader.roster.exports import from_gitlab, is_classroom, with_classroom_columns
 from grader.roster.folder import from_folder
-from grader.roster.model import Roster
+from grader.model.roster import Roster
 from grader.roster.table import read_table
 
 

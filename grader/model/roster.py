@@ -28,13 +28,24 @@ class Entry(Record):
     extra: Mapping[str, str] = Field(default_factory=dict)
 
 
+class RosterFault(Record):
+    """An entry that cannot be graded: where it stands (`roster.csv:7`), its id where it has one of its own, and why."""
+
+    where: str
+    id: str | None = None
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.text}"
+
+
 class Roster(Record):
     """The submissions of a class, in the order of the roster; `columns` are the names of the further columns.
 
-    `faults` are entries that cannot be graded, one line each: the others can.
+    `faults` are entries that cannot be graded: the others can.
     """
 
     file: str
     entries: tuple[Entry, ...]
     columns: tuple[str, ...] = ()
-    faults: tuple[str, ...] = ()
+    faults: tuple[RosterFault, ...] = ()

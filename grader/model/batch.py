@@ -1,0 +1,50 @@
+"""`run.json`: what a batch was asked to do and how far it came. Schema `grader.run/1`."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import Field
+
+from grader.model.record import Record
+from grader.model.result import RubricInfo
+from grader.model.roster import Entry, RosterFault
+
+State = Literal["running", "complete", "interrupted"]
+
+
+class Counts(Record):
+    """How many submissions came to what. `kept` of them were complete before; `missing` have no result yet."""
+
+    submissions: int = 0
+    graded: int = 0
+    inconclusive: int = 0
+    error: int = 0
+    missing: int = 0
+    kept: int = 0
+    passed: int = 0
+
+
+class BatchRun(Record):
+    """`roster` is the file or folder as it was given, `rubric_source` what `--rubric` said (an id or a file).
+
+    `entries` are the roster's, without passwords.
+    """
+
+    schema_: Literal["grader.run/1"] = Field(default="grader.run/1", alias="schema")
+    state: State
+    grader: str
+    rubric: RubricInfo
+    rubric_source: str
+    roster: str
+    static_only: bool = False
+    before: datetime | None = None
+    started_at: datetime
+    ended_at: datetime | None = None
+    jobs: int = 0
+    cluster: str = ""
+    counts: Counts = Counts()
+    columns: tuple[str, ...] = ()
+    faults: tuple[RosterFault, ...] = ()
+    entries: tuple[Entry, ...] = ()
