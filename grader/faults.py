@@ -52,6 +52,8 @@ MACHINE = FULL | {
 AGAIN = "mend that (`grader doctor` looks at this machine), then grade again"
 NUMBER = re.compile(r"\[Errno (\d+)\]")
 UNEXPECTED = {EvidenceError.kind, GraderError.kind}
+NOTHING_RUN = "nothing was run"
+"""In place of a sandbox's name."""
 NO_THREAD = "can't start new thread"
 """What Python says where there is no memory for its stack, or too many run."""
 MEMORY = "grade fewer submissions side by side, or on a machine with more memory"
@@ -139,7 +141,7 @@ def error_result(fault: GraderError, about: SubmissionInfo, attempt: Attempt) ->
         max_points=rubric.rubric.max_points,
         criteria=tuple(_open(criterion, fault) for criterion in rubric.rubric.criteria),
         environment=EnvironmentInfo(
-            grader=__version__, ros="", python=python_version(), sandbox="nothing was run"
+            grader=__version__, ros="", python=python_version(), sandbox=NOTHING_RUN
         ),
         timing=attempt.timing(),
         error=ErrorInfo(kind=fault.kind, message=fault.message, hint=fault.hint),

@@ -8,7 +8,7 @@ A recording that is handed in is evidence already: it skips the package and the 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from grader import __version__
 from grader.errors import EvidenceError, GraderError, SubmissionError, UsageError
 from grader.evidence.run import Run
-from grader.faults import Attempt, told_apart
+from grader.faults import NOTHING_RUN, Attempt, told_apart
 from grader.intake import open_recorded, open_recording, open_submission
 from grader.judge import judge
 from grader.judge.early import judge_files
@@ -60,12 +60,18 @@ LATER = ("grader.evidence.decode", "grader.evidence.reader")
 
 @dataclass(frozen=True, kw_only=True)
 class GradeOptions:
-    """`static_only` judges files alone; without `keep_hidden`, the reports leave hidden criteria out."""
+    """`static_only` judges files alone; without `keep_hidden`, the reports leave hidden criteria out.
+
+    `kept` is asked when the submission is open: a result that it gives stays, and nothing is done. `settled` makes of the
+    automatic result the one that counts.
+    """
 
     sandbox: Mode = "auto"
     submission_id: str | None = None
     static_only: bool = False
     keep_hidden: bool = True
+    kept: Callable[[SubmissionInfo], GradingResult | None] = lambda _: None
+    settled: Callable[[GradingResult], GradingResult] = lambda result: result
 
 
 def prepare(options: GradeOptions) -> None:
@@ -78,7 +84,7 @@ def prepare(options: GradeOptions) -> None:
 
 
 def grade(
-    source: str, rubric: LoadedRubric, out: Path, options: GradeOptions, progress: Progress
+    source: str | Source, rubric: LoadedRubric, out: Path, options: GradeOptions, progress: Progress
 ) -> GradingResult:
     """Grade one submission into `out/<its id>/`: evidence and reports, which replace older ones together.
 
@@ -96,6 +102,9 @@ def grade(
     finish_killed(out)
     with told_apart(attempt), _opened(source, rubric, options, progress) as submission:
         attempt.about = _about(submission)
+        kept = options.kept(attempt.about)
+        if kept is not None:
+            return kept
         with Results(out / submission.id) as results:
             if isinstance(submission, RecordedSubmission):
                 recording = None
@@ -105,7 +114,7 @@ def grade(
                     submission, rubric, results.evidence, options, progress
                 )
             graded = _result(submission, rubric, recording, criteria, clock)
-            result = graded.model_copy(update={"notes": notes_of(runs)})
+            result = options.settled(graded.model_copy(update={"notes": notes_of(runs)}))
             console = console_log(runs)
             write_reports(
                 result, results.new, console=console, rubric=rubric.rubric, keep_hidden=options.keep_hidden
@@ -311,7 +320,7 @@ def _result(
             grader=__version__,
             ros=ros.label if ros else "",
             python=python_version(),
-            sandbox=sandbox.label if sandbox else "nothing was run",
+            sandbox=sandbox.label if sandbox else NOTHING_RUN,
         ),
         timing=clock.timing(recording),
     )

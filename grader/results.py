@@ -71,10 +71,12 @@ class Results:
         except (OSError, ValueError, AttributeError):
             return False
 
-    def commit(self) -> None:
-        """Let what is in `new` take the place of what was there."""
+    def commit(self, *, keep: tuple[str, ...] = ()) -> None:
+        """Let what is in `new` take the place of what was there, but for the parts to `keep`."""
         with self._writable():
-            names = sorted(path.name for path in self.new.iterdir())
+            if EVIDENCE in keep:
+                shutil.rmtree(self.evidence)
+            names = sorted({*keep, *(path.name for path in self.new.iterdir())})
             (self.new / NAMES).write_text(json.dumps(names))
             sync_tree(self.new)
             self.new.rename(self.folder / READY)

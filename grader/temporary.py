@@ -17,7 +17,7 @@ from grader.errors import HostError
 from grader.files import lock
 
 MARK = ".grader"
-NAME = re.compile(r"grader-(source|run|check|new|mutants|tests)-[a-z0-9_]{8}")
+NAME = re.compile(r"grader-(source|fetch|run|check|new|mutants|tests)-[a-z0-9_]{8}")
 ATTEMPTS = 10
 
 

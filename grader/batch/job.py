@@ -9,8 +9,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.model.handed_in import Override
+from grader.model.handed_in import HandedIn, Override
 from grader.model.record import Record
+from grader.model.result import GradingResult
 from grader.model.roster import Entry
 from grader.rubric.load import LoadedRubric
 
@@ -22,8 +23,9 @@ class Job(Record):
     """One submission's grading into `out/<id>/`. It can be sent to another process, and to another machine.
 
     `before` is the time before which the commit that counts is looked for (`--before`), `overrides` map criteria to
-    what a person decided. With `again`, what is complete is graded once more. What was fetched after `fetched_since`
-    (seconds since 1970) is not fetched again.
+    what a person decided. `earlier` is the result of an earlier batch: where it is complete for the same commit, rubric
+    and grader, nothing is done, unless `again`. What was fetched after `fetched_since` (seconds since 1970) is not
+    fetched again.
     """
 
     entry: Entry
@@ -33,6 +35,7 @@ class Job(Record):
     static_only: bool = False
     before: datetime | None = None
     overrides: Mapping[str, Override] = Field(default_factory=dict)
+    earlier: GradingResult | None = None
     again: bool = False
     fetched_since: float = 0.0
 
@@ -40,8 +43,8 @@ class Job(Record):
 class Outcome(Record):
     """What became of a job, in short: the rest is in its folder.
 
-    `kept`: it was complete already for the same commit, rubric and grader. `message` and `hint` say in one line each
-    why there is no result, or that an earlier one stays.
+    `kept`: the earlier result stays. `handed_in` is what was found out about the submission's time, None where it could
+    not be had. `message` and `hint` say in one line each why there is no result, or why the earlier one stays.
     """
 
     id: str
@@ -50,6 +53,7 @@ class Outcome(Record):
     max_points: float = 0.0
     passed: bool = False
     kept: bool = False
+    handed_in: HandedIn | None = None
     kind: str = ""
     message: str = ""
     hint: str = ""

@@ -15,6 +15,7 @@ from grader.intake.git import Git
 from grader.intake.limits import Limits
 from grader.intake.names import brief, printable, safe_name
 from grader.intake.open import describe, locate, open_source
+from grader.intake.passwords import without_password
 from grader.intake.recordings import find_recordings, is_recording, several, single
 from grader.intake.source import Source, parse_source
 from grader.model.submission import RecordedSubmission, Submission
@@ -28,6 +29,7 @@ __all__ = [
     "open_recording",
     "open_submission",
     "safe_name",
+    "without_password",
 ]
 
 

@@ -7,7 +7,7 @@ from decimal import Decimal
 from typing import Literal
 
 from grader.judge.points import round_half_up
-from grader.model.result import CriterionResult
+from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
 from grader.shown import clipped, json_text, text_limit
@@ -40,6 +40,13 @@ def reached_pass_mark(rubric: Rubric, results: Sequence[CriterionResult]) -> boo
     visible = {c.id for c in rubric.criteria if c.visibility == "visible" and c.points > 0}
     judged = [r for r in results if r.id in visible]
     return bool(judged) and all(r.status is Status.PASS for r in judged)
+
+
+def passed(rubric: Rubric, result: GradingResult) -> bool:
+    """The same of a whole result: a mark in points is compared with those that count, lateness included."""
+    if rubric.pass_mark is not None:
+        return result.points >= rubric.pass_mark
+    return reached_pass_mark(rubric, result.criteria)
 
 
 def criteria_text(results: Sequence[CriterionResult], *, ascii_only: bool = False) -> str:

@@ -26,10 +26,17 @@ class Counts(Record):
     passed: int = 0
 
 
+class CriterionInfo(Record):
+    id: str
+    title: str
+    max_points: float
+
+
 class BatchRun(Record):
     """`roster` is the file or folder as it was given, `rubric_source` what `--rubric` said (an id or a file).
 
-    `entries` are the roster's, without passwords.
+    `title` and `criteria` are the rubric's; `entries` are the roster's, without passwords, and `columns` its further
+    columns. `before` is `--before`.
     """
 
     schema_: Literal["grader.run/1"] = Field(default="grader.run/1", alias="schema")
@@ -37,6 +44,9 @@ class BatchRun(Record):
     grader: str
     rubric: RubricInfo
     rubric_source: str
+    title: str
+    max_points: float
+    criteria: tuple[CriterionInfo, ...]
     roster: str
     static_only: bool = False
     before: datetime | None = None
