@@ -62,6 +62,7 @@ LATER = ("grader.evidence.decode", "grader.evidence.reader")
 class GradeOptions:
     """`static_only` judges files alone; without `keep_hidden`, the reports leave hidden criteria out.
 
+    With `tidy`, what killed graders left beside the submission's folder is put in order first; a batch does that once.
     `kept` is asked when the submission is open: a result that it gives stays, and nothing is done. `settled` makes of the
     automatic result the one that counts.
     """
@@ -70,6 +71,7 @@ class GradeOptions:
     submission_id: str | None = None
     static_only: bool = False
     keep_hidden: bool = True
+    tidy: bool = True
     kept: Callable[[SubmissionInfo], GradingResult | None] = lambda _: None
     settled: Callable[[GradingResult], GradingResult] = lambda result: result
 
@@ -99,7 +101,8 @@ def grade(
         keep_hidden=options.keep_hidden,
         timing=lambda: clock.timing(None),
     )
-    finish_killed(out)
+    if options.tidy:
+        finish_killed(out)
     with told_apart(attempt), _opened(source, rubric, options, progress) as submission:
         attempt.about = _about(submission)
         kept = options.kept(attempt.about)

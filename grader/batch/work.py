@@ -46,6 +46,7 @@ def _graded(job: Job, folder: Path) -> Outcome:
         sandbox=job.sandbox,
         submission_id=safe_name(job.entry.id),
         static_only=job.static_only,
+        tidy=False,
         kept=partial(_kept, job),
         settled=partial(_settled, job, obtained.handed_in),
     )

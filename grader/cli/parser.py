@@ -51,6 +51,7 @@ def build_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(metavar="COMMAND", required=True, title="commands", parser_class=Parser)
     adder = _Adder(commands, common)
     _grading(adder)
+    _class(adder)
     _evidence(adder)
     _authoring(adder)
     return parser
@@ -101,6 +102,40 @@ def _grading(add: _Adder) -> None:
     _out(check, "keep the results in DIR/<submission id>/ (default: they are only shown)")
     _sandbox(check)
     _json(check)
+
+
+def _class(add: _Adder) -> None:
+    batch = add("batch", "grade a class, and go on where an earlier batch stopped")
+    batch.add_argument(
+        "roster",
+        metavar="ROSTER|FOLDER",
+        type=Path,
+        help="a CSV file (id,source,...), a folder of submissions, an export of GitHub Classroom or GitLab",
+    )
+    _rubric(batch, required=True)
+    _out(batch, "results go to DIR/<id>/, with gradebook.csv and results.jsonl (default: ./grader-results)")
+    batch.add_argument(
+        "--jobs", metavar="N", type=_count, help="how many side by side (default: four a core, static ones one)"
+    )
+    batch.add_argument(
+        "--only",
+        metavar="WHICH",
+        nargs="+",
+        default=[],
+        help="failed, inconclusive, changed, or ids: these once more, all others stay",
+    )
+    batch.add_argument(
+        "--before", metavar="TIME", help="the last commit before it counts (default: the rubric's deadline)"
+    )
+    batch.add_argument("--static", action="store_true", help="look at the files only, run nothing")
+    batch.add_argument(
+        "--cluster", metavar="ADDRESS", help="hand the submissions to a Dask cluster: tcp://HOST:8786, or local"
+    )
+    batch.add_argument(
+        "--exchange", metavar="URL", help="where a cluster's workers leave results (default: in the folder of --out)"
+    )
+    _sandbox(batch)
+    _json(batch)
 
 
 def _evidence(add: _Adder) -> None:

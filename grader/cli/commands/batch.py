@@ -1,0 +1,115 @@
+"""`grader batch ROSTER|FOLDER --rubric ID|FILE [--out DIR]`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from grader.batch.flow import GRADEBOOK, RESULTS, BatchOptions, run_batch
+from grader.batch.folder import BatchFolder
+from grader.batch.hands import Hands, Processes
+from grader.batch.notable import notable
+from grader.cli.class_display import open_class_display
+from grader.cli.say import say, say_json
+from grader.errors import ExitCode, UsageError
+from grader.model.batch import BatchRun
+from grader.roster import read_roster
+from grader.roster.times import parse_time
+from grader.rubric.load import LoadedRubric, load_rubric
+from grader.shown import line
+
+if TYPE_CHECKING:
+    from grader.arena.sandbox import Mode
+
+DEFAULT_OUT = Path("grader-results")
+LINE_CHARS = 2000
+JOBS_PER_CORE = 4
+"""Most of a grading's time is spent in waiting for what the student's nodes send."""
+
+
+def run(
+    *,
+    roster: Path,
+    rubric: str,
+    out: Path | None = None,
+    jobs: int | None = None,
+    only: list[str] | None = None,
+    before: str | None = None,
+    static: bool = False,
+    sandbox: Mode = "auto",
+    cluster: str | None = None,
+    exchange: str | None = None,
+    as_json: bool = False,
+) -> ExitCode:
+    """Grade a class into `out/<id>/`, with a gradebook, and go on where an earlier batch stopped."""
+    loaded = load_rubric(rubric)
+    named = read_roster(roster)
+    options = BatchOptions(
+        out=out or DEFAULT_OUT,
+        jobs=jobs or _jobs(loaded, static=static),
+        sandbox=sandbox,
+        static_only=static,
+        before=_time(before),
+        only=only or (),
+        cluster=cluster or "",
+    )
+    for fault in named.faults:
+        print(f"grader: roster: {line(str(fault), LINE_CHARS)}", file=sys.stderr)
+    with open_class_display() as watcher:
+        hands = _hands(options, exchange)
+        folder = run_batch(named, rubric, loaded, options, hands=hands, watcher=watcher)
+    _show(folder, as_json=as_json)
+    return exit_code(folder.run)
+
+
+def exit_code(run: BatchRun) -> ExitCode:
+    """Of the worst that is there."""
+    counts = run.counts
+    if counts.error or counts.missing:
+        return ExitCode.NOT_GRADED
+    if counts.inconclusive:
+        return ExitCode.INCONCLUSIVE
+    return ExitCode.PASSED if counts.passed == counts.submissions else ExitCode.BELOW_PASS_MARK
+
+
+def _jobs(rubric: LoadedRubric, *, static: bool) -> int:
+    cores = len(os.sched_getaffinity(0))
+    return cores if static or not rubric.rubric.scenarios else cores * JOBS_PER_CORE
+
+
+def _time(text: str | None) -> datetime | None:
+    if text is None:
+        return None
+    found = parse_time(text)
+    if found is None:
+        raise UsageError(f"--before {line(text, 80)} is no time", hint="such as 2026-11-20T23:59:00+01:00")
+    return found
+
+
+def _hands(options: BatchOptions, exchange: str | None) -> Hands:
+    if not options.cluster:
+        if exchange is not None:
+            raise UsageError("--exchange is for --cluster", hint="leave it out")
+        return Processes(options.jobs)
+    from grader.cluster import cluster_hands  # noqa: PLC0415 - an extra
+
+    return cluster_hands(options.cluster, options.out, exchange)
+
+
+def _show(folder: BatchFolder, *, as_json: bool) -> None:
+    if as_json:
+        say_json(folder.run.model_dump(mode="json", by_alias=True, exclude={"entries"}))
+        return
+    for text in notable(folder):
+        say(text)
+    counts = folder.run.counts
+    parts = [f"{counts.submissions} submissions", f"{counts.graded} graded ({counts.passed} passed)"]
+    parts += [f"{counts.inconclusive} inconclusive"] if counts.inconclusive else []
+    parts += [f"{counts.error} could not be graded"] if counts.error else []
+    parts += [f"{counts.missing} not graded yet"] if counts.missing else []
+    parts += [f"{counts.kept} complete before"] if counts.kept else []
+    say(", ".join(parts))
+    say(f"{folder.path / GRADEBOOK}  {folder.path / RESULTS}")
