@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections.abc import Mapping
 from pathlib import Path
 
 from grader.errors import UsageError
-from grader.intake.names import archive_stem, is_archive_name, printable, safe_name
+from grader.intake.names import archive_stem, encodable, is_archive_name, listing, printable
 from grader.model.roster import Entry, Roster
+from grader.roster.gather import Found, columns_of, gather
 from grader.roster.platforms import Named, platform_name
 
 IGNORED = {"__MACOSX", "Thumbs.db", "desktop.ini"}
@@ -15,47 +16,92 @@ RECORDINGS = (".bag", ".mcap")
 
 
 def from_folder(folder: Path) -> Roster:
-    """An entry for each folder, repository, archive or recording in it, in order of names.
+    """An entry for each folder, repository, archive or recording in it, in order of names; one for all files that
+    Moodle or Canvas has from one student.
 
-    Raises UsageError where the folder cannot be read.
+    Raises UsageError where the folder cannot be read, or is one submission.
     """
+    paths = _inside(folder)
+    if any(path.name == "package.xml" for path in paths):
+        raise UsageError(
+            f"{folder}: this is one package, no folder of submissions",
+            hint="grader grade takes one submission",
+        )
+    students: dict[tuple[str, ...], list[tuple[Path, Named | None]]] = {}
+    for path in paths:
+        named = platform_name(path.name) if encodable(path.name) else None
+        key = (named.platform, named.id) if named else ("", path.name)
+        students.setdefault(key, []).append((path, named))
+    found = [_student(files) for files in students.values()]
+    return gather(folder, found, columns=columns_of(one.entry for one in found))
+
+
+def _inside(folder: Path) -> list[Path]:
     try:
-        paths = sorted(path for path in folder.iterdir() if not _is_clutter(path))
+        return sorted(
+            path for path in folder.iterdir() if not path.name.startswith(".") and path.name not in IGNORED
+        )
     except OSError as error:
         raise UsageError(f"{folder}: cannot be read: {error.strerror}") from error
-    entries, faults = [], []
-    seen: dict[str, list[str]] = defaultdict(list)
-    for path in paths:
-        shown = printable(path.name)
-        if not path.is_dir() and not is_archive_name(path.name) and path.suffix not in RECORDINGS:
-            faults.append(f"{shown}: neither a folder nor an archive")
-            continue
-        entry = _entry(path, platform_name(path.name))
-        seen[safe_name(entry.id).casefold()].append(shown)
-        entries.append(entry)
-    double = {key: names for key, names in seen.items() if len(names) > 1}
-    faults += [f"{names[1]}: belongs to the same student as {names[0]}" for names in double.values()]
-    whole = tuple(entry for entry in entries if safe_name(entry.id).casefold() not in double)
-    return Roster(file=str(folder), entries=whole, faults=tuple(faults))
 
 
-def _is_clutter(path: Path) -> bool:
-    return path.name.startswith(".") or path.name in IGNORED
-
-
-def _entry(path: Path, named: Named | None) -> Entry:
+def _student(files: list[tuple[Path, Named | None]]) -> Found:
+    path, named = files[0]
+    if named is not None:
+        return _named([(path, named) for path, named in files if named])
     where = printable(path.name)
-    if named is None:
-        return Entry(
-            id=path.name if path.is_dir() else archive_stem(path.name),
-            source=str(path.absolute()),
-            where=where,
-        )
-    extra = {"platform": named.platform, "file": named.file} | ({"late": "yes"} if named.late else {})
+    if not encodable(path.name):
+        return Found(where=where, faults=("its name is no UTF-8 text: rename it",))
+    if not _can_be_graded(path):
+        return Found(where=where, faults=("neither a folder nor an archive",))
+    name = path.name if path.is_dir() else archive_stem(path.name)
+    return Found(where=where, id=name, entry=Entry(id=name, source=str(path.absolute()), where=where))
+
+
+def _named(files: list[tuple[Path, Named]]) -> Found:
+    """What a platform has from one student: the one folder, or the one archive among the files."""
+    taken = [one for one in files if _can_be_graded(one[0]) and not one[1].is_text]
+    path, named = (taken or files)[0]
+    where, name = printable(path.name), f"{named.name}-{named.id}"
+    if not taken:
+        fault = "only text was handed in" if named.is_text else "neither a folder nor an archive"
+        return Found(where=where, id=name, faults=(fault,))
+    if len(taken) > 1:
+        more = listing([other.name for other, _ in taken[1:]])
+        fault = f"not the only one of this student, there is {more}: leave one there"
+        return Found(where=where, id=name, faults=(fault,))
+    others = [one.name for one, _ in files if one != path]
+    return Found(where=where, id=name, entry=_entry(path, named, name, others))
+
+
+def _entry(path: Path, named: Named, name: str, others: list[str]) -> Entry:
+    source = _single_archive(path) or path
+    file = named.file or (source.name if source != path else "")
+    extra: Mapping[str, str] = {
+        "platform": named.platform,
+        "file": printable(file),
+        "late": "yes" if named.late else "",
+        "other files": ", ".join(printable(other) for other in others),
+        f"{named.platform} id": named.id,
+    }
     return Entry(
-        id=f"{named.name}-{named.id}",
-        source=str(path.absolute()),
-        name=named.name,
-        where=where,
-        extra={**extra, f"{named.platform} id": named.id},
+        id=name,
+        source=str(source.absolute()),
+        name=f"{named.name} {named.id}" if named.is_blind else named.name,
+        where=printable(path.name),
+        extra={key: text for key, text in extra.items() if text},
     )
+
+
+def _can_be_graded(path: Path) -> bool:
+    return path.is_dir() or is_archive_name(path.name) or path.suffix.lower() in RECORDINGS
+
+
+def _single_archive(path: Path) -> Path | None:
+    """The archive that is all that a student's folder holds."""
+    try:
+        inside = _inside(path) if path.is_dir() else []
+    except UsageError:
+        return None
+    alone = len(inside) == 1 and inside[0].is_file() and is_archive_name(inside[0].name)
+    return inside[0] if alone and encodable(inside[0].name) else None

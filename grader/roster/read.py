@@ -5,15 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from grader.errors import UsageError
-from grader.roster.entries import entries_of
-from grader.roster.exports import from_gitlab, is_classroom, with_classroom_columns
-from grader.roster.folder import from_folder
 from grader.model.roster import Roster
+from grader.roster.classroom import is_classroom, refuse_classroom_roster, with_roster_columns
+from grader.roster.entries import entries_of
+from grader.roster.folder import from_folder
+from grader.roster.gitlab import from_gitlab
 from grader.roster.table import read_table
 
 
 def read_roster(path: Path) -> Roster:
-    """Every submission that the roster names, and every fault that it has.
+    """Every submission that the roster names, and every fault that it has, in the order of lines.
 
     `path` is a CSV file with the columns `id,source[,ref][,name][,group][,submitted_at][,extension_days]`, an export of
     GitHub Classroom (CSV) or of a GitLab group (the JSON of its projects), or a folder with a submission in each of its
@@ -21,14 +22,18 @@ def read_roster(path: Path) -> Roster:
     """
     if path.is_dir():
         roster = from_folder(path)
-    elif path.suffix.lower() == ".json":
+    elif path.suffix.lower() in {".json", ".ndjson", ".jsonl"}:
         roster = from_gitlab(path)
     else:
-        table = read_table(path)
-        table = with_classroom_columns(table, path.name) if is_classroom(table) else table
-        roster = entries_of(table, path)
+        roster = _from_table(path)
     if not roster.entries and not roster.faults:
         raise UsageError(
             f"{path}: no submission in it", hint="each is a row with id and source, or an entry of a folder"
         )
     return roster
+
+
+def _from_table(path: Path) -> Roster:
+    table = read_table(path)
+    refuse_classroom_roster(table, path)
+    return entries_of(with_roster_columns(table) if is_classroom(table) else table, path)

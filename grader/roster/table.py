@@ -3,82 +3,125 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+import io
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from grader.errors import UsageError
+from grader.intake.names import is_archive_name
+from grader.roster.decode import text_of
 
 BYTES_MAX = 32 << 20
 FIELD_LETTERS_MAX = 10_000
+UNREADABLE_MAX = 50
 DELIMITERS = (",", ";", "\t")
+_SEPARATOR = re.compile(r"\"?sep=(.)\"?[\r\n]*", re.IGNORECASE)
 
 
 class Row(NamedTuple):
-    """The fields of one row by their column's name, and the line in which it begins, counted from 1."""
+    """The fields of one row by their column's name, the line in which it begins, counted from 1, and what is wrong.
+
+    In a row that is `shifted`, no field but the first can be told to be in its column.
+    """
 
     line: int
     fields: Mapping[str, str]
+    faults: tuple[str, ...] = ()
+    shifted: bool = False
 
 
 class Table(NamedTuple):
-    """Column names as they are written, and the rows that are not empty."""
+    """Column names as they are written, the line that names them, and the rows that are not empty, in their order."""
 
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
-    faults: tuple[str, ...]
+    line: int = 1
 
 
 def read_table(path: Path) -> Table:
-    """Raises UsageError where the file is no table of text at all; what is wrong with a row is among the faults."""
-    lines = _text(path).splitlines(keepends=True)
-    if not lines:
+    """Raises UsageError where the file is no table of text at all; what is wrong with a row is said by the row."""
+    lines = list(io.StringIO(_text(path), newline=""))
+    found = _rows(lines, *_delimiter(lines))
+    header = next(found, None)
+    if header is None:
         raise UsageError(f"{path}: the file is empty", hint="its first line names the columns: id,source")
-    delimiter = max(DELIMITERS, key=lines[0].count)
-    reader = csv.reader(lines, delimiter=delimiter, strict=True)
-    columns: tuple[str, ...] = ()
-    rows, faults = [], []
-    while True:
-        begins = reader.line_num + 1
+    line, fields, faults = header
+    if faults:
+        raise UsageError(f"{path}:{line}: {faults[0]}", hint="the first line names the columns: id,source")
+    columns = tuple(name.strip() for name in fields)
+    return Table(columns, tuple(_row(columns, *row) for row in found), line)
+
+
+class _Fields(NamedTuple):
+    line: int
+    fields: list[str]
+    faults: tuple[str, ...] = ()
+
+
+def _rows(lines: Sequence[str], delimiter: str, start: int) -> Iterator[_Fields]:
+    """Each row that is not empty. After one that cannot be read, the next line begins a row again."""
+    unreadable = 0
+    while start < len(lines) and unreadable < UNREADABLE_MAX:
+        # Python 3.10 reads no zero byte: its place is kept by a sign that says the same to a reader.
+        reader = csv.reader(
+            (line.replace("\0", "\ufffd") for line in lines[start:]), delimiter=delimiter, strict=True
+        )
+        begins = start
         try:
-            fields = next(reader, None)
+            for fields in reader:
+                zero = any("\0" in line for line in lines[begins : start + reader.line_num])
+                if any(field.strip() for field in fields):
+                    yield _Fields(begins + 1, fields, ("a zero byte in it",) if zero else ())
+                begins = start + reader.line_num
         except csv.Error as error:
-            faults.append(f"{path.name}:{begins}: {error}")
-            break
-        if fields is None:
-            break
-        if not columns:
-            columns = tuple(name.strip() for name in fields)
-        elif any(field.strip() for field in fields):
-            rows.append(Row(begins, _named(columns, fields)))
-            faults += [f"{path.name}:{begins}: {fault}" for fault in _misfits(columns, fields)]
-    return Table(columns, tuple(rows), tuple(faults))
+            yield _Fields(begins + 1, [], (_said(error),))
+            start, unreadable = begins + 1, unreadable + 1
+        else:
+            return
+    if start < len(lines):
+        yield _Fields(start + 1, [], ("too many rows that cannot be read before it: the rest is left out",))
 
 
-def _named(columns: Sequence[str], fields: Sequence[str]) -> dict[str, str]:
-    return {name: field.strip() for name, field in zip(columns, fields, strict=False) if name}
+def _said(error: csv.Error) -> str:
+    said = str(error)
+    if said == "unexpected end of data":
+        return "a quotation mark that never ends"
+    if "expected after" in said:
+        return "a quotation mark that does not end where its field ends"
+    return f"no CSV: {said}"
 
 
-def _misfits(columns: Sequence[str], fields: Sequence[str]) -> list[str]:
-    found = []
-    if len(fields) > len(columns):
+def _row(columns: Sequence[str], line: int, fields: list[str], faults: tuple[str, ...]) -> Row:
+    named = {name: field.strip() for name, field in zip(columns, fields, strict=False) if name}
+    shifted = any(field.strip() for field in fields[len(columns) :])
+    found = list(faults)
+    if shifted:
         found.append(f"{len(fields)} fields, but the first line names {len(columns)} columns")
     if any(len(field) > FIELD_LETTERS_MAX for field in fields):
         found.append(f"a field of more than {FIELD_LETTERS_MAX} letters")
-    return found
+    return Row(line, named, tuple(found), shifted)
+
+
+def _delimiter(lines: Sequence[str]) -> tuple[str, int]:
+    """What stands between fields, and how many lines come before the header: Excel may say `sep=;` in the first."""
+    if lines and (said := _SEPARATOR.fullmatch(lines[0])):
+        return said[1], 1
+    header = next((line for line in lines if line.strip()), "")
+    plain = re.sub(r'"[^"]*"', "", header)
+    return max(DELIMITERS, key=plain.count), 0
 
 
 def _text(path: Path) -> str:
     try:
         data = path.read_bytes() if path.stat().st_size <= BYTES_MAX else None
     except OSError as error:
-        raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
+        raise UsageError(
+            f"{path}: cannot be read: {error.strerror}", hint="give a CSV file, a folder, or an export"
+        ) from error
+    if is_archive_name(path.name):
+        raise UsageError(f"{path}: an archive is no roster", hint="unpack it first, and give the folder")
     if data is None:
         raise UsageError(f"{path}: larger than {BYTES_MAX >> 20} MB: this is no roster")
-    try:
-        return data.decode("utf-16" if data[:2] in {b"\xff\xfe", b"\xfe\xff"} else "utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise UsageError(
-            f"{path}:{line}: no UTF-8 text", hint="save it as CSV UTF-8 (in Excel: 'CSV UTF-8', not 'CSV')"
-        ) from error
+    return text_of(data, path)

@@ -1,0 +1,54 @@
+"""The sources that a roster names: addresses as they are, paths from the roster's folder."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+from grader.intake.names import brief
+
+_ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://|[^/\s@]+@[^/\s:]+:|[\w.-]{2,}:(?!//)\S")
+"""An address with a scheme, git's `user@host:path`, or `host:path`, as an SSH configuration names hosts."""
+_WINDOWS = re.compile(r"[A-Za-z]:[\\/]|.*\\", re.DOTALL)
+_WEB = re.compile(r"(www\.|[\w-]+(\.[\w-]+)*\.(com|org|edu|net|io|de|fr|it|es|uk)/)\S")
+_NO_REF = re.compile(r"[\x00-\x20~^:?*\[\\\x7f]|\.\.|@\{|//|^[/-]|[/.]$")
+
+
+def source_fault(source: str, base: Path) -> str:
+    """Why nothing can be fetched from `source`, a field of a roster in the folder `base`; empty where it may be."""
+    relative = not Path(source).is_absolute() and not source.startswith("~")
+    try:
+        out = relative and not (base / source).resolve().is_relative_to(base.resolve())
+        there = _is_there(source, base)
+    except (OSError, ValueError, RuntimeError):
+        return f"{brief(source)} is no path that can be followed"
+    if not there and _ADDRESS.match(source):
+        return ""
+    if not there and _WINDOWS.match(source):
+        return f"{brief(source)} is a path of Windows: write it with / as it is on this machine"
+    if out:
+        return f"{brief(source)} leads out of the roster's folder"
+    if there or not relative:
+        return ""
+    web = "; a web address begins with https://" if _WEB.match(source) else ""
+    return f"{brief(source)} does not exist{web}"
+
+
+def whole_source(source: str, base: Path) -> str:
+    """The same for whoever stands in another folder: a path becomes absolute."""
+    if _ADDRESS.match(source) and not _is_there(source, base):
+        return source
+    return str(base.absolute() / os.path.expanduser(source))  # noqa: PTH111 - Path.expanduser raises without a home
+
+
+def ref_fault(ref: str) -> str:
+    """Why `ref` names no branch, tag or commit; empty where it may."""
+    return f"{brief(ref)} cannot be the name of a branch, tag or commit" if _NO_REF.search(ref) else ""
+
+
+def _is_there(source: str, base: Path) -> bool:
+    """Whether a path is, with or without the `@ref` behind it."""
+    ends = [len(source), *(at.start() for at in re.finditer("@", source))]
+    home = [os.path.expanduser(source[:end]) for end in ends[:20] if end]  # noqa: PTH111 - as above
+    return any(os.path.lexists(base / path) for path in home)

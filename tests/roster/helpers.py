@@ -1,0 +1,26 @@
+"""Rosters made in a test."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from grader.model.roster import Roster
+from grader.roster import read_roster
+
+
+def roster_file(folder: Path, text: str | bytes, encoding: str = "utf-8") -> Path:
+    path = folder / "roster.csv"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode(encoding))
+    return path
+
+
+def read(folder: Path, text: str | bytes) -> Roster:
+    return read_roster(roster_file(folder, text))
+
+
+def said(roster: Roster) -> list[str]:
+    return [str(fault) for fault in roster.faults]
+
+
+def ids(roster: Roster) -> list[str]:
+    return [entry.id for entry in roster.entries]
