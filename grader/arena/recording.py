@@ -261,7 +261,7 @@ class Recorder:
                     scenario,
                     place,
                     path=path,
-                    metadata=self._metadata(),
+                    metadata=self._metadata() | {"scenario.digest": scenario.digest},
                     tell=tell,
                     rates=self._rates.get(name, ()),
                     admission=self._admission,

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from grader import __version__
 from grader.batch.choice import check, chosen
@@ -40,7 +40,8 @@ RESERVED = frozenset({RUN, GRADEBOOK, RESULTS, INDEX, OVERRIDES, "similarity.jso
 
 @dataclass(frozen=True, kw_only=True)
 class BatchOptions:
-    """`jobs` submissions side by side; `only` as `--only` has it; `cluster` is said in `run.json`."""
+    """`jobs` submissions side by side; `only` as `--only` has it. With `same_commit`, what is
+    graded again is the commit of the earlier result. `cluster` is said in `run.json`."""
 
     out: Path
     jobs: int
@@ -48,6 +49,7 @@ class BatchOptions:
     static_only: bool = False
     before: datetime | None = None
     only: Sequence[str] = ()
+    same_commit: bool = False
     cluster: str = ""
 
 
@@ -135,6 +137,7 @@ def _outcomes(batch: _Batch, hands: Hands, watcher: Watcher) -> Iterator[Outcome
 
 def _job(batch: _Batch, entry: Entry, *, again: bool, since: float) -> Job:
     options = batch.options
+    earlier = batch.folder.earlier(entry)
     return Job(
         entry=entry,
         rubric=batch.rubric,
@@ -143,7 +146,8 @@ def _job(batch: _Batch, entry: Entry, *, again: bool, since: float) -> Job:
         static_only=options.static_only,
         before=options.before,
         overrides=batch.settler.of(entry.id),
-        earlier=batch.folder.earlier(entry),
+        earlier=earlier,
+        commit=earlier.submission.commit if earlier and options.same_commit else None,
         again=again,
         fetched_since=since,
     )
@@ -165,18 +169,11 @@ def _settled(batch: _Batch, entry: Entry, outcome: Outcome) -> Outcome:
     return outcome.model_copy(update={"status": now.status, "points": now.points, "passed": ok})
 
 
-def _run_of(
-    roster: Roster, rubric_source: str, rubric: LoadedRubric, options: BatchOptions
-) -> BatchRun:
-    lab = rubric.rubric
+def _run_of(roster: Roster, rubric_source: str, rubric: LoadedRubric, options: BatchOptions) -> BatchRun:
     return BatchRun(
         state="running",
         grader=__version__,
-        rubric=RubricInfo(id=lab.id, version=lab.version, digest=rubric.digest),
-        rubric_source=rubric_source,
-        title=lab.title,
-        max_points=lab.max_points,
-        criteria=tuple(CriterionInfo(id=c.id, title=c.title, max_points=c.points) for c in lab.criteria),
+        **described(rubric, rubric_source),
         roster=roster.file,
         static_only=options.static_only,
         before=options.before,
@@ -187,6 +184,18 @@ def _run_of(
         faults=roster.faults,
         entries=tuple(_without_password(entry) for entry in roster.entries),
     )
+
+
+def described(rubric: LoadedRubric, rubric_source: str) -> dict[str, Any]:
+    """What `run.json` says of the rubric, by its keys."""
+    lab = rubric.rubric
+    return {
+        "rubric": RubricInfo(id=lab.id, version=lab.version, digest=rubric.digest),
+        "rubric_source": rubric_source,
+        "title": lab.title,
+        "max_points": lab.max_points,
+        "criteria": tuple(CriterionInfo(id=c.id, title=c.title, max_points=c.points) for c in lab.criteria),
+    }
 
 
 def _without_password(entry: Entry) -> Entry:

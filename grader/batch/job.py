@@ -24,7 +24,7 @@ class Job(Record):
 
     `before` is the time before which the commit that counts is looked for (`--before`), `overrides` map criteria to
     what a person decided. `earlier` is the result of an earlier batch: where it is complete for the same commit, rubric
-    and grader, nothing is done, unless `again`. What was fetched after `fetched_since` (seconds since 1970) is not
+    and grader, nothing is done, unless `again`. `commit` is the one to grade of a repository, whatever else is said. What was fetched after `fetched_since` (seconds since 1970) is not
     fetched again.
     """
 
@@ -37,6 +37,7 @@ class Job(Record):
     overrides: Mapping[str, Override] = Field(default_factory=dict)
     earlier: GradingResult | None = None
     again: bool = False
+    commit: str | None = None
     fetched_since: float = 0.0
 
 

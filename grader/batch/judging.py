@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
@@ -11,47 +11,61 @@ from pathlib import Path
 from grader.batch.pool import side_by_side, workers, working
 from grader.errors import EvidenceError, GraderError
 from grader.evidence.reader import SUFFIXES, load_evidence
+from grader.evidence.run import Run
 from grader.judge import judge
 from grader.model.result import CriterionResult
 from grader.rubric.load import LoadedRubric
+from grader.rubric.model import Rubric
 
 EVIDENCE, RESULT, PACKAGE = "evidence", "result.json", "package.mcap"
+SCENARIO = "scenario.digest"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Judged:
-    """One submission's criteria, or in one line why there are none, and what to do about it."""
+    """One submission's criteria, or in one line why there are none, and what to do about it.
+
+    `missing` are the rubric's scenarios of which there is no recording that fits.
+    """
 
     folder: Path
     criteria: tuple[CriterionResult, ...] | None
+    missing: tuple[str, ...] = ()
     error: str = ""
     hint: str = ""
 
 
-def judge_all(folders: Sequence[Path], rubric: LoadedRubric, jobs: int) -> Iterator[Judged]:
+def judge_all(
+    folders: Sequence[Path], rubric: LoadedRubric, jobs: int, *, fitting: bool = False
+) -> Iterator[Judged]:
     """Every submission's evidence judged again, each as it comes, `jobs` at a time.
 
+    With `fitting`, a recording counts only where the rubric's scenario is still the one that was run.
     What is wrong with one of them is in its `error` and stops no other, not even where it ends the worker.
     """
     left = dict.fromkeys(folders)
     while left:
         begun: list[Path] = []
-        for judged in _until_broken(tuple(left), rubric, jobs, begun.append):
+        work = partial(_judged, rubric, fitting)
+        for judged in _until_broken(tuple(left), work, jobs, begun.append):
             del left[judged.folder]
             yield judged
         for suspect in [folder for folder in begun if folder in left]:
             del left[suspect]
-            yield from tuple(_until_broken([suspect], rubric, 1)) or [_ended(suspect)]
+            yield from tuple(_until_broken([suspect], work, 1)) or [_ended(suspect)]
 
 
 def _until_broken(
-    folders: Sequence[Path], rubric: LoadedRubric, jobs: int, begun: Callable[[Path], None] = lambda _: None
+    folders: Sequence[Path],
+    work: Callable[[Path], Judged],
+    jobs: int,
+    begun: Callable[[Path], None] = lambda _: None,
 ) -> Iterator[Judged]:
     """Ends early where a worker ends: on one of those that were begun, nobody knows which."""
     count = max(1, min(jobs, len(folders)))
     try:
         with workers(count) as pool:
-            yield from side_by_side(pool, partial(_judged, rubric), folders, most=2 * count, begun=begun)
+            yield from side_by_side(pool, work, folders, most=2 * count, begun=begun)
     except BrokenProcessPool:
         return
 
@@ -61,17 +75,33 @@ def _ended(folder: Path) -> Judged:
     return Judged(folder=folder, criteria=None, error=f"{folder}: judging it ended the process", hint=hint)
 
 
-def _judged(rubric: LoadedRubric, folder: Path) -> Judged:
+def _judged(rubric: LoadedRubric, fitting: bool, folder: Path) -> Judged:  # noqa: FBT001 - a partial's
     """In a worker."""
     with working():
         try:
-            criteria = judge(rubric.rubric, load_evidence([folder]), rubric.checks)
+            runs = load_evidence([folder])
+            runs = fitting_runs(rubric.rubric, runs) if fitting else runs
+            criteria = judge(rubric.rubric, runs, rubric.checks)
         except GraderError as error:
             return Judged(folder=folder, criteria=None, error=error.message, hint=error.hint)
         except Exception as error:  # noqa: BLE001 - whatever it is, the others are judged
             message = f"{folder}: internal error: {type(error).__name__}: {error}"
             return Judged(folder=folder, criteria=None, error=message, hint="judge it by itself with --debug")
-        return Judged(folder=folder, criteria=criteria)
+        missing = tuple(name for name in asked_for(rubric.rubric) if name not in runs)
+        return Judged(folder=folder, criteria=criteria, missing=missing)
+
+
+def fitting_runs(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
+    """Those that were recorded as the rubric's scenarios say; evidence that does not tell counts as such."""
+    digests = {name: scenario.digest for name, scenario in rubric.scenarios.items()}
+    return {
+        name: run for name, run in runs.items() if run.metadata.get(SCENARIO, digests.get(name)) == digests.get(name)
+    }
+
+
+def asked_for(rubric: Rubric) -> tuple[str, ...]:
+    """The scenarios that criteria judge."""
+    return tuple(dict.fromkeys(c.scenario for c in rubric.criteria if c.scenario is not None))
 
 
 def submissions_in(paths: Sequence[Path]) -> tuple[Path, ...]:

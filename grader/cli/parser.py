@@ -138,6 +138,20 @@ def _class(add: _Adder) -> None:
     _json(batch)
 
 
+    regrade = add("regrade", "judge a class again from its evidence; nothing is run, needs no ROS")
+    regrade.add_argument("folder", metavar="DIR", type=Path, help="the --out of `grader batch`")
+    _rubric(regrade, required=False)
+    regrade.add_argument(
+        "--run-missing",
+        action="store_true",
+        dest="run_missing_too",
+        help="run the submissions of which a scenario was not recorded",
+    )
+    regrade.add_argument("--jobs", metavar="N", type=_count, help="how many side by side")
+    _sandbox(regrade)
+    _json(regrade)
+
+
 def _evidence(add: _Adder) -> None:
     judge = add("judge", "judge recorded evidence again; needs no ROS")
     judge.add_argument(

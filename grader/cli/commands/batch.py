@@ -60,9 +60,15 @@ def run(
         print(f"grader: roster: {line(str(fault), LINE_CHARS)}", file=sys.stderr)
     with open_class_display() as watcher:
         hands = _hands(options, exchange)
-        folder = run_batch(named, rubric, loaded, options, hands=hands, watcher=watcher)
+        folder = run_batch(named, rubric_source(rubric), loaded, options, hands=hands, watcher=watcher)
     _show(folder, as_json=as_json)
     return exit_code(folder.run)
+
+
+def rubric_source(rubric: str) -> str:
+    """What `--rubric` said, so that it is found again from any folder."""
+    path = Path(rubric)
+    return str(path.absolute()) if path.is_file() else rubric
 
 
 def exit_code(run: BatchRun) -> ExitCode:
