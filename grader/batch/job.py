@@ -24,8 +24,8 @@ class Job(Record):
 
     `before` is the time before which the commit that counts is looked for (`--before`), `overrides` map criteria to
     what a person decided. `earlier` is the result of an earlier batch: where it is complete for the same commit, rubric
-    and grader, nothing is done, unless `again`. `commit` is the one to grade of a repository, whatever else is said. What was fetched after `fetched_since` (seconds since 1970) is not
-    fetched again.
+    and grader, nothing is done, unless `again`. `commit` is the one to grade of a repository, whatever else is said.
+    What was fetched after `fetched_since` (seconds since 1970) is not fetched again.
     """
 
     entry: Entry
