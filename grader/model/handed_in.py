@@ -5,11 +5,13 @@ from __future__ import annotations
 from datetime import date, datetime
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AwareDatetime, Field
 
 from grader.model.record import Record
 from grader.model.verdict import Status
 
+COMMENT_CHARS = 2000
+AUTHOR_CHARS = 200
 SaidBy = Literal["roster", "commit", "nobody"]
 """Who says when it was handed in: the roster's `submitted_at`, the commit's date, or nobody."""
 
@@ -21,11 +23,11 @@ class HandedIn(Record):
     commit that counts was looked for, None where the last one counts. `note` says how that commit was chosen.
     """
 
-    at: datetime | None = None
+    at: AwareDatetime | None = None
     by: SaidBy = "nobody"
-    deadline: datetime | None = None
+    deadline: AwareDatetime | None = None
     extension_days: float = 0.0
-    before: datetime | None = None
+    before: AwareDatetime | None = None
     note: str = ""
 
 
@@ -45,8 +47,8 @@ class Override(Record):
     """A person's points for one criterion of one submission (`overrides.yaml`)."""
 
     points: Annotated[float, Field(ge=0)]
-    comment: str = ""
-    author: str = ""
+    comment: Annotated[str, Field(max_length=COMMENT_CHARS)] = ""
+    author: Annotated[str, Field(max_length=AUTHOR_CHARS)] = ""
     date: datetime | date | None = None
 
 

@@ -36,6 +36,7 @@ def cross_faults(data: object, checks: Mapping[str, Check], *, complete: bool = 
     faults += _names(criteria)
     faults += _circles(criteria)
     faults += _points(rubric, criteria)
+    faults += _late(rubric)
     return faults
 
 
@@ -134,3 +135,15 @@ def _points(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) 
     mark = rubric.get("pass_mark")
     if isinstance(mark, int | float) and mark > total:
         yield ("pass_mark",), f"{mark:g} is more than all the points, {total:g}"
+
+
+def _late(rubric: dict[str, Any]) -> Iterator[Fault]:
+    late = as_map(rubric.get("late"))
+    if late and rubric.get("deadline") is None:
+        yield ("late",), "needs a deadline: deadline: 2026-11-20T23:59:00+01:00"
+    grace, cut_off = late.get("grace_minutes"), late.get("cut_off_days")
+    if isinstance(grace, int | float) and isinstance(cut_off, int | float) and grace > cut_off * 24 * 60:
+        yield (
+            ("late", "grace_minutes"),
+            f"is longer than cut_off_days, after which nothing counts: {cut_off:g}",
+        )

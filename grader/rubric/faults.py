@@ -20,6 +20,7 @@ PATTERN_RULES = {
     TYPE_PATTERN: "must be a type like std_msgs/String",
     PROGRAM_PATTERN: "must be a program like turtlesim/turtlesim_node",
 }
+TIME = "a time with its zone, such as 2026-11-20T23:59:00+01:00"
 UNITS = {"hz": "Hz", "s": "seconds", "m": "metres"}
 _NUMBER_AND_UNIT = re.compile(r"\s*(-?\d+(?:\.\d+)?)\s*([A-Za-z%]*)\s*")
 MUST_BE = {
@@ -36,6 +37,9 @@ MUST_BE = {
     "list_type": "a list",
     "dict_type": "a map of keys and values",
     "model_type": "a map of keys and values",
+    "datetime_type": TIME,
+    "datetime_parsing": TIME,
+    "timezone_aware": TIME,
 }
 BOUNDS = {
     "greater_than_equal": ("ge", "at least"),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from datetime import datetime
+from hashlib import sha256
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, AwareDatetime, Field
 
 from grader.model.record import Record
 
@@ -13,6 +15,17 @@ NAME_PATTERN = r"^[a-z][a-z0-9-]*$"
 PROGRAM_PATTERN = r"^[A-Za-z][\w-]*/[\w.-]+$"
 TYPE_PATTERN = r"^[A-Za-z]\w*/[A-Za-z]\w*$"
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
+YEARS = range(2000, 3000)
+LATE_DAYS_MAX = 3660
+
+
+def _of_these_times(time: datetime) -> datetime:
+    if time.year not in YEARS:
+        raise ValueError(f"must be a time of the years {YEARS[0]} to {YEARS[-1]}")
+    return time
+
+
+Deadline = Annotated[AwareDatetime, AfterValidator(_of_these_times)]
 
 
 class Start(Record):
@@ -130,6 +143,11 @@ class Scenario(Record):
     calls: tuple[Call, ...] = ()
     until: Annotated[Until, Field(default_factory=lambda: Until(messages={}))]
 
+    @property
+    def digest(self) -> str:
+        """The sha256 of what is run and until when: evidence of a scenario with another one says something else."""
+        return sha256(self.model_dump_json(exclude={"title"}).encode()).hexdigest()
+
 
 class Criterion(Record):
     """One line of the report. `with` holds the check's own parameters.
@@ -149,11 +167,26 @@ class Criterion(Record):
     reproduce: str = ""
 
 
+class Late(Record):
+    """What being late costs: `lost` percent for each `per` that has begun since the deadline, at most `cap` percent.
+
+    They are percents of the points that were reached, or with `of: possible` of all the rubric's points. What comes
+    at most `grace_minutes` after the deadline is in time. Later than `cut_off_days` after it, nothing counts.
+    """
+
+    lost: Annotated[float, Field(ge=0, le=100)]
+    of: Literal["reached", "possible"] = "reached"
+    per: Literal["day", "hour"] = "day"
+    grace_minutes: Annotated[float, Field(ge=0, le=LATE_DAYS_MAX * 24 * 60)] = 0.0
+    cap: Annotated[float, Field(ge=0, le=100)] = 100.0
+    cut_off_days: Annotated[float, Field(ge=0, le=LATE_DAYS_MAX)] | None = None
+
+
 class Rubric(Record):
     """A lab. `pass_mark` in points; without one, every visible criterion must be reached.
 
     `digits` is how many decimals points keep. `checks` is a Python file beside the rubric with checks of the
-    instructor's own.
+    instructor's own. `deadline` has a time zone; `late` says what later costs, and without it nothing is lost.
     """
 
     schema_: Annotated[Literal["grader.rubric/1"], Field(alias="schema")]
@@ -165,6 +198,8 @@ class Rubric(Record):
     pass_mark: Annotated[float, Field(ge=0)] | None = None
     digits: Annotated[int, Field(ge=0, le=3)] = 1
     checks: str | None = None
+    deadline: Deadline | None = None
+    late: Late | None = None
     scenarios: dict[Name, Scenario]
     criteria: Annotated[tuple[Criterion, ...], Field(min_length=1)]
 

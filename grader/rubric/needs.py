@@ -21,6 +21,17 @@ def needs_package(loaded: LoadedRubric) -> bool:
     return bool(started(rubric).scenarios) or any(_looks_at_files(c, checks) for c in rubric.criteria)
 
 
+def needs_ros(loaded: LoadedRubric) -> bool:
+    """Whether anything is to be built or run: files alone decide everything else."""
+    rubric, checks = loaded.rubric, loaded.checks
+    return bool(started(rubric).scenarios) or any(_needs_build(c, checks) for c in rubric.criteria)
+
+
+def _needs_build(criterion: Criterion, checks: Mapping[str, Check]) -> bool:
+    check = checks.get(criterion.check)
+    return check is not None and "build" in check.facts
+
+
 def _looks_at_files(criterion: Criterion, checks: Mapping[str, Check]) -> bool:
     check = checks.get(criterion.check)
     return check is not None and not check.messages_only and bool({"package", "build"} & set(check.facts))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from datetime import date
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -11,8 +12,6 @@ import yaml
 
 from grader.errors import RubricError
 
-MAX_BYTES = 1_000_000
-MAX_NODES = 100_000
 MAX_DEPTH = 50
 MAX_NUMBER = (1 << 63) - 1
 MAX_NUMBER_LETTERS = 100
@@ -23,6 +22,22 @@ PLAIN_TAGS = frozenset({"tag:yaml.org,2002:map", "tag:yaml.org,2002:seq"})
 KeyPath = tuple[str | int, ...]
 Value: TypeAlias = "dict[str, Any] | list[Any] | str | int | float | None"
 Fault = tuple[KeyPath, str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Form:
+    """What a file may hold, and how messages call it. Times are text of ISO 8601 under the keys of `times`, and faults
+    elsewhere. With `written_keys`, a key is what is written there, also where YAML reads a number or `no`."""
+
+    what: str = "rubric"
+    usual: str = "a rubric is a few kilobytes"
+    bytes_max: int = 1_000_000
+    nodes_max: int = 100_000
+    times: frozenset[str] = frozenset()
+    written_keys: bool = False
+
+
+RUBRIC = Form(times=frozenset({"deadline"}))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,15 +70,15 @@ def dotted(path: KeyPath) -> str:
     return text
 
 
-def read_source(path: Path, name: str) -> Source:
-    """The file's data. Raises RubricError where it is no YAML that a rubric could be."""
-    raw = _read(path, name)
+def read_source(path: Path, name: str, form: Form = RUBRIC) -> Source:
+    """The file's data. Raises RubricError where it is no YAML of that form."""
+    raw = _read(path, name, form)
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = raw.count(b"\n", 0, error.start) + 1
         raise RubricError([f"{name}:{line}: the file is not UTF-8: save it as UTF-8"]) from error
-    return _compose(text, raw, name)
+    return _compose(text, raw, name, form)
 
 
 def text_at(path: Path, name: str, key: str) -> str:
@@ -73,7 +88,7 @@ def text_at(path: Path, name: str, key: str) -> str:
     """
     found, is_key, depth = "", False, 0
     try:
-        for event in yaml.parse(_read(path, name), Loader=yaml.SafeLoader):
+        for event in yaml.parse(_read(path, name, RUBRIC), Loader=yaml.SafeLoader):
             begins = isinstance(event, yaml.CollectionStartEvent)
             if depth == 0 and isinstance(event, yaml.SequenceStartEvent):
                 break
@@ -89,29 +104,29 @@ def text_at(path: Path, name: str, key: str) -> str:
     return ""
 
 
-def _read(path: Path, name: str) -> bytes:
+def _read(path: Path, name: str, form: Form) -> bytes:
     try:
         with path.open("rb") as file:
-            raw = file.read(MAX_BYTES + 1)
+            raw = file.read(form.bytes_max + 1)
     except IsADirectoryError as error:
-        raise RubricError([f"{name}: is a folder, not a rubric file"]) from error
+        raise RubricError([f"{name}: is a folder, not a {form.what} file"]) from error
     except FileNotFoundError as error:
         raise RubricError([f"{name}: there is no such file"], hint="grader labs lists the rubrics") from error
     except OSError as error:
         raise RubricError([f"{name}: cannot be read: {error.strerror}"]) from error
-    if len(raw) > MAX_BYTES:
-        raise RubricError([f"{name}: is larger than 1 MB; a rubric is a few kilobytes"])
+    if len(raw) > form.bytes_max:
+        raise RubricError([f"{name}: is larger than {form.bytes_max // 1_000_000} MB; {form.usual}"])
     return raw
 
 
-def _compose(text: str, raw: bytes, name: str) -> Source:
+def _compose(text: str, raw: bytes, name: str, form: Form) -> Source:
     loader: yaml.SafeLoader | None = None
     try:
         loader = yaml.SafeLoader(text)
         node = loader.get_single_node()
         if node is None:
             raise RubricError([f"{name}:1: the file is empty"])
-        reader = _Reader(loader)
+        reader = _Reader(loader, form)
         data = reader.read(node, ())
     except yaml.YAMLError as error:
         raise RubricError([_yaml_fault(error, text, name)]) from error
@@ -143,17 +158,18 @@ def _char(error: yaml.reader.ReaderError) -> str:
 class _Reader:
     """Walks the composed nodes once, aliases expanded, and counts what it visits."""
 
-    def __init__(self, loader: yaml.SafeLoader) -> None:
+    def __init__(self, loader: yaml.SafeLoader, form: Form) -> None:
         self.loader = loader
+        self.form = form
         self.lines: dict[KeyPath, int] = {}
         self.faults: list[Fault] = []
         self.visited = 0
 
     def _count(self, node: yaml.Node) -> None:
         self.visited += 1
-        if self.visited > MAX_NODES:
+        if self.visited > self.form.nodes_max:
             raise yaml.MarkedYAMLError(
-                problem="too much: aliases multiply to more than a rubric can hold",
+                problem=f"too much: aliases multiply to more than a {self.form.what} file can hold",
                 problem_mark=node.start_mark,
             )
 
@@ -163,7 +179,7 @@ class _Reader:
             raise yaml.MarkedYAMLError(problem="is nested too deeply", problem_mark=node.start_mark)
         if not isinstance(node, yaml.ScalarNode) and node.tag not in PLAIN_TAGS:
             raise yaml.MarkedYAMLError(
-                problem=f"the tag {node.tag} is not for rubrics", problem_mark=node.start_mark
+                problem=f"the tag {node.tag} is not for {self.form.what} files", problem_mark=node.start_mark
             )
         self.lines.setdefault(path, node.start_mark.line + 1)
         if isinstance(node, yaml.MappingNode):
@@ -203,7 +219,7 @@ class _Reader:
     def _key(self, node: yaml.Node, path: KeyPath) -> str | None:
         if node.tag == MERGE_TAG:
             return None
-        if isinstance(node, yaml.ScalarNode) and node.tag == TEXT_TAG:
+        if isinstance(node, yaml.ScalarNode) and (node.tag == TEXT_TAG or self.form.written_keys):
             return str(node.value)
         shown = node.value if isinstance(node, yaml.ScalarNode) else "this"
         line = node.start_mark.line + 1
@@ -224,6 +240,8 @@ class _Reader:
             return value
         if isinstance(value, float):
             return value if math.isfinite(value) else self._refuse(path, f"must be finite, not {node.value}")
+        if isinstance(value, date) and path and path[-1] in self.form.times:
+            return value.isoformat()
         return self._refuse(path, f"must be text or a number: put {node.value[:40]} in quotes", node.value)
 
     def _refuse(self, path: KeyPath, message: str, stand_in: Value = 0.0) -> Value:
