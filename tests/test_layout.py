@@ -33,7 +33,7 @@ ALLOWED = {
     "instructor": BASE | {"checks", "temporary"},
     "rubric": BASE | {"checks", "evidence", "instructor"},
     "judge": BASE | {"checks", "evidence", "rubric"},
-    "report": BASE | {"files", "rubric.model"},
+    "report": BASE | {"files", "judge.late", "rubric.model"},
     "arena": BASE | {"admission", "evidence", "files", "package", "rubric.model", "temporary"},
     "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "pipeline": {
