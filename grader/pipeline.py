@@ -44,7 +44,7 @@ from grader.report.files import write_reports
 from grader.report.hidden import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
 from grader.rubric.load import LoadedRubric
-from grader.rubric.needs import needs_package, started
+from grader.rubric.needs import needs_package, needs_ros, started
 from grader.rubric.rates import rates_of
 from grader.temporary import temporary_folder
 
@@ -272,7 +272,7 @@ def _recorder(
         evidence,
         rates=rates_of(rubric.rubric),
         mode=options.sandbox,
-        static_only=options.static_only,
+        static_only=options.static_only or not needs_ros(rubric),
         progress=progress,
     )
 

@@ -49,4 +49,6 @@ def check(entries: Sequence[Entry], only: Sequence[str]) -> None:
             continue
         near = get_close_matches(name, list(known.values()), n=1)
         hint = f"did you mean {line(near[0], NAME_CHARS)}?" if near else f"an id, or {', '.join(WORDS)}"
-        raise UsageError(f"--only {line(name, NAME_CHARS)}: no submission of that id in the roster", hint=hint)
+        raise UsageError(
+            f"--only {line(name, NAME_CHARS)}: no submission of that id in the roster", hint=hint
+        )

@@ -35,7 +35,9 @@ from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 
 GRADEBOOK, RESULTS, INDEX = "gradebook.csv", "results.jsonl", "index.html"
-RESERVED = frozenset({RUN, GRADEBOOK, RESULTS, INDEX, OVERRIDES, "similarity.json", "similarity.csv", "changes.csv"})
+RESERVED = frozenset(
+    {RUN, GRADEBOOK, RESULTS, INDEX, OVERRIDES, "similarity.json", "similarity.csv", "changes.csv"}
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -246,7 +248,8 @@ def alone(out: Path) -> Iterator[None]:
             held = lock(descriptor)
         if not held:
             raise Busy(
-                f"another batch works in {out} just now", hint="wait until it has ended, or choose another --out"
+                f"another batch works in {out} just now",
+                hint="wait until it has ended, or choose another --out",
             )
         yield
     finally:

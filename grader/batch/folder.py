@@ -77,7 +77,11 @@ class BatchFolder:
                 yield Row(entry=entry, result=self._without(entry, ROSTER, str(fault)))
 
     def _without(self, entry: Entry, kind: str, message: str) -> GradingResult:
-        hint = "correct the roster" if kind == ROSTER else "run `grader batch` again: it goes on where it stopped"
+        hint = (
+            "correct the roster"
+            if kind == ROSTER
+            else "run `grader batch` again: it goes on where it stopped"
+        )
         return GradingResult(
             submission=SubmissionInfo(
                 id=safe_name(entry.id), source=entry.source, commit=None, digest="", package=""

@@ -75,7 +75,7 @@ def _ended(folder: Path) -> Judged:
     return Judged(folder=folder, criteria=None, error=f"{folder}: judging it ended the process", hint=hint)
 
 
-def _judged(rubric: LoadedRubric, fitting: bool, folder: Path) -> Judged:  # noqa: FBT001 - a partial's
+def _judged(rubric: LoadedRubric, fitting: bool, folder: Path) -> Judged:
     """In a worker."""
     with working():
         try:
@@ -95,7 +95,9 @@ def fitting_runs(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
     """Those that were recorded as the rubric's scenarios say; evidence that does not tell counts as such."""
     digests = {name: scenario.digest for name, scenario in rubric.scenarios.items()}
     return {
-        name: run for name, run in runs.items() if run.metadata.get(SCENARIO, digests.get(name)) == digests.get(name)
+        name: run
+        for name, run in runs.items()
+        if run.metadata.get(SCENARIO, digests.get(name)) == digests.get(name)
     }
 
 

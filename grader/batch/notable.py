@@ -2,46 +2,63 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 
 from grader.batch.folder import MISSING, BatchFolder
 from grader.gradebook import Row
+from grader.model.result import CriterionResult
 from grader.model.verdict import Status
+from grader.overrides import FILE as OVERRIDES
 
-OPEN = {Status.INCONCLUSIVE: "could not be judged", Status.MANUAL: "waits for a person", Status.ERROR: "failed"}
+OPEN = {
+    Status.INCONCLUSIVE: "could not be judged",
+    Status.MANUAL: "waits for a person",
+    Status.ERROR: "failed",
+}
 NAMES_SHOWN = 4
+GO_ON = {
+    "error": "{count} could not be graded; when that is mended: --only failed",
+    "inconclusive": "{count} inconclusive; to grade them again: --only inconclusive",
+    "manual": "{count} with criteria that a person decides: their points go into {overrides}",
+    "missing": "{count} not graded yet: the same command goes on with them",
+}
 
 
 def notable(folder: BatchFolder) -> Iterator[str]:
     """Of each submission that is not graded, why; then how to go on with them."""
-    failed = inconclusive = missing = manual = 0
+    found: Counter[str] = Counter()
     for row in folder.rows():
-        error = row.result.error
-        if error is not None and error.kind == MISSING:
-            missing += 1
-        elif row.result.status == "error":
-            failed += 1
+        state = _state(row)
+        found[state] += 1
+        if state == "error":
+            error = row.result.error
             yield f"{row.entry.id}: error: {error.message if error else _open(row)}"
-        elif row.result.status == "inconclusive":
-            only_manual = {c.status for c in row.result.criteria if c.status in OPEN and c.max_points} == {Status.MANUAL}
-            manual += only_manual
-            inconclusive += not only_manual
-            if not only_manual:
-                yield f"{row.entry.id}: inconclusive: {_open(row)}"
+        elif state == "inconclusive":
+            yield f"{row.entry.id}: inconclusive: {_open(row)}"
         for override in row.result.overrides:
             if override.changed:
-                yield f"{row.entry.id}: {override.criterion} was decided by a person, and the check says something else now"
-    if failed:
-        yield f"{failed} to be graded again when that is mended: --only failed"
-    if inconclusive:
-        yield f"{inconclusive} to be graded again: --only inconclusive"
-    if manual:
-        yield f"{manual} with criteria that a person decides: write their points into {folder.path / 'overrides.yaml'}"
-    if missing:
-        yield f"{missing} not graded yet: the same command goes on with them"
+                yield f"{row.entry.id}: {override.criterion}: a person decided, and the check says something else now"
+    for state, words in GO_ON.items():
+        if found[state]:
+            yield words.format(count=found[state], overrides=folder.path / OVERRIDES)
+
+
+def _state(row: Row) -> str:
+    """The result's status, told apart further: nothing there yet, and only people's criteria open."""
+    result = row.result
+    if result.error is not None and result.error.kind == MISSING:
+        return "missing"
+    if result.status == "inconclusive" and {c.status for c in _waiting(row)} == {Status.MANUAL}:
+        return "manual"
+    return result.status
+
+
+def _waiting(row: Row) -> tuple[CriterionResult, ...]:
+    return tuple(c for c in row.result.criteria if c.status in OPEN and c.max_points > 0)
 
 
 def _open(row: Row) -> str:
-    names = [f"{c.id} ({OPEN[c.status]})" for c in row.result.criteria if c.status in OPEN and c.max_points]
+    names = [f"{c.id} ({OPEN[c.status]})" for c in _waiting(row)]
     more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
     return ", ".join(names[:NAMES_SHOWN]) + more

@@ -97,7 +97,8 @@ def regrade(
             for judged in judge_all([path / EVIDENCE for path in by_folder], rubric, jobs, fitting=True)
         }
         regraded = tuple(
-            found.get(folder.folder_of(entry) / EVIDENCE) or _without_evidence(folder, entry) for entry in entries
+            found.get(folder.folder_of(entry) / EVIDENCE) or _without_evidence(folder, entry)
+            for entry in entries
         )
         run = folder.run.model_copy(update=described(rubric, rubric_source) | {"grader": __version__})
         now = BatchFolder(folder.path, run)
@@ -121,11 +122,13 @@ def _regraded(
             "max_points": rubric.rubric.max_points,
             "environment": before.environment.model_copy(update={"grader": __version__}),
             "overrides": (),
+            "handed_in": None,
             "late": None,
             "error": None,
         }
     )
-    after = settler.settled(automatic, entry.id, None, before)
+    handed_in = before.handed_in and before.handed_in.model_copy(update={"deadline": None})  # the rubric's of today
+    after = settler.settled(automatic, entry.id, handed_in, before)
     try:
         if after != before:
             rewrite(folder.folder_of(entry), after, rubric.rubric)
@@ -176,7 +179,10 @@ def run_missing(
     """
     again = [one.entry.id for one in regraded if one.missing]
     roster = Roster(
-        file=folder.run.roster, entries=folder.run.entries, columns=folder.run.columns, faults=folder.run.faults
+        file=folder.run.roster,
+        entries=folder.run.entries,
+        columns=folder.run.columns,
+        faults=folder.run.faults,
     )
     options = BatchOptions(
         out=folder.path,

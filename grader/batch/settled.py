@@ -35,7 +35,7 @@ class Settler:
             automatic,
             self.rubric,
             overrides=self.of(submission_id),
-            handed_in=handed_in or earlier.late,
+            handed_in=handed_in or earlier.handed_in,
             before=earlier.overrides,
         )
 

@@ -57,7 +57,11 @@ def _graded(job: Job, folder: Path) -> Outcome:
 def _attempt(job: Job) -> Attempt:
     """For the result of what could not be fetched."""
     about = SubmissionInfo(
-        id=safe_name(job.entry.id), source=without_password(job.entry.source), commit=None, digest="", package=""
+        id=safe_name(job.entry.id),
+        source=without_password(job.entry.source),
+        commit=None,
+        digest="",
+        package="",
     )
     return Attempt(
         source=about.source,

@@ -115,7 +115,10 @@ def _class(add: _Adder) -> None:
     _rubric(batch, required=True)
     _out(batch, "results go to DIR/<id>/, with gradebook.csv and results.jsonl (default: ./grader-results)")
     batch.add_argument(
-        "--jobs", metavar="N", type=_count, help="how many side by side (default: four a core, static ones one)"
+        "--jobs",
+        metavar="N",
+        type=_count,
+        help="how many side by side (default: four a core, static ones one)",
     )
     batch.add_argument(
         "--only",
@@ -129,14 +132,17 @@ def _class(add: _Adder) -> None:
     )
     batch.add_argument("--static", action="store_true", help="look at the files only, run nothing")
     batch.add_argument(
-        "--cluster", metavar="ADDRESS", help="hand the submissions to a Dask cluster: tcp://HOST:8786, or local"
+        "--cluster",
+        metavar="ADDRESS",
+        help="hand the submissions to a Dask cluster: tcp://HOST:8786, or local",
     )
     batch.add_argument(
-        "--exchange", metavar="URL", help="where a cluster's workers leave results (default: in the folder of --out)"
+        "--exchange",
+        metavar="URL",
+        help="where a cluster's workers leave results (default: in the folder of --out)",
     )
     _sandbox(batch)
     _json(batch)
-
 
     regrade = add("regrade", "judge a class again from its evidence; nothing is run, needs no ROS")
     regrade.add_argument("folder", metavar="DIR", type=Path, help="the --out of `grader batch`")
@@ -150,6 +156,25 @@ def _class(add: _Adder) -> None:
     regrade.add_argument("--jobs", metavar="N", type=_count, help="how many side by side")
     _sandbox(regrade)
     _json(regrade)
+
+    similar = add("similar", "name submissions that are nearly the same, for a person; never a mark")
+    similar.add_argument("folder", metavar="DIR", type=Path, help="the --out of `grader batch`")
+    similar.add_argument(
+        "--starter",
+        metavar="PATH",
+        action="append",
+        default=[],
+        type=Path,
+        help="code that everybody was given: a folder, an archive or a program; may be given several times",
+    )
+    similar.add_argument(
+        "--threshold",
+        metavar="PERCENT",
+        type=_percent,
+        default=80.0,
+        help="how much of one's own code must be in the other's (default: 80)",
+    )
+    _json(similar)
 
 
 def _evidence(add: _Adder) -> None:
@@ -247,6 +272,16 @@ def _mutants(test: argparse.ArgumentParser) -> None:
     )
     _sandbox(test)
     _json(test)
+
+
+def _percent(text: str) -> float:
+    try:
+        number = float(text.removesuffix("%"))
+    except ValueError:
+        number = 0.0
+    if not 1 <= number <= 100:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a percentage from 1 to 100")
+    return number
 
 
 def _count(text: str) -> int:

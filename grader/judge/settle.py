@@ -43,6 +43,7 @@ def settle(
         "points": late.points if late else points,
         "criteria": criteria,
         "overrides": applied,
+        "handed_in": handed_in,
         "late": late,
     }
     return automatic.model_copy(update=update)
@@ -50,7 +51,7 @@ def settle(
 
 def unsettled(result: GradingResult, rubric: Rubric) -> GradingResult:
     """The automatic result that a settled one was made from. An automatic result is given back as it is."""
-    if not result.overrides and result.late is None:
+    if not result.overrides and result.handed_in is None and result.late is None:
         return result
     said = {override.criterion: override.automatic for override in result.overrides}
     criteria = tuple(c.model_copy(update=dict(said[c.id])) if c.id in said else c for c in result.criteria)
@@ -59,6 +60,7 @@ def unsettled(result: GradingResult, rubric: Rubric) -> GradingResult:
         "points": total_points(rubric, criteria),
         "criteria": criteria,
         "overrides": (),
+        "handed_in": None,
         "late": None,
     }
     return result.model_copy(update=update)

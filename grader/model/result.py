@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.model.handed_in import AppliedOverride, Lateness
+from grader.model.handed_in import AppliedOverride, HandedIn, Lateness
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, FileCitation, Status
 
@@ -99,5 +99,6 @@ class GradingResult(Record):
     timing: TimingInfo
     notes: tuple[Note, ...] = ()
     overrides: tuple[AppliedOverride, ...] = ()
+    handed_in: HandedIn | None = None
     late: Lateness | None = None
     error: ErrorInfo | None = None

@@ -16,12 +16,12 @@ def result_bytes(result: GradingResult) -> bytes:
 
 
 def result_text(result: GradingResult, *, ascii_only: bool = False) -> str:
-    """`notes`, `overrides`, `late` and `error` are there only where there are any.
+    """`notes`, `overrides`, `handed_in`, `late` and `error` are there only where there are any.
 
     Criteria are written as `judge.summary.criteria_bytes` writes them.
     """
     data: dict[str, Any] = result.model_dump(mode="json", by_alias=True)
-    for name in ("notes", "overrides", "late", "error"):
+    for name in ("notes", "overrides", "handed_in", "late", "error"):
         if not data[name]:
             del data[name]
     return json_text(clipped(data, text_limit(len(result.criteria), LIMIT)), ascii_only=ascii_only)

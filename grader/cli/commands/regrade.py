@@ -103,7 +103,8 @@ def _told(batch: BatchFolder, regraded: Sequence[Regraded]) -> Iterator[str]:
         yield "  hint: --run-missing runs them"
     changed = sum(bool(one.changes) for one in regraded)
     judged = sum(one.after is not None for one in regraded)
-    yield f"{judged} of {len(regraded)} judged again, {changed} changed; {batch.path / GRADEBOOK}, {batch.path / CHANGES}"
+    yield f"{judged} of {len(regraded)} judged again, {changed} changed"
+    yield f"{batch.path / GRADEBOOK}  {batch.path / CHANGES}"
 
 
 def _words(change: Change, which: str) -> str:

@@ -1,0 +1,134 @@
+"""`grader similar DIR [--starter PATH]`: submissions that are nearly the same, for a person to look at."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from grader.batch.folder import RUN, open_batch
+from grader.cli.say import say, say_json
+from grader.errors import ExitCode, UsageError
+from grader.model.similarity import NotCompared, Pair, Similarity
+from grader.report.terminal import emit, open_console
+from grader.report.text import line
+from grader.results import EVIDENCE
+from grader.similarity import compare, write_similarity
+from grader.similarity.compare import require_library
+from grader.similarity.files import percent, stretches
+
+NAME_CHARS = 22
+PATH_CHARS = 40
+TEXT_CHARS = 300
+PAIRS_SHOWN = 50
+IDS_SHOWN = 20
+HARMLESS = "For a person to look at: no mark depends on it, and likeness alone proves nothing."
+
+
+def run(*, folder: Path, starter: list[Path], threshold: float, as_json: bool = False) -> ExitCode:
+    """Compare all submissions in `folder`; `threshold` is in percent. What is alike is shown and written there."""
+    require_library()
+    folders, names, groups = _class(folder)
+    similarity = compare(
+        folders,
+        starter=starter,
+        groups=groups,
+        threshold=threshold / 100,
+        jobs=len(os.sched_getaffinity(0)),
+    )
+    written = write_similarity(similarity, folder, names)
+    if as_json:
+        say_json(similarity.model_dump(mode="json", by_alias=True))
+        return ExitCode.PASSED
+    for text in _head(similarity):
+        say(text)
+    if similarity.pairs:
+        emit(open_console(sys.stdout), [_table(similarity, names)])
+    for text in _tail(similarity):
+        say(text)
+    say(f"Written: {', '.join(str(path) for path in written)}")
+    return ExitCode.PASSED
+
+
+def _class(folder: Path) -> tuple[dict[str, Path], dict[str, str], dict[str, str]]:
+    """The submissions' folders, names and groups by id: the batch's, or every folder with evidence in it."""
+    if (folder / RUN).exists():
+        batch = open_batch(folder)
+        entries = batch.run.entries
+        folders = {entry.id: batch.folder_of(entry) for entry in entries}
+        return folders, {e.id: e.name for e in entries}, {e.id: e.group for e in entries}
+    try:
+        below = sorted(path for path in folder.iterdir() if (path / EVIDENCE).is_dir())
+    except OSError as error:
+        raise UsageError(f"{folder}: {error.strerror}", hint="give the --out of `grader batch`") from error
+    if not below:
+        raise UsageError(
+            f"{folder}: no submissions with evidence in it", hint="give the --out of `grader batch`"
+        )
+    return {path.name: path for path in below}, {}, {}
+
+
+def _head(similarity: Similarity) -> Iterator[str]:
+    count = len(similarity.pairs)
+    what = "1 pair is" if count == 1 else f"{count or 'no'} pairs are"
+    yield f"{similarity.compared} submissions compared, {what} nearly the same."
+    yield HARMLESS
+
+
+def _table(similarity: Similarity, names: Mapping[str, str]) -> Padding:
+    """Each pair on two lines and more: how alike, then where."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for name in ("share", "lines", "submission", "where"):
+        table.add_column(Text(name), justify="right" if name in {"share", "lines"} else "left", no_wrap=False)
+    for pair in similarity.pairs[:PAIRS_SHOWN]:
+        for row in _rows(pair, names):
+            table.add_row(*(Text(cell) for cell in row))
+        table.add_row()
+    return Padding(table, (1, 0, 0, 0))
+
+
+def _rows(pair: Pair, names: Mapping[str, str]) -> Iterator[tuple[str, str, str, str]]:
+    """The one, then the other."""
+    for name, share, lines, where in (
+        (pair.a, pair.similarity_a, pair.lines_a, [(m.file_a, m.lines_a) for m in pair.files]),
+        (pair.b, pair.similarity_b, pair.lines_b, [(m.file_b, m.lines_b) for m in pair.files]),
+    ):
+        places = [f"{line(path, PATH_CHARS)}:{stretches(found)}" for path, found in where if found]
+        shown = names.get(name) or name
+        yield f"{percent(share)} %", str(lines), line(shown, NAME_CHARS), "\n".join(dict.fromkeys(places))
+
+
+def _tail(similarity: Similarity) -> Iterator[str]:
+    if len(similarity.pairs) > PAIRS_SHOWN:
+        yield f"{len(similarity.pairs) - PAIRS_SHOWN} more pairs are in the files below."
+    for group in similarity.clusters:
+        if len(group) > 2:
+            yield f"{len(group)} hang together: {_ids(group)}"
+    if similarity.same_group:
+        yield f"{similarity.same_group} pairs of one group each are not named."
+    if similarity.too_little:
+        count, total = len(similarity.too_little), similarity.compared
+        yield (
+            f"{count} of {total} have fewer than {similarity.min_lines} lines of their own beside the starter code, "
+            f"the tutorials and what most have: nothing can be said of them."
+        )
+    for one in similarity.not_compared[:IDS_SHOWN]:
+        yield f"Not compared: {_not_compared(one)}"
+    if len(similarity.not_compared) > IDS_SHOWN:
+        yield f"Not compared: {len(similarity.not_compared) - IDS_SHOWN} more"
+    yield from (f"Note: {note}" for note in similarity.notes)
+
+
+def _not_compared(one: NotCompared) -> str:
+    place = line(f"{one.id}: {one.file}" if one.file else one.id, TEXT_CHARS)
+    return f"{place}: {line(one.reason, TEXT_CHARS)}"
+
+
+def _ids(group: tuple[str, ...]) -> str:
+    more = f" and {len(group) - IDS_SHOWN} more" if len(group) > IDS_SHOWN else ""
+    return ", ".join(line(name, NAME_CHARS) for name in group[:IDS_SHOWN]) + more
