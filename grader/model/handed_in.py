@@ -10,6 +10,7 @@ from pydantic import AwareDatetime, Field
 from grader.model.record import Record
 from grader.model.verdict import Status
 
+Day = datetime | date
 COMMENT_CHARS = 2000
 AUTHOR_CHARS = 200
 SaidBy = Literal["roster", "commit", "nobody"]
@@ -49,7 +50,7 @@ class Override(Record):
     points: Annotated[float, Field(ge=0)]
     comment: Annotated[str, Field(max_length=COMMENT_CHARS)] = ""
     author: Annotated[str, Field(max_length=AUTHOR_CHARS)] = ""
-    date: datetime | date | None = None
+    date: Day | None = None
 
 
 class Automatic(Record):
