@@ -17,7 +17,7 @@ from benchmarks.figures import Found, NotMeasured, Options
 from benchmarks.machine import load, machine
 from grader.errors import GraderError
 
-NAMES = ("one", "hundred", "judging", "recorder", "accuracy", "load", "fair")
+NAMES = ("one", "hundred", "judging", "recorder", "accuracy", "load", "fair", "thousands")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -1,0 +1,149 @@
+"""Classes of a thousand and of ten thousand, judged by their files alone: whether time is linear and memory flat."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmarks.figures import Found, NotMeasured, Options, table
+from benchmarks.gradings import DATA, FIXTURES, SOLUTION, cores, folder_for
+
+COUNT = 10_000
+SHARES = (10, 1)
+"""Classes of a tenth of the count, and of the count."""
+RUBRIC = DATA / "static.yaml"
+KINDS = (
+    SOLUTION,
+    FIXTURES / "cmake-project-name",
+    FIXTURES / "manifest-name",
+    FIXTURES / "ok-no-dependencies",
+)
+LEFT = re.compile(r"\[(\d+) of (\d+) done.*about (\d+(?::\d+)?) (s|min|h) to go\]")
+UNITS_S = {"s": 1, "min": 60}
+GRADER = (sys.executable, "-m", "grader", "batch")
+
+
+class Batch(NamedTuple):
+    """Seconds of the wall, the largest resident sizes in MB of the process that hands out the work and of those that do
+    it, and what the progress said half-way that was left, with what then was."""
+
+    wall_s: float
+    handing_mb: float
+    grading_mb: float
+    said_s: float | None
+    took_s: float
+
+
+def measure(options: Options) -> Found:
+    count, jobs = options.count or COUNT, options.jobs or cores()
+    rows, faults = [], list[str]()
+    with folder_for("thousands", options) as folder:
+        points = _points_alone(folder / "alone", jobs)
+        for number in (count // share for share in SHARES):
+            handed_in, out = _made(folder / f"in-{number}", number), folder / f"out-{number}"
+            first, again = _batch(handed_in, out, jobs), _batch(handed_in, out, jobs)
+            faults += _wrong(out, number, points)
+            rows += [_row(number, "graded", first), _row(number, "found complete", again)]
+            shutil.rmtree(handed_in)
+            shutil.rmtree(out)
+    header = [
+        "submissions",
+        "",
+        "wall, s",
+        "each, ms",
+        "memory, MB: hands out",
+        "grades",
+        "half-way: said, s",
+        "took, s",
+    ]
+    return Found(
+        runs=f"{jobs} side by side, once each",
+        tables=(table(header, rows),),
+        faults=tuple(faults),
+    )
+
+
+def _row(count: int, what: str, batch: Batch) -> list[str]:
+    said = f"{batch.said_s:.0f}" if batch.said_s is not None else ""
+    times = [f"{batch.wall_s:.1f}", f"{1e3 * batch.wall_s / count:.1f}"]
+    sizes = [f"{batch.handing_mb:.0f}", f"{batch.grading_mb:.0f}"]
+    return [str(count), what, *times, *sizes, said, f"{batch.took_s:.0f}"]
+
+
+def _made(folder: Path, count: int) -> Path:
+    """A folder with so many submissions, the kinds in turn."""
+    for number in range(count):
+        shutil.copytree(KINDS[number % len(KINDS)], folder / f"s{number:05}")
+    return folder
+
+
+def _points_alone(folder: Path, jobs: int) -> list[float]:
+    """What each kind gets where it is alone."""
+    _batch(_made(folder / "in", len(KINDS)), folder / "out", jobs)
+    return list(_points(folder / "out"))
+
+
+def _points(out: Path) -> Iterator[float]:
+    with (out / "results.jsonl").open(encoding="utf-8") as lines:
+        for line in lines:
+            yield json.loads(line)["points"]
+
+
+def _wrong(out: Path, count: int, alone: list[float]) -> Iterator[str]:
+    found = list(_points(out))
+    if len(found) != count:
+        yield f"{len(found)} of {count} results"
+    different = sum(points != alone[number % len(alone)] for number, points in enumerate(found))
+    if different:
+        yield f"{different} of {count} got other points than alone"
+
+
+def _batch(handed_in: Path, out: Path, jobs: int) -> Batch:
+    argv = [*GRADER, str(handed_in), "--rubric", str(RUBRIC), "--out", str(out), "--jobs", str(jobs)]
+    begun_s, half_s, said_s = time.monotonic(), time.monotonic(), None
+    handing_kb = grading_kb = 0
+    with subprocess.Popen(argv, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None  # noqa: S101 - opened with PIPE
+        for line in process.stderr:
+            handing_kb = max(handing_kb, _peak_kb(process.pid))
+            grading_kb = max(grading_kb, *map(_peak_kb, _children(process.pid)), 0)
+            told = LEFT.search(line)
+            if told and said_s is None and int(told[1]) * 2 >= int(told[2]):
+                half_s, said_s = time.monotonic(), _seconds(told[3], told[4])
+    if process.returncode not in {0, 1}:
+        raise NotMeasured(f"grader batch ended with {process.returncode}")
+    ended_s = time.monotonic()
+    return Batch(ended_s - begun_s, handing_kb / 1e3, grading_kb / 1e3, said_s, ended_s - half_s)
+
+
+def _seconds(number: str, unit: str) -> float:
+    if unit == "h":
+        hours, minutes = number.split(":")
+        return int(hours) * 3600 + int(minutes) * 60
+    return int(number) * UNITS_S[unit]
+
+
+def _children(pid: int) -> Iterator[int]:
+    """Of all its threads."""
+    for listed in Path(f"/proc/{pid}/task").glob("*/children"):
+        try:
+            yield from map(int, listed.read_text().split())
+        except OSError:
+            continue
+
+
+def _peak_kb(pid: int) -> int:
+    """The largest resident size that the process had; 0 where it has ended."""
+    try:
+        status = Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return 0
+    found = re.search(r"VmHWM:\s*(\d+) kB", status)
+    return int(found[1]) if found else 0
