@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -133,10 +134,8 @@ def _seconds(number: str, unit: str) -> float:
 def _children(pid: int) -> Iterator[int]:
     """Of all its threads."""
     for listed in Path(f"/proc/{pid}/task").glob("*/children"):
-        try:
+        with suppress(OSError):
             yield from map(int, listed.read_text().split())
-        except OSError:
-            continue
 
 
 def _peak_kb(pid: int) -> int:
