@@ -44,7 +44,9 @@ ALLOWED = {
         *BASE, "checks", "evidence", "intake", "package", "pipeline", "rubric", "temporary"
     },
     "roster": BASE | {"intake"},
-    "batch": BASE | {"evidence", "judge", "pipeline", "rubric"},
+    "fetching": BASE | {"files", "intake", "temporary"},
+    "gradebook": BASE | {"files", "report"},
+    "batch": BASE | {"evidence", "fetching", "judge", "pipeline", "rubric"},
     "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
     "cli": {
         *BASE, "arena", "authoring", "batch", "checks", "evidence", "files", "instructor", "intake", "judge",

@@ -1,0 +1,34 @@
+"""The plain gradebook as CSV, and the results as JSON Lines."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from grader.gradebook.cells import csv_line
+from grader.gradebook.model import Book, Row
+from grader.gradebook.table import cells, header
+from grader.gradebook.whole import whole_file
+from grader.report.result_json import result_text
+from grader.shown import json_text
+
+
+def write_csv(book: Book, rows: Iterable[Row], target: Path) -> None:
+    """UTF-8 without a mark, as programs read it; whoever has Excel takes the workbook."""
+    with whole_file(target) as path, path.open("w", encoding="utf-8", newline="") as file:
+        file.write(csv_line(header(book)))
+        file.writelines(csv_line(list(cells(book, row))) for row in rows)
+
+
+def write_jsonl(rows: Iterable[Row], target: Path) -> None:
+    """A line is what `result.json` says (`grader.result/1`), and what the roster says of it under `roster`."""
+    with whole_file(target) as path, path.open("w", encoding="utf-8", newline="") as file:
+        file.writelines(json_line(row) for row in rows)
+
+
+def json_line(row: Row) -> str:
+    """One line, with its end."""
+    data = {**json.loads(result_text(row.result)), "roster": row.entry.model_dump(mode="json")}
+    return re.sub(r"\n *", "", json_text(data)) + "\n"
