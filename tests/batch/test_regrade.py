@@ -1,0 +1,214 @@
+"""`grader regrade`: a class judged again by another rubric, from what was recorded."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from datetime import datetime, timezone
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+
+from grader import __version__
+from grader.batch.flow import described
+from grader.batch.folder import open_batch, write_run
+from grader.cli.main import run
+from grader.evidence.reader import load_evidence
+from grader.judge import judge
+from grader.judge.summary import overall_status, total_points
+from grader.model.batch import BatchRun
+from grader.model.result import EnvironmentInfo, GradingResult, RubricInfo, SubmissionInfo, TimingInfo
+from grader.model.roster import Entry
+from grader.report.files import write_reports
+from grader.rubric.load import LoadedRubric, load_rubric
+from tests.batch.a_class import RUBRIC, batch, handed_in, lines_of, run_of
+
+RECORDINGS = Path(__file__).parent.parent / "data" / "recordings"
+LAB = Path(__file__).parent.parent.parent / "rubrics" / "leeds-comp3631-lab1.yaml"
+
+
+def recorded(out: Path, kinds: dict[str, str]) -> Path:
+    """A batch's folder as the lab's rubric left it, from recordings that are kept."""
+    rubric = load_rubric(str(LAB))
+    entries = tuple(Entry(id=name, source=f"/gone/{name}", name=name.title()) for name in kinds)
+    for name, kind in kinds.items():
+        shutil.copytree(RECORDINGS / kind, out / name / "evidence")
+        write_result(out / name, name, rubric)
+    about = BatchRun(
+        state="complete",
+        grader=__version__,
+        **described(rubric, str(LAB)),
+        roster="roster.csv",
+        started_at=datetime(2026, 11, 1, tzinfo=timezone.utc),
+        entries=entries,
+    )
+    write_run(out, about)
+    return out
+
+
+def write_result(folder: Path, name: str, rubric: LoadedRubric) -> None:
+    criteria = judge(rubric.rubric, load_evidence([folder / "evidence"]), rubric.checks)
+    result = GradingResult(
+        submission=SubmissionInfo(id=name, source=f"/gone/{name}", commit=None, digest="0", package="lab1"),
+        rubric=RubricInfo(id=rubric.rubric.id, version=rubric.rubric.version, digest=rubric.digest),
+        status=overall_status(criteria),
+        points=total_points(rubric.rubric, criteria),
+        max_points=rubric.rubric.max_points,
+        criteria=criteria,
+        environment=EnvironmentInfo(grader=__version__, ros="", python="", sandbox=""),
+        timing=TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0),
+    )
+    write_reports(result, folder, console="kept", rubric=rubric.rubric)
+
+
+def changed(path: Path, *changes: tuple[str, str]) -> Path:
+    """A copy of the lab's rubric with these texts replaced."""
+    text = LAB.read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text)
+    return path
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def kinds() -> dict[str, str]:
+    return {"ada": "correct", "bob": "correct"}
+
+
+def test_the_same_rubric_changes_nothing(tmp_path, capsys) -> None:
+    out = recorded(tmp_path / "out", kinds())
+    before = {name: (out / name / "result.json").read_bytes() for name in kinds()}
+    assert run(["regrade", str(out)]) == 0
+    assert {name: (out / name / "result.json").read_bytes() for name in kinds()} == before
+    assert rows_of(out / "changes.csv") == []
+    assert "2 of 2 judged again, 0 changed" in capsys.readouterr().out
+
+
+def test_points_that_a_new_rubric_gives(tmp_path, capsys) -> None:
+    out = recorded(tmp_path / "out", kinds())
+    rubric = changed(tmp_path / "new.yaml", ("rate_hz: 10", "rate_hz: 20"))
+    assert run(["regrade", str(out), "--rubric", str(rubric)]) == 1
+    shown = capsys.readouterr().out
+    assert "chatter-rate: pass 10 -> fail 0" in shown
+    assert "2 of 2 judged again, 2 changed" in shown
+    rows = rows_of(out / "changes.csv")
+    assert {row["id"] for row in rows} == {"ada", "bob"}
+    assert all(row["why"] for row in rows)
+    for name in kinds():
+        result = json.loads((out / name / "result.json").read_bytes())
+        assert result["rubric"]["digest"] == load_rubric(str(rubric)).digest
+        assert result["points"] < 100
+        assert (out / name / "console.log").read_text() == "kept"
+        assert list((out / name / "evidence").iterdir())
+        assert "rate" in (out / name / "report.md").read_text()
+    assert [line["points"] for line in lines_of(out)] == [
+        float(row["points"]) for row in rows_of(out / "gradebook.csv")
+    ]
+    assert run_of(out)["rubric"]["digest"] == load_rubric(str(rubric)).digest
+    assert open_batch(out).run.rubric_source == str(rubric)
+
+
+def test_a_scenario_that_was_not_recorded(tmp_path, capsys) -> None:
+    out = recorded(tmp_path / "out", kinds())
+    (out / "ada" / "evidence" / "listener.mcap").unlink()
+    assert run(["regrade", str(out)]) == 4
+    shown = capsys.readouterr().out
+    assert "1 must run again, there is no recording of listener: ada" in shown
+    assert "--run-missing" in shown
+    statuses = {line["submission"]["id"]: line["status"] for line in lines_of(out)}
+    assert statuses == {"ada": "inconclusive", "bob": "graded"}
+
+
+def test_a_scenario_that_runs_something_else_now(tmp_path, capsys) -> None:
+    """Evidence that does not say by which definition it was recorded counts; evidence of another one does not."""
+    out = recorded(tmp_path / "out", {"ada": "correct"})
+    rubric = changed(tmp_path / "new.yaml", ("window_s: 6", "window_s: 60"))
+    assert run(["regrade", str(out), "--rubric", str(rubric)]) == 0
+    spoil(out / "ada" / "evidence" / "talker.mcap")
+    assert run(["regrade", str(out), "--rubric", str(rubric)]) == 4
+    assert "no recording of talker: ada" in capsys.readouterr().out
+
+
+def spoil(path: Path) -> None:
+    """Write the file anew, as recorded by another definition."""
+    copy = path.with_suffix(".copy")
+    with path.open("rb") as source, copy.open("wb") as target:
+        reader = make_reader(source)
+        summary = reader.get_summary()
+        assert summary is not None
+        writer = Writer(target, compression=CompressionType.NONE)
+        header = reader.get_header()
+        writer.start(header.profile, header.library)
+        for metadata in reader.iter_metadata():
+            writer.add_metadata(metadata.name, {**metadata.metadata, "scenario.digest": "of another one"})
+        schemas = {s.id: writer.register_schema(s.name, s.encoding, s.data) for s in summary.schemas.values()}
+        channels = {
+            c.id: writer.register_channel(
+                c.topic, c.message_encoding, schemas.get(c.schema_id, 0), dict(c.metadata)
+            )
+            for c in summary.channels.values()
+        }
+        for _, channel, message in reader.iter_messages(log_time_order=False):
+            writer.add_message(
+                channels[channel.id], message.log_time, message.data, message.publish_time, message.sequence
+            )
+        writer.finish()
+    copy.replace(path)
+
+
+def test_what_people_decided_stays_and_is_marked(tmp_path, capsys) -> None:
+    out = recorded(tmp_path / "out", kinds())
+    (out / "overrides.yaml").write_text(
+        "ada:\n  chatter-rate: {points: 4, comment: seen in the lab, author: A. Miller, date: 2026-11-02}\n"
+    )
+    run(["regrade", str(out)])
+    points = {line["submission"]["id"]: line["points"] for line in lines_of(out)}
+    assert points == {"ada": 94, "bob": 100}
+    rubric = changed(tmp_path / "new.yaml", ("rate_hz: 10", "rate_hz: 20"))
+    capsys.readouterr()
+    run(["regrade", str(out), "--rubric", str(rubric)])
+    result = json.loads((out / "ada" / "result.json").read_bytes())
+    (override,) = result["overrides"]
+    assert (override["points"], override["changed"]) == (4, True)
+    assert override["was"]["status"] == "pass"
+    assert override["automatic"]["status"] == "fail"
+    assert {c["id"]: c["points"] for c in result["criteria"]}["chatter-rate"] == 4
+
+
+def test_a_deadline_that_comes_later(tmp_path) -> None:
+    """When it was handed in is in the result, so a late policy of a new rubric can be applied to it."""
+    handed_in(tmp_path / "in", ["ada"])
+    roster = tmp_path / "in" / "roster.csv"
+    roster.write_text("id,source,submitted_at\nada,ada,2026-10-31T12:00:00+00:00\n")
+    out = tmp_path / "out"
+    assert batch(roster, out) == 0
+    rubric = tmp_path / "late.yaml"
+    rubric.write_text(
+        RUBRIC.read_text().replace(
+            "scenarios:", "deadline: 2026-10-30T12:00:00+00:00\nlate: {lost: 10, per: day}\nscenarios:"
+        )
+    )
+    assert run(["regrade", str(out), "--rubric", str(rubric)]) in (0, 1)
+    (line,) = lines_of(out)
+    assert line["points"] == 90
+    assert line["late"]["points_before"] == 100
+
+
+def test_where_no_batch_has_been(tmp_path, capsys) -> None:
+    assert run(["regrade", str(tmp_path)]) == 2
+    assert "no run.json" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"schema": "grader.run/9"}', "\x00"])
+def test_a_run_that_cannot_be_read(tmp_path, capsys, text: str) -> None:
+    (tmp_path / "run.json").write_text(text)
+    assert run(["regrade", str(tmp_path)]) == 2
+    assert "run.json" in capsys.readouterr().err
