@@ -46,11 +46,15 @@ ALLOWED = {
     "roster": BASE | {"intake"},
     "fetching": BASE | {"files", "intake", "temporary"},
     "gradebook": BASE | {"files", "report"},
-    "batch": BASE | {"evidence", "fetching", "judge", "pipeline", "rubric"},
+    "batch": {
+        *BASE, "evidence", "faults", "fetching", "files", "gradebook", "intake", "judge", "overrides", "pipeline",
+        "report", "results", "rubric", "temporary"
+    },
     "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
     "cli": {
         *BASE, "arena", "authoring", "batch", "checks", "evidence", "files", "instructor", "intake", "judge",
-        "mutation", "package", "pipeline", "report", "rubric", "temporary"
+        "cluster", "gradebook", "mutation", "package", "pipeline", "report", "roster", "rubric", "similarity",
+        "temporary"
     },
     "__main__": {"cli"},
 }  # fmt: skip

@@ -33,7 +33,7 @@ def read_kept(name: str) -> bytes | None:
 
 
 def keep(name: str, data: bytes) -> None:
-    """Keep it, if that can be done here. Of all that is kept, the newest stays."""
+    """Keep it, if that can be done here. Of the files that are kept, the newest stay."""
     folder = _folder()
     with suppress(OSError, GraderError):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -44,7 +44,8 @@ def keep(name: str, data: bytes) -> None:
         if target.is_symlink():
             target.unlink()
         atomic_write(target, _sum(data) + data)
-        files = sorted(folder.iterdir(), key=lambda path: path.lstat().st_mtime_ns, reverse=True)
+        files = [path for path in folder.iterdir() if stat.S_ISREG(path.lstat().st_mode)]
+        files.sort(key=lambda path: path.lstat().st_mtime_ns, reverse=True)
         for old in files[FILES_MAX:]:
             old.unlink()
 

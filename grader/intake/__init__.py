@@ -22,19 +22,22 @@ from grader.model.submission import RecordedSubmission, Submission
 
 __all__ = [
     "Limits",
+    "Source",
     "enclosing_package",
     "find_packages",
     "find_recordings",
     "open_recorded",
     "open_recording",
     "open_submission",
+    "parse_source",
     "safe_name",
+    "unreadable",
     "without_password",
 ]
 
 
 def open_submission(
-    source: str,
+    source: str | Source,
     *,
     package: str,
     workdir: Path,
@@ -42,7 +45,7 @@ def open_submission(
     git_timeout_s: float = 120.0,
     limits: Limits | None = None,
 ) -> Submission:
-    """The submission that `source` names, with the lab's `package` found in it.
+    """The submission that `source` names, with the lab's `package` found in it; it may be read already.
 
     A folder is used in place and never written to. An archive or a repository comes to lie in a new folder
     below `workdir`, which is made where it is missing and belongs to the caller. All of git's work together
@@ -60,13 +63,13 @@ def open_submission(
             located = locate(opened, package)
             submission = describe(located, git, limits)
         except OSError as error:
-            raise _unreadable(parsed.given, error) from error
+            raise unreadable(parsed.given, error) from error
     if submission_id is None:
         return submission
     return submission.model_copy(update={"id": safe_name(submission_id)})
 
 
-def open_recording(source: str, *, submission_id: str | None = None) -> RecordedSubmission | None:
+def open_recording(source: str | Source, *, submission_id: str | None = None) -> RecordedSubmission | None:
     """The submission where `source` is itself a recording (a bag or an MCAP file), None where it is anything else.
 
     Raises what `open_submission` raises.
@@ -77,7 +80,7 @@ def open_recording(source: str, *, submission_id: str | None = None) -> Recorded
             return None
         submission = single(parsed, parsed.path)
     except OSError as error:
-        raise _unreadable(parsed.given, error) from error
+        raise unreadable(parsed.given, error) from error
     return (
         submission
         if submission_id is None
@@ -86,7 +89,7 @@ def open_recording(source: str, *, submission_id: str | None = None) -> Recorded
 
 
 def open_recorded(
-    source: str, *, workdir: Path, submission_id: str | None = None, git_timeout_s: float = 120.0
+    source: str | Source, *, workdir: Path, submission_id: str | None = None, git_timeout_s: float = 120.0
 ) -> RecordedSubmission:
     """The submission of a lab that asks for recordings alone: as `open_submission`, and no package is looked for."""
     parsed = _parsed(source)
@@ -95,7 +98,7 @@ def open_recorded(
             git = Git(base / "git-home", timeout_s=git_timeout_s)
             submission = several(open_source(parsed, git, base, Limits()), git)
         except OSError as error:
-            raise _unreadable(parsed.given, error) from error
+            raise unreadable(parsed.given, error) from error
     return (
         submission
         if submission_id is None
@@ -103,14 +106,17 @@ def open_recorded(
     )
 
 
-def _parsed(source: str) -> Source:
+def _parsed(source: str | Source) -> Source:
+    if isinstance(source, Source):
+        return source
     try:
         return parse_source(source)
     except OSError as error:
-        raise _unreadable(printable(source), error) from error
+        raise unreadable(printable(source), error) from error
 
 
-def _unreadable(given: str, error: OSError) -> GraderError:
+def unreadable(given: str, error: OSError) -> GraderError:
+    """The error for a source that this machine could not read, or had no room for."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return OutputError(f"{given}: the disk is full", hint="Free some room (`df -h`) and try again.")
     where = f" at {brief(str(error.filename))}" if error.filename else ""

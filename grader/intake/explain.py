@@ -7,6 +7,7 @@ import re
 from grader.errors import SubmissionError, Unreachable
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.names import brief
+from grader.intake.passwords import without_password
 from grader.intake.source import Source
 
 _PRIVATE = (
@@ -14,7 +15,8 @@ _PRIVATE = (
 )
 _NETWORK = "Check the address and the network, and try `git ls-remote URL`."
 _PAGE = "This looks like a page of the website: give the repository's own address, then @branch."
-_NOT_THEIRS = re.compile(r"this machine|name was not found|cannot be reached")
+_NOT_THEIRS = re.compile(r"this machine|name was not found|cannot be reached|has failed|broke off")
+_MAY_PASS = re.compile(r"name was not found|cannot be reached|has failed|broke off")
 # In this order: the first that fits what git said is the cause.
 _CAUSES: tuple[tuple[str, str, str], ...] = (
     (
@@ -26,6 +28,16 @@ _CAUSES: tuple[tuple[str, str, str], ...] = (
         r"invalid path",
         "it holds a path that git itself does not write (`.git`, `..`)",
         "Take it out of the repository, commit and push.",
+    ),
+    (
+        r"No space left",
+        "it could not be written to this machine's disk",
+        "Free some room (`df -h`) and try again.",
+    ),
+    (
+        r"(?:error: |HTTP (?:code )?)(?:429|5\d\d)\b",
+        "the server has failed, or has too much to do",
+        "Try again later.",
     ),
     (
         r"Host key verification failed",
@@ -45,9 +57,17 @@ _CAUSES: tuple[tuple[str, str, str], ...] = (
     (
         (
             r"Connection refused|Connection timed out|Failed to connect|Network is unreachable"
-            r"|No route to host|Couldn't connect|unable to connect"
+            r"|No route to host|Couldn't connect|unable to connect|Operation timed out"
         ),
         "the server cannot be reached",
+        _NETWORK,
+    ),
+    (
+        (
+            r"Connection (was )?reset|Connection closed by|SSL_read|SSL_ERROR_SYSCALL|recv error|early EOF"
+            r"|Empty reply|transfer closed|unexpected disconnect|HTTP/2 stream|Broken pipe"
+        ),
+        "the connection broke off",
         _NETWORK,
     ),
     (
@@ -72,9 +92,14 @@ _CAUSES: tuple[tuple[str, str, str], ...] = (
         f"Check the address. {_PRIVATE}",
     ),
     (
-        r"No space left|unable to write|cannot create|could not create",
+        r"unable to write|cannot create|could not create",
         "it could not be written to this machine's disk",
         "Free some room (`df -h`) and try again.",
+    ),
+    (
+        r"RPC failed|hung up unexpectedly",
+        "the connection broke off",
+        _NETWORK,
     ),
 )
 
@@ -96,12 +121,26 @@ def explained(failure: GitFailed, source: Source) -> SubmissionError:
             f"{source.given}: the repository is larger than a lab's submission may be",
             hint="Hand in the package's folder alone, without recordings and data.",
         )
-    for pattern, cause, hint in _CAUSES:
-        if re.search(pattern, failure.stderr):
-            page = re.search(r"/(tree|blob)/|/-/", source.url)
-            kind = Unreachable if _NOT_THEIRS.search(cause) else SubmissionError
-            return kind(f"{source.given}: {cause}", hint=_PAGE if page else hint)
+    if known := _cause(failure):
+        cause, hint = known
+        page = re.search(r"/(tree|blob)/|/-/", source.url)
+        kind = Unreachable if _NOT_THEIRS.search(cause) else SubmissionError
+        return kind(f"{source.given}: {cause}", hint=_PAGE if page else hint)
     return SubmissionError(f"{source.given}: git says: {said(failure, source)}", hint=_NETWORK)
+
+
+def may_pass(failure: GitFailed) -> bool:
+    """Whether the same may go well a little later: the network or the server has failed."""
+    if isinstance(failure, GitMissing | GitTimeout | GitTooMuch):
+        return isinstance(failure, GitTimeout)
+    known = _cause(failure)
+    return known is not None and _MAY_PASS.search(known[0]) is not None
+
+
+def _cause(failure: GitFailed) -> tuple[str, str] | None:
+    """The cause and the hint, where what git said is known."""
+    fitting = ((cause, hint) for pattern, cause, hint in _CAUSES if re.search(pattern, failure.stderr))
+    return next(fitting, None)
 
 
 def said(failure: GitFailed, source: Source) -> str:
@@ -109,4 +148,6 @@ def said(failure: GitFailed, source: Source) -> str:
     lines = [line.strip() for line in failure.stderr.splitlines() if line.strip()]
     fatal = [line for line in lines if line.startswith(("fatal:", "error:", "remote:"))]
     line = (fatal or lines or ["nothing"])[-1].removeprefix("fatal: ").removeprefix("error: ")
-    return brief(line.replace(source.url, source.given) if source.url else line)
+    for url in {source.url, without_password(source.url)} - {""}:
+        line = line.replace(url, source.given)
+    return brief(line)

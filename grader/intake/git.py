@@ -11,11 +11,13 @@ import signal
 import subprocess
 import tempfile
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
+
+from grader.intake.credentials import Access, refused, scrubbed
 
 _QUIET = {
     "core.hooksPath": os.devnull,
@@ -90,14 +92,34 @@ class Git:
         # Only a file of settings is heeded for this key by every git since 2.25, by `upload-pack` too.
         (home / ".gitconfig").write_text("[safe]\n\tdirectory = *\n", encoding="utf-8")
 
-    def run(self, *args: str, cwd: Path, repository: Repository | None = None, remote: bool = False) -> bytes:
-        """What `git *args` prints in `cwd`. `remote` lets it use the network and the user's own settings.
+    def run(
+        self,
+        *args: str,
+        cwd: Path,
+        repository: Repository | None = None,
+        remote: bool = False,
+        accesses: tuple[Access, ...] = (Access(),),
+    ) -> bytes:
+        """What `git *args` prints in `cwd`. `remote` lets it use the network and the user's own settings; of the
+        `accesses` each is tried where the server did not let git in with those before.
 
         Raises GitFailed, GitMissing or GitTimeout.
         """
+        first, *others = accesses
+        try:
+            return self._run(args, cwd, repository, remote=remote, access=first)
+        except GitFailed as failure:
+            if not others or not refused(failure.stderr):
+                raise
+        return self.run(*args, cwd=cwd, repository=repository, remote=remote, accesses=tuple(others))
+
+    def _run(
+        self, args: tuple[str, ...], cwd: Path, repository: Repository | None, *, remote: bool, access: Access
+    ) -> bytes:
         with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-            whole = (*_place(repository), *args)
-            with self._started(whole, cwd, remote=remote, stdout=out, stderr=err) as process:
+            whole = (*access.options, *_place(repository), *args)
+            environment = self._environment(cwd, access) if remote else self._local_environment()
+            with self._started(whole, cwd, environment, stdout=out, stderr=err) as process:
                 try:
                     code = process.wait(max(0.0, self._deadline - time.monotonic()))
                 except subprocess.TimeoutExpired:
@@ -107,7 +129,7 @@ class Git:
             if code in (-signal.SIGXFSZ, 128 + signal.SIGXFSZ):
                 raise GitTooMuch("larger than the limit")
             if code != 0:
-                said = err.read(_SAID_BYTES).decode("utf-8", "replace")
+                said = scrubbed(err.read(_SAID_BYTES).decode("utf-8", "replace"), access.secrets)
                 raise GitTooMuch(said) if _TOO_MUCH.search(said) else GitFailed(said)
             answer = out.read(_ANSWER_BYTES + 1)
         if len(answer) > _ANSWER_BYTES:
@@ -117,8 +139,9 @@ class Git:
     def records(self, *args: str, cwd: Path, repository: Repository) -> Generator[bytes]:
         """The NUL-ended records that git prints, one by one, so that a caller can stop an endless listing."""
         whole = (*_place(repository), *args)
+        environment = self._local_environment()
         with self._started(
-            whole, cwd, remote=False, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+            whole, cwd, environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
         ) as process:
             stream = process.stdout
             assert stream is not None  # noqa: S101 - opened with PIPE
@@ -144,8 +167,8 @@ class Git:
         self,
         args: tuple[str, ...],
         cwd: Path,
+        environment: Mapping[str, str],
         *,
-        remote: bool,
         stdout: IO[bytes] | int,
         stderr: IO[bytes] | int,
     ) -> Iterator[subprocess.Popen[bytes]]:
@@ -156,7 +179,7 @@ class Git:
             process = subprocess.Popen(
                 [*_limits(), "git", *options, *args],
                 cwd=cwd,
-                env=self._remote_environment(cwd) if remote else self._local_environment(),
+                env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=stdout,
                 stderr=stderr,
@@ -182,7 +205,7 @@ class Git:
             "GIT_NO_LAZY_FETCH": "1",
         }
 
-    def _remote_environment(self, cwd: Path) -> dict[str, str]:
+    def _environment(self, cwd: Path, access: Access) -> dict[str, str]:
         """For servers: the user's settings hold the credentials, the proxy, perhaps a mirror on this disk."""
         kept = {
             key: value
@@ -192,7 +215,7 @@ class Git:
         environment = {**kept, **_ASK_NOTHING, "GIT_ALLOW_PROTOCOL": "https:http:ssh:git:file"}
         if "GIT_SSH" not in kept or "GIT_SSH_COMMAND" in kept:
             environment["GIT_SSH_COMMAND"] = self._ssh(kept, cwd)
-        return environment
+        return {**environment, **access.environment}
 
     def _ssh(self, environment: dict[str, str], cwd: Path) -> str:
         """The user's ssh command, told to fail where it would ask and to leave no connection open."""

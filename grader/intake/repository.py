@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.errors import SubmissionError
+from grader.intake.credentials import Access, accesses, split_address
 from grader.intake.explain import explained
 from grader.intake.git import Git, GitFailed, GitTimeout, GitTooMuch, Repository
 from grader.intake.gitdir import Unfit, link_repository
@@ -60,7 +61,7 @@ def clone(source: Source, git: Git, into: Path, limits: Limits) -> Clone:
     Raises SubmissionError where it cannot be had; the reason is named.
     """
     try:
-        fetched = _served(source, git, into.parent.parent / "git-served")
+        fetched = served(source, git, into.parent.parent / "git-served")
         refs = _remote_refs(fetched, git, into)
         wanted = choose_ref(refs, source.ref, given=source.given)
         commit = _fetch(fetched, git, into, refs, wanted)
@@ -79,11 +80,11 @@ def clone(source: Source, git: Git, into: Path, limits: Limits) -> Clone:
         commit=commit,
         repository=_own(into),
         git_links=files.git_links,
-        hints=tuple(_hints(wanted, files)),
+        hints=(*source.hints, *_hints(wanted, files)),
     )
 
 
-def _served(source: Source, git: Git, view: Path) -> Source:
+def served(source: Source, git: Git, view: Path) -> Source:
     """A repository on this machine is served by its data alone: its settings could make git run programs."""
     if source.top is None:
         return source
@@ -112,9 +113,7 @@ def _remote_refs(source: Source, git: Git, into: Path) -> dict[str, str]:
     """Asked from inside the new repository: the folder one happens to stand in has settings of its own."""
     into.mkdir(parents=True)
     git.run("init", "--quiet", "--template=", ".", cwd=into)
-    listed = git.run(
-        "ls-remote", "--quiet", "--", source.url, cwd=into, repository=_own(into), remote=source.remote
-    )
+    listed = _ask(source, git, into, ("ls-remote", "--quiet"))
     refs = parse_refs(os.fsdecode(listed))
     if any(len(commit) == _FULL_HASHES[1] for commit in refs.values()):
         shutil.rmtree(into / ".git")
@@ -149,11 +148,22 @@ def _everything(refs: dict[str, str], wanted: Wanted) -> tuple[str, ...]:
 
 def _fetch_refs(source: Source, git: Git, into: Path, options: tuple[str, ...], *refspecs: str) -> None:
     always = ("--quiet", "--no-tags", "--no-recurse-submodules")
-    git.run(
-        *("fetch", *always, *options, "--", source.url, *refspecs),
-        cwd=into,
-        repository=_own(into),
+    _ask(source, git, into, ("fetch", *always, *options), *refspecs)
+
+
+def _ask(source: Source, git: Git, into: Path, command: tuple[str, ...], *refspecs: str) -> bytes:
+    return ask(source, git, _own(into), command, *refspecs)
+
+
+def ask(source: Source, git: Git, repository: Repository, command: tuple[str, ...], *refspecs: str) -> bytes:
+    """What the server of `source` answers to a command that takes an address. Raises GitFailed."""
+    url, login = split_address(source.url)
+    return git.run(
+        *(*command, "--", url, *refspecs),
+        cwd=repository.top,
+        repository=repository,
         remote=source.remote,
+        accesses=accesses(url, login) if source.remote else (Access(),),
     )
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 from urllib.parse import unquote
 
 from grader.errors import SubmissionError, UsageError
+from grader.intake.credentials import split_address
 from grader.intake.names import archive_stem, brief, printable
 from grader.intake.tree import is_file, is_there
 
@@ -30,18 +31,20 @@ class Source:
     """`given` may be shown: it holds no password. `path` is set where the source lies on this machine.
 
     `url`, `ref` and `inside` (the folder of it that was asked for) are for a repository; `remote` tells
-    whether reaching it takes the user's own git settings. `top` is where one on this machine lies.
+    whether reaching it takes the user's own git settings. `top` is where one on this machine lies. `hints` are what
+    whoever brought it here has to say about it.
     """
 
     kind: Literal["folder", "archive", "repository"]
     given: str
     name: str
     path: Path | None = None
-    url: str = ""
+    url: str = field(default="", repr=False)
     ref: str | None = None
     inside: str = "."
     remote: bool = False
     top: Path | None = None
+    hints: tuple[str, ...] = ()
 
 
 def parse_source(text: str) -> Source:
@@ -50,7 +53,7 @@ def parse_source(text: str) -> Source:
     Raises UsageError for what is neither there nor a git URL, SubmissionError for what cannot be a source.
     """
     if len(text) > _LONGEST:
-        raise UsageError(f"{printable(text[:40])}… is longer than any path or address", hint=_SOURCES)
+        raise UsageError(f"a SOURCE of {len(text)} letters is longer than any path or address", hint=_SOURCES)
     local = _existing(text)
     if local is not None:
         return _local(local, None, text)
@@ -67,6 +70,32 @@ def parse_source(text: str) -> Source:
             raise UsageError(f"'{brief(ref)}' cannot be the name of a branch, tag or commit", hint=_SOURCES)
     web = "A web address begins with https://. " if _HOST_AND_PATH.match(text) else ""
     raise UsageError(f"{printable(text) or 'an empty SOURCE'} does not exist", hint=web + _SOURCES)
+
+
+def with_ref(source: Source, ref: str | None) -> Source:
+    """The same at `ref`, which a roster names in a column of its own.
+
+    Raises UsageError where the source says another one, or is a file, SubmissionError for a folder without git.
+    """
+    if ref is None or ref == source.ref:
+        return source
+    if not _is_ref(ref):
+        raise UsageError(f"'{brief(ref)}' cannot be the name of a branch, tag or commit", hint=_SOURCES)
+    if source.ref is not None:
+        raise UsageError(
+            f"{source.given} says @{brief(source.ref)}, the column ref says {brief(ref)}",
+            hint="Keep one of the two.",
+        )
+    given = f"{source.given}@{printable(ref)}"
+    if source.path is not None and source.kind != "repository":
+        return _local(source.path, ref, given)
+    return replace(source, ref=ref, given=given)
+
+
+def as_repository(source: Source) -> Source:
+    """A folder that is a repository at its top, as what is committed there. Raises SubmissionError for another."""
+    assert source.path is not None  # noqa: S101 - folders have one
+    return _local_repository(source.path, None, source.given)
 
 
 def _existing(text: str) -> Path | None:
@@ -142,10 +171,15 @@ def _from_url(text: str, match: re.Match[str]) -> Source:
     if scheme == "file" and authority in ("", "localhost"):
         return _from_file_url(path, text)
     if scheme == "file" or authority.startswith("-"):
-        raise UsageError(f"{brief(text)} names no repository", hint=_SOURCES)
+        raise UsageError(
+            f"{brief(f'{scheme}://{_without_password(scheme, authority)}{path}')} names no repository",
+            hint=_SOURCES,
+        )
+    split_address(f"{scheme}://{authority}")
     path, ref = _split_remote(path)
     if not path.strip("/") or not authority:
-        raise UsageError(f"{printable(text)} names no repository", hint=_SOURCES)
+        named = printable(f"{scheme}://{_without_password(scheme, authority)}{path}")
+        raise UsageError(f"{named} names no repository", hint=_SOURCES)
     shown = f"{scheme}://{_without_password(scheme, authority)}{path}" + (f"@{ref}" if ref else "")
     url = f"{scheme}://{authority}{path}"
     return Source(kind="repository", given=printable(shown), name=_last(path), url=url, ref=ref, remote=True)
