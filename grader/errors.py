@@ -64,7 +64,7 @@ class OutputError(UsageError):
 
 
 class RubricError(UsageError):
-    """Faults of a rubric, one line each, as `file:line: key.path: what is wrong`."""
+    """Faults of a rubric, or of a file that goes with it, one line each, as `file:line: key.path: what is wrong`."""
 
     kind = "rubric"
 

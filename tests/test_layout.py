@@ -44,12 +44,14 @@ ALLOWED = {
         *BASE, "checks", "evidence", "intake", "package", "pipeline", "rubric", "temporary"
     },
     "roster": BASE | {"intake"},
+    "overrides": BASE | {"files", "intake", "rubric"},
     "fetching": BASE | {"files", "intake", "temporary"},
     "gradebook": BASE | {"files", "report"},
     "batch": {
         *BASE, "evidence", "faults", "fetching", "files", "gradebook", "intake", "judge", "overrides", "pipeline",
         "report", "results", "rubric", "temporary"
     },
+    "cluster": BASE | {"arena.ros_env", "batch.child", "batch.job", "intake", "results", "rubric", "temporary"},
     "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
     "cli": {
         *BASE, "arena", "authoring", "batch", "checks", "evidence", "files", "instructor", "intake", "judge",

@@ -10,7 +10,7 @@ from pydantic import AwareDatetime, Field
 from grader.model.record import Record
 from grader.model.verdict import Status
 
-Day = datetime | date
+Day = date | datetime
 COMMENT_CHARS = 2000
 AUTHOR_CHARS = 200
 SaidBy = Literal["roster", "commit", "nobody"]

@@ -21,6 +21,7 @@ PATTERN_RULES = {
     PROGRAM_PATTERN: "must be a program like turtlesim/turtlesim_node",
 }
 TIME = "a time with its zone, such as 2026-11-20T23:59:00+01:00"
+DAY = "a day such as 2026-11-02"
 UNITS = {"hz": "Hz", "s": "seconds", "m": "metres"}
 _NUMBER_AND_UNIT = re.compile(r"\s*(-?\d+(?:\.\d+)?)\s*([A-Za-z%]*)\s*")
 MUST_BE = {
@@ -37,6 +38,10 @@ MUST_BE = {
     "list_type": "a list",
     "dict_type": "a map of keys and values",
     "model_type": "a map of keys and values",
+    "date_type": DAY,
+    "date_parsing": DAY,
+    "date_from_datetime_parsing": DAY,
+    "date_from_datetime_inexact": DAY,
     "datetime_type": TIME,
     "datetime_parsing": TIME,
     "timezone_aware": TIME,
@@ -100,6 +105,7 @@ def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str
         "extra_forbidden": lambda: "is not known here" + did_you_mean(str(path[-1]), _keys(model, path[:-1])),
         "string_pattern_mismatch": lambda: f"{_pattern(context['pattern'])}, not {shown(value)}",
         "literal_error": lambda: _literal(value, context["expected"]),
+        "string_too_long": lambda: f"has at most {context['max_length']} characters, not {len(value)}",
         "too_long": lambda: f"has at most {context['max_length']}, not {context['actual_length']}",
         "too_short": lambda: f"needs at least {context['min_length']}, has {context['actual_length']}",
     }

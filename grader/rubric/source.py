@@ -26,8 +26,11 @@ Fault = tuple[KeyPath, str]
 
 @dataclass(frozen=True, kw_only=True)
 class Form:
-    """What a file may hold, and how messages call it. Times are text of ISO 8601 under the keys of `times`, and faults
-    elsewhere. With `written_keys`, a key is what is written there, also where YAML reads a number or `no`."""
+    """What a file may hold, and how messages call it.
+
+    Times are text of ISO 8601 under the keys of `times`, and faults elsewhere. With `written_keys`, a key is what is
+    written there, also where YAML reads a number or `no`. A file that `may_be_empty` is an empty map then.
+    """
 
     what: str = "rubric"
     usual: str = "a rubric is a few kilobytes"
@@ -35,6 +38,7 @@ class Form:
     nodes_max: int = 100_000
     times: frozenset[str] = frozenset()
     written_keys: bool = False
+    may_be_empty: bool = False
 
 
 RUBRIC = Form(times=frozenset({"deadline"}))
@@ -72,7 +76,11 @@ def dotted(path: KeyPath) -> str:
 
 def read_source(path: Path, name: str, form: Form = RUBRIC) -> Source:
     """The file's data. Raises RubricError where it is no YAML of that form."""
-    raw = _read(path, name, form)
+    return source_of(_read(path, name, form), name, form)
+
+
+def source_of(raw: bytes, name: str, form: Form) -> Source:
+    """The data of a file that holds these bytes. Raises RubricError as `read_source` does."""
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -111,7 +119,8 @@ def _read(path: Path, name: str, form: Form) -> bytes:
     except IsADirectoryError as error:
         raise RubricError([f"{name}: is a folder, not a {form.what} file"]) from error
     except FileNotFoundError as error:
-        raise RubricError([f"{name}: there is no such file"], hint="grader labs lists the rubrics") from error
+        hint = "grader labs lists the rubrics" if form is RUBRIC else ""
+        raise RubricError([f"{name}: there is no such file"], hint=hint) from error
     except OSError as error:
         raise RubricError([f"{name}: cannot be read: {error.strerror}"]) from error
     if len(raw) > form.bytes_max:
@@ -124,6 +133,8 @@ def _compose(text: str, raw: bytes, name: str, form: Form) -> Source:
     try:
         loader = yaml.SafeLoader(text)
         node = loader.get_single_node()
+        if node is None and form.may_be_empty:
+            return Source(name=name, raw=raw, data={}, lines={})
         if node is None:
             raise RubricError([f"{name}:1: the file is empty"])
         reader = _Reader(loader, form)
