@@ -1,0 +1,123 @@
+"""A client of a Dask cluster: of one that runs already, or of one that is started on this machine for trying it."""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+import signal
+import threading
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from grader.cluster import remote
+from grader.errors import HostError, UsageError
+
+LOCAL = "local"
+CONNECT_S = 15.0
+THREADS_A_CORE = 4  # a grading waits most of the time
+_ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://(\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]@]+):[0-9]{1,5}/?")
+EXTRA = 'pip install "ros-lab-grader[cluster]"'
+
+
+def check_address(text: str) -> str:
+    """What `--cluster` says: `tcp://host:8786` (or `tls://…`), or `local`.
+
+    Raises UsageError for what is neither, and where Dask is missing.
+    """
+    if text != LOCAL and not _ADDRESS.fullmatch(text):
+        raise UsageError(
+            f"--cluster {text}: not the address of a Dask scheduler",
+            hint="give tcp://host:8786 as `dask scheduler` prints it, or `local`",
+        )
+    try:
+        import distributed  # noqa: F401, PLC0415 - only to know that it is there
+    except ImportError as error:
+        raise UsageError(f"--cluster needs Dask: {error}", hint=EXTRA) from error
+    return text
+
+
+@contextmanager
+def connected(address: str) -> Iterator[Any]:
+    """A `distributed.Client`. Raises HostError where no scheduler answers, or one without this grader."""
+    from distributed import Client, LocalCluster  # noqa: PLC0415 - slow to load
+    from distributed.versions import VersionMismatchWarning  # noqa: PLC0415 - as above
+
+    warnings.filterwarnings("ignore", category=VersionMismatchWarning)  # each worker is asked what matters
+    _silence()
+    if address != LOCAL:
+        with _client(Client, address) as client:
+            _check_scheduler(client, address)
+            yield client
+        return
+    with _not_interrupted():
+        cluster = LocalCluster(
+            n_workers=os.cpu_count() or 1,
+            threads_per_worker=THREADS_A_CORE,
+            processes=True,
+            dashboard_address=None,
+            memory_limit=0,
+            silence_logs=logging.CRITICAL,
+        )
+    with cluster, Client(cluster, set_as_default=False) as client:
+        yield client
+
+
+@contextmanager
+def _client(make: Any, address: str) -> Iterator[Any]:  # noqa: ANN401 - Dask has no types
+    try:
+        client = make(address, timeout=CONNECT_S, set_as_default=False)
+    except (OSError, ValueError, ImportError, RuntimeError) as error:
+        raise HostError(
+            f"no Dask scheduler answers at {address} within {CONNECT_S:g} s",
+            hint="start one there with `dask scheduler`, and look whether a firewall is between",
+        ) from error
+    try:
+        yield client
+    finally:
+        client.close(timeout=CONNECT_S)
+
+
+def _check_scheduler(client: Any, address: str) -> None:  # noqa: ANN401 - Dask has no types
+    """The scheduler reads what it hands on: it needs the same grader as the workers."""
+    try:
+        there = client.run_on_scheduler(remote.versions)
+    except ImportError as error:
+        raise HostError(
+            f"the scheduler at {address} has no grader like this one ({error})",
+            hint="install the same grader, with the extra [cluster], where the scheduler runs",
+        ) from error
+    here = remote.versions()
+    for name in ("grader", "python"):
+        if there[name] != here[name]:
+            raise HostError(
+                f"the scheduler at {address} has {name} {there[name]}, here it is {here[name]}",
+                hint="use the same environment for the client, the scheduler and the workers",
+            )
+
+
+def _silence() -> None:
+    """What Dask logs of lost connections is said by the grader where it matters."""
+    for name in (
+        "distributed",
+        "distributed.client",
+        "distributed.scheduler",
+        "distributed.nanny",
+        "tornado",
+    ):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+@contextmanager
+def _not_interrupted() -> Iterator[None]:
+    """Processes that are started in here do not hear a Ctrl-C on the terminal: they are ended in order."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,0 +1,95 @@
+"""Clusters for tests: a scheduler and workers, each a process of its own, on the loopback."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+DASK = (sys.executable, "-m", "dask")
+ROOT = Path(__file__).resolve().parents[2]
+PATIENCE_S = 60.0
+
+
+class Cluster:
+    """A scheduler at `address`; `worker()` starts one more worker."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._processes: list[subprocess.Popen[bytes]] = []
+        address = folder / "address.json"
+        self.scheduler, _ = self._start(
+            "scheduler", "--host", "127.0.0.1", "--port", "0", "--dashboard-address", "127.0.0.1:0",
+            "--no-dashboard", "--scheduler-file", str(address)
+        )  # fmt: skip
+        until(lambda: address.exists() and address.read_text().endswith("}"))
+        self.address = str(json.loads(address.read_text())["address"])
+
+    def worker(self, *, threads: int = 1, nanny: bool = False, preload: str = "") -> subprocess.Popen[bytes]:
+        """Its process (that of its nanny, where it has one), once the scheduler knows it."""
+        more = ["--preload", f"tests.cluster.preloads.{preload}"] if preload else []
+        process, log = self._start(
+            "worker", self.address, "--no-dashboard", "--nthreads", str(threads), "--memory-limit", "0",
+            "--local-directory", str(self._folder), "--nanny" if nanny else "--no-nanny", *more
+        )  # fmt: skip
+        until(lambda: b"Registered to" in log.read_bytes())
+        return process
+
+    def close(self) -> None:
+        for process in reversed(self._processes):
+            process.terminate()
+        for process in self._processes:
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(10)
+            process.kill()
+            process.wait()
+
+    def _start(self, *args: str) -> tuple[subprocess.Popen[bytes], Path]:
+        log = self._folder / f"{args[0]}-{len(self._processes)}.log"
+        env = {**os.environ, "PYTHONPATH": str(ROOT)}
+        with log.open("wb") as file:
+            process = subprocess.Popen([*DASK, *args], stdout=file, stderr=file, cwd=self._folder, env=env)
+        self._processes.append(process)
+        return process, log
+
+
+@contextmanager
+def cluster(folder: Path) -> Iterator[Cluster]:
+    """Ended with everything that belongs to it."""
+    made = Cluster(folder)
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+def until(holds: Callable[[], object], patience_s: float = PATIENCE_S) -> None:
+    """Wait until it holds."""
+    end = time.monotonic() + patience_s
+    while not holds():
+        assert time.monotonic() < end, "it never came"
+        time.sleep(0.05)
+
+
+def children_of(pid: int) -> list[int]:
+    """The processes that it has started, as far as they live; none where it does not."""
+    tasks = Path(f"/proc/{pid}/task").glob("*/children")
+    return [int(child) for task in tasks for child in task.read_text().split()]
+
+
+def lives(pid: int) -> bool:
+    """Whether there is such a process, and not only what is left of it."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def kill(pid: int) -> None:
+    os.kill(pid, signal.SIGKILL)

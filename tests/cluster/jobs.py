@@ -1,0 +1,42 @@
+"""Jobs for tests."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from grader.batch.job import Job, Outcome
+from grader.model.roster import Entry
+from grader.results import RESULT
+from grader.rubric.load import load_rubric
+
+LAB = "leeds-comp3631-lab1"
+FIXTURES = Path(__file__).resolve().parents[2] / "fixtures" / LAB
+
+
+def sources() -> list[Path]:
+    """Packages, right and wrong ones."""
+    return sorted(path for path in FIXTURES.iterdir() if path.is_dir())
+
+
+def jobs_for(out: Path, count: int, *, static_only: bool = True, names: Iterable[str] = ()) -> Iterator[Job]:
+    """`count` submissions, made of the fixtures in turn."""
+    rubric = load_rubric(LAB)
+    chosen = [FIXTURES / name for name in names] or sources()
+    for number in range(count):
+        entry = Entry(id=f"s{number:03}", source=str(chosen[number % len(chosen)]))
+        yield Job(entry=entry, rubric=rubric, out=out, static_only=static_only)
+
+
+def verdicts(out: Path) -> dict[str, list[tuple[str, str, float]]]:
+    """What every result in `out` says of each criterion."""
+    found = {}
+    for path in sorted(out.glob(f"*/{RESULT}")):
+        result = json.loads(path.read_text())
+        found[path.parent.name] = [(c["id"], c["status"], c["points"]) for c in result["criteria"]]
+    return found
+
+
+def ids(outcomes: Iterable[Outcome]) -> list[str]:
+    return sorted(outcome.id for outcome in outcomes)

@@ -1,0 +1,17 @@
+"""A worker that one submission ends."""
+
+import os
+import signal
+
+from grader.cluster import remote
+
+_done = remote._done
+
+
+def _ended(sent, folder, wanted):
+    if sent.job.entry.id == "poison":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return _done(sent, folder, wanted)
+
+
+remote._done = _ended

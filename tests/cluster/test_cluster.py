@@ -1,0 +1,76 @@
+"""Real clusters: workers in processes of their own, lost in the middle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from grader.batch.hands import Processes
+from grader.cluster import ClusterHands
+from grader.cluster.hands import EXCHANGE
+from grader.errors import HostError
+from tests.cluster.clusters import Cluster, cluster, kill
+from tests.cluster.jobs import ids, jobs_for, verdicts
+from tests.cluster.shelf import on_shelf, register
+
+COUNT = 30
+NAMES = [f"s{number:03}" for number in range(COUNT)]
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Iterator[Cluster]:
+    folder = tmp_path / "cluster"
+    folder.mkdir()
+    with cluster(folder) as made:
+        yield made
+
+
+def _none(_: str) -> None:
+    pass
+
+
+@pytest.mark.slow
+def test_a_worker_killed_in_the_middle_costs_nobody_a_result(place: Cluster, tmp_path: Path) -> None:
+    workers = [place.worker() for _ in range(3)]
+    out, begun, outcomes = tmp_path / "out", [], []
+    for outcome in ClusterHands(place.address, out).run(jobs_for(out, COUNT), begun=begun.append):
+        outcomes.append(outcome)
+        if len(outcomes) == 5:
+            kill(workers[0].pid)
+    assert ids(outcomes) == NAMES
+    assert sorted(begun) == NAMES
+    assert {o.status for o in outcomes} == {"inconclusive"}
+    assert not (out / EXCHANGE).exists()
+
+    alone = tmp_path / "alone"
+    assert ids(Processes(2).run(jobs_for(alone, COUNT), begun=_none)) == NAMES
+    assert verdicts(out) == verdicts(alone)
+    assert sorted(verdicts(out)) == NAMES
+
+
+@pytest.mark.slow
+def test_results_come_through_a_url_that_is_no_path(place: Cluster, tmp_path: Path, monkeypatch) -> None:
+    shelf = tmp_path / "shelf"
+    shelf.mkdir()
+    monkeypatch.setenv("SHELF", str(shelf))
+    register()
+    place.worker(preload="shelf", threads=2)
+    out = tmp_path / "out"
+    hands = ClusterHands(place.address, out, "shelf://results")
+    assert ids(hands.run(jobs_for(out, 4), begun=_none)) == NAMES[:4]
+    assert sorted(verdicts(out)) == NAMES[:4]
+    assert on_shelf(shelf) == []
+
+
+def test_workers_that_differ_are_named_and_left_out(place: Cluster, tmp_path: Path) -> None:
+    place.worker(preload="older")
+    place.worker(preload="without")
+    out, said = tmp_path / "out", []
+    hands = ClusterHands(place.address, out, say=said.append, patience_s=5.0)
+    with pytest.raises(HostError, match="no worker that can grade") as caught:
+        list(hands.run(jobs_for(out, 1), begun=_none))
+    assert f"dask worker {place.address}" in caught.value.hint
+    assert any("it has grader 0.0.9, here it is" in line for line in said)
+    assert any("no grader like this one is installed there" in line for line in said)
