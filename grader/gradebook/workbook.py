@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import xlsxwriter
 from xlsxwriter.exceptions import XlsxWriterException
@@ -27,17 +28,21 @@ OPTIONS = {
 
 def write_workbook(book: Book, rows: Iterable[Row], target: Path) -> None:
     """Two sheets: the gradebook, and what its criteria are. No text is a formula or a link."""
-    with whole_file(target) as path:
-        workbook = xlsxwriter.Workbook(str(path), OPTIONS)
+    with whole_file(target) as path, TemporaryDirectory(prefix="gradebook-") as temporary:
+        workbook = xlsxwriter.Workbook(str(path), {**OPTIONS, "tmpdir": temporary})
+        sheets = [workbook.add_worksheet(name) for name in ("Gradebook", "Criteria")]
         try:
             bold = workbook.add_format({"bold": True})
-            _gradebook(workbook.add_worksheet("Gradebook"), book, rows, bold)
-            _criteria(workbook.add_worksheet("Criteria"), book, bold)
+            _gradebook(sheets[0], book, rows, bold)
+            _criteria(sheets[1], book, bold)
             workbook.close()
         except XlsxWriterException as error:
             raise OutputError(
                 f"cannot write {target}: {error}", hint="choose another form with --form"
             ) from error
+        finally:
+            for sheet in sheets:  # where something failed, the rows that are there already are still open
+                sheet.row_data_fh.close()
 
 
 def _gradebook(sheet: Worksheet, book: Book, rows: Iterable[Row], bold: Format) -> None:

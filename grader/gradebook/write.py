@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
 
 from grader.errors import UsageError
+from grader.files import atomic_write
+from grader.gradebook.fill import fill_template
+from grader.gradebook.fresh import fresh
+from grader.gradebook.identity import Platform
+from grader.gradebook.marks import marks_of, remarks_of, wanted_columns
 from grader.gradebook.model import Book, Form, Row
 from grader.gradebook.plain import write_csv, write_jsonl
+from grader.gradebook.whole import whole_file
+
+PLATFORMS: Mapping[Form, Platform] = {"canvas": "canvas", "moodle": "moodle", "blackboard": "blackboard"}
 
 
 def write_gradebook(
@@ -29,7 +37,8 @@ def write_gradebook(
 
     Raises UsageError where the template cannot be filled in, OutputError or HostError where nothing can be written.
     """
-    if form in ("csv", "jsonl", "xlsx"):
+    platform = PLATFORMS.get(form)
+    if platform is None:
         if template or per_criterion or column:
             raise UsageError(
                 f"--form {form} has every criterion and needs no template",
@@ -37,7 +46,21 @@ def write_gradebook(
             )
         _plain(book, rows, target, form)
         return ()
-    raise UsageError(f"--form {form} is not there yet")
+    marks = marks_of(book, rows, per_criterion=per_criterion)
+    wanted = wanted_columns(book, column, per_criterion=per_criterion)
+    if not wanted:
+        raise UsageError(
+            f"{book.title} has no criteria that are worth points", hint="leave out --per-criterion"
+        )
+    remarks = list(remarks_of(marks, per_criterion=per_criterion))
+    if template:
+        data, more = fill_template(template, platform, marks, wanted, named=bool(column))
+        atomic_write(target, data)
+    else:
+        lines, more = fresh(platform, marks, wanted, book.columns)
+        with whole_file(target) as path, path.open("w", encoding="utf-8", newline="") as file:
+            file.writelines(lines)
+    return (*remarks, *more)
 
 
 def _plain(book: Book, rows: Iterable[Row], target: Path, form: Form) -> None:

@@ -1,0 +1,83 @@
+"""Books and rows made in a test."""
+
+from __future__ import annotations
+
+from grader.gradebook import Book, Row
+from grader.model.handed_in import AppliedOverride, Automatic, Lateness
+from grader.model.result import (
+    CriterionResult,
+    EnvironmentInfo,
+    ErrorInfo,
+    GradingResult,
+    RubricInfo,
+    SubmissionInfo,
+    TimingInfo,
+)
+from grader.model.roster import Entry
+from grader.model.verdict import Status
+
+BOOK = Book(
+    title="Lab 1",
+    rubric_id="lab1",
+    max_points=100,
+    criteria=(("rate", "Right rate", 60), ("name", "Right name", 40), ("advice", "Advice", 0)),
+    columns=("Seat", "SIS User ID", "Email"),
+)
+MAXIMA = {"rate": 60.0, "name": 40.0, "advice": 0.0}
+
+
+def criterion(criterion_id: str, points: float, status: Status = Status.PARTIAL) -> CriterionResult:
+    return CriterionResult(
+        id=criterion_id,
+        title=criterion_id,
+        check="rate",
+        scenario=None,
+        status=status,
+        points=points,
+        max_points=MAXIMA[criterion_id],
+        message="",
+        expected="",
+        measured="",
+        hint="",
+        reproduce="",
+        citations=(),
+    )
+
+
+def row(
+    who: str, points: float = 87.5, *, name: str = "", open_: str = "", error: str = "", **extra: str
+) -> Row:
+    """`open_` is a criterion that a person has to look at. `extra` are the roster's further columns."""
+    criteria = [criterion("rate", points - 40), criterion("name", 40.0), criterion("advice", 0.0)]
+    if open_:
+        criteria = [c if c.id != open_ else criterion(open_, 0, Status.INCONCLUSIVE) for c in criteria]
+    result = GradingResult(
+        submission=SubmissionInfo(id=who, source="s", commit=None, digest="", package="lab1"),
+        rubric=RubricInfo(id="lab1", version="1", digest="d"),
+        status="error" if error else "inconclusive" if open_ else "graded",
+        points=0 if error else points,
+        max_points=100,
+        criteria=() if error else tuple(criteria),
+        environment=EnvironmentInfo(grader="", ros="", python="", sandbox=""),
+        timing=TimingInfo(wall_s=0, cpu_s=0, student_cpu_s=0),
+        error=ErrorInfo(kind="submission", message=error, hint="") if error else None,
+    )
+    columns = {column.replace("_", " "): text for column, text in extra.items()}
+    return Row(entry=Entry(id=who, source="s", name=name, extra=columns), result=result)
+
+
+def late(one: Row, before: float) -> Row:
+    """The same, handed in a day late."""
+    lateness = Lateness(
+        late_s=86400, points_before=before, points=one.result.points, text="1 day late: 10 taken"
+    )
+    return one.model_copy(update={"result": one.result.model_copy(update={"late": lateness})})
+
+
+def overridden(one: Row) -> Row:
+    """The same, with a person's points."""
+    said = Automatic(status=Status.FAIL, points=0, message="")
+    override = AppliedOverride(
+        criterion="rate", points=50, comment="=ran by hand", author="kim", automatic=said, was=said
+    )
+    return one.model_copy(update={"result": one.result.model_copy(update={"overrides": (override,)})})
