@@ -157,6 +157,25 @@ def _class(add: _Adder) -> None:
     _sandbox(regrade)
     _json(regrade)
 
+    book = add("gradebook", "write a class's gradebook for people, programs or a learning platform")
+    book.add_argument("folder", metavar="DIR", type=Path, help="the --out of `grader batch`")
+    book.add_argument(
+        "--form",
+        choices=("csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"),
+        required=True,
+        help="what it is for; canvas, moodle and blackboard import theirs",
+    )
+    book.add_argument(
+        "--out", metavar="FILE", default="", help="where it goes; - is stdout (default: into DIR)"
+    )
+    book.add_argument(
+        "--template", metavar="FILE", type=Path, help="the platform's own export: our points are filled in"
+    )
+    book.add_argument(
+        "--column", metavar="NAME", default="", help="what the platform calls the column of points"
+    )
+    book.add_argument("--per-criterion", action="store_true", help="a column for each criterion")
+
     similar = add("similar", "name submissions that are nearly the same, for a person; never a mark")
     similar.add_argument("folder", metavar="DIR", type=Path, help="the --out of `grader batch`")
     similar.add_argument(
