@@ -47,6 +47,7 @@ ALLOWED = {
     "overrides": BASE | {"files", "intake", "rubric"},
     "fetching": BASE | {"files", "intake", "temporary"},
     "gradebook": BASE | {"files", "report"},
+    "similarity": BASE | {"evidence", "files", "intake", "report", "temporary"},
     "batch": {
         *BASE, "evidence", "faults", "fetching", "files", "gradebook", "intake", "judge", "overrides", "pipeline",
         "report", "results", "rubric", "temporary"

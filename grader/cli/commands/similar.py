@@ -17,10 +17,10 @@ from grader.errors import ExitCode, UsageError
 from grader.model.similarity import NotCompared, Pair, Similarity
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
-from grader.results import EVIDENCE
 from grader.similarity import compare, write_similarity
 from grader.similarity.compare import require_library
 from grader.similarity.files import percent, stretches
+from grader.similarity.sources import PLACE
 
 NAME_CHARS = 22
 PATH_CHARS = 40
@@ -63,7 +63,7 @@ def _class(folder: Path) -> tuple[dict[str, Path], dict[str, str], dict[str, str
         folders = {entry.id: batch.folder_of(entry) for entry in entries}
         return folders, {e.id: e.name for e in entries}, {e.id: e.group for e in entries}
     try:
-        below = sorted(path for path in folder.iterdir() if (path / EVIDENCE).is_dir())
+        below = sorted(path for path in folder.iterdir() if path.joinpath(*PLACE).is_file())
     except OSError as error:
         raise UsageError(f"{folder}: {error.strerror}", hint="give the --out of `grader batch`") from error
     if not below:
