@@ -15,7 +15,8 @@ CELL_CHARS = 10_000
 """What a cell holds of a longer text; a workbook's may have 32,767 characters."""
 Cell = str | float | None
 
-_NUMBER = re.compile(r"[+-]?\d{1,15}([.,]\d{1,15})?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?\d{1,15}([.,]\d{1,15})?|-", re.ASCII)
+"""A number, or the dash that stands for none."""
 _JOINERS = ("\u200c", "\u200d")
 """Letters of Persian, Hindi and others need them between them, and nothing is hidden by them."""
 

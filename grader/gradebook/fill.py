@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from grader.errors import UsageError
-from grader.gradebook.cells import number_text
+from grader.gradebook.cells import harmless, number_text
 from grader.gradebook.columns import find_column, maximum_in, new_header, worksheet_columns
 from grader.gradebook.identity import Identity, Kind, Platform, entry_identity, kinds, row_identity
 from grader.gradebook.marks import Mark, Wanted
 from grader.gradebook.match import match
-from grader.gradebook.sheet import Record, Sheet, filled, read_sheet
+from grader.gradebook.sheet import Record, Sheet, read_sheet
 
 KEPT = {"EX", "N/A"}
 """What Canvas writes for who is excused, and for who has not got the assignment."""
@@ -97,13 +97,13 @@ def _added(work: _Work, wanted: Wanted) -> int:
     """A new column at the end of every row."""
     place = len(work.sheet.header)
     points = number_text(wanted.max_points)
-    name = new_header(wanted, work.platform, points)
+    (name,) = harmless([new_header(wanted, work.platform, points)])
     for number, record in enumerate(work.sheet.records):
         if record.is_empty:
             continue
         record.cells += [""] * (place - len(record.cells))
         text = name if number == 0 else points if "Points Possible" in record.value(0) else ""
-        record.cells.append(filled(text, like=record.cells[0]) if text else "")
+        record.cells.append(work.sheet.written(text) if text else "")
     made = {
         "canvas": "Canvas makes a new assignment of it",
         "moodle": "map it to a new grade item",
@@ -145,8 +145,7 @@ def _fill(work: _Work, record: Record, mark: Mark) -> None:
                 f"{mark.entry.id}: {there} stays, the {number_text(points)} points are left out"
             )
         elif _number(there) != points:
-            like = record.cells[place] or record.cells[0]
-            record.cells[place] = filled(number_text(points), like)
+            record.cells[place] = work.sheet.written(number_text(points), record.cells[place])
 
 
 def _left(

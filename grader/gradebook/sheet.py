@@ -50,6 +50,13 @@ class Sheet:
         """The columns' names, as they are written."""
         return [_value(cell) for cell in self.records[0].cells]
 
+    def written(self, text: str, instead: str = "") -> str:
+        """A cell that says `text`, in quotation marks where the cell before had them, or else every column's name."""
+        quoted = instead.startswith('"') if instead else all(c.startswith('"') for c in self.records[0].cells)
+        if quoted or any(sign in text for sign in (self.delimiter, '"', "\r", "\n")):
+            return '"' + text.replace('"', '""') + '"'
+        return text
+
     def to_bytes(self) -> bytes:
         """The whole file."""
         text = "".join(self.delimiter.join(record.cells) + record.end for record in self.records)
@@ -83,12 +90,6 @@ def read_sheet(path: Path) -> Sheet:
     if not any(name.strip() for name in sheet.header):
         raise UsageError(f"{path}:1: no columns are named", hint=_EXPORT)
     return sheet
-
-
-def filled(text: str, like: str) -> str:
-    """A cell that says `text`, in quotation marks where the cell `like` has them."""
-    quoted = like.lstrip().startswith('"') or any(sign in text for sign in '",;\t\r\n')
-    return '"' + text.replace('"', '""') + '"' if quoted else text
 
 
 def _records(text: str, delimiter: str) -> Iterator[Record]:
