@@ -26,6 +26,7 @@ class Course:
     running: dict[str, float] = field(default_factory=dict)
     _ends_s: list[float] = field(default_factory=list)
     _begun_s: float = 0.0
+    _paced_s: float = 0.0
 
     def planned(self, total: int) -> None:
         """So many submissions are to be done."""
@@ -45,6 +46,8 @@ class Course:
         self.kept += outcome.kept
         self.points_sum += outcome.points if outcome.status != "error" else 0.0
         if not outcome.kept:
+            if not self._ends_s:
+                self._paced_s = self.clock() - outcome.wall_s
             self._ends_s = [*self._ends_s[-LATELY:], self.clock()]
 
     @property
@@ -73,6 +76,6 @@ class Course:
         """
         if len(self._ends_s) < 2:
             return None
-        whole = len(self._ends_s) <= LATELY  # then the first of them began with the batch
-        begin_s, count = (self._begun_s, len(self._ends_s)) if whole else (self._ends_s[0], LATELY)
+        few = len(self._ends_s) <= LATELY
+        begin_s, count = (self._paced_s, len(self._ends_s)) if few else (self._ends_s[0], LATELY)
         return (self.clock() - begin_s) / count * (self.total - self.done)

@@ -131,7 +131,8 @@ def _outcomes(batch: _Batch, hands: Hands, watcher: Watcher) -> Iterator[Outcome
         prepare(GradeOptions(sandbox=options.sandbox, static_only=options.static_only))
     since = time.time()
     entries = {entry.id: entry for entry, _ in todo}
-    with prefetch([entry for entry, _ in todo] if not options.cluster else []):
+    ahead = [entry for entry, _ in todo] if not options.cluster else []
+    with prefetch(ahead, fetched_since=since):
         jobs = (_job(batch, entry, again=again, since=since) for entry, again in todo)
         for outcome in hands.run(jobs, begun=watcher.begun):
             yield _settled(batch, entries[outcome.id], outcome) if outcome.kept else outcome
