@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import re
@@ -48,6 +49,7 @@ def connected(address: str) -> Iterator[Any]:
     warnings.filterwarnings("ignore", category=VersionMismatchWarning)  # each worker is asked what matters
     _silence()
     if address != LOCAL:
+        _check_address_answers(address)
         with _client(Client, address) as client:
             _check_scheduler(client, address)
             yield client
@@ -65,19 +67,43 @@ def connected(address: str) -> Iterator[Any]:
         yield client
 
 
+def _check_address_answers(address: str) -> None:
+    """Dask's own client waits for ever where something else than a scheduler listens."""
+    try:
+        asyncio.run(asyncio.wait_for(_answer(address), CONNECT_S))
+    except (TimeoutError, asyncio.TimeoutError, OSError) as error:
+        raise _nobody_answers(address) from error
+    except Exception as error:
+        message = f"what answers at {address} is no Dask scheduler ({type(error).__name__})"
+        raise HostError(
+            message, hint="give the address that `dask scheduler` prints, of a like version"
+        ) from error
+
+
+async def _answer(address: str) -> None:
+    from distributed import Security, rpc  # noqa: PLC0415 - slow to load
+
+    async with rpc(address, connection_args=Security().get_connection_args("client")) as scheduler:
+        await scheduler.versions()
+
+
 @contextmanager
 def _client(make: Any, address: str) -> Iterator[Any]:  # noqa: ANN401 - Dask has no types
     try:
         client = make(address, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError, ImportError, RuntimeError) as error:
-        raise HostError(
-            f"no Dask scheduler answers at {address} within {CONNECT_S:g} s",
-            hint="start one there with `dask scheduler`, and look whether a firewall is between",
-        ) from error
+        raise _nobody_answers(address) from error
     try:
         yield client
     finally:
         client.close(timeout=CONNECT_S)
+
+
+def _nobody_answers(address: str) -> HostError:
+    return HostError(
+        f"no Dask scheduler answers at {address} within {CONNECT_S:g} s",
+        hint="start one there with `dask scheduler`, and look whether a firewall is between",
+    )
 
 
 def _check_scheduler(client: Any, address: str) -> None:  # noqa: ANN401 - Dask has no types

@@ -1,0 +1,110 @@
+"""Results that come back take their place: the attempt that counts, and nothing else."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from grader.batch.job import Job, Outcome
+from grader.cluster import placing
+from grader.cluster.errands import Report
+from grader.cluster.exchange import Exchange, Parcel
+from grader.cluster.parcels import pack
+from grader.cluster.placing import ParcelLost, place
+from grader.errors import Busy
+from grader.results import Results
+from tests.cluster.jobs import jobs_for
+
+
+@pytest.fixture
+def exchange(tmp_path: Path, monkeypatch) -> Exchange:
+    monkeypatch.setattr(placing, "PAUSE_S", 0.0)
+    made = Exchange(str(tmp_path / "exchange"))
+    made.make()
+    return made
+
+
+@pytest.fixture
+def job(tmp_path: Path) -> Job:
+    return next(jobs_for(tmp_path / "out", 1))
+
+
+def _sent(
+    exchange: Exchange, folder: Path, *, status: str = "graded", words: str = "", evidence: str = ""
+) -> Parcel:
+    (folder / "s000" / "evidence").mkdir(parents=True, exist_ok=True)
+    (folder / "s000" / "result.json").write_text(json.dumps({"status": status, "words": words}))
+    if evidence:
+        (folder / "s000" / "evidence" / "package.mcap").write_text(evidence)
+    packed = folder / "packed"
+    packed.unlink(missing_ok=True)
+    pack(folder / "s000", packed)
+    return exchange.put(packed, "s000")
+
+
+def _outcome(status: str = "graded", kind: str = "") -> Outcome:
+    return Outcome.model_validate({"id": "s000", "status": status, "kind": kind})
+
+
+def _words(job: Job) -> str:
+    return str(json.loads((job.out / "s000" / "result.json").read_text())["words"])
+
+
+def test_of_two_attempts_the_one_that_was_reported_counts(
+    exchange: Exchange, job: Job, tmp_path: Path
+) -> None:
+    believed_lost = _sent(exchange, tmp_path, words="first", evidence="first")
+    reported = _sent(exchange, tmp_path, words="second", evidence="second")
+    assert place(job, Report(outcome=_outcome(), machine="b", parcel=reported), exchange).status == "graded"
+    assert _words(job) == "second"
+    assert (job.out / "s000" / "evidence" / "package.mcap").read_text() == "second"
+    assert sorted(path.name for path in (job.out / "s000").iterdir()) == ["evidence", "result.json"]
+    with pytest.raises(FileNotFoundError):
+        exchange.open(believed_lost)
+
+
+@pytest.mark.parametrize(("kind", "stays"), [("host", True), ("killed", True), ("submission", False)])
+def test_only_an_error_of_the_submission_takes_the_place_of_a_complete_result(
+    kind: str, stays: bool, exchange: Exchange, job: Job, tmp_path: Path
+) -> None:
+    earlier = _sent(exchange, tmp_path / "a", words="earlier", evidence="earlier")
+    place(job, Report(outcome=_outcome(), machine="a", parcel=earlier), exchange)
+    wrong = _sent(exchange, tmp_path / "b", status="error", words="wrong")
+    outcome = place(job, Report(outcome=_outcome("error", kind), machine="a", parcel=wrong), exchange)
+    assert outcome.status == "error"
+    assert _words(job) == ("earlier" if stays else "wrong")
+    assert (job.out / "s000" / "evidence").exists() is stays
+    assert ("stays as it is" in outcome.hint) is stays
+    assert list(Path(exchange.url).iterdir()) == []
+
+
+def test_a_result_that_was_kept_needs_no_parcel(exchange: Exchange, job: Job) -> None:
+    kept = _outcome().model_copy(update={"kept": True})
+    assert place(job, Report(outcome=kept, machine="a"), exchange) == kept
+    assert not job.out.exists()
+
+
+def test_a_parcel_that_is_not_there_or_not_whole_changes_nothing(
+    exchange: Exchange, job: Job, tmp_path: Path
+) -> None:
+    earlier = _sent(exchange, tmp_path, words="earlier", evidence="earlier")
+    place(job, Report(outcome=_outcome(), machine="a", parcel=earlier), exchange)
+    with pytest.raises(ParcelLost):
+        place(job, Report(outcome=_outcome(), machine="a", parcel=earlier), exchange)
+    broken = _sent(exchange, tmp_path, words="broken")
+    whole = Path(exchange.url, broken.name).read_bytes()
+    Path(exchange.url, broken.name).write_bytes(whole[:-9])
+    with pytest.raises(ParcelLost):
+        place(job, Report(outcome=_outcome(), machine="a", parcel=broken), exchange)
+    assert _words(job) == "earlier"
+    assert sorted(path.name for path in (job.out / "s000").iterdir()) == ["evidence", "result.json"]
+
+
+def test_a_submission_that_another_grader_works_on_is_left_to_it(
+    exchange: Exchange, job: Job, tmp_path: Path
+) -> None:
+    parcel = _sent(exchange, tmp_path)
+    with Results(job.out / "s000"), pytest.raises(Busy):
+        place(job, Report(outcome=_outcome(), machine="a", parcel=parcel), exchange)
