@@ -18,10 +18,10 @@ from grader.rubric.source import Fault, Form, Source, as_map, read_source
 FILE = "overrides.yaml"
 SCHEMA_KEY, SCHEMA = "schema", "grader.overrides/1"
 FORM = Form(
-    what="overrides",
+    what="an overrides file",
     usual="overrides of a class are far less",
     bytes_max=20_000_000,
-    nodes_max=2_000_000,
+    nodes_max=300_000,
     times=frozenset({"date"}),
     written_keys=True,
     may_be_empty=True,

@@ -32,7 +32,7 @@ class Form:
     written there, also where YAML reads a number or `no`. A file that `may_be_empty` is an empty map then.
     """
 
-    what: str = "rubric"
+    what: str = "a rubric file"
     usual: str = "a rubric is a few kilobytes"
     bytes_max: int = 1_000_000
     nodes_max: int = 100_000
@@ -117,7 +117,7 @@ def _read(path: Path, name: str, form: Form) -> bytes:
         with path.open("rb") as file:
             raw = file.read(form.bytes_max + 1)
     except IsADirectoryError as error:
-        raise RubricError([f"{name}: is a folder, not a {form.what} file"]) from error
+        raise RubricError([f"{name}: is a folder, not {form.what}"]) from error
     except FileNotFoundError as error:
         hint = "grader labs lists the rubrics" if form is RUBRIC else ""
         raise RubricError([f"{name}: there is no such file"], hint=hint) from error
@@ -180,7 +180,7 @@ class _Reader:
         self.visited += 1
         if self.visited > self.form.nodes_max:
             raise yaml.MarkedYAMLError(
-                problem=f"too much: aliases multiply to more than a {self.form.what} file can hold",
+                problem=f"too much: aliases multiply to more than {self.form.what} can hold",
                 problem_mark=node.start_mark,
             )
 
@@ -190,7 +190,7 @@ class _Reader:
             raise yaml.MarkedYAMLError(problem="is nested too deeply", problem_mark=node.start_mark)
         if not isinstance(node, yaml.ScalarNode) and node.tag not in PLAIN_TAGS:
             raise yaml.MarkedYAMLError(
-                problem=f"the tag {node.tag} is not for {self.form.what} files", problem_mark=node.start_mark
+                problem=f"the tag {node.tag} is not for {self.form.what}", problem_mark=node.start_mark
             )
         self.lines.setdefault(path, node.start_mark.line + 1)
         if isinstance(node, yaml.MappingNode):
