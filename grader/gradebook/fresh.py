@@ -52,7 +52,7 @@ def _canvas(marks: Sequence[Mark], wanted: Sequence[Wanted], roster: _Roster) ->
         roster,
         "Canvas",
         ("platform", "number", "login", "email"),
-        "a column 'SIS User ID', 'SIS Login ID' or 'Canvas id'",
+        "column 'SIS User ID', 'SIS Login ID' or 'Canvas id'",
         "SIS Login ID",
     )
     remarks.append(
@@ -86,7 +86,7 @@ def _moodle(marks: Sequence[Mark], wanted: Sequence[Wanted], roster: _Roster) ->
         roster,
         "Moodle",
         ("email", "login", "number"),
-        "a column 'Email address', 'Username' or 'ID number'",
+        "column 'Email address', 'Username' or 'ID number'",
         "Username",
     )
     found = [(mark, mark.entry.id if by_id else roster.text(mark.entry, kind)) for mark in marks]
@@ -105,7 +105,7 @@ def _moodle(marks: Sequence[Mark], wanted: Sequence[Wanted], roster: _Roster) ->
 
 
 def _blackboard(marks: Sequence[Mark], wanted: Sequence[Wanted], roster: _Roster) -> Made:
-    remarks = _missing(roster, "Blackboard", ("login",), "a column 'Username'", "Username")
+    remarks = _missing(roster, "Blackboard", ("login",), "column 'Username'", "Username")
     remarks.append(
         "Blackboard makes a column of text of each new column: with --template it fills in one that is there"
     )
@@ -136,4 +136,10 @@ def _names(entry: Entry, roster: _Roster) -> tuple[str, str]:
 def _missing(roster: _Roster, platform: str, wanted: Sequence[Kind], columns: str, instead: str) -> list[str]:
     if roster.has(*wanted):
         return []
-    return [f"the roster has not {columns}, by which {platform} finds students: the ids stand as {instead}"]
+    remarks = [f"the roster has no {columns}, by which {platform} finds students: ids stand as {instead}"]
+    if platform == "Moodle" and roster.has("platform"):
+        remarks.append(
+            "the numbers of a bulk download are those of Moodle's offline grading worksheet: "
+            "give it with --template"
+        )
+    return remarks

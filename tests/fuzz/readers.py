@@ -9,6 +9,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
@@ -27,7 +28,9 @@ from grader.evidence.run import Run
 from grader.evidence.services import ServiceType
 from grader.evidence.timeline import build_runs
 from grader.evidence.writer import EvidenceStream
-from grader.intake import Limits, open_submission
+from grader.gradebook import write_gradebook
+from grader.gradebook.sheet import read_sheet
+from grader.intake import Limits, open_submission, safe_name
 from grader.intake.manifest import manifest_name
 from grader.intake.refs import choose_ref, parse_refs
 from grader.intake.source import parse_source
@@ -40,9 +43,11 @@ from grader.package.launch import parse_launch, parse_launch_files
 from grader.package.manifest import parse_manifest, read_manifest
 from grader.package.python import read_syntax_report
 from grader.package.python_causes import cause_of
+from grader.roster import read_roster
 from grader.rubric.load import load_rubric
 from grader.rubric.model import Param, Rubric
 from grader.rubric.source import read_source
+from tests.gradebook.made import BOOK, row
 
 Read = Callable[[bytes], None]
 Promised = tuple[type[Exception], ...]
@@ -167,6 +172,38 @@ def source(data: bytes) -> None:
     except (UsageError, SubmissionError) as error:
         one_line(error, data)
         raise
+
+
+def roster(data: bytes) -> None:
+    _roster(write(fresh("class") / "roster.csv", data), data)
+
+
+def gitlab(data: bytes) -> None:
+    _roster(write(fresh("class") / "projects.json", data), data)
+
+
+def _roster(path: Path, data: bytes) -> None:
+    try:
+        found = read_roster(path)
+    except UsageError as error:
+        one_line(error, data)
+        raise
+    comes_back(found)
+    ids = [safe_name(entry.id).casefold() for entry in found.entries]
+    assert len(ids) == len(set(ids)), "two entries would share one folder"
+    for fault in found.faults:
+        assert "\n" not in str(fault), f"more than one line: {str(fault)!r}"
+
+
+def template(data: bytes) -> None:
+    """A platform's export comes back as it was, but for one cell."""
+    path = write(fresh("book") / "export.csv", data)
+    assert read_sheet(path).to_bytes() == data
+    for platform in ("canvas", "moodle", "blackboard"):
+        with suppress(UsageError):
+            write_gradebook(
+                BOOK, [row("ada", name="Ada Lovelace")], path.with_name("out"), platform, template=path
+            )
 
 
 def archive(data: bytes) -> None:
@@ -295,6 +332,9 @@ READERS: dict[str, tuple[Read, Promised]] = {
     "source-file": (source_file, NOTHING),
     "parameters": (parameters, NOTHING),
     "source": (source, (UsageError, SubmissionError)),
+    "roster": (roster, (UsageError,)),
+    "gitlab": (gitlab, (UsageError,)),
+    "template": (template, (UsageError,)),
     "archive": (archive, (SubmissionError,)),
     "built": (built, NOTHING),
     "git-refs": (git_refs, (SubmissionError,)),

@@ -186,7 +186,7 @@ def test_without_an_export(tmp_path: Path) -> None:
 def test_without_an_export_and_without_columns(tmp_path: Path) -> None:
     cells, remarks = made(tmp_path, [row("ada")], Book(title="L", rubric_id="l", max_points=1))
     assert cells[2] == ["ada", "", "", "ada", "", "87.5"]
-    assert "the ids stand as SIS Login ID" in remarks[0]
+    assert "ids stand as SIS Login ID" in remarks[0]
 
 
 def test_without_an_export_by_criterion(tmp_path: Path) -> None:

@@ -103,4 +103,4 @@ def test_without_an_export_and_without_columns(tmp_path: Path) -> None:
         ["Username", "Full name", "Lab 1 - Right rate", "Lab 1 - Right name", "Feedback"],
         ["ada", "", "47.5", "40", ""],
     ]
-    assert "the ids stand as Username" in remarks[0]
+    assert "ids stand as Username" in remarks[0]

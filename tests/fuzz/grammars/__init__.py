@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from hypothesis.strategies import SearchStrategy
 
-from tests.fuzz.grammars import binary, markup, messages, text, wire
+from tests.fuzz.grammars import binary, markup, messages, tables, text, wire
 
 GRAMMARS: dict[str, Callable[[], SearchStrategy[bytes]]] = {
     "manifest": markup.manifest,
@@ -19,6 +19,9 @@ GRAMMARS: dict[str, Callable[[], SearchStrategy[bytes]]] = {
     "source-file": text.source_file,
     "parameters": text.any_yaml,
     "source": text.source,
+    "roster": tables.roster,
+    "gitlab": tables.gitlab,
+    "template": tables.template,
     "archive": binary.archive,
     "built": binary.built,
     "git-refs": text.git_refs,
