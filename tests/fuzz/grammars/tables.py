@@ -20,8 +20,8 @@ ROSTER_FIELDS = (
     "!!!", "x" * 300, "github.com/x/y", '"a\nb"', '"a', 'a"b', '""', "-x", "a\x0bb\u2028c", "a:b@c:d",
 )  # fmt: skip
 EXPORT_COLUMNS = (
-    "Student", "ID", "SIS User ID", "SIS Login ID", "Section", "Lab 1 (12)", "Lab 1",
-    '"Lab 1 [Total Pts: 10 Score] |3"', "Identifier", "Full name", "Email address", "Grade", "Maximum Grade", "First name", "Surname", "Username",
+    "Student", "ID", "SIS User ID", "SIS Login ID", "Section", "Lab 1 (12)", "Lab 1", "Identifier", "Full name",
+    '"Lab 1 [Total Pts: 10 Score] |3"', "Email address", "Grade", "Maximum Grade", "First name", "Surname", "Username",
     "Assignment: Lab 1 (Real)", "Last Name", '"Lab 1 [Total Pts: 1.2.3 Score]"', '"Lab ""1"""',
 )  # fmt: skip
 EXPORT_FIELDS = (
