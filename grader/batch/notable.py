@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from grader.batch.folder import MISSING, BatchFolder
+from grader.batch.folder import MISSING, ROSTER, BatchFolder
 from grader.gradebook import Row
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status
@@ -33,15 +33,22 @@ def notable(folder: BatchFolder) -> Iterator[str]:
         found[state] += 1
         if state == "error":
             error = row.result.error
-            yield f"{row.entry.id}: error: {error.message if error else _open(row)}"
+            yield f"{_name(row)}: error: {error.message if error else _open(row)}"
         elif state == "inconclusive":
-            yield f"{row.entry.id}: inconclusive: {_open(row)}"
+            yield f"{_name(row)}: inconclusive: {_open(row)}"
         for override in row.result.overrides:
             if override.changed:
                 yield f"{row.entry.id}: {override.criterion}: a person decided, and the check says something else now"
     for state, words in GO_ON.items():
         if found[state]:
             yield words.format(count=found[state], overrides=folder.path / OVERRIDES)
+
+
+def _name(row: Row) -> str:
+    """The id, and the line of the roster where the error does not name it already."""
+    error = row.result.error
+    told = error is not None and error.kind == ROSTER
+    return row.entry.id if told or not row.entry.where else f"{row.entry.id} ({row.entry.where})"
 
 
 def _state(row: Row) -> str:

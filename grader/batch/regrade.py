@@ -127,7 +127,9 @@ def _regraded(
             "error": None,
         }
     )
-    handed_in = before.handed_in and before.handed_in.model_copy(update={"deadline": None})  # the rubric's of today
+    handed_in = before.handed_in and before.handed_in.model_copy(
+        update={"deadline": None}
+    )  # the rubric's of today
     after = settler.settled(automatic, entry.id, handed_in, before)
     try:
         if after != before:

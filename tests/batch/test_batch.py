@@ -8,7 +8,10 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
 import pytest
@@ -77,7 +80,9 @@ def test_another_rubric_grades_all_again(tmp_path) -> None:
     out = tmp_path / "out"
     batch(tmp_path / "in", out)
     other = tmp_path / "other.yaml"
-    other.write_text(RUBRIC.read_text().replace("points: 40", "points: 20").replace("points: 30", "points: 40"))
+    other.write_text(
+        RUBRIC.read_text().replace("points: 40", "points: 20").replace("points: 30", "points: 40")
+    )
     batch(tmp_path / "in", out, rubric=other)
     (line,) = lines_of(out)
     assert {c["id"]: c["points"] for c in line["criteria"]}["manifest"] == 20
@@ -130,6 +135,82 @@ def test_rows_that_cannot_be_graded_stand_in_the_gradebook(tmp_path, capsys) -> 
     assert "roster.csv:4" in shown
     rows = {row["id"]: row["status"] for row in book(tmp_path / "out")}
     assert rows == {"ada": "graded", "eve": "error", "run.json": "error"}
+
+
+class Asks(BaseHTTPRequestHandler):
+    """A server that wants a password."""
+
+    def do_GET(self) -> None:
+        self.send_response(401)
+        self.send_header("WWW-Authenticate", 'Basic realm="course"')
+        self.send_header("Content-Length", "0")
+        self.end_headers()
+
+    def log_message(self, *_: object) -> None:
+        """Say nothing."""
+
+
+@pytest.fixture
+def asking() -> Iterator[str]:
+    with HTTPServer(("127.0.0.1", 0), Asks) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+        thread.join()
+
+
+def git(folder: Path, *arguments: str) -> None:
+    who = ("-c", "user.name=a", "-c", "user.email=a@example.org")
+    subprocess.run([str(shutil.which("git")), *who, *arguments], cwd=folder, check=True, capture_output=True)
+
+
+def test_ten_rows_that_are_bad_in_ten_ways(tmp_path, asking, capsys) -> None:
+    """Each has a line of its own, and the others are graded."""
+    folder = handed_in(tmp_path / "in", ["ada", "bob", "two/a", "two/b"])
+    git(tmp_path, "init", "-q", "--bare", "empty.git")
+    git(tmp_path, "init", "-q", "repository")
+    shutil.copytree(CORRECT, tmp_path / "repository" / "work")
+    git(tmp_path / "repository", "add", "-A")
+    git(tmp_path / "repository", "commit", "-qm", "all of it")
+    (folder / "broken.zip").write_text("no archive")
+    (folder / "none").mkdir()
+    (folder / "none" / "notes.txt").write_text("nothing yet")
+    rows = [
+        "ada,ada,,",
+        "unreachable,https://nowhere.invalid/lab1.git,,",
+        f"empty,file://{tmp_path}/empty.git,,",
+        f"ref,file://{tmp_path}/repository,no-such-branch,",
+        "broken,broken.zip,,",
+        "none,none,,",
+        "two,two,,",
+        "outside,../../etc,,",
+        f"private,{asking}/lab1.git,,",
+        "ada,bob,,",
+        "soon,bob,,soon",
+        "bob,bob,,",
+        f"cem,file://{tmp_path}/repository,,",
+    ]
+    roster = roster_of(folder, rows, "id,source,ref,extension_days")
+    assert batch(roster, tmp_path / "out") == 3
+    shown = capsys.readouterr()
+    told = {
+        "unreachable (roster.csv:3)": "the server's name was not found",
+        "empty (roster.csv:4)": "the repository is empty",
+        "ref (roster.csv:5)": "there is no branch, tag or commit 'no-such-branch'",
+        "broken (roster.csv:6)": "broken.zip is damaged",
+        "none (roster.csv:7)": "no package.xml was found",
+        "outside": "roster.csv:9: source: ../../etc leads out of the roster's folder",
+        "private (roster.csv:10)": "it does not exist, or it needs a password",
+        "soon": "roster.csv:12: extension_days: soon is no number of days",
+    }
+    for name, words in told.items():
+        (line,) = [line for line in shown.out.splitlines() if line.startswith(f"{name}: error: ")]
+        assert words in line
+    assert "roster.csv:11: id: ada is there already, in roster.csv:2" in shown.err
+    good = {line["submission"]["id"] for line in lines_of(tmp_path / "out") if line["status"] == "graded"}
+    assert good == {"ada", "bob", "cem", "two"}
+    assert len(lines_of(tmp_path / "out")) == len(rows) - 1
 
 
 def test_one_whose_process_dies_stops_no_other(tmp_path, monkeypatch) -> None:

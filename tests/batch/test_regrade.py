@@ -130,7 +130,7 @@ def test_a_scenario_that_was_not_recorded(tmp_path, capsys) -> None:
 def test_a_scenario_that_runs_something_else_now(tmp_path, capsys) -> None:
     """Evidence that does not say by which definition it was recorded counts; evidence of another one does not."""
     out = recorded(tmp_path / "out", {"ada": "correct"})
-    rubric = changed(tmp_path / "new.yaml", ("window_s: 6", "window_s: 60"))
+    rubric = changed(tmp_path / "new.yaml", ("window_s: 6", "window_s: 7"))
     assert run(["regrade", str(out), "--rubric", str(rubric)]) == 0
     spoil(out / "ada" / "evidence" / "talker.mcap")
     assert run(["regrade", str(out), "--rubric", str(rubric)]) == 4
