@@ -15,10 +15,11 @@ NOBODY = "nobody says when it was handed in, so it counts as in time"
 
 
 def deadline_of(rubric: Rubric, extension_days: float = 0.0) -> datetime | None:
-    """The rubric's deadline with one submission's extension, in UTC; None where the rubric has none."""
+    """The rubric's deadline with one submission's extension, in its time zone; None where the rubric has none."""
     if rubric.deadline is None:
         return None
-    return rubric.deadline.astimezone(timezone.utc) + timedelta(days=extension_days)
+    moved = rubric.deadline.astimezone(timezone.utc) + timedelta(days=extension_days)
+    return moved.astimezone(rubric.deadline.tzinfo)
 
 
 def lateness(points: float, rubric: Rubric, handed_in: HandedIn | None) -> Lateness | None:

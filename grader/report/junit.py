@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from lxml import etree
 
+from grader.model.handed_in import AppliedOverride
 from grader.model.result import CriterionResult, ErrorInfo, GradingResult, Note
 from grader.model.verdict import FileCitation, Status
 from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
+from grader.report.settled import automatic_words, decision, look_again
 from grader.report.text import line, number, text_limit, visible
 from grader.report.view import places
 
@@ -37,9 +39,15 @@ class _Writer:
         suite = etree.Element("testsuite", {"name": self._text(result.rubric.id), **_counts(result)})
         about = {"submission": result.submission.id, "package": result.submission.package}
         points = {"points": number(result.points), "max_points": number(result.max_points)}
-        self._properties(suite, {**about, **points})
+        late = (
+            {"points_before": number(result.late.points_before), "late": result.late.text}
+            if result.late
+            else {}
+        )
+        self._properties(suite, {**about, **points, **late})
+        decided = {override.criterion: override for override in result.overrides}
         for criterion in result.criteria:
-            suite.append(self._case(criterion, result.rubric.id))
+            suite.append(self._case(criterion, result.rubric.id, decided.get(criterion.id)))
         if result.error is not None:
             self._error(suite, result.rubric.id, result.error)
         if result.notes:
@@ -48,7 +56,9 @@ class _Writer:
         root.append(suite)
         return etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
 
-    def _case(self, criterion: CriterionResult, rubric_id: str) -> etree._Element:
+    def _case(
+        self, criterion: CriterionResult, rubric_id: str, override: AppliedOverride | None
+    ) -> etree._Element:
         cited = next((c for c in criterion.citations if isinstance(c, FileCitation)), None)
         attributes = {"classname": self._text(rubric_id), "name": self._text(criterion.id), "time": "0"}
         if cited is not None:
@@ -57,7 +67,8 @@ class _Writer:
                 attributes["line"] = str(cited.line)
         case = etree.Element("testcase", attributes)
         points = {"points": number(criterion.points), "max_points": number(criterion.max_points)}
-        self._properties(case, {"title": criterion.title, "status": criterion.status.value, **points})
+        title = {"title": criterion.title, "status": criterion.status.value}
+        self._properties(case, {**title, **points, **_decided(criterion, override)})
         outcome = OUTCOME[criterion.status]
         if outcome is not None:
             self._outcome(case, outcome, criterion.status.value, criterion.message, self._details(criterion))
@@ -97,6 +108,14 @@ class _Writer:
 
     def _text(self, text: str) -> str:
         return line(text, self._limit)
+
+
+def _decided(criterion: CriterionResult, override: AppliedOverride | None) -> dict[str, str]:
+    if override is None:
+        return {}
+    again = look_again(override, criterion)
+    words = {"decided_by_a_person": decision(override), "check": automatic_words(override, criterion)}
+    return {**words, **({"look_again": again} if again else {})}
 
 
 def _counts(result: GradingResult) -> dict[str, str]:

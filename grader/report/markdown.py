@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from grader.model.result import CriterionResult, GradingResult, Note
-from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
+from grader.report import noticed
+from grader.report.settled import TITLE, automatic_words, decided, decision, late_words, look_again
 from grader.report.text import line, markdown, markdown_code, number, text_limit
-from grader.report.view import Loss, arrange, places, points_of
+from grader.report.view import Loss, arrange, not_graded, places, points_of
 from grader.rubric.model import Rubric
 
 LIMIT = 1000
@@ -27,7 +28,8 @@ class _Writer:
     def report(self, result: GradingResult, rubric: Rubric, hidden: int) -> str:
         view = arrange(result, rubric)
         lines = [*self._head(result, rubric, hidden)]
-        if result.error is None:
+        lines += self._decided(result)
+        if not not_graded(result):
             lines += self._losses("What was lost", view.lost)
             lines += self._losses("What is still open", view.open)
         lines += self._advice(view.advice)
@@ -39,9 +41,12 @@ class _Writer:
     def _head(self, result: GradingResult, rubric: Rubric, hidden: int) -> Iterator[str]:
         submission = result.submission
         graded = f"{number(result.points)} of {number(result.max_points)} points"
-        yield f"# {graded if result.error is None else 'Not graded'}"
+        yield f"# {'Not graded' if not_graded(result) else graded}"
         yield ""
+        for words in late_words(result):
+            yield from (self._text(words), "")
         if result.error is not None:
+            yield from ([] if not_graded(result) else ["It could not be graded automatically:", ""])
             yield from (self._text(result.error.message), "", self._text(result.error.hint), "")
         version = self._text(result.rubric.version)
         yield f"{self._text(rubric.title)} ({self._code(result.rubric.id)}, version {version})"
@@ -56,6 +61,19 @@ class _Writer:
         if hidden:
             yield f"{hidden} hidden {'criterion is' if hidden == 1 else 'criteria are'} not part of this report."
             yield ""
+
+    def _decided(self, result: GradingResult) -> Iterator[str]:
+        found = decided(result)
+        if not found:
+            return
+        yield f"## {TITLE}"
+        yield ""
+        for override, criterion in found:
+            yield f"- {self._code(criterion.id)}: {points_of(criterion)} {self._text(decision(override))}"
+            yield f"  - The check says: {self._text(automatic_words(override, criterion))}"
+            again = look_again(override, criterion)
+            yield from [f"  - **{self._text(again)}**"] if again else []
+        yield ""
 
     def _losses(self, title: str, losses: tuple[Loss, ...]) -> Iterator[str]:
         if not losses:
@@ -101,11 +119,12 @@ class _Writer:
     def _noticed(self, notes: tuple[Note, ...]) -> Iterator[str]:
         if not notes:
             return
-        yield f"## {TITLE}"
+        yield f"## {noticed.TITLE}"
         yield ""
-        yield COSTS_NOTHING
+        yield noticed.COSTS_NOTHING
         yield ""
-        yield from (f"- {self._code(place(note))}: {self._text(words(note))}" for note in notes)
+        for note in notes:
+            yield f"- {self._code(noticed.place(note))}: {self._text(noticed.words(note))}"
         yield ""
 
     def _table(self, criteria: tuple[CriterionResult, ...]) -> Iterator[str]:

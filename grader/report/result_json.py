@@ -18,10 +18,14 @@ def result_bytes(result: GradingResult) -> bytes:
 def result_text(result: GradingResult, *, ascii_only: bool = False) -> str:
     """`notes`, `overrides`, `handed_in`, `late` and `error` are there only where there are any.
 
-    Criteria are written as `judge.summary.criteria_bytes` writes them.
+    What a person wrote is bounded by its record and stays whole: a later grading compares it. Criteria are written as
+    `judge.summary.criteria_bytes` writes them.
     """
     data: dict[str, Any] = result.model_dump(mode="json", by_alias=True)
     for name in ("notes", "overrides", "handed_in", "late", "error"):
         if not data[name]:
             del data[name]
-    return json_text(clipped(data, text_limit(len(result.criteria), LIMIT)), ascii_only=ascii_only)
+    data = clipped(data, text_limit(len(result.criteria), LIMIT))
+    for written, override in zip(data.get("overrides", ()), result.overrides, strict=False):
+        written |= {"comment": override.comment, "author": override.author}
+    return json_text(data, ascii_only=ascii_only)

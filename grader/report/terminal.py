@@ -10,8 +10,10 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from grader.model.handed_in import AppliedOverride
 from grader.model.result import CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
+from grader.report import settled
 from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
 from grader.report.text import line, number, uncommanded
 from grader.report.view import Loss, arrange, places, points_of
@@ -83,6 +85,8 @@ class Terminal:
     def report(self, result: GradingResult, rubric: Rubric, hidden: int, static: bool) -> None:
         view = arrange(result, rubric)
         parts: list[RenderableType] = [self._head(result, rubric)]
+        parts += [Text(self._show(words)) for words in settled.late_words(result)]
+        parts += self._section(settled.TITLE, [self._decision(o, c) for o, c in settled.decided(result)])
         parts += self._losses("Lost", view.lost)
         if static:
             parts += self._unrun(view.open)
@@ -101,6 +105,12 @@ class Terminal:
         text = Text.assemble((points, "bold"), "  ", self._show(result.submission.id), "\n")
         text.append(self._show(f"{result.rubric.id}: {rubric.title}"), "dim")
         return text
+
+    def _decision(self, override: AppliedOverride, criterion: CriterionResult) -> RenderableType:
+        head = self._line(criterion, settled.decision(override))
+        again = settled.look_again(override, criterion)
+        rows = [("check", settled.automatic_words(override, criterion)), ("changed", again)]
+        return Group(head, Padding(self._rows(rows), (0, 0, 0, 4)))
 
     def _section(self, title: str, parts: list[RenderableType]) -> list[RenderableType]:
         return [Text(f"\n{title}", "bold"), *parts] if parts else []

@@ -55,6 +55,7 @@ def arrange(result: GradingResult, rubric: Rubric) -> ReportView:
     ]
     losses.sort(key=lambda loss: -loss.points)
     told = {c.id for loss in losses for c in (loss.criterion, *loss.blocked)}
+    told |= {override.criterion for override in result.overrides}
     return ReportView(
         lost=tuple(loss for loss in losses if loss.criterion.status not in OPEN),
         open=_folded([loss for loss in losses if loss.criterion.status in OPEN]),
@@ -80,6 +81,11 @@ def _folded(losses: list[Loss]) -> tuple[Loss, ...]:
         )
         for first, *others in groups.values()
     )
+
+
+def not_graded(result: GradingResult) -> bool:
+    """Whether it could not be graded, and no person has decided instead."""
+    return result.error is not None and result.status == "error"
 
 
 def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric) -> str:

@@ -18,6 +18,7 @@ from lxml import html as parser
 from rich.console import Console
 
 from grader.judge import criteria_bytes
+from grader.model.handed_in import AUTHOR_CHARS, COMMENT_CHARS, AppliedOverride, Automatic, Lateness
 from grader.model.result import CriterionResult, ErrorInfo, GradingResult, Note, SubmissionInfo
 from grader.model.verdict import EvidenceCitation, FileCitation, Status
 from grader.report.files import write_reports
@@ -49,8 +50,24 @@ def spoiled(texts: Iterator[str], status: str = "fail") -> GradingResult:
         ),
         criteria=(one, criterion("other", Status.BLOCKED, 0, 5, message=next(texts))),
         notes=(Note(scenario=next(texts), actor=next(texts), kind="refused", text=next(texts)),),
+        overrides=(decided(one, texts),),
+        late=Lateness(note=next(texts), points_before=5, points=4, text=next(texts)),
         error=ErrorInfo(kind=next(texts), message=next(texts), hint=next(texts)),
         status="error",
+    )
+
+
+def decided(of_criterion: CriterionResult, texts: Iterator[str]) -> AppliedOverride:
+    """Its person's texts are as long as they may be, and UTF-8."""
+    comment, author = (next(texts).encode("utf-8", "backslashreplace").decode() for _ in range(2))
+    return AppliedOverride(
+        criterion=of_criterion.id,
+        points=0,
+        comment=comment[:COMMENT_CHARS],
+        author=author[:AUTHOR_CHARS],
+        automatic=Automatic(status=Status.PASS, points=5, message=next(texts)),
+        was=Automatic(status=Status.FAIL, points=0, message=next(texts)),
+        changed=True,
     )
 
 
@@ -89,7 +106,9 @@ def test_markdown_holds_nothing_but_the_template(shown):
     plain = spoiled(of("word"), shown.criteria[0].status.value)
     assert blocks(source) == blocks(markdown_report(plain, rubric()))
     inlines = [token.children for token in MARKDOWN.parse(source) if token.type == "inline"]
-    assert {token.type for children in inlines for token in children} <= HARMLESS
+    kinds = [token.type for children in inlines for token in children]
+    assert kinds.count("strong_open") == 1  # the template's own: look again
+    assert set(kinds) - {"strong_open", "strong_close"} <= HARMLESS
     assert [found for children in inlines if (found := FOUND_BY_FORGES.search(prose(children)))] == []
     assert QUICK_ACTION.search(source) is None
     assert STEERING.search(source) is None
@@ -126,6 +145,8 @@ def test_junit_parses_and_gives_the_visible_text_back(shown):
     outcome = [child for child in case if child.tag != "properties"]
     assert [child.get("message") for child in outcome] in ([], [line(hostile.message, 2000)])
     assert line(shown.notes[0].text, 2000) in suite.findtext("system-out")
+    assert case.find("properties/property[@name='check']") is not None
+    assert suite.find("properties/property[@name='late']").get("value") == line(shown.late.text, 2000)
     assert STEERING.search(data.decode()) is None
     assert TO_A_CI.search(data.decode()) is None
 
@@ -137,7 +158,9 @@ def test_json_is_the_result_itself(shown):
         return text.encode("utf-8", "backslashreplace").decode()
 
     data = json.loads(result_bytes(shown))
-    assert list(data)[-2:] == ["notes", "error"]
+    assert list(data)[-4:] == ["notes", "overrides", "late", "error"]
+    assert data["overrides"][0]["comment"] == encodable(shown.overrides[0].comment)
+    assert data["late"]["note"] == encodable(shown.late.note)
     for name in FIELDS:
         assert data["criteria"][0][name] == encodable(getattr(shown.criteria[0], name))
     assert data["notes"][0]["text"] == encodable(shown.notes[0].text)

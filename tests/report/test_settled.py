@@ -1,0 +1,162 @@
+"""What people decided and what being late cost stands in every report, near the points."""
+
+from __future__ import annotations
+
+import io
+import json
+from datetime import date, datetime, timedelta, timezone
+
+import pytest
+from lxml import etree
+
+from grader.model.handed_in import AppliedOverride, Automatic, HandedIn, Lateness
+from grader.model.result import ErrorInfo, GradingResult
+from grader.model.verdict import Status
+from grader.report.junit import junit
+from grader.report.markdown import markdown_report
+from grader.report.result_json import result_bytes
+from grader.report.settled import late_words
+from grader.report.terminal import open_console, print_report
+from tests.report.hostile import criterion, result, rubric
+
+DEADLINE = datetime(2026, 11, 20, 23, 59, tzinfo=timezone(timedelta(hours=1)))
+DEADLINE_WORDS = "deadline 2026-11-20 23:59 UTC+01:00 with 1 day of extension"
+LATE = Lateness(
+    at=datetime(2026, 11, 22, 8, 0, 7, tzinfo=timezone.utc),
+    by="commit",
+    deadline=DEADLINE,
+    extension_days=1,
+    note="the last commit on main counts",
+    late_s=118_807,
+    points_before=87.5,
+    points=70,
+    text="2 days late (begun days count): 20 % of 87.5 points reached are lost",
+)
+FAILED = Automatic(status=Status.FAIL, points=0, message="5 Hz, not 10 Hz")
+PASSED = Automatic(status=Status.PASS, points=10, message="10 Hz")
+STYLE = AppliedOverride(
+    criterion="style",
+    points=7,
+    comment="clear names",
+    author="A. Miller",
+    date=date(2026, 11, 2),
+    automatic=Automatic(status=Status.MANUAL, points=0, message="a person gives these points"),
+    was=Automatic(status=Status.MANUAL, points=0, message="a person gives these points"),
+)
+RATE = AppliedOverride(criterion="rate", points=8, automatic=PASSED, was=FAILED, changed=True)
+CRITERIA = (
+    criterion("style", Status.PARTIAL, 7, 10, message="7 of 10 points by A. Miller: clear names"),
+    criterion(
+        "rate", Status.PARTIAL, 8, 10, message="8 of 10 points, decided by a person", hint="sleep less"
+    ),
+    criterion("build", Status.PASS, 80, 80),
+)
+AGAIN = "the check now says pass 10/10, it said fail 0/10 when this was decided: look again"
+
+
+def settled(**changes: object) -> GradingResult:
+    data = {"criteria": CRITERIA, "overrides": (STYLE, RATE), "late": LATE, "points": 70, "status": "graded"}
+    return result(**{**data, **changes})
+
+
+def terminal(shown: GradingResult) -> str:
+    out = io.StringIO()
+    print_report(shown, rubric(), open_console(out))
+    return out.getvalue()
+
+
+def test_words_of_being_late():
+    assert late_words(settled()) == (
+        "87.5 of 100 points before, 70 after: 2 days late (begun days count): 20 % of 87.5 points reached are lost",
+        f"Handed in 2026-11-22 09:00:07 UTC+01:00 (the commit's date), {DEADLINE_WORDS}",
+        "The last commit on main counts",
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"late": None}, ()),
+        ({"late": None, "handed_in": HandedIn(note="the folder as it is")}, ("The folder as it is",)),
+        (
+            {"late": None, "handed_in": HandedIn(at=DEADLINE, by="roster")},
+            ("Handed in 2026-11-20 23:59 UTC+01:00 (as the roster says)",),
+        ),
+        (
+            {"late": Lateness(deadline=DEADLINE, points_before=70, points=70, text="in time")},
+            ("In time", "Deadline 2026-11-20 23:59 UTC+01:00"),
+        ),
+    ],
+)
+def test_words_where_nothing_was_lost(changes, words):
+    assert late_words(settled(**changes)) == words
+
+
+def test_markdown_says_it_below_the_points():
+    text = markdown_report(settled(), rubric())
+    assert text.startswith("# 70 of 100 points\n\n87.5 of 100 points before, 70 after: 2 days late")
+    assert "\n\nThe last commit on main counts\n\n" in text
+    section = text[text.index("## Decided by a person") : text.index("## What was lost")]
+    assert section == (
+        "## Decided by a person\n\n"
+        "- `style`: 7/10 by A. Miller, 2026-11-02: clear names\n"
+        "  - The check says: manual 0/10: a person gives these points\n"
+        "- `rate`: 8/10 by a person\n"
+        "  - The check says: pass 10/10: 10 Hz\n"
+        f"  - **{AGAIN}**\n\n"
+    )
+
+
+def test_the_terminal_says_it_below_the_points():
+    text = terminal(settled())
+    assert text.startswith(
+        "70 of 100 points  ada\nhostile-lab: A lab | with *markup*\n87.5 of 100 points before, 70"
+    )
+    section = text[text.index("Decided by a person") : text.index("\nLost\n")]
+    assert "style  7/10  partial  by A. Miller, 2026-11-02: clear names\n" in section
+    assert AGAIN in " ".join(section.split())
+    assert section.count("look again") == 1
+
+
+def test_junit_has_it_as_properties():
+    suite = etree.fromstring(junit(settled()))[0]
+    values = {p.get("name"): p.get("value") for p in suite.iterfind("properties/property")}
+    assert (values["points"], values["points_before"], values["late"]) == ("70", "87.5", LATE.text)
+    style, rate, build = [
+        {p.get("name"): p.get("value") for p in case.iterfind("properties/property")}
+        for case in suite.iterfind("testcase")
+    ]
+    assert style["decided_by_a_person"] == "by A. Miller, 2026-11-02: clear names"
+    assert (rate["check"], rate["look_again"]) == ("pass 10/10: 10 Hz", AGAIN)
+    assert "look_again" not in style
+    assert "check" not in build
+
+
+def test_nothing_of_it_where_nobody_decided():
+    for text in (markdown_report(result(), rubric()), terminal(result()), junit(result()).decode()):
+        assert "ecided" not in text
+        assert "late" not in text
+
+
+def test_a_long_comment_stays_whole_in_a_result_of_many_criteria():
+    comment = "x\x1b" * 1000
+    many = tuple(criterion(f"c{i}", Status.PASS, 1, 1, message=comment) for i in range(300))
+    override = STYLE.model_copy(update={"criterion": "c0", "comment": comment})
+    data = json.loads(result_bytes(settled(criteria=many, overrides=(override,))))
+    assert data["overrides"][0]["comment"] == comment
+    assert data["criteria"][0]["message"].endswith("more characters)")
+    assert data["overrides"][0]["date"] == "2026-11-02"
+
+
+def test_a_hint_is_no_advice_where_a_person_has_decided():
+    right = CRITERIA[1].model_copy(update={"status": Status.PASS, "points": 10})
+    assert "sleep less" not in markdown_report(settled(criteria=(CRITERIA[0], right, CRITERIA[2])), rubric())
+
+
+def test_what_a_person_graded_in_the_graders_place_is_graded():
+    error = ErrorInfo(kind="submission", message="no package in it", hint="hand in a package")
+    text = markdown_report(settled(error=error), rubric())
+    assert text.startswith("# 70 of 100 points\n")
+    assert "It could not be graded automatically:\n\nno package in it\n\nhand in a package\n" in text
+    assert "## What was lost" in text
+    assert markdown_report(settled(error=error, status="error"), rubric()).startswith("# Not graded\n")
