@@ -1,0 +1,131 @@
+"""What a report shows beside a verdict: numbers and texts taken from the evidence, each of bounded size.
+
+All times are seconds since the run began. Who draws them knows nothing of evidence.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from grader.model.record import Record
+
+POINTS_MAX = 600
+"""So many points a figure has at most; of more, those are kept that show what is judged."""
+
+
+class RateFigure(Record):
+    """The rate of one publisher over time, and how long its gaps are.
+
+    `times_s` are the arrivals but for the first, `gaps_s` the time before each; `low_hz` and `high_hz` bound the mean
+    that passes, `gap_low_s` and `gap_high_s` a single gap. `mean_hz` is what was measured, of so many `messages`.
+    `late` are stretches in which the machine was late.
+    """
+
+    kind: Literal["rate"] = "rate"
+    topic: str
+    publisher: str
+    scenario: str
+    times_s: tuple[float, ...]
+    gaps_s: tuple[float, ...]
+    mean_hz: float | None
+    low_hz: float
+    high_hz: float
+    gap_low_s: float | None = None
+    gap_high_s: float | None = None
+    late: tuple[tuple[float, float], ...] = ()
+    messages: int = 0
+
+
+class CounterFigure(Record):
+    """A counter's values over time. `wraps` and `wrong` are indexes into the points: steps to the first value after a
+    wrap, and steps that are not as they should be; `texts` say what is wrong with each of `wrong`."""
+
+    kind: Literal["counter"] = "counter"
+    topic: str
+    publisher: str
+    scenario: str
+    times_s: tuple[float, ...]
+    values: tuple[int, ...]
+    wraps: tuple[int, ...] = ()
+    wrong: tuple[int, ...] = ()
+    texts: tuple[str, ...] = ()
+    messages: int = 0
+
+
+class Heard(Record):
+    """One probe: what was sent on which topic, and the line that the listener printed of it, if any."""
+
+    topic: str
+    sent: str
+    at_s: float
+    heard: str | None = None
+    after_s: float | None = None
+
+
+class HeardFigure(Record):
+    """What the listener was sent, against what it printed."""
+
+    kind: Literal["heard"] = "heard"
+    scenario: str
+    rows: tuple[Heard, ...]
+
+
+class Edge(Record):
+    """Over `topic`, from the node to the topic (`publishes`) or from the topic to the node."""
+
+    node: str
+    topic: str
+    publishes: bool
+
+
+class GraphFigure(Record):
+    """Nodes and topics as `rqt_graph` draws them, all that were there during the run. `types` are the topics'."""
+
+    kind: Literal["graph"] = "graph"
+    scenario: str
+    nodes: tuple[str, ...]
+    topics: tuple[str, ...]
+    types: dict[str, str] = Field(default_factory=dict)
+    edges: tuple[Edge, ...]
+
+
+class ConsoleLine(Record):
+    at_s: float
+    process: str
+    stream: str
+    text: str
+
+
+class ConsoleFigure(Record):
+    """What was printed during a run; `left_out` lines are only in the evidence."""
+
+    kind: Literal["console"] = "console"
+    scenario: str
+    lines: tuple[ConsoleLine, ...]
+    left_out: int = 0
+
+
+class CodeFigure(Record):
+    """Lines of a file from `first_line` (counted from 1) on, with the `marked` ones."""
+
+    kind: Literal["code"] = "code"
+    file: str
+    first_line: int
+    lines: tuple[str, ...]
+    marked: tuple[int, ...]
+
+
+Figure = Annotated[
+    RateFigure | CounterFigure | HeardFigure | GraphFigure | ConsoleFigure | CodeFigure,
+    Field(discriminator="kind"),
+]
+
+
+class Figures(Record):
+    """Of one submission: by criterion what shows its verdict, and of each scenario the graph and the console."""
+
+    by_criterion: dict[str, tuple[Figure, ...]] = Field(default_factory=dict)
+    graphs: dict[str, GraphFigure] = Field(default_factory=dict)
+    consoles: dict[str, ConsoleFigure] = Field(default_factory=dict)
