@@ -11,8 +11,13 @@ from grader.gradebook.cells import csv_line
 from grader.gradebook.model import Book, Row
 from grader.gradebook.table import cells, header
 from grader.gradebook.whole import whole_file
-from grader.report.result_json import result_text
+from grader.model.result import GradingResult
 from grader.shown import json_text
+
+OPTIONAL = {
+    name for name, field in GradingResult.model_fields.items() if not (field.is_required() or field.default)
+}
+"""What `result.json` has only where there is any."""
 
 
 def write_csv(book: Book, rows: Iterable[Row], target: Path) -> None:
@@ -29,6 +34,11 @@ def write_jsonl(rows: Iterable[Row], target: Path) -> None:
 
 
 def json_line(row: Row) -> str:
-    """One line, with its end."""
-    data = {**json.loads(result_text(row.result)), "roster": row.entry.model_dump(mode="json")}
+    """One line, with its end. Nothing in it steers or hides."""
+    result = row.result.model_dump(mode="json", by_alias=True)
+    data = {key: value for key, value in result.items() if value or key not in OPTIONAL}
+    data["roster"] = row.entry.model_dump(mode="json")
+    text = json.dumps(data, ensure_ascii=False)
+    if text.isascii() and text.isprintable() and "##" not in text:
+        return text + "\n"
     return re.sub(r"\n *", "", json_text(data)) + "\n"

@@ -50,7 +50,7 @@ def read_table(path: Path) -> Table:
     line, fields, faults = header
     if faults:
         raise UsageError(f"{path}:{line}: {faults[0]}", hint="the first line names the columns: id,source")
-    columns = tuple(name.strip() for name in fields)
+    columns = tuple(_bare(name) for name in fields)
     return Table(columns, tuple(_row(columns, *row) for row in found), line)
 
 
@@ -94,7 +94,7 @@ def _said(error: csv.Error) -> str:
 
 
 def _row(columns: Sequence[str], line: int, fields: list[str], faults: tuple[str, ...]) -> Row:
-    named = {name: field.strip() for name, field in zip(columns, fields, strict=False) if name}
+    named = {name: _bare(field) for name, field in zip(columns, fields, strict=False) if name}
     shifted = any(field.strip() for field in fields[len(columns) :])
     found = list(faults)
     if shifted:
@@ -102,6 +102,11 @@ def _row(columns: Sequence[str], line: int, fields: list[str], faults: tuple[str
     if any(len(field) > FIELD_LETTERS_MAX for field in fields):
         found.append(f"a field of more than {FIELD_LETTERS_MAX} letters")
     return Row(line, named, tuple(found), shifted)
+
+
+def _bare(field: str) -> str:
+    """Without blanks around it, nor the invisible signs that come along when text is copied into a spreadsheet."""
+    return field.strip().strip("\ufeff\u200b\u200e\u200f\u2060").strip()
 
 
 def _delimiter(lines: Sequence[str]) -> tuple[str, int]:

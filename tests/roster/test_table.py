@@ -63,6 +63,12 @@ def test_signs_that_python_takes_for_line_ends_are_none(tmp_path: Path) -> None:
     assert said(roster) == ["roster.csv:3: no source"]
 
 
+def test_invisible_signs_around_a_field_are_no_part_of_it(tmp_path: Path) -> None:
+    roster = read(tmp_path, "\u200bid,source \u200e\nada\u200b,\u200essh://h/a\nada,ssh://h/b\n")
+    assert ids(roster) == ["ada"]
+    assert said(roster) == ["roster.csv:3: id: ada is there already, in roster.csv:2"]
+
+
 def test_one_source_may_be_of_two(tmp_path: Path) -> None:
     roster = read(tmp_path, "id,source\nada,ssh://h/pair\nbob,ssh://h/pair\n")
     assert (ids(roster), roster.faults) == (["ada", "bob"], ())
