@@ -21,7 +21,7 @@ _HELPER = (
 _URL = re.compile(
     r"(?P<scheme>[a-z][a-z0-9+.-]*)://(?:(?P<login>[^/]*)@)?(?P<host>[^/@]*)(?P<path>.*)", re.DOTALL
 )
-_HOST = re.compile(r"(?:[\w.~%-]+|\[[0-9A-Fa-f:.]+\])?(?::\d*)?")
+_HOST = re.compile(r"(?:[\w.-]+|\[[0-9A-Fa-f:.]+\])(?::\d*)?")
 _UNFIT = re.compile(r"[\x00-\x1f\x7f]")
 _REFUSED = re.compile(
     r"could not read (?:Username|Password)|terminal prompts disabled|Authentication failed|Access denied"

@@ -157,7 +157,7 @@ def _ask(source: Source, git: Git, into: Path, command: tuple[str, ...], *refspe
 
 def ask(source: Source, git: Git, repository: Repository, command: tuple[str, ...], *refspecs: str) -> bytes:
     """What the server of `source` answers to a command that takes an address. Raises GitFailed."""
-    url, login = split_address(source.url)
+    url, login = split_address(source.url) if source.remote else (source.url, None)
     return git.run(
         *(*command, "--", url, *refspecs),
         cwd=repository.top,

@@ -35,7 +35,7 @@ def grown(server):
     git(repo, "checkout", "-q", "-b", "feature/x")
     commit_at(repo, "2026-10-02T10:00:00+01:00", {"lab1/step": "feature"})
     git(repo, "checkout", "-q", "main")
-    commit_at(repo, "2026-10-03T10:00:00+01:00", {"lab1/step": "last", "lab1/big.bin": b"x" * (33 << 20)})
+    commit_at(repo, "2026-10-03T10:00:00+01:00", {"lab1/step": "last"})
     return repo
 
 
@@ -44,7 +44,6 @@ def test_the_same_submission_through_the_mirror_and_without_it(ref, grown, serve
     direct, mirrored = both(server, f"{HOST}/student{ref}")
     assert mirrored == direct
     assert mirrored["commit"]
-    assert "left out" in " ".join(mirrored["hints"]) or ref in {"@feature/x", "@v1", "@refs/heads/feature/x"}
 
 
 def test_hashes_and_their_beginnings(grown, server):
@@ -193,11 +192,11 @@ def test_only_the_commit_stays_in_the_work_folder(server):
 
 def test_too_much_history_is_left_behind_where_nobody_asks_for_it(server, monkeypatch):
     repo = server.new()
-    noise = b"".join(hashlib.sha256(str(n).encode()).digest() for n in range(100_000))
+    noise = b"".join(hashlib.sha256(str(n).encode()).digest() for n in range(10_000))
     commit_at(repo, "2026-10-02T10:00:00+01:00", {"lab1/a.bin": noise})
     (repo / "lab1/a.bin").unlink()
     head = commit_at(repo, "2026-10-03T10:00:00+01:00")
-    monkeypatch.setattr("grader.intake.git._FILE_BYTES", 2 << 20)
+    monkeypatch.setattr("grader.intake.git._FILE_BYTES", 200 << 10)
     found = server.obtain()
     assert (found.source.ref, found.handed_in.by) == (head, "commit")
     assert open_submission(found.source, package="lab1", workdir=server.base / "w").commit == head

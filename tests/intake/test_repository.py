@@ -7,12 +7,16 @@ import shutil
 import subprocess
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from grader.errors import PackageNotFound, SubmissionError
+from grader.intake import open_recorded, open_recording, open_submission
+from grader.intake.identity import identify
 from grader.intake.limits import Limits
+from grader.intake.source import parse_source
 from tests.intake.samples import commit, git, lab, opened, repository, write
 
 
@@ -364,3 +368,28 @@ def test_without_git(repo, tmp_path, monkeypatch):
     submission = opened(repo, tmp_path)
     assert (submission.commit, submission.package.mode_source) == (None, "disk")
     assert "git is not installed" in submission.hints[0]
+
+
+def test_a_password_stands_in_no_command_line_of_git(tmp_path, monkeypatch):
+    stand_in_for_git(tmp_path, monkeypatch, f'echo "$*" > {tmp_path}/argv; env > {tmp_path}/env; exit 1')
+    refused("https://ada:s%40crt@h.invalid/lab", tmp_path)
+    assert "https://h.invalid/lab" in (tmp_path / "argv").read_text()
+    assert "s%40crt" not in (tmp_path / "argv").read_text()
+    assert "s@crt" not in (tmp_path / "argv").read_text()
+    assert "GRADER_LOGIN_PASSWORD=s@crt" in (tmp_path / "env").read_text().splitlines()
+
+
+def test_a_password_that_the_server_says_again_is_not_shown(tmp_path, monkeypatch):
+    stand_in_for_git(tmp_path, monkeypatch, "echo 'fatal: something new for ada:s@crt' >&2; exit 128")
+    error = refused("https://ada:s%40crt@h.invalid/lab", tmp_path)
+    assert "something new for ada:***" in error.message
+
+
+def test_a_source_that_was_read_already(repo, history, tmp_path):
+    source = replace(parse_source(f"{repo}@v1"), given="https://h/student@v1", hints=("from elsewhere",))
+    submission = open_submission(source, package="lab1", workdir=tmp_path / "work")
+    assert (submission.commit, submission.source) == (history["first"], "https://h/student@v1")
+    assert submission.hints == ("from elsewhere",)
+    assert identify(source, "s1") == ("s1", "https://h/student@v1")
+    assert open_recording(source) is None
+    assert open_recorded(source, workdir=tmp_path / "work").commit == history["first"]

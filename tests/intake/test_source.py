@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.errors import SubmissionError, UsageError
-from grader.intake.source import parse_source
+from grader.intake.source import as_repository, parse_source, with_ref
 from tests.intake.samples import lab, repository, write
 
 
@@ -140,3 +140,33 @@ def test_a_home_folder_is_understood(tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path))
     write(tmp_path / "lab1", lab())
     assert parse_source("~/lab1").path == Path(tmp_path / "lab1")
+
+
+@pytest.mark.parametrize(
+    ("text", "ref", "given"),
+    [
+        ("https://host/lab.git", "v1", "https://host/lab.git@v1"),
+        ("git@host:lab", "feature/x", "git@host:lab@feature/x"),
+        ("https://ada:secret@host/lab", "main", "https://host/lab@main"),
+        ("https://host/lab@main", "main", "https://host/lab@main"),
+        ("https://host/lab@main", None, "https://host/lab@main"),
+    ],
+)
+def test_a_ref_from_elsewhere(text, ref, given):
+    source = with_ref(parse_source(text), ref)
+    assert (source.given, source.name) == (given, "lab")
+    assert source.ref == (ref or "main")
+
+
+def test_a_ref_from_elsewhere_makes_a_folder_a_repository(tmp_path):
+    repo = repository(tmp_path / "repo", lab())
+    source = with_ref(parse_source(f"{repo}/lab1"), "main")
+    assert (source.kind, source.inside, source.given) == ("repository", "lab1", f"{repo}/lab1@main")
+
+
+def test_a_folder_as_what_is_committed_there(tmp_path):
+    repo = repository(tmp_path / "repo", lab())
+    source = as_repository(parse_source(str(repo)))
+    assert (source.kind, source.ref, source.given, source.top) == ("repository", None, str(repo), repo)
+    with pytest.raises(SubmissionError, match="no git repository"):
+        as_repository(parse_source(str(write(tmp_path / "plain", lab()))))
