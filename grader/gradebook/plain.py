@@ -12,7 +12,7 @@ from grader.gradebook.model import Book, Row
 from grader.gradebook.table import cells, header
 from grader.gradebook.whole import whole_file
 from grader.model.result import GradingResult
-from grader.shown import json_text
+from grader.shown import json_text, steers
 
 OPTIONAL = {
     name for name, field in GradingResult.model_fields.items() if not (field.is_required() or field.default)
@@ -39,6 +39,6 @@ def json_line(row: Row) -> str:
     data = {key: value for key, value in result.items() if value or key not in OPTIONAL}
     data["roster"] = row.entry.model_dump(mode="json")
     text = json.dumps(data, ensure_ascii=False)
-    if text.isascii() and text.isprintable() and "##" not in text:
+    if "##" not in text and not any(map(steers, set(text))):
         return text + "\n"
     return re.sub(r"\n *", "", json_text(data)) + "\n"
