@@ -4,7 +4,7 @@ The comparison is `copydetect`'s: code without names and layout, fingerprints of
 starter code, the tutorials and most of the class have is taken out first. Needs the extra `similarity`.
 """
 
-from grader.similarity.compare import compare
+from grader.similarity.comparing import compare
 from grader.similarity.files import write_similarity
 
 __all__ = ["compare", "write_similarity"]

@@ -42,7 +42,7 @@ class Sources:
 def read_submission(name: str, folder: Path) -> Sources:
     """The judged files of the package in `folder/evidence/package.mcap`.
 
-    Raises EvidenceError where there is none, it is a link, or it cannot be read.
+    Raises OSError where there is none, or a link is on the way, EvidenceError where it cannot be read.
     """
     with os.fdopen(_opened(folder), "rb") as file:
         status = os.fstat(file.fileno())
@@ -78,9 +78,9 @@ def _opened(folder: Path) -> int:
             inner = os.open(part, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | kind, dir_fd=place)
             os.close(place)
             place = inner
-    except OSError as error:
+    except OSError:
         os.close(place)
-        raise EvidenceError(f"evidence/package.mcap: {error.strerror}") from error
+        raise
     return place
 
 
@@ -91,16 +91,18 @@ def _head(path: Path) -> bytes:
 
 
 def _chosen(name: str, files: list[tuple[str, bytes]]) -> Sources:
+    """Small ones first: large ones take nobody's room."""
     chosen: list[Source] = []
     left_out: list[NotCompared] = []
     room_bytes = SUBMISSION_BYTES_MAX
-    for path, data, language in _programs(files):
+    for path, data, language in sorted(_programs(files), key=lambda one: len(one[1])):
         reason = _why_not(data, room_bytes, len(chosen))
         if reason:
             left_out.append(NotCompared(id=name, file=path, reason=reason))
             continue
         room_bytes -= len(data)
         chosen.append(Source(path=path, code=data.decode(errors="replace"), language=language))
+    chosen.sort(key=lambda one: one.path)
     return Sources(files=tuple(chosen), left_out=tuple(left_out[:FILES_MAX]))
 
 

@@ -7,18 +7,19 @@ import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from rich.console import RenderableType
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
 from grader.batch.folder import RUN, open_batch
-from grader.cli.say import say, say_json
+from grader.cli.say import say_json
 from grader.errors import ExitCode, UsageError
 from grader.model.similarity import NotCompared, Pair, Similarity
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
 from grader.similarity import compare, write_similarity
-from grader.similarity.compare import require_library
+from grader.similarity.comparing import require_library
 from grader.similarity.files import percent, stretches
 from grader.similarity.sources import PLACE
 
@@ -45,13 +46,8 @@ def run(*, folder: Path, starter: list[Path], threshold: float, as_json: bool = 
     if as_json:
         say_json(similarity.model_dump(mode="json", by_alias=True))
         return ExitCode.PASSED
-    for text in _head(similarity):
-        say(text)
-    if similarity.pairs:
-        emit(open_console(sys.stdout), [_table(similarity, names)])
-    for text in _tail(similarity):
-        say(text)
-    say(f"Written: {', '.join(str(path) for path in written)}")
+    emit(open_console(sys.stdout), _report(similarity, names))
+    emit(open_console(sys.stdout), [Text(f"Written: {line(str(path), TEXT_CHARS)}") for path in written])
     return ExitCode.PASSED
 
 
@@ -73,11 +69,14 @@ def _class(folder: Path) -> tuple[dict[str, Path], dict[str, str], dict[str, str
     return {path.name: path for path in below}, {}, {}
 
 
-def _head(similarity: Similarity) -> Iterator[str]:
+def _report(similarity: Similarity, names: Mapping[str, str]) -> Iterator[RenderableType]:
     count = len(similarity.pairs)
     what = "1 pair is" if count == 1 else f"{count or 'no'} pairs are"
-    yield f"{similarity.compared} submissions compared, {what} nearly the same."
-    yield HARMLESS
+    yield Text(f"{similarity.compared} submissions compared, {what} nearly the same.")
+    yield Text(HARMLESS)
+    if similarity.pairs:
+        yield _table(similarity, names)
+    yield from map(Text, _tail(similarity))
 
 
 def _table(similarity: Similarity, names: Mapping[str, str]) -> Padding:
@@ -110,7 +109,12 @@ def _tail(similarity: Similarity) -> Iterator[str]:
         if len(group) > 2:
             yield f"{len(group)} hang together: {_ids(group)}"
     if similarity.same_group:
-        yield f"{similarity.same_group} pairs of one group each are not named."
+        count = similarity.same_group
+        yield (
+            "1 pair of one group is not named."
+            if count == 1
+            else f"{count} pairs of one group are not named."
+        )
     if similarity.too_little:
         count, total = len(similarity.too_little), similarity.compared
         yield (
