@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -21,7 +22,7 @@ def whole_file(target: Path) -> Iterator[Path]:
     """
     target = target.resolve() if target.is_symlink() else target
     special = target.exists() and not target.is_file()
-    folder = Path(os.environ.get("TMPDIR", "/tmp")) if special else target.parent  # noqa: S108 - nothing else is at hand
+    folder = Path(tempfile.gettempdir()) if special else target.parent
     beside = folder / f".{target.name[:80]}.{secrets.token_hex(6)}"
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -11,6 +11,7 @@ from grader.intake.names import brief
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://|[^/\s@]+@[^/\s:]+:|[\w.-]{2,}:(?!//)\S")
 """An address with a scheme, git's `user@host:path`, or `host:path`, as an SSH configuration names hosts."""
 _WINDOWS = re.compile(r"[A-Za-z]:[\\/]|.*\\", re.DOTALL)
+_SLASHES = re.compile(r"(https?|ssh|git|file):(?!//)", re.IGNORECASE)
 _WEB = re.compile(r"(www\.|[\w-]+(\.[\w-]+)*\.(com|org|edu|net|io|de|fr|it|es|uk)/)\S")
 _NO_REF = re.compile(r"[\x00-\x20~^:?*\[\\\x7f]|\.\.|@\{|//|^[/-]|[/.]$")
 
@@ -22,17 +23,23 @@ def source_fault(source: str, base: Path) -> str:
         out = relative and not (base / source).resolve().is_relative_to(base.resolve())
         there = _is_there(source, base)
     except (OSError, ValueError, RuntimeError):
-        return f"{brief(source)} is no path that can be followed"
-    if not there and _ADDRESS.match(source):
-        return ""
-    if not there and _WINDOWS.match(source):
-        return f"{brief(source)} is a path of Windows: write it with / as it is on this machine"
+        return f"{_shown(source)} is no path that can be followed"
+    if not there and (_ADDRESS.match(source) or _WINDOWS.match(source)):
+        return _address_fault(source)
     if out:
-        return f"{brief(source)} leads out of the roster's folder"
+        return f"{_shown(source)} leads out of the roster's folder"
     if there or not relative:
         return ""
     web = "; a web address begins with https://" if _WEB.match(source) else ""
-    return f"{brief(source)} does not exist{web}"
+    return f"{_shown(source)} does not exist{web}"
+
+
+def _address_fault(source: str) -> str:
+    if _SLASHES.match(source):
+        return f"{_shown(source)}: an address has two slashes behind its colon, as in https://"
+    if _ADDRESS.match(source):
+        return ""
+    return f"{_shown(source)} is a path of Windows: write it with / as it is on this machine"
 
 
 def whole_source(source: str, base: Path) -> str:
@@ -45,6 +52,11 @@ def whole_source(source: str, base: Path) -> str:
 def ref_fault(ref: str) -> str:
     """Why `ref` names no branch, tag or commit; empty where it may."""
     return f"{brief(ref)} cannot be the name of a branch, tag or commit" if _NO_REF.search(ref) else ""
+
+
+def _shown(source: str) -> str:
+    """Without what may be a password: all that stands before an `@`."""
+    return brief(source.rpartition("@")[2] if re.search(r":.*@", source, re.DOTALL) else source)
 
 
 def _is_there(source: str, base: Path) -> bool:

@@ -140,7 +140,26 @@ def test_what_can_be_no_ref(tmp_path: Path, ref: str) -> None:
     assert said(roster) == [f"roster.csv:2: ref: {ref} cannot be the name of a branch, tag or commit"]
 
 
-def test_no_password_is_told(tmp_path: Path) -> None:
-    roster = read(tmp_path, "id,source,ref\nada,https://ada:s3cret@host/a,-x\n")
+@pytest.mark.parametrize(
+    ("source", "ref"),
+    [
+        ("https://ada:s3cret@host/a", "-x"),
+        ("https:/ada:s3cret@host/a", ""),
+        ("https:s3cret@host/a", ""),
+        ("x/ada:s3cret@host/a", ""),
+        ("C:\\ada:s3cret@host/a", ""),
+        ("../ada:s3cret@host/a", ""),
+    ],
+)
+def test_no_password_is_told(tmp_path: Path, source: str, ref: str) -> None:
+    roster = read(tmp_path, f"id,source,ref\nada,{source},{ref}\n")
     assert len(roster.faults) == 1
     assert "s3cret" not in said(roster)[0]
+
+
+def test_an_address_with_one_slash(tmp_path: Path) -> None:
+    roster = read(tmp_path, "id,source\nada,https:/github.com/c/ada\n")
+    (fault,) = said(roster)
+    assert fault.endswith(
+        "https:/github.com/c/ada: an address has two slashes behind its colon, as in https://"
+    )
