@@ -85,6 +85,8 @@ def entry_identity(entry: Entry, platform: Platform) -> Identity:
     identity = row_identity(entry.extra, kinds(entry.extra, platform))
     identity.sure |= {(kind, key(entry.id)) for kind in ("platform", "number", "login")}
     identity.name = _turned(key(entry.name)) or identity.name
+    if any(kind == "platform" and text in identity.name.split() for kind, text in identity.sure):
+        identity.name = ""  # `Participant 123` is nobody's name
     return identity
 
 

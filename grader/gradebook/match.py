@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from grader.gradebook.identity import Identity
+from grader.gradebook.identity import Identity, plain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +29,7 @@ def match(ours: Sequence[Identity], theirs: Sequence[Identity]) -> Matched:
     for place, identity in enumerate(ours):
         rows = set().union(*(by_sure.get(sure, set()) for sure in identity.sure))
         found[place] = rows or by_name.get(identity.name, set())
+        found[place] = {row for row in found[place] if not _contradict(identity, theirs[row])}
     wanted = defaultdict[int, list[int]](list)
     for place, rows in found.items():
         for row in rows:
@@ -38,6 +39,14 @@ def match(ours: Sequence[Identity], theirs: Sequence[Identity]) -> Matched:
         rows={place: next(iter(rows)) for place, rows in found.items() if place not in doubtful},
         doubtful=doubtful,
     )
+
+
+def _contradict(ours: Identity, theirs: Identity) -> bool:
+    """Whether only the platform's number says so, and the names have nothing in common: Moodle numbers teams too."""
+    if not (ours.name and theirs.name) or any(kind != "platform" for kind, _ in ours.sure & theirs.sure):
+        return False
+    name = plain(ours.name)
+    return not any(plain(word) in name for word in theirs.name.split() if len(word) > 1)
 
 
 def _doubt(rows: set[int], wanted: dict[int, list[int]]) -> str:

@@ -64,7 +64,7 @@ def _named(files: list[tuple[Path, Named]]) -> Found:
     path, named = (taken or files)[0]
     where, name = printable(path.name), f"{named.name}-{named.id}"
     if not taken:
-        fault = "only text was handed in" if named.is_text else "neither a folder nor an archive"
+        fault = "only text or a link was handed in" if named.is_text else "neither a folder nor an archive"
         return Found(where=where, id=name, faults=(fault,))
     if len(taken) > 1:
         more = listing([other.name for other, _ in taken[1:]])
@@ -82,7 +82,7 @@ def _entry(path: Path, named: Named, name: str, others: list[str]) -> Entry:
         "file": printable(file),
         "late": "yes" if named.late else "",
         "other files": ", ".join(printable(other) for other in others),
-        f"{named.platform} id": named.id,
+        _id_column(named): named.id,
     }
     return Entry(
         id=name,
@@ -91,6 +91,10 @@ def _entry(path: Path, named: Named, name: str, others: list[str]) -> Entry:
         where=printable(path.name),
         extra={key: text for key, text in extra.items() if text},
     )
+
+
+def _id_column(named: Named) -> str:
+    return "Canvas anonymous id" if named.platform == "Canvas" and named.is_blind else f"{named.platform} id"
 
 
 def _can_be_graded(path: Path) -> bool:

@@ -97,7 +97,9 @@ def test_two_submissions_for_one_row_are_both_left_out(tmp_path: Path) -> None:
 
 
 def test_canvas_ids_of_a_bulk_download(tmp_path: Path) -> None:
-    data, _ = filled(tmp_path, [row("lovelaceada-11", 1, Canvas_id="11"), row("q", 2, Moodle_id="12")])
+    data, _ = filled(
+        tmp_path, [row("lovelaceada-11", 1, name="lovelaceada", Canvas_id="11"), row("q", 2, Moodle_id="12")]
+    )
     assert b'"L1, L2",1,9.00' in data
     assert b"L1,55.5," in data
 

@@ -50,6 +50,17 @@ def test_the_worksheet_by_the_numbers_of_a_bulk_download(tmp_path: Path) -> None
     assert remarks == ["x: no grade (inconclusive: open: rate)"]
 
 
+def test_the_number_of_a_team_is_no_students_number(tmp_path: Path) -> None:
+    data, remarks = filled(tmp_path, WORKSHEET, [row("Team A-101", name="Team A", Moodle_id="101")])
+    assert data == WORKSHEET
+    assert remarks[0].startswith("Team A-101 (Team A): not in export.csv")
+
+
+def test_hidden_names_go_by_their_number(tmp_path: Path) -> None:
+    data, _ = filled(tmp_path, WORKSHEET, [row("Participant-101", name="Participant 101", Moodle_id="101")])
+    assert data == WORKSHEET.replace(b'grading",,100.00', b'grading",87.5,100.00')
+
+
 def test_the_worksheet_in_another_language(tmp_path: Path) -> None:
     text = "ID;Vollständiger Name;E-Mail-Adresse;Bewertung;Bestwertung\nTeilnehmer/in101;Ada;a@x;;10,00\n"
     data, remarks = filled(tmp_path, text.encode(), [row("Ada-101", 7.5, Moodle_id="101")])

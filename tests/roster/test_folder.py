@@ -22,15 +22,28 @@ from tests.roster.helpers import ids, said
         ("Zoë Ångström_7_assignsubmission_file_", Named("Moodle", "7", "Zoë Ångström", "")),
         (
             "Participant_99_assignsubmission_onlinetext",
-            Named("Moodle", "99", "Participant", "", is_text=True),
+            Named("Moodle", "99", "Participant", "", is_text=True, is_blind=True),
         ),
-        ("Participant 99_assignsubmission_file", Named("Moodle", "99", "Participant", "")),
+        ("Participant 99_assignsubmission_file", Named("Moodle", "99", "Participant", "", is_blind=True)),
         ("lovelaceada_12345_67890_lab1.zip", Named("Canvas", "12345", "lovelaceada", "lab1.zip")),
         (
             "lovelaceada_LATE_12345_67890_lab1-2.zip",
             Named("Canvas", "12345", "lovelaceada", "lab1-2.zip", late=True),
         ),
-        ("anon_12345_67890_lab_1.tar.gz", Named("Canvas", "12345", "anon", "lab_1.tar.gz")),
+        (
+            "anon_12345_67890_lab_1.tar.gz",
+            Named("Canvas", "12345", "anon", "lab_1.tar.gz", is_blind=True),
+        ),
+        (
+            "LATE_anon_x7Yz2_67890_lab1.zip",
+            Named("Canvas", "x7Yz2", "anon", "lab1.zip", late=True, is_blind=True),
+        ),
+        ("van_der_meer_12345_67890_lab1.zip", Named("Canvas", "12345", "van_der_meer", "lab1.zip")),
+        (
+            "lovelaceada_LATE_12345_text.html",
+            Named("Canvas", "12345", "lovelaceada", "", late=True, is_text=True),
+        ),
+        ("lovelaceada_12345_link.html", Named("Canvas", "12345", "lovelaceada", "", is_text=True)),
         ("lab1", None),
         ("lab1_2026_11.zip", None),
         ("ada_lovelace.zip", None),
@@ -74,24 +87,29 @@ def test_canvas_one_archive_among_the_files_of_a_student(tmp_path: Path) -> None
         "y_8_2_lab1.zip",
         "y_8_3_text.html",
         "z_9_1_talker.py",
+        "z_10_link.html",
+        "anon_x7Yz2_1_lab1.zip",
     )
     roster = read_roster(tmp_path)
-    assert ids(roster) == ["lovelaceada-5", "y-8"]
-    assert roster.entries[0].extra == {
+    assert ids(roster) == ["anon-x7Yz2", "lovelaceada-5", "y-8"]
+    anonymous, ada, other = roster.entries
+    assert anonymous.extra["Canvas anonymous id"] == "x7Yz2"
+    assert ada.extra == {
         "platform": "Canvas",
         "file": "lab1-2.zip",
         "late": "yes",
         "Canvas id": "5",
     }
-    assert roster.entries[1].source == str(tmp_path / "y_8_2_lab1.zip")
-    assert roster.entries[1].extra["other files"] == "y_8_1_plot.png, y_8_3_text.html"
-    assert roster.columns == ("platform", "file", "late", "Canvas id", "other files")
+    assert other.source == str(tmp_path / "y_8_2_lab1.zip")
+    assert other.extra["other files"] == "y_8_1_plot.png, y_8_3_text.html"
+    assert roster.columns == ("platform", "file", "Canvas anonymous id", "late", "Canvas id", "other files")
     assert roster.faults == (
         RosterFault(
             where="x_7_8_a.zip",
             id="x-7",
             text="not the only one of this student, there is x_7_9_b.zip: leave one there",
         ),
+        RosterFault(where="z_10_link.html", id="z-10", text="only text or a link was handed in"),
         RosterFault(where="z_9_1_talker.py", id="z-9", text="neither a folder nor an archive"),
     )
 
@@ -116,7 +134,7 @@ def test_moodle_folders(tmp_path: Path) -> None:
         ("Participant-15", "Participant 15", f"{tmp_path}/Participant_15_assignsubmission_file/lab1.tar.gz"),
     ]
     assert [entry.extra["Moodle id"] for entry in roster.entries] == ["12", "13", "14", "15"]
-    assert said(roster) == ["Dan_16_assignsubmission_onlinetext: only text was handed in"]
+    assert said(roster) == ["Dan_16_assignsubmission_onlinetext: only text or a link was handed in"]
     assert roster.faults[0].id == "Dan-16"
 
 
