@@ -65,7 +65,10 @@ class LiveClass(Course):
         more = len(self.running) - RUNNING_SHOWN
         rest = [Text(f"  and {more} more", "dim")] if more > 0 else []
         bar = ProgressBar(total=max(self.total, 1), completed=self.done, width=40)
-        return Group(table, *rest, bar, Text(summary(self)))
+        below = Table.grid()
+        below.add_row(bar)
+        below.add_row(Text(summary(self)))
+        return Group(table, *rest, below)
 
 
 def said(outcome: Outcome) -> str:
