@@ -61,7 +61,8 @@ class _Fields(NamedTuple):
 
 
 def _rows(lines: Sequence[str], delimiter: str, start: int) -> Iterator[_Fields]:
-    """Each row that is not empty. After one that cannot be read, the next line begins a row again."""
+    """Each row that is not empty. After one that cannot be read, the next line begins a row again; of it there is the
+    first field at most."""
     unreadable = 0
     while start < len(lines) and unreadable < UNREADABLE_MAX:
         # Python 3.10 reads no zero byte: its place is kept by a sign that says the same to a reader.
@@ -76,7 +77,8 @@ def _rows(lines: Sequence[str], delimiter: str, start: int) -> Iterator[_Fields]
                     yield _Fields(begins + 1, fields, ("a zero byte in it",) if zero else ())
                 begins = start + reader.line_num
         except csv.Error as error:
-            yield _Fields(begins + 1, [], (_said(error),))
+            first = lines[begins].partition(delimiter)[0]
+            yield _Fields(begins + 1, [] if '"' in first else [first], (_said(error),))
             start, unreadable = begins + 1, unreadable + 1
         else:
             return

@@ -113,6 +113,7 @@ def test_a_quote_that_never_ends_in_the_last_row(tmp_path: Path) -> None:
     roster = read(tmp_path, 'id,source\nada,ssh://h/a\nbob,"ssh://h/b\ncem,ssh://h/c\n')
     assert ids(roster) == ["ada", "cem"]
     assert said(roster) == ["roster.csv:3: a quotation mark that never ends"]
+    assert roster.faults[0].id == "bob"
 
 
 def test_quotes_without_end_in_every_row_are_told_up_to_a_limit(tmp_path: Path) -> None:
