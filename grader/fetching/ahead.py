@@ -11,9 +11,9 @@ from pathlib import Path
 
 from grader.errors import GraderError
 from grader.fetching.cache import cache_folder, locked, tidy_now_and_then
-from grader.fetching.history import Rule
-from grader.fetching.obtain import Task, bring_up_to_date, place_name, source_of
+from grader.fetching.obtain import source_of
 from grader.fetching.patience import GivenUp, Patience
+from grader.fetching.update import Errand, bring_up_to_date, place_name
 from grader.intake.git import GitFailed
 from grader.model.roster import Entry
 from grader.temporary import temporary_folder
@@ -81,10 +81,10 @@ class Prefetch:
         if folder is None:
             return None
         tidy_now_and_then(folder)
-        task = Task(source=source, entry=entry, rule=Rule(), since=self._since, patience=self._patience)
+        errand = Errand(source=source, since=self._since, patience=self._patience)
         try:
             with locked(folder / place_name(source)) as place:
-                bring_up_to_date(place, task, room)
+                bring_up_to_date(place, errand, room)
         except (GraderError, GitFailed, GivenUp, OSError):
             return False
         return True

@@ -1,7 +1,8 @@
 """Where mirrors are kept: in a folder of the grader's user that nobody else can enter, each used by one at a time.
 
 `<cache>/grader/repositories/<sum of the address>/` holds `lock`, `mirror.git` and `state.json`. The state is written
-when the mirror is complete, and its time of change says when the mirror was used last.
+when the mirror is complete, and its time of change says when the mirror was used last. `failure.json` is there where
+the network has failed since.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import stat
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from grader.files import lock
@@ -33,6 +34,16 @@ class State:
 
     fetched_at: float
     listing: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """That the network failed: what git said (without the address), how often it was tried, and until when."""
+
+    at: float
+    said: str
+    tries: int
+    timeout: bool
 
 
 @dataclass(frozen=True)
@@ -60,6 +71,26 @@ class Place:
         beside = self.folder / "state.json.new"
         beside.write_text(json.dumps(data), encoding="utf-8")
         beside.replace(self.folder / "state.json")
+
+        (self.folder / "failure.json").unlink(missing_ok=True)
+
+    def failure(self) -> Failure | None:
+        """The last one, where nothing went well since."""
+        try:
+            data = json.loads((self.folder / "failure.json").read_bytes())
+            return Failure(
+                at=float(data["at"]),
+                said=str(data["said"]),
+                tries=int(data["tries"]),
+                timeout=bool(data["timeout"]),
+            )
+        except (OSError, ValueError, TypeError, KeyError, RecursionError):
+            return None
+
+    def failed(self, failure: Failure) -> None:
+        """Tell whoever comes next, so that not all of them wait for a server that does not answer."""
+        with suppress(OSError):
+            (self.folder / "failure.json").write_text(json.dumps(asdict(failure)), encoding="utf-8")
 
     def used(self) -> None:
         with suppress(OSError):

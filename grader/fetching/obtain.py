@@ -11,14 +11,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.errors import OutputError, SubmissionError
-from grader.fetching.cache import Place, State, cache_folder, locked, name_of, tidy_now_and_then
-from grader.fetching.history import Commit, Rule, choose, not_chosen
+from grader.fetching.cache import Place, cache_folder, locked, tidy_now_and_then
+from grader.fetching.history import Commit, NothingInTime, Rule, choose, not_chosen
 from grader.fetching.mirror import Listing, Mirror
 from grader.fetching.patience import GivenUp, Patience, error_of, patiently
+from grader.fetching.update import Errand, bring_up_to_date, git_in, place_name
 from grader.intake import unreadable
-from grader.intake.credentials import split_address
-from grader.intake.explain import may_pass
-from grader.intake.git import Git, GitFailed, GitMissing, GitTimeout, GitTooMuch
+from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.names import brief, printable
 from grader.intake.refs import Wanted, choose_ref, no_such_ref
 from grader.intake.repository import served
@@ -26,9 +25,6 @@ from grader.intake.source import Source, as_repository, parse_source, with_ref
 from grader.intake.tree import is_there
 from grader.model.handed_in import HandedIn
 from grader.model.roster import Entry
-
-GIT_TIMEOUT_S = 120.0
-"""For everything that git does in one try."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,14 +42,20 @@ class Obtained:
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """What to bring here. What was fetched after `since` (seconds since 1970) need not be fetched again."""
+    """A repository to bring here. With `uncommitted`, it is a folder in which more may lie than what counts."""
 
-    source: Source
+    errand: Errand
     entry: Entry
     rule: Rule
-    since: float
-    patience: Patience
     uncommitted: bool = False
+
+    @property
+    def source(self) -> Source:
+        return self.errand.source
+
+    @property
+    def patience(self) -> Patience:
+        return self.errand.patience
 
 
 def obtain(
@@ -76,28 +78,24 @@ def obtain(
     uncommitted = is_clone and rule.is_any
     if source.kind != "repository" and not uncommitted:
         return Obtained(source=source, handed_in=not_chosen(rule, entry))
-    task = Task(
+    errand = Errand(
         source=as_repository(source) if uncommitted else source,
-        entry=entry,
-        rule=rule,
         since=fetched_since or time.time(),
         patience=patience or Patience(),
-        uncommitted=uncommitted,
     )
     try:
         with _room(workdir) as room:
-            try:
-                here = served(task.source, git_in(room), room / "view")
-            except SubmissionError as error:
-                if not uncommitted:
-                    raise
-                note = f"its history cannot be read, so all of the folder counts ({error.message})"
-                return Obtained(source=source, handed_in=not_chosen(rule, entry, note=note))
-            return _from_repository(replace(task, source=here), room)
-    except GitFailed as failure:
-        raise error_of(failure, source) from None
+            task = Task(errand=errand, entry=entry, rule=rule, uncommitted=uncommitted)
+            return _from_repository(task, room)
+    except _Unreadable as unread:
+        note = f"its history cannot be read, so all of the folder counts ({unread})"
+        return Obtained(source=source, handed_in=not_chosen(rule, entry, note=note))
     except OSError as error:
         raise unreadable(source.given, error) from error
+
+
+class _Unreadable(Exception):
+    """Why the history of a folder is not read."""
 
 
 def source_of(entry: Entry) -> Source:
@@ -106,54 +104,6 @@ def source_of(entry: Entry) -> Source:
         return with_ref(parse_source(entry.source), entry.ref)
     except OSError as error:
         raise unreadable(printable(entry.source), error) from error
-
-
-def bring_up_to_date(place: Place, task: Task, room: Path) -> tuple[Mirror, Listing]:
-    """The mirror in `place`, as the server has it now, or had it after `task.since`.
-
-    Raises GivenUp, or GitFailed where the mirror may be damaged as well.
-    """
-    state = place.state()
-    mirror = Mirror(source=task.source, path=place.mirror, room=room, git=git_in(room))
-    if state is not None and task.since <= state.fetched_at <= time.time() + 1:
-        place.used()
-        return mirror, Listing(state.listing)
-    if state is None:
-        place.clear()
-
-    def ask() -> tuple[Mirror, Listing, float]:
-        fresh = replace(mirror, git=git_in(room))
-        asked_at = time.time()
-        listing = _listing(fresh)
-        if listing.refs and (state is None or listing.text != state.listing):
-            place.incomplete()
-            fresh.fetch(listing)
-        return fresh, listing, asked_at
-
-    asked, listing, asked_at = patiently(ask, task.patience)
-    if listing.refs:
-        place.complete(State(fetched_at=asked_at, listing=listing.text))
-    return asked, listing
-
-
-def _listing(mirror: Mirror) -> Listing:
-    """Raises GivenUp where asking again does not help: that is no fault of the mirror's."""
-    try:
-        return mirror.listing()
-    except GitFailed as failure:
-        if may_pass(failure):
-            raise
-        raise GivenUp(failure, 1) from None
-
-
-def git_in(room: Path) -> Git:
-    """git with all its time before it."""
-    return Git(room / "git-home", timeout_s=GIT_TIMEOUT_S)
-
-
-def place_name(source: Source) -> str:
-    """The name of the mirror for a remote source."""
-    return name_of(split_address(source.url)[0])
 
 
 @contextmanager
@@ -177,24 +127,40 @@ def _room(workdir: Path) -> Iterator[Path]:
 
 
 def _from_repository(task: Task, room: Path) -> Obtained:
+    """Raises _Unreadable for a folder with a `.git` that is not to be read."""
     try:
-        with ExitStack() as stack:
-            place = _place(task.source, room, stack)
-            kept = place.state() is not None
-            try:
-                return _commit_of(place, task, room)
-            except GitFailed as failure:
-                if not kept or isinstance(failure, GitMissing | GitTimeout | GitTooMuch):
-                    raise
-            place.clear()  # it may be damaged
-            shutil.rmtree(room / "commit.git", ignore_errors=True)
-            return _commit_of(place, task, room)
+        here = _served(task, room)
+        return _through_mirror(replace(task, errand=replace(task.errand, source=here)), room)
     except GitTooMuch as failure:
-        if _needs_history(task):
+        if task.rule.is_any:
             raise error_of(failure, task.source) from None
         return _alone(task, room)
     except (GitFailed, GivenUp) as problem:
         raise error_of(problem, task.source) from None
+
+
+def _served(task: Task, room: Path) -> Source:
+    try:
+        return served(task.source, git_in(room), room / "view")
+    except SubmissionError as error:
+        if task.uncommitted:
+            raise _Unreadable(error.message) from None
+        raise
+
+
+def _through_mirror(task: Task, room: Path) -> Obtained:
+    """A mirror that seems to be damaged is made anew."""
+    with ExitStack() as stack:
+        place = _place(task.source, room, stack)
+        kept = place.state() is not None
+        try:
+            return _commit_of(place, task, room)
+        except GitFailed as failure:
+            if not kept or isinstance(failure, GitMissing | GitTimeout | GitTooMuch):
+                raise
+        place.clear()
+        shutil.rmtree(room / "commit.git", ignore_errors=True)
+        return _commit_of(place, task, room)
 
 
 def _place(source: Source, room: Path, stack: ExitStack) -> Place:
@@ -212,7 +178,7 @@ def _place(source: Source, room: Path, stack: ExitStack) -> Place:
 
 
 def _commit_of(place: Place, task: Task, room: Path) -> Obtained:
-    mirror, listing = bring_up_to_date(place, task, room)
+    mirror, listing = bring_up_to_date(place, task.errand, room)
     wanted = choose_ref(listing.refs, task.source.ref, given=task.source.given)
     tip = patiently(lambda: mirror.commit(listing, wanted), task.patience)
     if tip is None:
@@ -231,9 +197,14 @@ def _chosen(
             commit = next(commits)
             note = f"the roster names {brief(task.source.ref or '')}: {commit}" if task.rule.is_any else ""
             return commit, not_chosen(task.rule, task.entry, commit.at, note)
-        commit, handed_in = choose(
-            commits, rule=task.rule, entry=task.entry, branch=branch, given=task.source.given
-        )
+        try:
+            commit, handed_in = choose(
+                commits, rule=task.rule, entry=task.entry, branch=branch, given=task.source.given
+            )
+        except NothingInTime as error:
+            if mirror.is_cut_off():
+                error.hint += " Its history is cut off (a shallow clone): hand in a whole one."
+            raise
     if task.uncommitted:
         note = f"{handed_in.note}; changes that are not committed do not count"
         handed_in = handed_in.model_copy(update={"note": note})
@@ -254,13 +225,10 @@ def branch_of(listing: Listing, ref: str | None, wanted: Wanted) -> str | None:
     return name.removeprefix("refs/heads/").removeprefix("refs/remotes/")
 
 
-def _needs_history(task: Task) -> bool:
-    return task.rule.is_any
-
-
 def _alone(task: Task, room: Path) -> Obtained:
     """What is too much with its history, without it."""
-    source = task.source
+    local = task.source.top is not None
+    source = replace(task.source, url=(room / "view").as_uri()) if local else task.source
     shutil.rmtree(room / "commit.git", ignore_errors=True)
 
     def ask() -> tuple[Mirror, Listing, Wanted]:

@@ -191,6 +191,16 @@ def test_a_clone_whose_history_cannot_be_read_counts_as_a_folder(server):
     assert "its history cannot be read" in found.handed_in.note
 
 
+def test_a_shallow_clone_says_so(commits, server):
+    clone = server.base / "shallow"
+    git(server.base, "clone", "-q", "--depth=2", f"file://{server.folder}/student", str(clone))
+    assert server.obtain(str(clone), Rule(before=time(DATES["last"]))).source.ref == commits["last"]
+    assert server.obtain(str(clone), Rule(before=time(DATES["later"]))).source.ref == commits["later"]
+    with pytest.raises(NothingInTime) as caught:
+        server.obtain(str(clone), Rule(deadline=DEADLINE))
+    assert "a shallow clone" in caught.value.hint
+
+
 def test_a_clone_without_a_commit_has_nothing_that_counts(server):
     folder = server.base / "new"
     folder.mkdir()
