@@ -117,7 +117,7 @@ def test_a_quote_that_never_ends_in_the_last_row(tmp_path: Path) -> None:
 
 
 def test_quotes_without_end_in_every_row_are_told_up_to_a_limit(tmp_path: Path) -> None:
-    roster = read(tmp_path, "id,source\n" + 'a,"b"c\n' * 100)
+    roster = read(tmp_path, "id,source\n" + '"a","b"c\n' * 100)
     assert len(roster.faults) == 51
     assert (
         said(roster)[-1] == "roster.csv:52: too many rows that cannot be read before it: the rest is left out"
