@@ -16,11 +16,13 @@ POINTS_MAX = 600
 
 
 class RateFigure(Record):
-    """The rate of one publisher over time, and how long its gaps are.
+    """The rate of a topic over time, and how long its gaps are.
 
-    `times_s` are the arrivals but for the first, `gaps_s` the time before each; `low_hz` and `high_hz` bound the mean
-    that passes, `gap_low_s` and `gap_high_s` a single gap. `mean_hz` is what was measured, of so many `messages`.
-    `late` are stretches in which the machine was late.
+    `publisher` is one node, or all of the student's on the topic together (`/a and /b`): that is what is judged.
+    `times_s` are the arrivals but for the first, `gaps_s` the time before each; where the publisher `ends_silent`, the
+    last of them is the silence at the end. `low_hz` and `high_hz` bound the mean that passes, `gap_low_s` and
+    `gap_high_s` a single gap. `mean_hz` is what was measured, of so many `messages`; of a flood of them some points
+    are shown. `late` are stretches in which the machine was late.
     """
 
     kind: Literal["rate"] = "rate"
@@ -36,21 +38,26 @@ class RateFigure(Record):
     gap_high_s: float | None = None
     late: tuple[tuple[float, float], ...] = ()
     messages: int = 0
+    ends_silent: bool = False
 
 
 class CounterFigure(Record):
     """A counter's values over time. `wraps` and `wrong` are indexes into the points: steps to the first value after a
-    wrap, and steps that are not as they should be; `texts` say what is wrong with each of `wrong`."""
+    wrap, and steps that are not as they should be; `texts` say what is wrong with each of `wrong`, and `more_wrong`
+    steps are not named. `numbers` count each point's value from 0 on its publisher: where they jump, points are left
+    out."""
 
     kind: Literal["counter"] = "counter"
     topic: str
     publisher: str
     scenario: str
     times_s: tuple[float, ...]
-    values: tuple[int, ...]
+    values: tuple[int | float, ...]
+    numbers: tuple[int, ...] = ()
     wraps: tuple[int, ...] = ()
     wrong: tuple[int, ...] = ()
     texts: tuple[str, ...] = ()
+    more_wrong: int = 0
     messages: int = 0
 
 
@@ -65,11 +72,16 @@ class Heard(Record):
 
 
 class HeardFigure(Record):
-    """What the listener was sent, against what it printed."""
+    """What the listener was sent, against what it printed; `left_out` of what was sent is not shown.
+
+    Where it is `out_of_order`, everything was printed, but not in the order in which it was sent.
+    """
 
     kind: Literal["heard"] = "heard"
     scenario: str
     rows: tuple[Heard, ...]
+    left_out: int = 0
+    out_of_order: bool = False
 
 
 class Edge(Record):
@@ -81,7 +93,10 @@ class Edge(Record):
 
 
 class GraphFigure(Record):
-    """Nodes and topics as `rqt_graph` draws them, all that were there during the run. `types` are the topics'."""
+    """Nodes and topics as `rqt_graph` draws them, all that were there during the run. `types` are the topics'.
+
+    `left_out` nodes and topics are not shown.
+    """
 
     kind: Literal["graph"] = "graph"
     scenario: str
@@ -89,6 +104,7 @@ class GraphFigure(Record):
     topics: tuple[str, ...]
     types: dict[str, str] = Field(default_factory=dict)
     edges: tuple[Edge, ...]
+    left_out: int = 0
 
 
 class ConsoleLine(Record):
@@ -117,14 +133,35 @@ class CodeFigure(Record):
     marked: tuple[int, ...]
 
 
+class PathFigure(Record):
+    """The way that a robot took, through `points` in metres, and the `corners` that it had to pass in their order.
+
+    It may be `tolerance_m` off. `reached` of the corners were passed; `strayed` is the index of the first point that
+    is too far from the way, None where none is.
+    """
+
+    kind: Literal["path"] = "path"
+    topic: str
+    scenario: str
+    points: tuple[tuple[float, float], ...]
+    corners: tuple[tuple[float, float], ...]
+    tolerance_m: float
+    reached: int
+    strayed: int | None = None
+    messages: int = 0
+
+
 Figure = Annotated[
-    RateFigure | CounterFigure | HeardFigure | GraphFigure | ConsoleFigure | CodeFigure,
+    RateFigure | CounterFigure | HeardFigure | GraphFigure | ConsoleFigure | CodeFigure | PathFigure,
     Field(discriminator="kind"),
 ]
 
 
 class Figures(Record):
-    """Of one submission: by criterion what shows its verdict, and of each scenario the graph and the console."""
+    """Of one submission: by criterion what shows its verdict, and of each scenario the graph and the console.
+
+    `consoles` has what the build printed too, as `package`.
+    """
 
     by_criterion: dict[str, tuple[Figure, ...]] = Field(default_factory=dict)
     graphs: dict[str, GraphFigure] = Field(default_factory=dict)
