@@ -9,6 +9,7 @@ import pytest
 
 from grader.errors import SubmissionError, UsageError
 from grader.fetching import Rule
+from grader.intake import without_password
 from grader.intake.credentials import Access, accesses, split_address
 from grader.intake.source import parse_source
 from tests.fetching.forge import certificate_in, forge
@@ -229,6 +230,23 @@ def test_an_address_that_cannot_be_read_is_not_shown_with_its_password(text):
     with pytest.raises(UsageError) as caught:
         parse_source(text)
     assert "sec" not in caught.value.message + caught.value.hint
+
+
+@pytest.mark.parametrize(
+    ("source", "shown"),
+    [
+        ("https://ada:sec/ret@host/lab", "https://…"),
+        ("https://ada:12/34@host/lab", "https://ada:12/34@host/lab"),  # a port and a path, to anybody
+        ("https://ada:secret@host:8443/lab", "https://host:8443/lab"),
+        ("https://host:8443", "https://host:8443"),
+        ("https://[::1]:80/lab@x", "https://[::1]:80/lab@x"),
+        ("https://host/a:b/lab", "https://host/a:b/lab"),
+        ("git@host:lab", "git@host:lab"),
+        ("/home/a:b/lab", "/home/a:b/lab"),
+    ],
+)
+def test_what_is_shown_of_an_address(source, shown):
+    assert without_password(source) == shown
 
 
 def test_a_password_for_ssh_is_taken_away():
