@@ -12,10 +12,11 @@ MINUTES ?= 10
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
 
-setup: ## ROS 1 and the virtual environment, where they are missing
+setup: ## ROS 1, the virtual environment and a browser for the tests of pages, where they are missing
 	@scripts/setup.sh
 
-demo: setup ## grade the reference solution and one faulty package, for real
+demo: ## grade the reference solution and one faulty package, for real
+	@scripts/setup.sh --no-browser
 	@rm -rf demo
 	@$(BIN)/grader grade reference_solutions/$(LAB) --rubric $(LAB) --out demo
 	@$(BIN)/grader grade fixtures/$(LAB)/counter-resets-to-1 --rubric $(LAB) --out demo || test $$? -eq 1

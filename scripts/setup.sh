@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Sets up what `make demo` and `make test` need: ROS 1 where it is missing, and .venv with the grader in it.
-# Runs again in a moment when there is nothing to do.
+# Sets up what `make demo` and `make test` need: ROS 1 where it is missing, and .venv with the grader in it; for the
+# tests of pages a browser too, but with `--no-browser`. Runs again in a moment when there is nothing to do.
 set -euo pipefail
 cd -P "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -17,8 +17,11 @@ ros_extras=(
   ros-message-generation libnav-msgs-dev libsensor-msgs-dev libstd-srvs-dev
   ros-std-msgs ros-std-srvs ros-geometry-msgs ros-nav-msgs ros-sensor-msgs
 )
-# Program to find on PATH, and the package that has it (`ip` is for the tests of hostile submissions).
+# Program to find on PATH, and the package that has it (`ip` is for the tests of hostile submissions). The grader does
+# without those of the second line, and so do its tests: those of pages are skipped.
 tools=(bwrap:bubblewrap git:git cmake:cmake make:make g++:g++ ip:iproute2)
+browser_tools=(chromium:chromium node:nodejs npm:npm)
+page_tools=tests/browser # with its own package.json
 
 say() { printf 'setup: %s\n' "$*"; }
 
@@ -119,6 +122,40 @@ install_extras() {
   printf '%s' "${wanted[*]}" >"$tried"
 }
 
+# What the tests of pages need. Tried once for each set of names, and for each package-lock.json.
+install_browser() {
+  local tool wanted=() tried=.venv/setup-browser
+  for tool in "${browser_tools[@]}"; do
+    command -v "${tool%%:*}" >/dev/null || wanted+=("${tool#*:}")
+  done
+  if [ "${#wanted[@]}" -gt 0 ] && [ "$(cat "$tried" 2>/dev/null)" != "${wanted[*]}" ]; then
+    printf '%s' "${wanted[*]}" >"$tried"
+    apt_try "${wanted[@]}" || say "no ${wanted[*]} here: the tests of pages in a browser will be skipped"
+  fi
+  install_page_tools
+}
+
+apt_try() { # as far as it can be done without asking anybody
+  command -v apt-get >/dev/null && find_root || return 1
+  say "installing $*"
+  local apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -q -y -o DPkg::Lock::Timeout=300)
+  "${apt[@]}" update </dev/null || true
+  "${apt[@]}" install --no-install-recommends "$@" </dev/null
+}
+
+install_page_tools() {
+  local stamp="$page_tools/node_modules/.setup-stamp" lock
+  if [ ! -f "$page_tools/package-lock.json" ] || ! command -v npm >/dev/null; then return; fi
+  lock="$(cksum <"$page_tools/package-lock.json")"
+  if [ "$(cat "$stamp" 2>/dev/null)" = "$lock" ]; then return; fi
+  say "installing what $page_tools measures pages with"
+  if npm --prefix "$page_tools" ci --ignore-scripts --no-audit --no-fund --loglevel=error </dev/null; then
+    printf '%s\n' "$lock" >"$stamp"
+  else
+    say "npm could not: the tests of pages in a browser will be skipped"
+  fi
+}
+
 fits() { # Python 3.10 or newer that can make virtual environments
   "$1" -c 'import ensurepip, sys, venv; sys.exit(sys.version_info < (3, 10))' 2>/dev/null
 }
@@ -165,3 +202,6 @@ if ! ready "$stamp"; then
   make_venv "$stamp"
 fi
 install_extras
+if [ "${1:-}" != --no-browser ]; then
+  install_browser
+fi

@@ -36,15 +36,17 @@ class Machine:
         self.programs.mkdir()
         self.log = folder / "log"
 
-    def run(self, programs: Mapping[str, str]) -> subprocess.CompletedProcess[str]:
+    def run(
+        self, programs: Mapping[str, str], *arguments: str, rest: str = "/usr/bin:/bin"
+    ) -> subprocess.CompletedProcess[str]:
         for name, text in programs.items():
             (self.programs / name).write_text(f"#!/bin/bash\n{text}\n")
             (self.programs / name).chmod(0o755)
-        path = f"{self.programs}:/usr/bin:/bin"
+        path = f"{self.programs}:{rest}"
         env = {"PATH": path, "LOG": str(self.log), "HOME": os.devnull}
         script = str(self.project / "scripts" / "setup.sh")
         return subprocess.run(
-            [script],
+            [script, *arguments],
             env=env,
             stdin=subprocess.DEVNULL,
             capture_output=True,
@@ -108,6 +110,66 @@ def test_a_missing_setup_file_is_named(machine, tmp_path) -> None:
     done = subprocess.run([script], env=env, capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
     assert "none.bash" in done.stderr
+
+
+class Ready(Machine):
+    """All is installed but what the tests of pages need: not even a program of /usr/bin is to be seen."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder)
+        binaries = self.project / ".venv" / "bin"
+        binaries.mkdir(parents=True)
+        for name in ("python", "grader"):
+            (binaries / name).write_text("#!/bin/sh\n")
+            (binaries / name).chmod(0o755)
+        (self.project / ".venv" / "setup-stamp").write_text(f"4294967295 0 {self.project}\n")
+        for name in ("bash", "env", "dirname", "cat", "cksum", "grep", "sed", "ls"):
+            (self.programs / name).symlink_to(shutil.which(name))
+
+    def setup(self, *arguments: str, **programs: str) -> subprocess.CompletedProcess[str]:
+        installed = {
+            "dpkg-query": 'shift 2; for name; do echo "installed $name"; done',
+            **dict.fromkeys(("bwrap", "git", "cmake", "make", "g++", "ip"), "exit 0"),
+        }
+        return self.run({**BARE, **installed, **programs}, *arguments, rest="/nowhere")
+
+
+@pytest.fixture
+def ready(machine, tmp_path) -> Ready:
+    return Ready(tmp_path / "ready")
+
+
+def test_a_browser_that_cannot_be_had_is_no_obstacle_and_said_once(ready) -> None:
+    done = ready.setup()
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == (
+        "setup: no chromium nodejs npm here: the tests of pages in a browser will be skipped\n"
+    )
+    again = ready.setup()
+    assert (again.returncode, again.stdout) == (0, "")
+
+
+def test_a_browser_is_installed_by_root(ready) -> None:
+    ready.setup(id="echo 0", node="exit 0")
+    update, install = ready.calls()
+    assert update == UPDATE
+    assert install.endswith("install --no-install-recommends chromium npm")
+
+
+def test_a_browser_is_not_for_everybody(ready) -> None:
+    done = ready.setup("--no-browser", id="echo 0")
+    assert (done.returncode, done.stdout, ready.calls()) == (0, "", [])
+
+
+def test_what_npm_brings_is_installed_once_for_each_lock_file(ready) -> None:
+    pages = ready.project / "tests" / "browser"
+    (pages / "node_modules").mkdir(parents=True)
+    (pages / "package-lock.json").write_text("{}")
+    here = {"chromium": "exit 0", "node": "exit 0", "npm": LOG}
+    for text in ("{}", "{}", "{ }"):
+        (pages / "package-lock.json").write_text(text)
+        assert ready.setup(**here).returncode == 0
+    assert [call.split()[3] for call in ready.calls()] == ["ci", "ci"]
 
 
 def test_the_second_time_there_is_nothing_to_do() -> None:

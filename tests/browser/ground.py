@@ -1,0 +1,49 @@
+"""What the tests of pages stand on: Debian's Chromium and two tools from npm, or why they are missing."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+AXE = HERE / "node_modules" / "axe-core" / "axe.min.js"
+VALIDATE = HERE / "node_modules" / "html-validate" / "bin" / "html-validate.mjs"
+CHROMIUMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+
+def chromium() -> str | None:
+    """The program; None where there is none. `GRADER_CHROMIUM` names another one."""
+    named = os.environ.get("GRADER_CHROMIUM")
+    return named or next((path for name in CHROMIUMS if (path := shutil.which(name))), None)
+
+
+def missing() -> str | None:
+    """In one line what is missing here and how it comes; None where all is there."""
+    lacking = []
+    if chromium() is None:
+        lacking.append("chromium")
+    if shutil.which("node") is None:
+        lacking.append("nodejs")
+    if not (AXE.exists() and VALIDATE.exists()):
+        lacking.append("the packages of tests/browser/package.json (npm)")
+    if not lacking:
+        return None
+    return f"no {', no '.join(lacking)}: apt-get install chromium nodejs npm, then make setup"
+
+
+def validate(path: Path) -> list[str]:
+    """What html-validate has against an HTML file, a line each: `12:3 rule: text`."""
+    command = ["node", str(VALIDATE), "--config", str(HERE / "htmlvalidate.mjs"), "--formatter", "json"]
+    done = subprocess.run(
+        [*command, str(path)], cwd=HERE, capture_output=True, text=True, timeout=60, check=False
+    )
+    if done.returncode not in (0, 1):
+        raise RuntimeError(done.stderr)
+    return [
+        f"{message['line']}:{message['column']} {message['ruleId']}: {message['message']}"
+        for file in json.loads(done.stdout)
+        for message in file["messages"]
+    ]
