@@ -14,7 +14,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 import grader
-from grader.errors import HostError, UsageError
+from grader.errors import HostError, SubmissionError, UsageError
 from grader.intake import Limits
 from grader.intake.archive import unpack
 from grader.model.similarity import Similarity
@@ -68,7 +68,12 @@ def _unpacked(path: Path, into: Path) -> Path:
         raise UsageError(f"--starter {path}: not found", hint="name a folder, an archive or a program")
     if path.is_dir() or path.suffix in {".py", ".cpp", ".cc", ".h", ".hpp"}:
         return path.absolute()
-    unpack(path, into, Limits())
+    try:
+        unpack(path, into, Limits())
+    except SubmissionError as error:
+        raise UsageError(f"--starter {error.message}", hint=error.hint) from error
+    except OSError as error:
+        raise UsageError(f"--starter {path}: cannot be read: {error.strerror}") from error
     return into
 
 

@@ -7,6 +7,7 @@ import resource
 import sys
 from collections.abc import Mapping, Sequence
 from importlib import metadata
+from pathlib import Path
 
 import numpy as np
 
@@ -34,14 +35,13 @@ MEMORY_BYTES = 6 << 30
 CPU_S = 1800
 PRINTS_MAX = 20_000_000
 PAIRS_MAX = 2_000
+STARTER_NOTES = 20
 LARGE_CLUSTER = 6
 
 
 def run(request: Request) -> Similarity:
     """Compare."""
-    starter = tuple(
-        text for place in request.starter for text in texts_of("", read_starter(place).files).texts
-    )
+    starter, unread = _starter(request.starter)
     tutorials = texts_of("", TUTORIALS).texts
     texts, not_compared = _texts(request)
     several = len(texts) >= COMMON_FROM
@@ -67,24 +67,38 @@ def run(request: Request) -> Similarity:
         too_little=tuple(work.id for work in works if work.lines < MIN_LINES),
         not_compared=tuple(not_compared),
         same_group=same_group,
-        notes=tuple(_notes(request, len(works), found, cut=cut or len(pairs) > PAIRS_MAX)),
+        notes=(*unread, *_notes(request, len(works), found, cut=cut or len(pairs) > PAIRS_MAX)),
     )
 
 
+def _starter(places: Sequence[Path]) -> tuple[tuple[Text, ...], list[str]]:
+    """The starter code's fingerprints, and what to say of what cannot be taken out."""
+    texts: list[Text] = []
+    notes: list[str] = []
+    for place in places:
+        sources = read_starter(place)
+        read = texts_of("", sources.files)
+        texts += read.texts
+        notes += [f"starter code: {one.file}: {one.reason}" for one in (*sources.left_out, *read.left_out)]
+        if not sources.files:
+            notes.append("starter code: holds no program in Python or C++")
+    return tuple(texts), notes[:STARTER_NOTES]
+
+
 def _texts(request: Request) -> tuple[dict[str, tuple[Text, ...]], list[NotCompared]]:
-    """The submissions' fingerprints, the smallest first as long as there is room for them."""
-    read = dict(read_all(request.folders, request.jobs))
+    """The submissions' fingerprints, as long as there is room for them."""
     texts: dict[str, tuple[Text, ...]] = {}
     left_out: list[NotCompared] = []
     held = 0
-    for name in sorted(read, key=lambda name: (sum(len(t.prints) for t in read[name].texts), name)):
-        left_out += read[name].left_out
-        held += sum(len(text.prints) for text in read[name].texts)
-        if held > PRINTS_MAX:
+    for name, read in read_all(request.folders, request.jobs):
+        left_out += read.left_out
+        size = sum(len(text.prints) for text in read.texts)
+        if held + size > PRINTS_MAX:
             left_out.append(NotCompared(id=name, reason="the class has too much code to compare all of it"))
-        elif read[name].texts:
-            texts[name] = read[name].texts
-        elif not read[name].left_out:
+        elif read.texts:
+            texts[name] = read.texts
+            held += size
+        elif not read.left_out:
             left_out.append(NotCompared(id=name, reason="holds no program in Python or C++"))
     left_out.sort(key=lambda one: (one.id, one.file))
     return {name: texts[name] for name in sorted(texts)}, left_out

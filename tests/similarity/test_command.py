@@ -108,6 +108,18 @@ def test_a_folder_without_submissions_is_refused(tmp_path, capsys, folder) -> No
     assert "grader batch" in capsys.readouterr().err
 
 
+def test_starter_code_that_is_no_archive_is_refused(class_folder, tmp_path, capsys) -> None:
+    (tmp_path / "handout.zip").write_bytes(b"PK\3\4 and no more")
+    assert grader(["similar", str(class_folder), "--starter", str(tmp_path / "handout.zip")]) == 2
+    assert "--starter handout.zip" in capsys.readouterr().err
+
+
+def test_starter_code_without_a_program_is_said(class_folder, tmp_path, capsys) -> None:
+    (tmp_path / "handout").mkdir()
+    assert grader(["similar", str(class_folder), "--starter", str(tmp_path / "handout")]) == 0
+    assert "starter code: holds no program" in capsys.readouterr().out
+
+
 def test_starter_code_that_is_not_there_is_refused(class_folder, capsys) -> None:
     assert grader(["similar", str(class_folder), "--starter", "no/such"]) == 2
     assert "no/such: not found" in capsys.readouterr().err

@@ -9,8 +9,9 @@ import time
 
 import pytest
 
-from grader.similarity import compare, reading
+from grader.similarity import compare, job, reading
 from grader.similarity.reading import read_all, texts_of
+from grader.similarity.request import Request
 from grader.similarity.sources import Source, Sources
 from tests.similarity.classes import class_of, hand_in, solution
 
@@ -116,3 +117,13 @@ def test_too_many_and_too_large_programs_are_named(tmp_path) -> None:
 def test_no_program_is_said(tmp_path) -> None:
     (one,) = compare({"ann": hand_in(tmp_path / "ann", {"package.xml": b"<package/>"})}).not_compared
     assert one.reason == "holds no program in Python or C++"
+
+
+def test_a_class_with_too_much_code_is_compared_as_far_as_there_is_room(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(job, "PRINTS_MAX", 700)
+    folders = class_of(tmp_path, {name: {"a.py": GOOD} for name in ("ann", "ben", "cem")})
+    similarity = job.run(Request(folders=folders, starter=(), groups={}, threshold=0.8, jobs=1))
+    assert [(pair.a, pair.b) for pair in similarity.pairs] == [("ann", "ben")]
+    assert [(one.id, one.reason[:24]) for one in similarity.not_compared] == [
+        ("cem", "the class has too much c")
+    ]
