@@ -132,6 +132,7 @@ def _silence() -> None:
         "distributed.scheduler",
         "distributed.nanny",
         "tornado",
+        "asyncio",
     ):
         logging.getLogger(name).setLevel(logging.CRITICAL)
 

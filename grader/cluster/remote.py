@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 WATCH_S = 1.0
 LEAVE_S = 40.0
+IDLE_S = 60.0
 UPLOADS = 3
 PAUSE_S = 2.0
 INTERRUPTED = "interrupted"
@@ -51,21 +52,26 @@ def versions() -> dict[str, str]:
     }
 
 
-def perform(errand: bytes) -> Report:
-    """In a worker's thread: grade, and leave the results in the exchange. The report says what went wrong."""
+def perform(errand: bytes) -> None:
+    """In a worker's thread: grade, and leave the results in the exchange.
+
+    The client hears two events of the batch's topic: that the task was begun, and its `Report` as JSON. A task's own
+    result would be lost with its worker, an event has reached the scheduler before the task is done.
+    """
     from distributed import get_worker  # noqa: PLC0415 - the module loads little
 
     sent: Errand = pickle.loads(errand)  # noqa: S301 - from the client, whose code this worker runs anyway
     worker = get_worker()
     key = worker.get_current_task()
-    worker.log_event(sent.batch, {"key": key, "worker": worker.address})
+    worker.log_event(sent.batch, {"key": key})
 
     def wanted() -> bool:
         """A task whose client is gone, or wants it no more, is cancelled; its thread is left to itself."""
         task = worker.state.tasks.get(key)
         return task is not None and task.state != "cancelled"
 
-    return _report(sent, wanted)
+    report = _report(sent, wanted)
+    worker.log_event(sent.batch, {"key": key, "report": report.model_dump_json()})
 
 
 async def dismiss(batch: str) -> None:
@@ -168,10 +174,11 @@ def _watched(child: Child, wanted: Callable[[], bool]) -> Iterator[None]:
 
 
 class _Children:
-    """The processes of this worker, and for which batch each of them works."""
+    """The processes of this worker, and for which batch each of them works. One that has nothing to do for a while is
+    ended: its client may have been killed."""
 
     def __init__(self) -> None:
-        self._idle: list[Child] = []
+        self._idle: dict[Child, threading.Timer] = {}
         self._busy: dict[Child, str] = {}
         self._changed = threading.Condition()
 
@@ -179,7 +186,10 @@ class _Children:
         from grader.batch.child import Child  # noqa: PLC0415 - the module loads little
 
         with self._changed:
-            child = self._idle.pop() if self._idle else Child()
+            child = Child()
+            if self._idle:
+                child, timer = self._idle.popitem()
+                timer.cancel()
             self._busy[child] = batch
             return child
 
@@ -189,7 +199,10 @@ class _Children:
         with self._changed:
             del self._busy[child]
             if usable:
-                self._idle.append(child)
+                timer = threading.Timer(IDLE_S, self._retire, (child,))
+                timer.daemon = True
+                self._idle[child] = timer
+                timer.start()
             self._changed.notify_all()
 
     def dismiss(self, batch: str) -> None:
@@ -197,8 +210,15 @@ class _Children:
             for child in self._of(batch):
                 child.interrupt()
             self._changed.wait_for(lambda: not self._of(batch), LEAVE_S)
-            idle, self._idle = self._idle, []
+            idle = list(self._idle)
         for child in idle:
+            self._retire(child)
+
+    def _retire(self, child: Child) -> None:
+        with self._changed:
+            timer = self._idle.pop(child, None)
+        if timer is not None:
+            timer.cancel()
             child.close()
 
     def _of(self, batch: str) -> list[Child]:

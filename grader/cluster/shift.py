@@ -30,7 +30,6 @@ TASKS_A_THREAD = 2
 LOSSES = 3
 ANSWERING = 3  # times as long is waited while a worker has still to say who it is
 PLACERS = 4
-GATHER_S = 60.0
 LEAVE_S = 45.0
 GOES_ON = "then run the same command again: it goes on where it stopped"
 LOST = "the workers that graded it were lost"
@@ -63,7 +62,7 @@ class Shift:
     def run(self, jobs: Iterable[Job]) -> Iterator[Outcome]:
         """See `ClusterHands.run`."""
         waiting = iter(jobs)
-        self._client.subscribe_topic(self._batch, self._put(self._begins))
+        self._client.subscribe_topic(self._batch, self._put(self._told))
         try:
             while True:
                 self._look()
@@ -97,10 +96,18 @@ class Shift:
             self._tasks.hand_out(task, list(self._crew.fit))
         return True
 
-    def _begins(self, event: tuple[float, dict[str, str]]) -> Iterator[Outcome]:
-        key = event[1].get("key", "")
+    def _told(self, event: tuple[float, dict[str, str]]) -> Iterator[Outcome]:
+        """A worker begins a task, or reports what became of it."""
+        said = event[1]
+        key = said.get("key", "")
         task = self._tasks.get(key)
-        if task is None:
+        if task is None or task.placing:
+            return
+        if "report" in said:
+            task.placing = True
+            report = Report.model_validate_json(said["report"])
+            placing = self._placers.submit(place, task.job, report, self._exchange)
+            placing.add_done_callback(partial(self._put(self._placed), key))
             return
         task.begun += 1
         if task.begun == 1:
@@ -113,14 +120,11 @@ class Shift:
         if task is None or task.placing:
             return
         status = task.future.status
-        if status == "finished":
-            task.placing = True
-            self._placers.submit(self._place, task).add_done_callback(partial(self._put(self._placed), key))
-        elif status == "error":
+        if status == "error":
             yield from self._erred(key, task.future.exception())
-        elif self._client.status != "running":
-            raise self._scheduler_gone()
-        else:
+        elif status == "cancelled":
+            if self._client.status != "running":
+                raise self._scheduler_gone()
             task.lost += 1
             yield from self._again(key, "it was cancelled on the cluster")
 
@@ -144,14 +148,6 @@ class Shift:
         self._tasks.take_out(key)
         hint = "look into the workers' logs (out of memory?), then grade it again with `--only failed`"
         yield failed(task.job, kind="worker-lost", message=f"{why}, {LOSSES} times", hint=hint)
-
-    def _place(self, task: Task) -> Outcome:
-        """In a thread of its own."""
-        try:
-            report: Report = task.future.result(timeout=GATHER_S)
-        except Exception as error:
-            raise ParcelLost(f"its worker was lost with the report ({type(error).__name__})") from error
-        return place(task.job, report, self._exchange)
 
     def _placed(self, key: str, done: Future[Outcome]) -> Iterator[Outcome]:
         task = self._tasks.get(key)

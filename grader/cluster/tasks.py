@@ -79,10 +79,11 @@ class Tasks:
         self.back.append(self.take_out(key))
 
     def missed_by(self, held: set[str]) -> list[str]:
-        """The keys that nobody has, several times in a row: they wait for workers that are gone."""
+        """The keys that nobody has, several times in a row: they wait for workers that are gone, or are done and no
+        report came."""
         found = []
         for key, task in self._held.items():
-            missing = key not in held and not task.placing and task.future.status == "pending"
+            missing = key not in held and not task.placing and task.future.status in ("pending", "finished")
             task.missed = task.missed + 1 if missing else 0
             found += [key] if task.missed >= MISSES else []
         return found

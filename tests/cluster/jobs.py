@@ -29,6 +29,12 @@ def jobs_for(out: Path, count: int, *, static_only: bool = True, names: Iterable
         yield Job(entry=entry, rubric=rubric, out=out, static_only=static_only)
 
 
+def named_job(out: Path, name: str) -> Job:
+    """One submission of that id."""
+    job = next(jobs_for(out, 1))
+    return job.model_copy(update={"entry": job.entry.model_copy(update={"id": name})})
+
+
 def verdicts(out: Path) -> dict[str, list[tuple[str, str, float]]]:
     """What every result in `out` says of each criterion."""
     found = {}
