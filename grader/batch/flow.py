@@ -100,7 +100,7 @@ def run_batch(
     options.out.mkdir(parents=True, exist_ok=True)
     with alone(options.out):
         finish_killed(options.out)
-        overrides = read_overrides(options.out / OVERRIDES, rubric.rubric, [e.id for e in roster.entries])
+        overrides = read_overrides(options.out / OVERRIDES, rubric.rubric, ids_of(roster))
         folder = BatchFolder(options.out, _run_of(roster, rubric_source, rubric, options))
         write_run(options.out, folder.run)
         batch = _Batch(
@@ -135,7 +135,9 @@ def _outcomes(batch: _Batch, hands: Hands, watcher: Watcher) -> Iterator[Outcome
     with prefetch(ahead, fetched_since=since):
         jobs = (_job(batch, entry, again=again, since=since) for entry, again in todo)
         for outcome in hands.run(jobs, begun=watcher.begun):
-            yield _settled(batch, entries[outcome.id], outcome) if outcome.kept else outcome
+            entry = entries[outcome.id]
+            decided = outcome.status == "error" and batch.settler.of(entry.id)
+            yield _settled(batch, entry, outcome) if outcome.kept or decided else outcome
 
 
 def _job(batch: _Batch, entry: Entry, *, again: bool, since: float) -> Job:
@@ -157,7 +159,8 @@ def _job(batch: _Batch, entry: Entry, *, again: bool, since: float) -> Job:
 
 
 def _settled(batch: _Batch, entry: Entry, outcome: Outcome) -> Outcome:
-    """An override, an extension or a deadline may be new since its result was written."""
+    """An override, an extension or a deadline may be new since its result was written, and people may give points for
+    what could not be graded."""
     earlier = batch.folder.earlier(entry)
     if earlier is None or earlier.rubric.digest != batch.rubric.digest:
         return outcome
@@ -203,6 +206,14 @@ def described(rubric: LoadedRubric, rubric_source: str) -> dict[str, Any]:
 
 def _without_password(entry: Entry) -> Entry:
     return entry.model_copy(update={"source": without_password(entry.source)})
+
+
+def ids_of(roster: Roster | BatchRun) -> list[str]:
+    """Of all that may stand in `overrides.yaml`: what cannot be graded, too."""
+    return [
+        *(entry.id for entry in roster.entries),
+        *(fault.id for fault in roster.faults if fault.id is not None),
+    ]
 
 
 def _gradable(roster: Roster, out: Path) -> Roster:

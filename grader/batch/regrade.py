@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader import __version__
-from grader.batch.flow import BatchOptions, Watcher, alone, described, run_batch, write_books
+from grader.batch.flow import BatchOptions, Watcher, alone, described, ids_of, run_batch, write_books
 from grader.batch.folder import BatchFolder, write_run
 from grader.batch.hands import Hands
 from grader.batch.job import Sandbox
@@ -89,7 +89,7 @@ def regrade(
     """
     with alone(folder.path):
         entries = folder.run.entries
-        overrides = read_overrides(folder.path / OVERRIDES, rubric.rubric, [entry.id for entry in entries])
+        overrides = read_overrides(folder.path / OVERRIDES, rubric.rubric, ids_of(folder.run))
         settler = Settler(rubric.rubric, overrides)
         by_folder = {folder.folder_of(entry): entry for entry in entries if folder.has_evidence(entry)}
         found = {
@@ -139,9 +139,12 @@ def _regraded(
     return Regraded(entry=entry, before=before, after=after, missing=judged.missing)
 
 
-def _without_evidence(folder: BatchFolder, entry: Entry) -> Regraded:
+def _without_evidence(folder: BatchFolder, settler: Settler, entry: Entry) -> Regraded:
+    """What could not be graded has what people gave for it."""
     before = folder.earlier(entry)
     error = before.error.message if before is not None and before.error else "nothing was recorded"
+    if before is not None and (settler.of(entry.id) or before.overrides):
+        rewrite(folder.folder_of(entry), settler.again(before, entry.id, None), settler.rubric)
     return Regraded(entry=entry, before=before, after=None, error=error)
 
 

@@ -43,9 +43,12 @@ def reached_pass_mark(rubric: Rubric, results: Sequence[CriterionResult]) -> boo
 
 
 def passed(rubric: Rubric, result: GradingResult) -> bool:
-    """The same of a whole result: a mark in points is compared with those that count, lateness included."""
+    """The same of a whole result: a mark in points is compared with those that count, lateness included. What came
+    after the cut-off has passed nothing."""
     if rubric.pass_mark is not None:
         return result.points >= rubric.pass_mark
+    if result.late is not None and result.points == 0 < result.late.points_before:
+        return False
     return reached_pass_mark(rubric, result.criteria)
 
 

@@ -125,3 +125,20 @@ def test_an_override_that_comes_later_grades_nothing_again(tmp_path) -> None:
     assert run_of(tmp_path / "out")["counts"]["kept"] == 1
     (tmp_path / "out" / "overrides.yaml").unlink()
     assert graded(tmp_path, ["ada,ada,,"])["ada"]["points"] == 100
+
+
+def test_people_give_points_for_what_could_not_be_graded(tmp_path) -> None:
+    (tmp_path / "ada").mkdir()
+    (tmp_path / "ada" / "notes.txt").write_text("by mail")
+    assert graded(tmp_path, ["ada,ada,,", "bob,../bob,,"])["ada"]["status"] == "error"
+    text = "ada:\n" + "".join(f"  {name}: {{points: 5}}\n" for name in ("manifest", "cmake", "dependencies"))
+    (tmp_path / "out" / "overrides.yaml").write_text(text + "bob:\n  cmake: {points: 3}\n")
+    found = graded(tmp_path, ["ada,ada,,", "bob,../bob,,"])
+    assert (found["ada"]["status"], found["ada"]["points"]) == ("graded", 15)
+    assert found["ada"]["error"]["kind"] == "package-not-found"
+
+
+def test_what_came_after_the_cut_off_has_not_passed(tmp_path) -> None:
+    shutil.copytree(CORRECT, tmp_path / "ada")
+    graded(tmp_path, ["ada,ada,2026-11-20T12:00:00Z,"], f"deadline: {DEADLINE}", POLICY)
+    assert run_of(tmp_path / "out")["counts"]["passed"] == 0
