@@ -7,7 +7,17 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.counting import Count, Step, cite, counts, first_values, longest
+from grader.checks.support.counting import (
+    Count,
+    Step,
+    Wrong,
+    cite,
+    counts,
+    first_values,
+    judged_steps,
+    longest,
+    wrong_steps,
+)
 from grader.checks.support.ending import explain_end
 from grader.checks.support.losses import losses
 from grader.checks.support.process import early_end
@@ -64,12 +74,12 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
         "measured": f"{first_values(first.values)}",
         "citations": cite(run, params.topic, first.times_ns[0], first.times_ns[0]),
     }
-    if first.values[0] == params.start and first.sequences[0] == 0:
+    if begins_with(first, params.start):
         return passed(f"{params.topic} begins with {params.start}", **fields)
     if run.foreign:
         message = f"{run.evidence} may have begun after the first message on {params.topic}"
         return inconclusive(message, hint="start the recording, and then the node", **fields)
-    if first.sequences[0] > 0 or _recorder_was_late(run, params.topic, first.callerid):
+    if missed_the_first(run, params.topic, first):
         message = f"the recorder missed the first messages on {params.topic}"
         return inconclusive(message, hint="grade again", **fields)
     hint = f"set the counter to {params.start} before the loop, and add one after publish(…), not before"
@@ -102,11 +112,11 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     count = longest(run, params.topic)
     if count is None:
         return _nothing(package, run, params.topic).model_copy(update={"expected": expected})
-    steps = _judged_steps(count, params)
-    wrong = [s for s in steps if s.change in {0, -1} or s.change > 1]
-    right = sum(s.change == 1 for s in steps)
+    steps = judged_steps(count, params.maximum)
+    found = wrong_steps(count, run, maximum=params.maximum, rate_hz=params.rate_hz)
+    wrong, right = found.steps, sum(s.change == 1 for s in steps)
     verdict = (
-        _wrong_steps(count, wrong, run, params)
+        _wrong(count, found, params)
         or _too_few(len(steps), run, package, params)
         or passed(f"the counter goes up by one, {plural(right, 'time')}")
     )
@@ -168,6 +178,16 @@ def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
     return unjudged(f"no message came on {topic}{cause}", measured="no message", hint=hint)
 
 
+def begins_with(first: Count, start: int) -> bool:
+    """Whether this is the first of all its values, and the right one."""
+    return first.values[0] == start and first.sequences[0] == 0
+
+
+def missed_the_first(run: Run, topic: str, first: Count) -> bool:
+    """Whether values may have come before the first one that is recorded."""
+    return first.sequences[0] > 0 or _recorder_was_late(run, topic, first.callerid)
+
+
 def _recorder_was_late(run: Run, topic: str, callerid: str) -> bool:
     """It was connected more than the second later that `registerPublisher` waits for it."""
     registered = min((t for t, e in run.graph if callerid in e.publishers.get(topic, ())), default=None)
@@ -176,28 +196,16 @@ def _recorder_was_late(run: Run, topic: str, callerid: str) -> bool:
     return registered is not None and connected is not None and connected - registered > CONNECT_NS
 
 
-def _judged_steps(count: Count, params: StepParams) -> list[Step]:
-    """All of them, without the repeats of a counter that stays at its maximum: that is the wrap's fault."""
-    steps = list(count.steps)
-    if count.values[-1] == params.maximum and count.stuck > 1:
-        del steps[len(steps) - (count.stuck - 1) :]
-    return steps
-
-
-def _wrong_steps(count: Count, wrong: list[Step], run: Run, params: StepParams) -> Verdict | None:
-    if not wrong:
+def _wrong(count: Count, found: Wrong, params: StepParams) -> Verdict | None:
+    if not found.steps or found.excused:
         return None
-    skips = [s for s in wrong if s.change > 1]
-    usual = count.usual_step()
-    if len(skips) == len(wrong) and usual in {None, 1} and count.is_flood(run, params.rate_hz):
-        return None if usual == 1 else _flooded(len(skips), params)
-    lost = [s for s in skips if count.lost_on_the_way(s, s.change)]
-    own = [s for s in wrong if s not in lost]
-    if not own:
-        missing = sum(int(s.change) - 1 for s in lost)
+    if found.flood:
+        return _flooded(len(found.steps), params)
+    if not found.own:
+        missing = sum(int(s.change) - 1 for s in found.lost)
         message = f"{plural(missing, 'value')} of {params.topic} got lost on the way, with a gap in time"
         return inconclusive(message, hint="grade again while the machine has less to do")
-    first = own[0]
+    first, usual = found.own[0], count.usual_step()
     after = seconds(first.to_ns - count.times_ns[0])
     comes = f"after {number(first.before)} comes {number(first.after)}"
     place = f"{comes} (value {first.number + 1}, {after} after the first)"
@@ -205,7 +213,7 @@ def _wrong_steps(count: Count, wrong: list[Step], run: Run, params: StepParams) 
         message = _usual_fault(usual or 0.0)
     else:
         kinds = {0: "repeats a value", -1: "goes back"}
-        message = listed(dict.fromkeys(kinds.get(int(s.change), "skips values") for s in own))
+        message = listed(dict.fromkeys(kinds.get(int(s.change), "skips values") for s in found.own))
     hint = "add one to the counter in one place only, once in each turn of the loop"
     return failed(f"the counter {message}: {place}", hint=hint)
 

@@ -9,7 +9,7 @@ from grader.checks.support.printed import (
     Line,
     Probe,
     in_order,
-    number_places,
+    places_of,
     printed_lines,
     probes_on,
     text_places,
@@ -62,7 +62,7 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
     if not probes:
         return never_sent(package, run, params.topic).model_copy(update={"expected": expected})
     lines = printed_lines(run)
-    places = _places(run, probes, lines, params)
+    places = places_of(run, probes, lines, params.template)
     missing = [] if places is None else [p for p, found in zip(probes, places, strict=True) if not found]
     if places is None:
         message = "it prints so many numbers that it cannot be told which of them it heard"
@@ -87,15 +87,6 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
             "citations": (*verdict.citations, sent),
         }
     )
-
-
-def _places(
-    run: Run, probes: Sequence[Probe], lines: Sequence[Line], params: HearsParams
-) -> list[tuple[int, ...]] | None:
-    if all(isinstance(p.value, int) for p in probes):
-        texts = {e.value for _, e in run.actors if e.action == "publish" and isinstance(e.value, str)}
-        return number_places(probes, lines, texts)
-    return text_places(probes, lines, params.template)
 
 
 def _other_words(

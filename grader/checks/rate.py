@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
@@ -13,7 +14,7 @@ from grader.checks.support.lateness import Lateness, lateness
 from grader.checks.support.losses import all_lost, whole_until_ns
 from grader.checks.support.process import early_end, observed_until_ns
 from grader.checks.support.text import hertz, number, plural, seconds
-from grader.evidence.run import Run
+from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.rhythm import ROUNDING, RateBounds, Rhythm
@@ -108,8 +109,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     if run.clock != "real":
         message = "rates are judged in real time only, and this run was warped"
         return inconclusive(message, expected=expected, hint="give the criterion a scenario with clock: real")
-    until_ns = whole_until_ns(run, params.topic, observed_until_ns(run))
-    found = rhythm(run.student_channels(params.topic), until_ns, params.period_ns)
+    found = judged_rhythm(run, params, run.student_channels(params.topic))
     if found is None:
         message, hint = f"no message came on {params.topic}", f"look at rostopic hz {params.topic}"
         absent = unjudged(message, measured="no message", hint=hint)
@@ -127,6 +127,12 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     return verdict.model_copy(
         update={"expected": expected, "measured": _measured(found, run, params), "citations": citations}
     )
+
+
+def judged_rhythm(run: Run, params: RateParams, channels: Sequence[Channel]) -> Rhythm | None:
+    """What these channels of the topic sent, as far as it is judged."""
+    until_ns = whole_until_ns(run, params.topic, observed_until_ns(run))
+    return rhythm(channels, until_ns, params.period_ns)
 
 
 def _measured(found: Rhythm, run: Run, params: RateParams) -> str:
@@ -221,7 +227,7 @@ def _excused(verdict: Verdict | None, found: Rhythm, run: Run, params: RateParam
     beyond = found.mean_hz >= 2 * params.rate_hz or found.tail_ns / 2e6 > max(
         late.max_ms, params.period_ns / 1e6
     )
-    if beyond or not (_was_late(late, params) or _sleeps_explain(found, late, params)):
+    if beyond or not (was_late(late, params) or sleeps_explain(found, late, params)):
         return verdict
     message = (
         f"{verdict.message}; but the grading machine was late itself "
@@ -230,7 +236,8 @@ def _excused(verdict: Verdict | None, found: Rhythm, run: Run, params: RateParam
     return inconclusive(message, hint="grade again while the machine has less to do")
 
 
-def _was_late(late: Lateness, params: RateParams) -> bool:
+def was_late(late: Lateness, params: RateParams) -> bool:
+    """Whether the machine was late by so much that it shows in the gaps."""
     period_ms = params.period_ns / 1e6
     return (
         late.mean_ms >= max(params.tolerance, 0.02) / 2 * period_ms
@@ -239,7 +246,7 @@ def _was_late(late: Lateness, params: RateParams) -> bool:
     )
 
 
-def _sleeps_explain(found: Rhythm, late: Lateness, params: RateParams) -> bool:
+def sleeps_explain(found: Rhythm, late: Lateness, params: RateParams) -> bool:
     """A loop of plain sleeps would have the right rate if its sleeps had not been too long."""
     if late.sleep_ms is None or not 0 < found.mean_hz < params.low_hz:
         return False

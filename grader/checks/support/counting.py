@@ -105,6 +105,38 @@ class Count(Record):
         return change if times and times >= 0.8 * len(self.steps) else None
 
 
+class Wrong(NamedTuple):
+    """Steps that are not +1: the program's `own`, or of values that were `lost` on the way.
+
+    Where it is a `flood`, they are skips of a publisher whose queue drops values, and neither of both; `excused` where
+    the others are right.
+    """
+
+    steps: tuple[Step, ...]
+    own: tuple[Step, ...] = ()
+    lost: tuple[Step, ...] = ()
+    flood: bool = False
+    excused: bool = False
+
+
+def wrong_steps(count: Count, run: Run, *, maximum: int, rate_hz: float) -> Wrong:
+    """Of `judged_steps`. Where the counter falls by more than one, it may have started again: that is no such step."""
+    wrong = tuple(s for s in judged_steps(count, maximum) if s.change in {0, -1} or s.change > 1)
+    skips = tuple(s for s in wrong if s.change > 1)
+    usual = count.usual_step()
+    if wrong and skips == wrong and usual in {None, 1} and count.is_flood(run, rate_hz):
+        return Wrong(wrong, flood=True, excused=usual == 1)
+    lost = tuple(s for s in skips if count.lost_on_the_way(s, s.change))
+    numbers = {s.number for s in lost}
+    return Wrong(wrong, own=tuple(s for s in wrong if s.number not in numbers), lost=lost)
+
+
+def judged_steps(count: Count, maximum: int) -> tuple[Step, ...]:
+    """All of them, without the repeats of a counter that stays at its maximum: that is the wrap's fault."""
+    stays = count.values[-1] == maximum and count.stuck > 1
+    return count.steps[: len(count.steps) - (count.stuck - 1)] if stays else count.steps
+
+
 def counts(run: Run, topic: str) -> tuple[Count, ...]:
     """What the student's publishers counted on a topic, the earliest first; what is no number is left out, and what
     came after the recorder had lost something."""

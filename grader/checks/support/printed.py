@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Sequence
+from bisect import bisect_right
+from collections.abc import Callable, Collection, Iterable, Sequence
 from typing import NamedTuple
 
 from grader.checks.support.text import bare
@@ -101,6 +102,31 @@ def numbers_in(text: str) -> frozenset[int]:
     return frozenset(found)
 
 
+def places_of(
+    run: Run, probes: Sequence[Probe], lines: Sequence[Line], template: str
+) -> list[tuple[int, ...]] | None:
+    """For each probe where it was printed; None where so many numbers are printed that nobody can tell.
+
+    Places follow each other as the lines do; `line_finder` gives a place's line.
+    """
+    if not _are_numbers(probes):
+        return text_places(probes, lines, template)
+    texts = {e.value for _, e in run.actors if e.action == "publish" and isinstance(e.value, str)}
+    return number_places(probes, lines, texts)
+
+
+def line_finder(probes: Sequence[Probe], lines: Sequence[Line], template: str) -> Callable[[int], Line]:
+    """From a place of `places_of` to the line that begins there, or before it."""
+    if _are_numbers(probes):
+        return lambda place: lines[place]
+    starts = [offset for _, offset in _joined(lines, template)[1]]
+    return lambda place: lines[bisect_right(starts, place) - 1]
+
+
+def _are_numbers(probes: Sequence[Probe]) -> bool:
+    return all(isinstance(p.value, int) for p in probes)
+
+
 def number_places(
     probes: Sequence[Probe], lines: Sequence[Line], texts: Iterable[str]
 ) -> list[tuple[int, ...]] | None:
@@ -110,14 +136,14 @@ def number_places(
     numbers are printed that any probe would be among them.
     """
     hidden = re.compile("|".join(map(re.escape, sorted(texts, key=len, reverse=True))) or r"(?!)")
-    rows = [(line.at_ns, numbers_in(hidden.sub(" ", line.text))) for line in lines]
-    rows = [(t, numbers) for t, numbers in rows if numbers]
+    found = ((i, line.at_ns, numbers_in(hidden.sub(" ", line.text))) for i, line in enumerate(lines))
+    rows = [(i, t, numbers) for i, t, numbers in found if numbers]
     if len(rows) > LINES_PER_PROBE * (len(probes) + len(set(texts))) + LINES_SPARE:
         return None
     return [
         tuple(
             i
-            for i, (t, numbers) in enumerate(rows)
+            for i, t, numbers in rows
             if p.value in numbers and len(numbers) <= NUMBERS_PER_LINE and t >= p.at_ns - CLOCK_SLACK_NS
         )
         for p in probes
@@ -130,10 +156,7 @@ def text_places(probes: Sequence[Probe], lines: Sequence[Line], template: str) -
     The template's own words may be in capitals or not; the text itself stands letter by letter.
     """
     blank = "" if template == VALUE else " "
-    blob, starts = "", []
-    for line in lines:
-        starts.append((line.at_ns, len(blob)))
-        blob += blank.join(line.text.split()) + blank
+    blob, starts = _joined(lines, template)
     places = []
     for probe in probes:
         begin = next((at for t, at in starts if t >= probe.at_ns - CLOCK_SLACK_NS), len(blob))
@@ -144,12 +167,27 @@ def text_places(probes: Sequence[Probe], lines: Sequence[Line], template: str) -
     return places
 
 
+def _joined(lines: Sequence[Line], template: str) -> tuple[str, list[tuple[int, int]]]:
+    """All that was printed, and when and at which offset each line begins."""
+    blank = "" if template == VALUE else " "
+    parts, starts, offset = [], [], 0
+    for line in lines:
+        starts.append((line.at_ns, offset))
+        parts.append(blank.join(line.text.split()) + blank)
+        offset += len(parts[-1])
+    return "".join(parts), starts
+
+
+def chosen(places: Sequence[tuple[int, ...]]) -> list[int | None]:
+    """For each probe the first of its places that is behind the one before; None where it has none."""
+    position, found = -1, list[int | None]()
+    for choices in places:
+        later = next((place for place in choices if place > position), None)
+        position = position if later is None else later
+        found.append(later)
+    return found
+
+
 def in_order(places: Sequence[tuple[int, ...]]) -> bool:
     """Whether one place can be chosen for each probe, each behind the one before."""
-    position = -1
-    for choices in places:
-        later = [place for place in choices if place > position]
-        if not later:
-            return False
-        position = later[0]
-    return True
+    return None not in chosen(places)

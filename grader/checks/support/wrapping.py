@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field
 
@@ -40,13 +40,8 @@ def judge_wraps(
     count: Count, run: Run, package: PackageFacts, params: WrapParams
 ) -> tuple[Verdict, Step | None]:
     """The verdict, and the turn that it rests on."""
-    turns = [s for s in count.steps if s.change < 0]
-    good = [s for s in turns if _is_good(s, params)]
-    bad = next((s for s in count.steps if _is_bad(s, params)), None)
-    in_range = bad is not None and params.minimum <= bad.after <= params.maximum
-    if in_range and good and count.is_flood(run, params.rate_hz):
-        # the publisher dropped values around this turn: those that came whole decide
-        bad, good = None, turns
+    turns, good, wrong = turns_of(count, run, params)
+    bad = wrong[0] if wrong else None
     if bad is not None:
         return _bad_turn(bad, turns, count, run, params), bad
     last = good[-1] if good else None
@@ -58,6 +53,26 @@ def judge_wraps(
         return inconclusive(message, hint="grade again"), last
     verdict = _died(count, run, package, params) or _stuck(count, params)
     return verdict or _silent(count, run, package, params) or _too_few(count, good, run, params), last
+
+
+class Turns(NamedTuple):
+    """`every` step down, those of them that are `good`, and all `bad` steps: also those past the maximum."""
+
+    every: list[Step]
+    good: list[Step]
+    bad: list[Step]
+
+
+def turns_of(count: Count, run: Run, params: WrapParams) -> Turns:
+    """Where bad turns of a flood are let pass, all count as good."""
+    turns = [s for s in count.steps if s.change < 0]
+    good = [s for s in turns if _is_good(s, params)]
+    bad = [s for s in count.steps if _is_bad(s, params)]
+    in_range = bool(bad) and params.minimum <= bad[0].after <= params.maximum
+    if in_range and good and count.is_flood(run, params.rate_hz):
+        # the publisher dropped values around this turn: those that came whole decide
+        return Turns(turns, turns, [])
+    return Turns(turns, good, bad)
 
 
 def _is_good(step: Step, params: WrapParams) -> bool:
@@ -73,19 +88,29 @@ def _is_bad(step: Step, params: WrapParams) -> bool:
 
 
 def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: WrapParams) -> Verdict:
-    low, high = params.minimum, params.maximum
-    beyond = step.after > high or step.after < low
-    jump = (high - step.before) + (step.after - low) + 1
-    if not beyond and count.is_flood(run, params.rate_hz):
+    whose = whose_turn(step, count, run, params)
+    if whose == "flood":
         message = f"{params.topic} is flooded, so its publisher drops values, also around the wrap"
         return unjudged(message, hint="first make the loop sleep, then look at the counter again")
-    if not beyond and count.lost_on_the_way(step, jump):
+    if whose == "lost":
         message = f"values of {params.topic} got lost around the wrap, with a gap in time"
         return inconclusive(message, hint="grade again while the machine has less to do")
-    return failed(_bad_turn_message(step, turns, params), hint=params.reset_hint)
+    return failed(bad_turn_message(step, turns, params), hint=params.reset_hint)
 
 
-def _bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
+def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Literal["program", "flood", "lost"]:
+    """Whether a bad turn is the program's own, or one of values that its flood, or the way, swallowed."""
+    low, high = params.minimum, params.maximum
+    if step.after > high or step.after < low:
+        return "program"
+    if count.is_flood(run, params.rate_hz):
+        return "flood"
+    jump = (high - step.before) + (step.after - low) + 1
+    return "lost" if count.lost_on_the_way(step, jump) else "program"
+
+
+def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
+    """What is wrong with a turn, in a student's words."""
     low, high = params.minimum, params.maximum
     before, after = number(step.before), number(step.after)
     comes = f"after {before} comes {after}"
