@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from grader.cluster import remote
+from grader.cluster.crew import has_no_grader
 from grader.errors import HostError, UsageError
 
 LOCAL = "local"
@@ -110,9 +111,11 @@ def _check_scheduler(client: Any, address: str) -> None:  # noqa: ANN401 - Dask 
     """The scheduler reads what it hands on: it needs the same grader as the workers."""
     try:
         there = client.run_on_scheduler(remote.versions)
-    except ImportError as error:
+    except Exception as error:
+        if not has_no_grader(error):
+            raise _nobody_answers(address) from error
         raise HostError(
-            f"the scheduler at {address} has no grader like this one ({error})",
+            f"the scheduler at {address} has no grader like this one",
             hint="install the same grader, with the extra [cluster], where the scheduler runs",
         ) from error
     here = remote.versions()

@@ -94,8 +94,8 @@ def ask_of(client: Any, exchange: str, word: str) -> Callable[[str], Answer]:  #
 
 def why_not(answer: Mapping[str, str] | BaseException, needs: Needs) -> str:
     """Why a worker that says this cannot grade; nothing where it can."""
-    if isinstance(answer, ImportError):
-        return f"no grader like this one is installed there ({answer})"
+    if isinstance(answer, BaseException) and has_no_grader(answer):
+        return "no grader like this one is installed there"
     if isinstance(answer, BaseException):
         return f"it cannot answer: {type(answer).__name__}: {answer}"
     for name, here in needs.versions.items():
@@ -105,3 +105,8 @@ def why_not(answer: Mapping[str, str] | BaseException, needs: Needs) -> str:
     if needs.ros and not answer.get("ros"):
         return f"no ROS 1 there; {INSTALL_HINT}"
     return answer.get("kept_out", "")
+
+
+def has_no_grader(error: BaseException) -> bool:
+    """Whether that is why a worker or scheduler could not answer. Dask sends some errors as their text."""
+    return isinstance(error, ImportError) or "ModuleNotFoundError" in str(error)

@@ -20,23 +20,22 @@ PATIENCE_S = 60.0
 class Cluster:
     """A scheduler at `address`; `worker()` starts one more worker."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, preload: str = "") -> None:
         self._folder = folder
         self._processes: list[subprocess.Popen[bytes]] = []
         address = folder / "address.json"
         self.scheduler, _ = self._start(
             "scheduler", "--host", "127.0.0.1", "--port", "0", "--dashboard-address", "127.0.0.1:0",
-            "--no-dashboard", "--scheduler-file", str(address)
+            "--no-dashboard", "--scheduler-file", str(address), *_preload(preload)
         )  # fmt: skip
         until(lambda: address.exists() and address.read_text().endswith("}"))
         self.address = str(json.loads(address.read_text())["address"])
 
     def worker(self, *, threads: int = 1, nanny: bool = False, preload: str = "") -> subprocess.Popen[bytes]:
         """Its process (that of its nanny, where it has one), once the scheduler knows it."""
-        more = ["--preload", f"tests.cluster.preloads.{preload}"] if preload else []
         process, log = self._start(
             "worker", self.address, "--no-dashboard", "--nthreads", str(threads), "--memory-limit", "0",
-            "--local-directory", str(self._folder), "--nanny" if nanny else "--no-nanny", *more
+            "--local-directory", str(self._folder), "--nanny" if nanny else "--no-nanny", *_preload(preload)
         )  # fmt: skip
         until(lambda: b"Registered to" in log.read_bytes())
         return process
@@ -60,13 +59,17 @@ class Cluster:
 
 
 @contextmanager
-def cluster(folder: Path) -> Iterator[Cluster]:
+def cluster(folder: Path, *, preload: str = "") -> Iterator[Cluster]:
     """Ended with everything that belongs to it."""
-    made = Cluster(folder)
+    made = Cluster(folder, preload=preload)
     try:
         yield made
     finally:
         made.close()
+
+
+def _preload(name: str) -> list[str]:
+    return ["--preload", f"tests.cluster.preloads.{name}"] if name else []
 
 
 def until(holds: Callable[[], object], patience_s: float = PATIENCE_S) -> None:

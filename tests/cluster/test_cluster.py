@@ -74,3 +74,37 @@ def test_workers_that_differ_are_named_and_left_out(place: Cluster, tmp_path: Pa
     assert f"dask worker {place.address}" in caught.value.hint
     assert any("it has grader 0.0.9, here it is" in line for line in said)
     assert any("no grader like this one is installed there" in line for line in said)
+
+
+@pytest.mark.parametrize(
+    ("preload", "why"), [("without", "has no grader like this one"), ("older", "has grader 0.0.9")]
+)
+def test_a_scheduler_that_differs_is_named(preload: str, why: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with cluster(tmp_path, preload=preload) as made, pytest.raises(HostError, match=why) as caught:
+        list(ClusterHands(made.address, out).run(jobs_for(out, 1), begun=_none))
+    assert f"the scheduler at {made.address}" in caught.value.message
+    assert caught.value.hint
+    assert not out.exists()
+
+
+@pytest.mark.ros
+def test_real_gradings_get_the_same_verdicts_with_a_worker_killed(place: Cluster, tmp_path: Path) -> None:
+    names, count = ("counter-resets-to-1", "listener-silent", "chatter-capital"), 6
+    workers = [place.worker() for _ in range(3)]
+    out, begun = tmp_path / "out", []
+
+    def note(name: str) -> None:
+        begun.append(name)
+        if len(begun) == 3:
+            kill(workers[0].pid)
+
+    jobs = jobs_for(out, count, static_only=False, names=names)
+    outcomes = list(ClusterHands(place.address, out).run(jobs, begun=note))
+    assert ids(outcomes) == NAMES[:count]
+    assert {outcome.status for outcome in outcomes} == {"graded"}
+
+    alone = tmp_path / "alone"
+    list(Processes(2).run(jobs_for(alone, 3, static_only=False, names=names), begun=_none))
+    once = verdicts(alone)
+    assert verdicts(out) == {name: once[f"s{number % 3:03}"] for number, name in enumerate(NAMES[:count])}

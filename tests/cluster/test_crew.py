@@ -25,6 +25,7 @@ A, B = "tcp://10.0.0.1:1", "tcp://10.0.0.2:1"
         ({**GOOD, "ros": ""}, "no ROS 1 there"),
         ({**GOOD, "kept_out": "/srv/out is another place there"}, "/srv/out is another place there"),
         (ModuleNotFoundError("No module named 'grader'"), "no grader like this one is installed there"),
+        (Exception("ModuleNotFoundError(\"No module named 'grader'\")"), "no grader like this one"),
         (ValueError("broken"), "it cannot answer: ValueError: broken"),
     ],
 )
