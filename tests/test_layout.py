@@ -33,6 +33,7 @@ ALLOWED = {
     "instructor": BASE | {"checks", "temporary"},
     "rubric": BASE | {"checks", "evidence", "instructor"},
     "judge": BASE | {"checks", "evidence", "rubric"},
+    "figures": BASE | {"checks", "evidence.run", "evidence.events", "judge.facts", "judge.recordings", "rubric.model"},
     "report": BASE | {"files", "judge.late", "rubric.model"},
     "arena": BASE | {"admission", "evidence", "files", "package", "rubric.model", "temporary"},
     "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
@@ -94,7 +95,7 @@ def test_imports_go_one_way() -> None:
 def test_checks_and_records_do_no_io() -> None:
     wrong = [
         f"{path.relative_to(GRADER)}: {name}"
-        for folder in ("checks", "model")
+        for folder in ("checks", "figures", "model")
         for path in _sources(GRADER / folder)
         for name in [*_imports(path), *_calls(path)]
         if name.split(".")[0] in IO_MODULES or name in IO_CALLS

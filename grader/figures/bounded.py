@@ -1,0 +1,46 @@
+"""Texts and numbers of a figure: each of bounded size, whatever the evidence holds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+from grader.evidence.run import Run
+
+NAME_LETTERS = 200
+LINE_LETTERS = 300
+LARGEST = 1e18
+SPREAD = (math.sqrt(5) - 1) / 2
+
+
+def short(text: object, letters: int = LINE_LETTERS) -> str:
+    """Its beginning, with a mark where it goes on."""
+    whole = text if isinstance(text, str) else str(text)
+    cut = whole if len(whole) <= letters else f"{whole[: letters - 1]}…"
+    return cut if cut.isascii() else cut.encode(errors="replace").decode()
+
+
+def named(text: object) -> str:
+    """The name of a topic, a node or a file."""
+    return short(text, NAME_LETTERS)
+
+
+def finite(value: float) -> float:
+    """A number that can be drawn and written as JSON; what is none is 0."""
+    if isinstance(value, int):
+        return max(-int(LARGEST), min(int(LARGEST), value))
+    return max(-LARGEST, min(LARGEST, value)) if value == value else 0.0  # noqa: PLR0124 - NaN is not itself
+
+
+def second(run: Run, time_ns: int) -> float:
+    """Since the run began."""
+    return round((time_ns - run.start_ns) / 1e9, 6)
+
+
+def spread(indices: Sequence[int], count: int) -> Iterable[int]:
+    """About `count` of them, one from each of as many parts, at another place in each: so that no rhythm of theirs
+    meets one of the parts'."""
+    if len(indices) <= count:
+        return indices
+    size = len(indices) / max(1, count)
+    return (indices[int((part + part * SPREAD % 1) * size)] for part in range(count))
