@@ -8,6 +8,7 @@ scheduler imports this module too: it loads little.
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import os
 import pickle
 import platform
@@ -47,6 +48,7 @@ def versions() -> dict[str, str]:
 
     return {
         "grader": grader.__version__,
+        "code": _code(),
         "python": ".".join(platform.python_version_tuple()[:2]),
         "pydantic": pydantic.VERSION,
     }
@@ -79,11 +81,31 @@ async def dismiss(batch: str) -> None:
     await asyncio.to_thread(_children.dismiss, batch)
 
 
+def _code() -> str:
+    """A digest of the grader's own files: two of one version may differ. In a worker, of those that it began with."""
+    if _Code.digest:
+        return _Code.digest
+    folder = Path(__file__).resolve().parents[1]
+    digest = hashlib.sha256()
+    for path in sorted(folder.rglob("*.py")):
+        name = path.relative_to(folder)
+        if "_data" not in name.parts:
+            digest.update(f"{name}\0{hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+    return digest.hexdigest()[:12]
+
+
+class _Code:
+    """What a worker remembers of it."""
+
+    digest = ""
+
+
 def _answer(exchange: str, word: str) -> dict[str, str]:
     from grader.arena.ros_env import find_ros  # noqa: PLC0415 - the module loads little
     from grader.cluster.exchange import Exchange  # noqa: PLC0415 - the module loads little
     from grader.errors import GraderError  # noqa: PLC0415 - the module loads little
 
+    _Code.digest = _code()
     ros = kept_out = ""
     with suppress(GraderError):
         found = find_ros()
