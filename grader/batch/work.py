@@ -77,9 +77,8 @@ def _attempt(job: Job) -> Attempt:
 def _fetched(job: Job, folder: Path) -> Obtained:
     """A source that is not there is the submission's fault here, not the command line's."""
     try:
-        return obtain(
-            job.entry, rule_of(job.rubric.rubric, job), workdir=folder, fetched_since=job.fetched_since
-        )
+        rule = rule_of(job.rubric.rubric, job)
+        return obtain(job.entry, rule, workdir=folder, fetched_since=job.fetched_since, commit=job.commit)
     except UsageError as error:
         raise SubmissionError(error.message, hint=error.hint) from error
 

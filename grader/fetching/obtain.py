@@ -65,15 +65,19 @@ def obtain(
     workdir: Path,
     fetched_since: float = 0.0,
     patience: Patience | None = None,
+    commit: str | None = None,
 ) -> Obtained:
     """The source of `entry`, and when it was handed in. New folders are made in `workdir`, which is the caller's.
 
     A repository that was fetched after `fetched_since` (seconds since 1970) is not fetched again; with 0 it is in any
-    case. What the network fails at is tried again with `patience`.
+    case. What the network fails at is tried again with `patience`. With `commit`, a full hash, that one counts of a
+    repository, whatever the roster and the rule say.
 
     Raises what `open_submission` raises, and NothingInTime where no commit is old enough.
     """
     source = source_of(entry)
+    if commit is not None and source.kind == "repository":
+        source = replace(source, ref=commit)
     is_clone = source.kind == "folder" and source.path is not None and is_there(source.path / ".git")
     uncommitted = is_clone and rule.is_any
     if source.kind != "repository" and not uncommitted:

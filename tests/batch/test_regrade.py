@@ -24,7 +24,8 @@ from grader.model.result import EnvironmentInfo, GradingResult, RubricInfo, Subm
 from grader.model.roster import Entry
 from grader.report.files import write_reports
 from grader.rubric.load import LoadedRubric, load_rubric
-from tests.batch.a_class import RUBRIC, batch, handed_in, lines_of, run_of
+from tests.batch.a_class import CORRECT, RUBRIC, WRONG_NAME, batch, handed_in, lines_of, roster_of, run_of
+from tests.batch.repositories import commit, repository
 
 RECORDINGS = Path(__file__).parent.parent / "data" / "recordings"
 LAB = Path(__file__).parent.parent.parent / "rubrics" / "leeds-comp3631-lab1.yaml"
@@ -212,3 +213,59 @@ def test_a_run_that_cannot_be_read(tmp_path, capsys, text: str) -> None:
     (tmp_path / "run.json").write_text(text)
     assert run(["regrade", str(tmp_path)]) == 2
     assert "run.json" in capsys.readouterr().err
+
+
+TALKER = """\
+schema: grader.rubric/1
+id: runs
+title: Runs
+version: "1"
+package: lab1
+scenarios:
+  first:
+    title: The talker
+    start:
+      - {name: talker, script: src/numeric_talker.py}
+    until: {nodes: 1, alive_s: 2}
+"""
+LISTENER = """\
+  second:
+    title: The listener
+    start:
+      - {name: listener, script: src/numeric_listener.py}
+    until: {nodes: 1, alive_s: 2}
+"""
+CRITERION = """\
+  - id: {name}-node
+    title: It runs
+    points: {points}
+    check: node-lives
+    with: {{process: {name}, min_s: 1}}
+    scenario: {scenario}
+"""
+
+
+@pytest.mark.ros
+def test_what_was_not_recorded_is_run_of_the_same_commit(tmp_path, capsys) -> None:
+    talker = CRITERION.format(name="talker", scenario="first", points=100)
+    (tmp_path / "one.yaml").write_text(f"{TALKER}criteria:\n{talker}")
+    half = talker.replace("100", "50")
+    second = CRITERION.format(name="listener", scenario="second", points=50)
+    (tmp_path / "two.yaml").write_text(f"{TALKER}{LISTENER}criteria:\n{half}{second}")
+    work = repository(tmp_path / "ada", (CORRECT, "2026-10-01T12:00:00+00:00"))
+    roster, out = roster_of(tmp_path, [f"ada,{work.as_uri()}"]), tmp_path / "out"
+    assert batch(roster, out, rubric=tmp_path / "one.yaml") == 0
+    (before,) = lines_of(out)
+    commit(work, WRONG_NAME, "2026-10-02T12:00:00+00:00")
+    arguments = ["regrade", str(out), "--rubric", str(tmp_path / "two.yaml")]
+    capsys.readouterr()
+    assert run(arguments) == 4
+    assert "no recording of second: ada" in capsys.readouterr().out
+    assert run([*arguments, "--run-missing"]) == 0
+    (after,) = lines_of(out)
+    assert after["submission"]["commit"] == before["submission"]["commit"]
+    assert {c["id"]: c["status"] for c in after["criteria"]} == {
+        "talker-node": "pass",
+        "listener-node": "pass",
+    }
+    assert run(["regrade", str(out)]) == 0
