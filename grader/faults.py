@@ -26,6 +26,7 @@ from grader.errors import (
 )
 from grader.files import FULL
 from grader.intake.identity import identify
+from grader.intake.source import Source
 from grader.model.result import (
     CriterionResult,
     EnvironmentInfo,
@@ -65,7 +66,7 @@ class Attempt:
     """What is known of a grading while it runs: enough to say in the end that it failed. `about` is None until the
     submission is open."""
 
-    source: str
+    source: str | Source
     submission_id: str | None
     rubric: LoadedRubric
     out: Path

@@ -22,6 +22,7 @@ from grader.errors import EvidenceError, GraderError, SubmissionError, UsageErro
 from grader.evidence.run import Run
 from grader.faults import NOTHING_RUN, Attempt, told_apart
 from grader.intake import open_recorded, open_recording, open_submission
+from grader.intake.source import Source
 from grader.judge import judge
 from grader.judge.early import judge_files
 from grader.judge.notes import notes_of
@@ -179,9 +180,9 @@ class _Clock:
 
 @contextmanager
 def _opened(
-    source: str, rubric: LoadedRubric, options: GradeOptions, progress: Progress
+    source: str | Source, rubric: LoadedRubric, options: GradeOptions, progress: Progress
 ) -> Iterator[Submission | RecordedSubmission]:
-    progress.step("intake", "running", source)
+    progress.step("intake", "running", source if isinstance(source, str) else source.given)
     with temporary_folder("source") as folder:
         recorded = open_recording(source, submission_id=options.submission_id)
         submission = recorded or _opened_tree(source, rubric, folder, options)
@@ -190,7 +191,7 @@ def _opened(
 
 
 def _opened_tree(
-    source: str, rubric: LoadedRubric, workdir: Path, options: GradeOptions
+    source: str | Source, rubric: LoadedRubric, workdir: Path, options: GradeOptions
 ) -> Submission | RecordedSubmission:
     if not needs_package(rubric):
         return open_recorded(source, workdir=workdir, submission_id=options.submission_id)

@@ -97,7 +97,7 @@ def regrade(
             for judged in judge_all([path / EVIDENCE for path in by_folder], rubric, jobs, fitting=True)
         }
         regraded = tuple(
-            found.get(folder.folder_of(entry) / EVIDENCE) or _without_evidence(folder, entry)
+            found.get(folder.folder_of(entry) / EVIDENCE) or _without_evidence(folder, settler, entry)
             for entry in entries
         )
         run = folder.run.model_copy(update=described(rubric, rubric_source) | {"grader": __version__})

@@ -203,6 +203,20 @@ def test_a_deadline_that_comes_later(tmp_path) -> None:
     assert line["late"]["points_before"] == 100
 
 
+def test_what_could_not_be_graded_stays_as_it_was(tmp_path, capsys) -> None:
+    handed_in(tmp_path / "in", ["ada"])
+    (tmp_path / "in" / "bob").mkdir()
+    (tmp_path / "in" / "bob" / "notes.txt").write_text("nothing yet")
+    out = tmp_path / "out"
+    batch(tmp_path / "in", out)
+    capsys.readouterr()
+    assert run(["regrade", str(out)]) == 3
+    shown = capsys.readouterr().out
+    assert "bob: stays as it was: there is no package lab1" in shown
+    assert "1 of 2 judged again, 0 changed" in shown
+    assert [line["status"] for line in lines_of(out)] == ["graded", "error"]
+
+
 def test_where_no_batch_has_been(tmp_path, capsys) -> None:
     assert run(["regrade", str(tmp_path)]) == 2
     assert "no run.json" in capsys.readouterr().err
