@@ -29,6 +29,7 @@ from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 
 CONNECT_NS = 1_000_000_000
+LARGEST = 2.0**64
 
 
 class StartParams(Record):
@@ -202,7 +203,7 @@ def _wrong(count: Count, found: Wrong, params: StepParams) -> Verdict | None:
     if found.flood:
         return _flooded(len(found.steps), params)
     if not found.own:
-        missing = sum(int(s.change) - 1 for s in found.lost)
+        missing = sum(int(min(s.change, LARGEST)) - 1 for s in found.lost)
         message = f"{plural(missing, 'value')} of {params.topic} got lost on the way, with a gap in time"
         return inconclusive(message, hint="grade again while the machine has less to do")
     first, usual = found.own[0], count.usual_step()
@@ -212,8 +213,8 @@ def _wrong(count: Count, found: Wrong, params: StepParams) -> Verdict | None:
     if usual not in {None, 1}:
         message = _usual_fault(usual or 0.0)
     else:
-        kinds = {0: "repeats a value", -1: "goes back"}
-        message = listed(dict.fromkeys(kinds.get(int(s.change), "skips values") for s in found.own))
+        kinds: dict[float, str] = {0: "repeats a value", -1: "goes back"}
+        message = listed(dict.fromkeys(kinds.get(s.change, "skips values") for s in found.own))
     hint = "add one to the counter in one place only, once in each turn of the loop"
     return failed(f"the counter {message}: {place}", hint=hint)
 

@@ -9,7 +9,7 @@ from grader.evidence.run import Run
 
 NAME_LETTERS = 200
 LINE_LETTERS = 300
-LARGEST = 1e18
+LARGEST = 2**64
 SPREAD = (math.sqrt(5) - 1) / 2
 
 
@@ -27,8 +27,6 @@ def named(text: object) -> str:
 
 def finite(value: float) -> float:
     """A number that can be drawn and written as JSON; what is none is 0."""
-    if isinstance(value, int):
-        return max(-int(LARGEST), min(int(LARGEST), value))
     return max(-LARGEST, min(LARGEST, value)) if value == value else 0.0  # noqa: PLR0124 - NaN is not itself
 
 

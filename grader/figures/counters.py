@@ -23,6 +23,7 @@ from grader.model.verdict import Status
 
 FIRST_VALUES = 40
 MARKS_MAX = 40
+TURNS_MAX = 60
 AROUND = 4
 TEXT_LETTERS = 200
 
@@ -115,27 +116,24 @@ def _whole(value: float) -> float:
 
 
 def _drawable(value: float) -> bool:
-    return value - value == 0  # neither infinite nor no number
+    """What is no number at all has no place; what is infinite is drawn as the largest."""
+    return value == value  # noqa: PLR0124 - NaN is not itself
 
 
 def _kept(count: Count, marks: Sequence[int], turns: Sequence[Step]) -> Sequence[int]:
     """All values, or of many: what is around the marks and the turns, both ends, and a fair choice of the others.
 
-    Where even the turns are too many, the first of them.
+    Of very many turns, only the values of the first ones and what is around the marks.
     """
     every = range(len(count.values))
     if len(every) <= POINTS_MAX:
         return every
-    kept = {every[0], every[-1], *_around(marks, AROUND, every)}
-    breaks = _around((s.number for s in turns), 1, every)
-    for index in breaks:
-        if len(kept) >= POINTS_MAX - 1:
-            break
-        kept.add(index)
-    spare = POINTS_MAX - len(kept)
-    return sorted({*kept, *spread(every, spare)})
+    begin = every[: turns[TURNS_MAX].number] if len(turns) > TURNS_MAX else every
+    breaks = _around([s.number for s in turns[:TURNS_MAX]], 1, begin)
+    kept = {begin[0], begin[-1], *_around(marks, AROUND, every), *breaks}
+    return sorted({*kept, *spread(begin, POINTS_MAX - len(kept))})
 
 
-def _around(numbers: Sequence[int] | Iterator[int], count: int, every: range) -> Iterator[int]:
+def _around(numbers: Sequence[int], count: int, every: range) -> Iterator[int]:
     """These values and so many before and behind each; of a step, that is from `count` before to `count` - 1 behind."""
     return chain.from_iterable(every[max(0, n - count) : n + count] for n in numbers)
