@@ -21,6 +21,7 @@ LOCAL = "local"
 CONNECT_S = 15.0
 THREADS_A_CORE = 4  # a grading waits most of the time
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://(\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]@]+):[0-9]{1,5}/?")
+TLS = tuple(f"DASK_DISTRIBUTED__COMM__TLS__{name}" for name in ("CA_FILE", "CLIENT__CERT", "CLIENT__KEY"))
 EXTRA = 'pip install "ros-lab-grader[cluster]"'
 
 
@@ -75,6 +76,11 @@ def _check_address_answers(address: str) -> None:
     except (TimeoutError, asyncio.TimeoutError, OSError) as error:
         raise _nobody_answers(address) from error
     except Exception as error:
+        if address.startswith("tls") and "ssl_context" in str(error):
+            hint = f"set {', '.join(TLS)} to their files"
+            raise HostError(
+                f"{address} needs certificates, and none are configured here", hint=hint
+            ) from error
         message = f"what answers at {address} is no Dask scheduler ({type(error).__name__})"
         raise HostError(
             message, hint="give the address that `dask scheduler` prints, of a like version"

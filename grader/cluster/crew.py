@@ -100,6 +100,8 @@ def why_not(answer: Mapping[str, str] | BaseException, needs: Needs) -> str:
         return f"it cannot answer: {type(answer).__name__}: {answer}"
     for name, here in needs.versions.items():
         there = answer.get(name, "")
+        if there != here and name == "code":
+            return "its grader has other files than this one: update both, and start it again"
         if there != here:
             return f"it has {name} {there or 'of no version'}, here it is {here}"
     if needs.ros and not answer.get("ros"):

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from grader.batch.job import Job, Outcome
 from grader.cluster import remote
-from grader.cluster.connecting import check_address, connected
+from grader.cluster.connecting import LOCAL, check_address, connected
 from grader.cluster.crew import Needs
 from grader.cluster.exchange import Exchange, checked_url
 from grader.cluster.shift import Shift
@@ -57,7 +57,7 @@ class ClusterHands:
         first = next(waiting, None)
         if first is None:
             return
-        needs = Needs(versions=remote.versions(), ros=not first.static_only and needs_ros(first.rubric))
+        needs = Needs(versions=self._versions(), ros=not first.static_only and needs_ros(first.rubric))
         with connected(self._address) as client:
             word = secrets.token_hex(TOKEN_BYTES)
             self._exchange.make()
@@ -77,6 +77,11 @@ class ClusterHands:
             finally:
                 with suppress(GraderError, OSError):  # what is left is removed by the next batch
                     self._exchange.remove()
+
+    def _versions(self) -> dict[str, str]:
+        """Those that a worker must have; one that is started here has our own files."""
+        versions = remote.versions()
+        return {k: v for k, v in versions.items() if k != "code"} if self._address == LOCAL else versions
 
 
 def needs_ros(rubric: LoadedRubric) -> bool:

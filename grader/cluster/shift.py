@@ -18,6 +18,7 @@ from typing import Any
 
 from grader.batch.job import Job, Outcome
 from grader.cluster import remote
+from grader.cluster.connecting import LOCAL
 from grader.cluster.crew import Answer, Crew, Needs, ask_of
 from grader.cluster.errands import Report, failed
 from grader.cluster.exchange import Exchange
@@ -193,9 +194,10 @@ class Shift:
     def _nobody(self) -> HostError:
         left_out = "; ".join(self._crew.left_out.values())
         what = f"no worker that can grade ({left_out})" if left_out else "no worker"
+        start = f"start one with `dask worker {self._address} --nthreads 4`, {GOES_ON}"
         return HostError(
             f"{what} at {self._address} for {self._patience_s:g} s",
-            hint=f"start one with `dask worker {self._address} --nthreads 4`, {GOES_ON}",
+            hint=start if self._address != LOCAL else "grade without --cluster",
         )
 
     def _scheduler_gone(self) -> HostError:

@@ -19,7 +19,7 @@ A, B = "tcp://10.0.0.1:1", "tcp://10.0.0.2:1"
     [
         (GOOD, ""),
         ({**GOOD, "grader": "0.9"}, "it has grader 0.9, here it is 1.0"),
-        ({**GOOD, "code": "9a8b"}, "it has code 9a8b, here it is 1f2e"),
+        ({**GOOD, "code": "9a8b"}, "its grader has other files than this one"),
         ({**GOOD, "python": "3.10"}, "it has python 3.10, here it is 3.11"),
         ({**GOOD, "pydantic": "2.6.0"}, "it has pydantic 2.6.0, here it is 2.7.0"),
         ({"host": "node1"}, "it has grader of no version, here it is 1.0"),
