@@ -53,12 +53,15 @@ ALLOWED = {
         *BASE, "evidence", "faults", "fetching", "files", "gradebook", "intake", "judge", "overrides", "pipeline",
         "report", "results", "rubric", "temporary"
     },
+    "review": BASE | {
+        "batch", "files", "gradebook", "intake", "overrides", "report", "results", "rubric", "temporary"
+    },
     "cluster": BASE | {"arena.ros_env", "batch.child", "batch.job", "intake", "results", "rubric", "temporary"},
     "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
     "cli": {
         *BASE, "arena", "authoring", "batch", "checks", "evidence", "files", "instructor", "intake", "judge",
-        "cluster", "gradebook", "mutation", "package", "pipeline", "report", "roster", "rubric", "similarity",
-        "temporary"
+        "cluster", "gradebook", "mutation", "package", "pipeline", "report", "review", "roster", "rubric",
+        "similarity", "temporary"
     },
     "__main__": {"cli"},
 }  # fmt: skip

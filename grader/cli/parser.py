@@ -176,6 +176,16 @@ def _class(add: _Adder) -> None:
     )
     book.add_argument("--per-criterion", action="store_true", help="a column for each criterion")
 
+    review = add("review", "look at a class in the browser: give points, decide otherwise, comment")
+    review.add_argument("folder", metavar="DIR", type=Path, help="the --out of `grader batch`")
+    review.add_argument(
+        "--port", metavar="N", type=_port, default=0, help="the page's port (default: any that is free)"
+    )
+    review.add_argument("--no-browser", action="store_true", help="only print the address")
+    review.add_argument(
+        "--author", metavar="NAME", help="who decides (default: git config user.name); the page can change it"
+    )
+
     similar = add("similar", "name submissions that are nearly the same, for a person; never a mark")
     similar.add_argument("folder", metavar="DIR", type=Path, help="the --out of `grader batch`")
     similar.add_argument(
@@ -300,6 +310,13 @@ def _percent(text: str) -> float:
         number = 0.0
     if not 1 <= number <= 100:
         raise argparse.ArgumentTypeError(f"{text!r} is not a percentage from 1 to 100")
+    return number
+
+
+def _port(text: str) -> int:
+    number = int(text) if text.isascii() and text.isdecimal() else -1
+    if not 0 <= number <= 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port from 1 to 65535")
     return number
 
 

@@ -1,0 +1,40 @@
+"""`grader review DIR`: a web page on this machine alone, to look at a class, give points and decide otherwise."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+
+from grader.cli.say import say
+from grader.errors import ExitCode, UsageError
+from grader.review import require_library
+
+
+def run(*, folder: Path, port: int = 0, no_browser: bool = False, author: str | None = None) -> ExitCode:
+    """Serve the page until Ctrl-C; `author` stands beside decisions (default: what git calls the person)."""
+    require_library()
+    from grader.review.desk import open_desk  # noqa: PLC0415 - an extra: not there everywhere
+    from grader.review.form import Wrong, author_of  # noqa: PLC0415
+    from grader.review.serve import browser, git_user, serve  # noqa: PLC0415
+
+    try:
+        name = author_of(git_user() if author is None else author)
+    except Wrong as error:
+        raise UsageError(f"--author: {error}") from error
+    desk = open_desk(folder)
+    with ExitStack() as stack:
+
+        def opened(address: str) -> None:
+            tried = stack.enter_context(browser(address, wanted=not no_browser))
+            say(f"{'Opening' if tried else 'Open'} {address}")
+            say("Only this machine reaches it, and only with this address. Ctrl-C ends it.")
+
+        done = serve(desk, port=port, author=name, opened=opened)
+    if done:
+        say("Ended. Everything is saved and written.")
+        return ExitCode.PASSED
+    say(
+        f"Ended. What you decided is in overrides.yaml; the gradebook is not written: {desk.follower.trouble}"
+    )
+    say(f"  hint: when that is over, grader regrade {folder} writes it")
+    return ExitCode.NOT_GRADED

@@ -1,0 +1,18 @@
+"""`grader review DIR`: a page of this machine alone, on which an instructor looks at a class and decides."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+from grader.errors import UsageError
+
+INSTALL = "pip install 'ros-lab-grader[review]'"
+
+
+def require_library() -> None:
+    """Raise UsageError where the extra is not installed."""
+    missing = [name for name in ("flask", "waitress") if find_spec(name) is None]
+    if missing:
+        raise UsageError(
+            f"reviewing a class needs {' and '.join(missing)}, which is not installed", hint=INSTALL
+        )

@@ -1,0 +1,241 @@
+"""Where decisions are made: each is written into `overrides.yaml` at once, and results and gradebook follow."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from grader.batch.flow import alone, ids_of, write_books
+from grader.batch.folder import BatchFolder, open_batch, read_result, write_run
+from grader.batch.settled import Settler, rewrite
+from grader.errors import Busy, GraderError, UsageError
+from grader.files import unwritable
+from grader.model.handed_in import Override
+from grader.model.result import GradingResult
+from grader.overrides import FILE, Overrides, read_overrides, write_override
+from grader.review.follower import Follower, Pace
+from grader.review.submissions import Item, Stamp, Submissions, stamp_of
+from grader.rubric.load import LoadedRubric, load_rubric
+
+LOCK = ".review.lock"
+PATIENCE_S = 0.3
+OTHER_RUBRIC = "the class has been graded by another rubric since: end this review and start it again"
+
+
+class Conflict(Exception):
+    """Somebody else decided meanwhile: `now` is what stands there, None for nothing."""
+
+    def __init__(self, now: Override | None) -> None:
+        super().__init__("decided meanwhile")
+        self.now = now
+
+
+@dataclass(frozen=True, kw_only=True)
+class Saved:
+    """What came of a decision: the result as it counts now (None where there is none), and in a line why its files do
+    not say so yet; empty where they do."""
+
+    result: GradingResult | None
+    waits: str = ""
+
+
+def open_desk(path: Path, pace: Pace | None = None) -> Desk:
+    """The desk of the class in `path`. Raises UsageError where there is none, and where its rubric has changed."""
+    run = open_batch(path).run
+    rubric = load_rubric(run.rubric_source)
+    if rubric.digest != run.rubric.digest:
+        raise UsageError(
+            f"{run.rubric_source}: the rubric has changed since the class was graded",
+            hint=f"grader regrade {path} judges it by the rubric of today; then review it",
+        )
+    return Desk(path, rubric, pace or Pace())
+
+
+class Desk:
+    """Safe to use from several threads, and beside other desks and batches of the same class."""
+
+    def __init__(self, path: Path, rubric: LoadedRubric, pace: Pace) -> None:
+        self.path, self.rubric = path, rubric
+        self.submissions = Submissions(path)
+        self.follower = Follower(self._follow, pace)
+        self._saving, self._writing, self._guard = threading.Lock(), threading.Lock(), threading.Lock()
+        self._overrides: tuple[tuple[Stamp, tuple[str, ...]], Overrides] | None = None
+        self._pending: set[str] = set()
+        self._caught_up = False
+
+    def start(self) -> None:
+        """Begin to follow; what was decided while nobody reviewed is looked at first."""
+        self.follower.start()
+        self.follower.changed()
+
+    def close(self) -> bool:
+        """Write what is left; whether all is written."""
+        return self.follower.close()
+
+    def overrides(self) -> Overrides:
+        """What `overrides.yaml` says now. Raises RubricError where it has faults."""
+        ids = tuple(ids_of(self.submissions.batch().run))
+        stamp = (stamp_of(self.path / FILE), ids)
+        with self._guard:
+            found = self._overrides
+        if found is None or found[0] != stamp:
+            found = (stamp, read_overrides(self.path / FILE, self.rubric.rubric, ids))
+            with self._guard:
+                self._overrides = found
+        return found[1]
+
+    def save(self, item: Item, criterion: str, override: Override | None, seen: str) -> Saved:
+        """Put a decision in place of the one that was `seen` (its `mark`), or take that out (None).
+
+        Raises Conflict where another one stands there by now, and what `write_override` raises; then nothing changed.
+        """
+        name = item.entry.id
+        with self._saving, _reviewing(self.path):
+            found = self.overrides()
+            now = found.get(name, {}).get(criterion)
+            if not _alike(now, override):
+                if mark(now) != seen:
+                    raise Conflict(now)
+                write_override(self.path / FILE, name, criterion, override)
+                found = _with(found, name, criterion, override)
+        with self._guard:
+            self._pending.add(item.key)
+        waits = self._settled_soon(item, found)
+        self.follower.changed()
+        return Saved(result=self.result(item, found), waits=waits)
+
+    def result(self, item: Item, overrides: Overrides) -> GradingResult | None:
+        """A submission's result as it counts with these overrides; None where it has none."""
+        result = read_result(self.path / item.key) if item.gradable else None
+        if (
+            result is None
+            or result.rubric.digest != self.rubric.digest
+            or not self._behind(item, result, overrides)
+        ):
+            return result
+        return Settler(self.rubric.rubric, overrides).again(result, item.entry.id, None)
+
+    def waits(self, item: Item) -> str:
+        """Why the files of a submission do not say yet what was decided; empty where they do."""
+        with self._guard:
+            pending = item.key in self._pending
+        return self.follower.trouble or "its report follows in a moment" if pending else ""
+
+    def batch_runs(self) -> bool:
+        """Whether a batch works in the folder just now."""
+        if self.submissions.batch().run.state != "running" or self._writing.locked():
+            return False
+        try:
+            with alone(self.path):
+                return False
+        except Busy:
+            return True
+
+    def _settled_soon(self, item: Item, overrides: Overrides) -> str:
+        """Settle one submission now, or say why that comes later."""
+        if not item.gradable:
+            return "it counts as soon as the submission has a result"
+        if not self._writing.acquire(timeout=PATIENCE_S):
+            return "the report follows in a moment"
+        try:
+            with alone(self.path):
+                self._settle(item, overrides)
+        except Busy:
+            return "a batch works in this folder just now: the report follows when it has ended"
+        except GraderError as error:
+            return error.message
+        finally:
+            self._writing.release()
+        return ""
+
+    def _settle(self, item: Item, overrides: Overrides) -> None:
+        """Let the submission's files say what was decided. Somebody holds the class's lock."""
+        batch = self.submissions.batch()
+        if batch.run.rubric.digest != self.rubric.digest:
+            raise UsageError(OTHER_RUBRIC)
+        result = batch.earlier(item.entry) if item.gradable else None
+        if result is not None and result.rubric.digest == self.rubric.digest:
+            now = Settler(self.rubric.rubric, overrides).again(result, item.entry.id, None)
+            if now != result:
+                rewrite(batch.folder_of(item.entry), now, self.rubric.rubric, self.rubric.docs)
+        with self._guard:
+            self._pending.discard(item.key)
+
+    def _follow(self) -> None:
+        """Settle what is not settled yet, and write the class's files."""
+        overrides = self.overrides()
+        if not self._caught_up:
+            behind = set(self._all_behind(overrides))
+            with self._guard:
+                self._pending |= behind
+            self._caught_up = True
+            if not behind:
+                return
+        with self._writing, alone(self.path):
+            with self._guard:
+                pending = sorted(self._pending)
+            for item in filter(None, map(self.submissions.item, pending)):
+                self._settle(item, overrides)
+            self._write_books(self.submissions.batch())
+
+    def _write_books(self, batch: BatchFolder) -> None:
+        run = batch.run
+        state = "interrupted" if run.state == "running" else run.state
+        written = write_books(batch, self.rubric.rubric, state, run.counts.kept)
+        write_run(self.path, written.run.model_copy(update={"ended_at": run.ended_at}))
+
+    def _all_behind(self, overrides: Overrides) -> Iterator[str]:
+        for item in self.submissions.items():
+            result = read_result(self.path / item.key) if item.gradable else None
+            same = result is not None and result.rubric.digest == self.rubric.digest
+            if result is not None and same and self._behind(item, result, overrides):
+                yield item.key
+
+    @staticmethod
+    def _behind(item: Item, result: GradingResult, overrides: Overrides) -> bool:
+        """Whether a result says something else than `overrides.yaml`."""
+        known = {criterion.id for criterion in result.criteria}
+        given = {k: v for k, v in overrides.get(item.entry.id, {}).items() if k in known}
+        return given != {o.criterion: Override(**_fields(o)) for o in result.overrides}
+
+
+def mark(override: Override | None) -> str:
+    """What a form carries to say which decision it was made from; empty for none."""
+    return sha256(override.model_dump_json().encode()).hexdigest()[:24] if override else ""
+
+
+def _fields(override: Override) -> dict[str, object]:
+    return {name: getattr(override, name) for name in Override.model_fields}
+
+
+def _alike(one: Override | None, other: Override | None) -> bool:
+    """Whether both say the same, whenever it was said."""
+    if one is None or other is None:
+        return one is other
+    return one.model_copy(update={"date": None}) == other.model_copy(update={"date": None})
+
+
+def _with(overrides: Overrides, name: str, criterion: str, override: Override | None) -> Overrides:
+    of: Mapping[str, Override] = {k: v for k, v in overrides.get(name, {}).items() if k != criterion}
+    return {**overrides, name: of if override is None else {**of, criterion: override}}
+
+
+@contextmanager
+def _reviewing(path: Path) -> Iterator[None]:
+    """Hold what all reviews of a class hold while they compare and write: another process may review it, too."""
+    try:
+        descriptor = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+    except OSError as error:
+        raise unwritable(path / LOCK, error) from error
+    try:
+        with suppress(OSError):  # a file system without locks: whoever shares it has to know what they do
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,118 @@
+"use strict";
+
+const told = (form, text, bad) => {
+  const place = form.querySelector(".told");
+  place.textContent = text;
+  place.classList.toggle("bad", Boolean(bad));
+};
+
+const typed = (form) => JSON.stringify([...form.querySelectorAll("input:not([type=hidden]), textarea")].map((field) => field.value));
+
+const settle = (form) => {
+  form.dataset.at = typed(form);
+  form.classList.remove("unsaved");
+};
+
+const unsaved = () => [...document.querySelectorAll("form.decide")].filter((form) => typed(form) !== form.dataset.at);
+
+const put = (form, answer) => {
+  const card = form.closest(".card");
+  if (answer.head === undefined) return;
+  card.querySelector(".card-head").innerHTML = answer.head;
+  card.querySelector(".notes").innerHTML = answer.notes;
+  card.classList.remove(`edge-${card.dataset.status}`);
+  card.classList.add(`edge-${answer.status}`);
+  card.dataset.status = answer.status;
+  form.elements.seen.value = answer.seen;
+  form.querySelector("[value=remove]").hidden = !answer.decided;
+  document.getElementById("total").textContent = answer.total;
+};
+
+const send = async (form, submitter) => {
+  if (form.dataset.busy) return;
+  const before = typed(form);
+  const body = new URLSearchParams(new FormData(form));
+  if (submitter && submitter.name) body.set(submitter.name, submitter.value);
+  form.dataset.busy = "yes";
+  told(form, "saving…");
+  try {
+    const response = await fetch(form.action, { method: "POST", body, headers: { "X-Asked-By": "script" } });
+    const answer = await response.json();
+    put(form, answer);
+    if (!response.ok) {
+      told(form, answer.error || "not saved", true);
+      return;
+    }
+    if (body.get("do") === "remove" && typed(form) === before) form.querySelectorAll("input[type=text], textarea").forEach((field) => { field.value = ""; });
+    if (body.get("do") === "remove" || typed(form) === before) settle(form);
+    told(form, answer.said);
+    if (answer.author !== undefined) document.querySelector(".author").textContent = answer.author || "nobody";
+    const anew = document.getElementById("anew");
+    if (anew && answer.head !== undefined) anew.hidden = false;
+    if (answer.go && !unsaved().length) window.location.assign(answer.go);
+  } catch (error) {
+    told(form, "not saved: the review does not answer; is it still running in the terminal?", true);
+  } finally {
+    delete form.dataset.busy;
+  }
+};
+
+document.addEventListener("submit", (event) => {
+  if (event.target.method !== "post") return;
+  event.preventDefault();
+  send(event.target, event.submitter);
+});
+
+document.addEventListener("input", (event) => {
+  const form = event.target.closest("form.decide");
+  if (!form) return;
+  const changed = typed(form) !== form.dataset.at;
+  form.classList.toggle("unsaved", changed);
+  told(form, changed ? "not saved yet" : "");
+});
+
+window.addEventListener("beforeunload", (event) => {
+  if (unsaved().length) event.preventDefault();
+});
+
+const step = (by) => {
+  const rows = [...document.querySelectorAll("a.row")];
+  if (rows.length) {
+    const at = rows.indexOf(document.activeElement);
+    const to = rows[at < 0 ? 0 : Math.min(Math.max(at + by, 0), rows.length - 1)];
+    to.focus();
+    return;
+  }
+  const link = document.getElementById(by > 0 ? "after" : "before");
+  if (link) link.click();
+};
+
+const STEPS = { j: 1, ArrowRight: 1, k: -1, ArrowLeft: -1 };
+
+document.addEventListener("keydown", (event) => {
+  const field = event.target.closest("input, textarea, select");
+  if (field && event.key === "Escape") field.blur();
+  if (field && event.key === "Enter" && (event.ctrlKey || event.metaKey) && field.form) field.form.requestSubmit(field.form.querySelector("[value=save]"));
+  if (field || event.ctrlKey || event.metaKey || event.altKey || event.shiftKey || event.defaultPrevented) return;
+  const listing = document.body.classList.contains("listing");
+  const by = STEPS[event.key] || (listing && { ArrowDown: 1, ArrowUp: -1 }[event.key]);
+  if (by) {
+    event.preventDefault();
+    step(by);
+  }
+  if (event.key === "e") {
+    const first = document.querySelector(".decisions form.decide input[type=text]");
+    if (first && first.offsetParent) {
+      event.preventDefault();
+      first.focus();
+      first.select();
+    }
+  }
+});
+
+document.querySelectorAll("form.decide").forEach(settle);
+document.getElementById("anew")?.addEventListener("click", (event) => {
+  event.target.hidden = true;
+  const frame = document.getElementById("report");
+  if (frame) frame.src = frame.getAttribute("src");
+});
