@@ -11,6 +11,8 @@ from grader.model.record import Record
 from grader.model.result import RubricInfo
 from grader.model.roster import Entry, RosterFault
 
+MISSING, ROSTER = "not-graded-yet", "roster"
+"""Kinds of errors that only a class has: nothing was graded so far, and the roster keeps it from that."""
 State = Literal["running", "complete", "interrupted"]
 
 

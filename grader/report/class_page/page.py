@@ -1,0 +1,158 @@
+"""`index.html`: one file that needs nothing else. Begin reading at `write_class_page`."""
+
+from __future__ import annotations
+
+import secrets
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Template
+from markupsafe import Markup
+
+from grader.files import atomic_write
+from grader.model.batch import BatchRun
+from grader.model.result import GradingResult
+from grader.model.roster import Entry
+from grader.report.class_page.anonymous import SALT_BYTES
+from grader.report.class_page.costs import costs, most_first
+from grader.report.class_page.data import link_to, page_data
+from grader.report.class_page.gathered import Gathered, Shared, gather, gather_anonymous
+from grader.report.class_page.heat import heat_map
+from grader.report.class_page.lines import LETTERS, Line
+from grader.report.class_page.points import histogram, spread
+from grader.report.class_page.timing import span, timing
+from grader.report.class_page.todo import todos
+from grader.report.html.shell import environment, policy, script, style
+from grader.report.html.words import SIGNS, count
+
+SHARED_MAX, SHARED_FIRST, ALONE_MAX, WORDINGS_MAX = 100, 12, 100, 12
+"""So many diagnoses are listed that several submissions share (the first ones not folded), and that one has alone; so
+many wordings of each."""
+COPYING = "report.js"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Listed:
+    """A diagnosis in the page's list; `place` is its own in the page's data."""
+
+    place: int
+    title: str
+    worth: float
+    found: Shared
+
+
+def write_class_page(
+    run: BatchRun,
+    rows: Iterable[tuple[Entry, GradingResult]],
+    target: Path,
+    *,
+    anonymous: bool = False,
+    salt: bytes | None = None,
+) -> None:
+    """Write the page of a class to the file `target`; `rows` are read one by one. Links lead to reports beside it.
+
+    An `anonymous` page says nothing of who anybody is: no ids, names, groups, sources, commits, no links and no
+    commands. The same `salt` gives everybody the same pseudonym each time (`salt_in` keeps one); without one they are
+    new each time. Raises OutputError or HostError where the file cannot be written.
+    """
+    if anonymous:
+        found = gather_anonymous(run, rows, salt or secrets.token_bytes(SALT_BYTES))
+        page = _page(run, found, None)
+    else:
+        page = _page(run, gather(run, rows), target.parent)
+    atomic_write(target, page.encode("utf-8"))
+
+
+def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
+    """Without `out`, nothing is said of where anything is."""
+    lines = found.lines
+    judged = [line for line in lines if line.judged]
+    heat = heat_map(lines, run.criteria)
+    points = spread([line.points for line in judged], run.max_points)
+    cost = costs(lines, run.criteria)
+    shared, alone = _listed(run, found.diagnoses)
+    parts: dict[str, Any] = {
+        "run": run,
+        "anonymous": out is None,
+        "lines": lines,
+        "states": Counter(line.state for line in lines),
+        "todos": list(todos(run, lines, out)),
+        "points": points,
+        "histogram": histogram(points) if points else "",
+        "costs": most_first(cost),
+        "unlost": [one.criterion.title for one in cost if one.judged and not one.lost],
+        "late": [line for line in lines if line.late_s > 0],
+        "shared": shared,
+        "alone": alone,
+        "heat": heat,
+        "timing": timing(run, lines),
+        "columns": list(_columns(lines)),
+        "data": page_data(
+            lines,
+            run.criteria,
+            [one.found.members for one in (*shared, *alone)],
+            heat.columns if heat else (),
+        ),
+    }
+    return _template().render(parts)
+
+
+def _listed(run: BatchRun, found: Sequence[Shared]) -> tuple[list[Listed], list[Listed]]:
+    """Diagnoses that several share, and those that one has alone."""
+    worth: Mapping[str, Any] = {criterion.id: criterion for criterion in run.criteria}
+    shared = [one for one in found if len(one.members) > 1][:SHARED_MAX]
+    alone = [one for one in found if len(one.members) == 1][:ALONE_MAX]
+    listed = [
+        Listed(
+            place=place,
+            title=worth[one.criterion].title if one.criterion in worth else "",
+            worth=worth[one.criterion].max_points if one.criterion in worth else 0.0,
+            found=one,
+        )
+        for place, one in enumerate((*shared, *alone))
+    ]
+    return listed[: len(shared)], listed[len(shared) :]
+
+
+def _columns(lines: Sequence[Line]) -> Iterator[tuple[str, str]]:
+    """The table's, as the script knows them and as they are called; what nobody has is left out."""
+    yield "id", "Submission"
+    if any(line.name for line in lines):
+        yield "name", "Name"
+    if any(line.group for line in lines):
+        yield "group", "Group"
+    yield "points", "Points"
+    yield "letters", "Criteria"
+    yield "state", "Status"
+    if any(line.late_s > 0 for line in lines):
+        yield "late", "Late"
+    if any(line.decided for line in lines):
+        yield "decided", "Decided by a person"
+    yield "time", "Time"
+
+
+@cache
+def _template() -> Template:
+    copying, own = script(COPYING), Markup(_file("class.js"))  # noqa: S704 - ours
+    shared = {
+        "style": style() + Markup(_file("class.css")),  # noqa: S704 - ours
+        "scripts": (copying, own),
+        "policy": Markup(policy(copying, own)),  # noqa: S704 - ours
+        "signs": {LETTERS[status]: (sign, status.value) for status, sign in SIGNS.items()},
+        "count": count,
+        "span": span,
+        "link_to": link_to,
+        "shared_first": SHARED_FIRST,
+        "wordings_max": WORDINGS_MAX,
+    }
+    return environment().from_string(_file("templates/index.html"), globals=shared)
+
+
+@cache
+def _file(name: str) -> str:
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")

@@ -1,0 +1,138 @@
+"""What a person has to do before all points are settled, and what to type for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from markupsafe import Markup
+
+from grader.model.batch import BatchRun
+from grader.report.class_page.commands import again, review
+from grader.report.class_page.data import link_to
+from grader.report.class_page.lines import CHARS, MESSAGE_CHARS, Line
+from grader.shown import line
+
+SHOWN_MAX = 200
+
+
+@dataclass(frozen=True, kw_only=True)
+class Item:
+    id: str
+    link: str
+    name: str = ""
+    text: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Todo:
+    """Submissions with the same thing to do. `more` are not among `items`, which are bounded in number."""
+
+    anchor: str
+    title: str
+    advice: str
+    items: Sequence[Item]
+    count: int
+    command: Markup
+
+    @property
+    def more(self) -> int:
+        return self.count - len(self.items)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Kind:
+    anchor: str
+    title: str
+    advice: str
+    holds: Callable[[Line], bool]
+    text: Callable[[Line], str]
+    command: Callable[[BatchRun, Path], Markup]
+
+
+def _problem(found: Line) -> str:
+    return (
+        " ".join(part for part in (found.problem.message, found.problem.hint) if part)
+        if found.problem
+        else ""
+    )
+
+
+KINDS = (
+    _Kind(
+        anchor="missing",
+        title="Not graded yet",
+        advice="The batch goes on where it stopped:",
+        holds=lambda found: found.state == "missing",
+        text=lambda _: "",
+        command=again,
+    ),
+    _Kind(
+        anchor="inconclusive",
+        title="Inconclusive",
+        advice="This machine could not tell this time, so nobody loses points by it. Run only these again:",
+        holds=lambda found: found.state == "inconclusive",
+        text=lambda found: found.why,
+        command=lambda run, out: again(run, out, "inconclusive"),
+    ),
+    _Kind(
+        anchor="error",
+        title="Could not be graded",
+        advice="What is wrong with a submission is for its student to mend. Then run only these again:",
+        holds=lambda found: found.problem is not None and not found.problem.roster,
+        text=_problem,
+        command=lambda run, out: again(run, out, "failed"),
+    ),
+    _Kind(
+        anchor="manual",
+        title="Points that a person gives",
+        advice="All that can be checked is checked. Give the points in your browser:",
+        holds=lambda found: found.state == "manual",
+        text=lambda _: "",
+        command=lambda _, out: review(out),
+    ),
+    _Kind(
+        anchor="look-again",
+        title="Decided by a person, and the check says something else now",
+        advice="See whether the points still stand:",
+        holds=lambda found: found.look_again > 0,
+        text=lambda _: "",
+        command=lambda _, out: review(out),
+    ),
+)
+
+
+def todos(run: BatchRun, lines: Sequence[Line], out: Path | None) -> Iterator[Todo]:
+    """Without `out`, nothing is said of where anything is: no commands, no faults of the roster."""
+    for kind in KINDS:
+        found = [one for one in lines if kind.holds(one)]
+        if found:
+            yield Todo(
+                anchor=kind.anchor,
+                title=kind.title,
+                advice=kind.advice,
+                items=[
+                    Item(id=one.id, link=link_to(one), name=one.name, text=kind.text(one))
+                    for one in found[:SHOWN_MAX]
+                ],
+                count=len(found),
+                command=kind.command(run, out) if out else Markup(),
+            )
+    if run.faults:
+        yield _faults(run, out)
+
+
+def _faults(run: BatchRun, out: Path | None) -> Todo:
+    faults = run.faults[:SHOWN_MAX] if out else ()
+    return Todo(
+        anchor="roster",
+        title="Rows of the roster that cannot be graded",
+        advice="Correct the roster, then run the batch again: what is complete is not done again.",
+        items=[
+            Item(id=line(fault.id or fault.where, CHARS), link="", text=line(str(fault), MESSAGE_CHARS))
+            for fault in faults
+        ],
+        count=len(run.faults),
+        command=again(run, out) if out else Markup(),
+    )
