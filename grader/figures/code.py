@@ -35,7 +35,10 @@ def code_figures(build: Run, citations: Sequence[Citation]) -> Iterator[CodeFigu
 
 def _lines(attachments: Mapping[str, bytes], file: str) -> list[str]:
     data = attachments.get(file, b"")[:BYTES_MAX]
-    lines = _LINE_END.split(data.decode("utf-8-sig", errors="replace"))
+    text = data.decode("utf-8-sig", errors="replace")
+    lines = _LINE_END.split(text)
+    if lines[0].startswith("#!") and text.startswith(f"{lines[0]}\r"):
+        lines[0] += "\r"  # for the kernel, part of the program's name
     return lines if lines[-1] else lines[:-1]
 
 

@@ -55,7 +55,7 @@ def _row(run: Run, topic: str, probe: Probe, line: Line | None) -> Heard:
         sent=short(probe.value, TEXT_LETTERS),
         at_s=second(run, probe.at_ns),
         heard=None if line is None else _said(line),
-        after_s=None if line is None else round((line.at_ns - probe.at_ns) / 1e9, 6),
+        after_s=None if line is None else max(0.0, round((line.at_ns - probe.at_ns) / 1e9, 6)),
     )
 
 

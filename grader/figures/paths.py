@@ -41,8 +41,10 @@ def _spot(point: tuple[float, float]) -> tuple[float, float]:
 
 
 def _kept(path: Sequence[Pose], strayed: int | None) -> list[int]:
-    """Its ends, what is around the place where it strays, and a fair choice of the others."""
+    """Its ends, what is around the place where it strays, and a fair choice of the others where it moves."""
     every = range(len(path))
+    spots = [_spot(pose.point) for pose in path]
+    moves = [i for i in every[1:] if spots[i] != spots[i - 1]]
     near = every[max(0, strayed - AROUND) : strayed + AROUND] if strayed is not None else ()
     own = {every[0], every[-1], *near}
-    return sorted({*own, *spread(every, POINTS_MAX - len(own))})
+    return sorted({*own, *spread(moves, POINTS_MAX - len(own))})

@@ -60,6 +60,14 @@ def test_lines_end_as_they_do_for_python(end: str) -> None:
     assert figure.lines == ("a", "b\x0cb\u2028b", "c")
 
 
+@pytest.mark.parametrize(
+    ("end", "shown"), [("\n", "#!/usr/bin/env python3"), ("\r\n", "#!/usr/bin/env python3\r")]
+)
+def test_a_shebang_has_its_carriage_return(end: str, shown: str) -> None:
+    (figure,) = code(f"#!/usr/bin/env python3{end}import rospy{end}", 1)
+    assert figure.lines == (shown, "import rospy")
+
+
 def test_what_is_no_text_is_shown_all_the_same() -> None:
     (figure,) = code(b"\xef\xbb\xbf\xff\x00\nprint\n", 2)
     assert figure.lines == ("\ufffd\x00", "print")

@@ -54,7 +54,8 @@ def test_counter(correct: tuple[Figures, dict[str, Run]]) -> None:
         assert figure.values == (*range(128), *range(128), 0, 1)
         assert all(isinstance(value, int) for value in figure.values)
         assert figure.wraps == (128, 256)
-        assert figure.wrong == figure.texts == ()
+        assert figure.wrong == ()
+        assert figure.texts == ()
         assert figure.messages == 258
     first = only(correct[0], "counter-start", CounterFigure)
     assert first.values == tuple(range(40))

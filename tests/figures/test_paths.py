@@ -1,0 +1,58 @@
+"""The way that a robot took, seen as its points are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from grader.model.figure import POINTS_MAX, PathFigure
+from tests.figures.made import criterion, drawn, only
+
+SQUARE = criterion("path", topic="/pose", points=[[1, 0], [1, 1]], tolerance_m=0.2)
+
+
+def poses(*points: tuple[float, float], rate_hz: float = 10) -> dict[str, Any]:
+    values = [{"x": x, "y": y, "theta": 0.0} for x, y in points]
+    return {
+        "topics": [{"topic": "/pose", "type": "geometry_msgs/Pose2D", "values": values, "rate_hz": rate_hz}]
+    }
+
+
+def line(start: tuple[float, float], end: tuple[float, float], count: int) -> list[tuple[float, float]]:
+    shares = [number / count for number in range(count)]
+    return [(start[0] + (end[0] - start[0]) * s, start[1] + (end[1] - start[1]) * s) for s in shares]
+
+
+def test_a_right_way_seen_from_its_start() -> None:
+    way = [*line((5, 5), (6, 5), 10), *line((6, 5), (6, 6), 10), (6, 6)]
+    figures, results = drawn(poses(*way), SQUARE)
+    figure = only(figures, "path", PathFigure)
+    assert results["path"].status.value == "pass"
+    assert figure.corners == ((0, 0), (1, 0), (1, 1))
+    assert (figure.points[0], figure.points[-1]) == ((0, 0), (1, 1))
+    assert (figure.reached, figure.strayed, figure.messages) == (3, None, 21)
+    assert figure.tolerance_m == pytest.approx(0.2)
+
+
+def test_the_first_point_that_strays_stays_of_many() -> None:
+    way = [*line((0, 0), (1, 0), 3000), *line((1, 0), (3, 0), 3000)]
+    figures, results = drawn(poses(*way, rate_hz=100), SQUARE)
+    figure = only(figures, "path", PathFigure)
+    assert results["path"].status.value == "fail"
+    assert len(figure.points) <= POINTS_MAX
+    assert figure.strayed is not None
+    assert figure.points[figure.strayed] == pytest.approx((1.2, 0), abs=2e-3)
+    assert figure.reached == 2
+
+
+def test_a_robot_that_waits_long_is_shown_where_it_moves() -> None:
+    way = [(0.0, 0.0)] * 4000 + line((0, 0), (1, 0), 200) + line((1, 0), (1, 1), 200) + [(1.0, 1.0)] * 4000
+    figures, _ = drawn(poses(*way, rate_hz=100), SQUARE)
+    figure = only(figures, "path", PathFigure)
+    assert len(set(figure.points)) >= 390
+
+
+def test_no_way_no_figure() -> None:
+    assert drawn({}, SQUARE)[0].by_criterion == {}
+    assert drawn({"topics": [{"topic": "/pose"}]}, SQUARE)[0].by_criterion == {}
