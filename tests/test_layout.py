@@ -57,11 +57,15 @@ ALLOWED = {
         "batch", "files", "gradebook", "intake", "overrides", "report", "results", "rubric", "temporary"
     },
     "cluster": BASE | {"arena.ros_env", "batch.child", "batch.job", "intake", "results", "rubric", "temporary"},
+    "watching": {
+        *BASE, "arena.asynchronous", "arena.workspace", "faults", "intake", "package", "pipeline", "report", "rubric",
+        "temporary"
+    },
     "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
     "cli": {
         *BASE, "arena", "authoring", "batch", "checks", "evidence", "files", "instructor", "intake", "judge",
         "cluster", "gradebook", "mutation", "package", "pipeline", "report", "review", "roster", "rubric",
-        "similarity", "temporary"
+        "similarity", "temporary", "watching"
     },
     "__main__": {"cli"},
 }  # fmt: skip
