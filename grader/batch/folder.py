@@ -14,7 +14,7 @@ from grader.errors import UsageError
 from grader.files import atomic_write
 from grader.gradebook import Book, Row
 from grader.intake import safe_name
-from grader.model.batch import BatchRun
+from grader.model.batch import MISSING, ROSTER, BatchRun
 from grader.model.result import (
     CriterionResult,
     EnvironmentInfo,
@@ -30,8 +30,6 @@ from grader.shown import json_text
 
 RUN = "run.json"
 BYTES_MAX = 64 << 20
-MISSING = "not-graded-yet"
-ROSTER = "roster"
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from grader.batch.folder import MISSING, ROSTER, BatchFolder
+from grader.batch.folder import BatchFolder
 from grader.gradebook import Row
+from grader.model.batch import MISSING, ROSTER
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status
 from grader.overrides import FILE as OVERRIDES

@@ -34,9 +34,8 @@ def reduced(message: str) -> str:
 
 @dataclass(kw_only=True)
 class Diagnosis:
-    """One fault that many may share: `members` are the places of its submissions, `wordings` what it was called
-    (and `more` of them).
-    `criterion` is an id, empty for what could not be graded."""
+    """One fault that many may share: `members` are the places of its submissions, `wordings` what it was called (`more`
+    where there are others). `criterion` is an id, empty for what could not be graded."""
 
     criterion: str
     members: list[int] = field(default_factory=list)

@@ -15,8 +15,10 @@ from grader.report.class_page.lines import Line, line_of
 
 @dataclass(frozen=True, kw_only=True)
 class Shared:
-    """A diagnosis: `message` as most have it, `wordings` with how often each was said (`more` where there are others); `members` are places of
-    submissions. `criterion` is an id, empty for what could not be graded."""
+    """A diagnosis: `message` as most have it, `wordings` with how often each was said (`more` where there are others).
+
+    `members` are places of submissions. `criterion` is an id, empty for what could not be graded.
+    """
 
     criterion: str
     message: str
