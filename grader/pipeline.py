@@ -8,9 +8,9 @@ A recording that is handed in is evidence already: it skips the package and the 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -50,6 +50,7 @@ from grader.rubric.rates import rates_of
 from grader.temporary import temporary_folder
 
 if TYPE_CHECKING:
+    from grader.arena.asynchronous import Stop
     from grader.arena.recording import Recorder, Recording
     from grader.arena.sandbox import Mode
 
@@ -65,7 +66,8 @@ class GradeOptions:
 
     With `tidy`, what killed graders left beside the submission's folder is put in order first; a batch does that once.
     `kept` is asked when the submission is open: a result that it gives stays, and nothing is done. `settled` makes of the
-    automatic result the one that counts.
+    automatic result the one that counts. `recorded` is evidence by scenario that still holds: these are not run again.
+    `stop` ends what runs, in order, from another thread; then `arena.asynchronous.Stopped` is raised.
     """
 
     sandbox: Mode = "auto"
@@ -75,6 +77,8 @@ class GradeOptions:
     tidy: bool = True
     kept: Callable[[SubmissionInfo], GradingResult | None] = lambda _: None
     settled: Callable[[GradingResult], GradingResult] = lambda result: result
+    recorded: Mapping[str, Path] = field(default_factory=dict)
+    stop: Stop | None = None
 
 
 def prepare(options: GradeOptions) -> None:
@@ -275,6 +279,8 @@ def _recorder(
         mode=options.sandbox,
         static_only=options.static_only or not needs_ros(rubric),
         progress=progress,
+        recorded=options.recorded,
+        stop=options.stop,
     )
 
 

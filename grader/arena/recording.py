@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import shutil
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -18,7 +19,7 @@ from typing_extensions import Self
 
 from grader import __version__
 from grader.admission import Admission, shared_folder
-from grader.arena.asynchronous import run_until_signal, side_by_side
+from grader.arena.asynchronous import Stop, run_until_signal, side_by_side
 from grader.arena.build import BUILD_EXPECTED_S, BuildOutcome, build
 from grader.arena.inside import prepare
 from grader.arena.limits import Limits
@@ -62,6 +63,7 @@ NO_ROS = "no ROS 1 on this machine"
 WAITING = "for its turn"
 WAITING_ALONE = "to be run again, alone"
 STATIC_ONLY = "nothing was run: only the files were asked for"
+STILL_HOLDS = "unchanged: what was recorded before still holds"
 
 
 @dataclass(kw_only=True)
@@ -84,7 +86,8 @@ class Recording:
 class Recorder:
     """Records one submission into a folder. Use as a context: its workspaces live as long as it does.
 
-    `rates` are judged, by scenario: a run that is to show them ends when they are clear.
+    `rates` are judged, by scenario: a run that is to show them ends when they are clear. `recorded` is evidence, by
+    scenario, that stands for a run of it: it is copied. `stop` ends the runs from another thread.
     """
 
     def __init__(
@@ -98,8 +101,12 @@ class Recorder:
         static_only: bool,
         progress: Progress,
         rates: Mapping[str, tuple[RateBounds, ...]] | None = None,
+        recorded: Mapping[str, Path] | None = None,
+        stop: Stop | None = None,
     ) -> None:
         self._submission = submission
+        self._recorded = recorded or {}
+        self._stop = stop
         self._rates = rates or {}
         self._rubric = rubric
         self._progress = progress
@@ -124,15 +131,16 @@ class Recorder:
     def record_all(self, meanwhile: Callable[[], None]) -> None:
         """The package with its build, then every scenario, side by side. Where there is a build to wait for,
         `meanwhile` is called beside it, in another thread."""
-        run_until_signal(self._record_all(meanwhile))
+        run_until_signal(self._record_all(meanwhile), self._stop)
 
     def record_again(self, scenarios: Iterable[str]) -> None:
         """These scenarios once more, one after the other, with no other run on the machine."""
-        run_until_signal(self._record_alone(tuple(scenarios)))
+        run_until_signal(self._record_alone(tuple(scenarios)), self._stop)
 
     async def _record_all(self, meanwhile: Callable[[], None]) -> None:
         self._admission = Admission(shared_folder())
-        names = in_order(self._rubric)
+        names = [name for name in in_order(self._rubric) if name not in self._recorded]
+        self._copy_recorded()
         if not self._not_run:
             self._progress.step("build", "waiting", "", BUILD_EXPECTED_S)
             for name in names:
@@ -146,6 +154,11 @@ class Recorder:
                 self._progress.step(name, "skipped", self._not_run)
             return
         await side_by_side(*(self._record_scenario(self._place, name) for name in names))
+
+    def _copy_recorded(self) -> None:
+        for name, path in self._recorded.items():
+            shutil.copyfile(path, self.recording.folder / f"{name}.mcap")
+            self._progress.step(name, "skipped", STILL_HOLDS)
 
     async def _record_alone(self, names: tuple[str, ...]) -> None:
         self._admission = Admission(shared_folder())
