@@ -46,7 +46,7 @@ class Stop:
 
 
 def run_until_signal(work: Coroutine[Any, Any, None], stop: Stop | None = None) -> None:
-    """Run to the end, or until SIGINT or SIGTERM cancels it; then raise KeyboardInterrupt, or Stopped where `stop` did."""
+    """Run to the end, or until SIGINT, SIGTERM or `stop` cancels it; then raise KeyboardInterrupt, or Stopped."""
     stop, signals = stop or Stop(), list[int]()
 
     async def main() -> None:
