@@ -27,6 +27,7 @@ from grader.judge import judge
 from grader.judge.early import judge_files
 from grader.judge.notes import notes_of
 from grader.judge.summary import overall_status, total_points
+from grader.model.figure import Figures
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
 from grader.model.result import (
@@ -123,9 +124,14 @@ def grade(
                 )
             graded = _result(submission, rubric, recording, criteria, clock)
             result = options.settled(graded.model_copy(update={"notes": notes_of(runs)}))
-            console = console_log(runs)
             write_reports(
-                result, results.new, console=console, rubric=rubric.rubric, keep_hidden=options.keep_hidden
+                result,
+                results.new,
+                console=console_log(runs),
+                rubric=rubric.rubric,
+                keep_hidden=options.keep_hidden,
+                figures=_figures(rubric, runs, result),
+                docs=rubric.docs,
             )
             results.commit()
     return result
@@ -165,6 +171,15 @@ def console_log(runs: dict[str, Run]) -> str:
             text = line.line.replace("\n", "\\n")  # a line is one, whatever a recording says
             lines.append(f"{(time_ns - run.start_ns) / 1e9:8.3f} {line.process} {line.stream}: {text}")
     return "".join(f"{line}\n" for line in lines)
+
+
+def _figures(rubric: LoadedRubric, runs: dict[str, Run], result: GradingResult) -> Figures | None:
+    """What the reports show beside the verdicts. A result without pictures is better than none."""
+    with suppress(Exception):
+        from grader.figures import figures_of  # noqa: PLC0415 - see LATER
+
+        return figures_of(rubric.rubric, runs, result.criteria)
+    return None
 
 
 class _Clock:

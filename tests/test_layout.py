@@ -34,12 +34,12 @@ ALLOWED = {
     "rubric": BASE | {"checks", "evidence", "instructor"},
     "judge": BASE | {"checks", "evidence", "rubric"},
     "figures": BASE | {"checks", "evidence.run", "evidence.events", "judge.facts", "judge.recordings", "rubric.model"},
-    "report": BASE | {"files", "judge.late", "rubric.model"},
+    "report": BASE | {"files", "judge.late", "judge.summary", "rubric.model"},
     "arena": BASE | {"admission", "evidence", "files", "package", "rubric.model", "temporary"},
     "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "pipeline": {
-        *BASE, "arena", "evidence", "faults", "files", "intake", "judge", "package", "recordings", "report", "results",
-        "rubric", "temporary"
+        *BASE, "arena", "evidence", "faults", "figures", "files", "intake", "judge", "package", "recordings", "report",
+        "results", "rubric", "temporary"
     },
     "authoring": {
         *BASE, "checks", "evidence", "intake", "package", "pipeline", "rubric", "temporary"
@@ -50,8 +50,8 @@ ALLOWED = {
     "gradebook": BASE | {"files", "report"},
     "similarity": BASE | {"evidence", "files", "intake", "report", "temporary"},
     "batch": {
-        *BASE, "evidence", "faults", "fetching", "files", "gradebook", "intake", "judge", "overrides", "pipeline",
-        "report", "results", "rubric", "temporary"
+        *BASE, "checks", "evidence", "faults", "fetching", "figures", "files", "gradebook", "intake", "judge",
+        "overrides", "pipeline", "report", "results", "rubric", "temporary"
     },
     "review": BASE | {
         "batch", "files", "gradebook", "intake", "overrides", "report", "results", "rubric", "temporary"

@@ -133,7 +133,7 @@ def _regraded(
     after = settler.settled(automatic, entry.id, handed_in, before)
     try:
         if after != before:
-            rewrite(folder.folder_of(entry), after, rubric.rubric)
+            rewrite(folder.folder_of(entry), after, rubric.rubric, rubric.docs)
     except GraderError as error:
         return Regraded(entry=entry, before=before, after=None, error=error.message)
     return Regraded(entry=entry, before=before, after=after, missing=judged.missing)

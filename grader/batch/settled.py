@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from grader.batch.judging import fitting_runs
+from grader.checks import CHECKS
+from grader.evidence.reader import load_evidence
+from grader.figures import figures_of
 from grader.judge.settle import settle, unsettled
+from grader.model.figure import Figures
 from grader.model.handed_in import HandedIn, Override
 from grader.model.result import GradingResult
 from grader.report.files import write_reports
@@ -45,9 +51,24 @@ class Settler:
         return self.settled(automatic, submission_id, handed_in, result)
 
 
-def rewrite(folder: Path, result: GradingResult, rubric: Rubric) -> None:
-    """Write the result's reports; the evidence that it was judged from stays. Raises as `Results` does."""
+def rewrite(
+    folder: Path, result: GradingResult, rubric: Rubric, docs: Mapping[str, Mapping[str, str]] | None = None
+) -> None:
+    """Write the result's reports; the evidence that it was judged from stays. Raises as `Results` does.
+
+    `docs` has the sections of the checks' docstrings; without them, those of the grader's own checks are taken.
+    """
     with Results(folder) as results:
-        write_reports(result, results.new, console="", rubric=rubric)
+        figures = _figures(folder / EVIDENCE, result, rubric)
+        docs = docs or {name: check.sections for name, check in CHECKS.items()}
+        write_reports(result, results.new, console="", rubric=rubric, figures=figures, docs=docs)
         (results.new / CONSOLE).unlink()
         results.commit(keep=(EVIDENCE, CONSOLE))
+
+
+def _figures(evidence: Path, result: GradingResult, rubric: Rubric) -> Figures | None:
+    """Drawn from the evidence again; None where there is none, or it cannot be read."""
+    with suppress(Exception):  # no mark hangs on a picture
+        runs = fitting_runs(rubric, load_evidence([evidence]))
+        return figures_of(rubric, runs, result.criteria)
+    return None

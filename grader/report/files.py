@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from grader.files import atomic_write
+from grader.model.figure import Figures
 from grader.model.result import GradingResult
 from grader.report.hidden import without_hidden
 from grader.report.junit import junit
@@ -17,16 +19,27 @@ CONSOLE_CHARS = 4_000_000
 
 
 def write_reports(
-    result: GradingResult, out_dir: Path, *, console: str, rubric: Rubric, keep_hidden: bool = True
+    result: GradingResult,
+    out_dir: Path,
+    *,
+    console: str,
+    rubric: Rubric,
+    keep_hidden: bool = True,
+    figures: Figures | None = None,
+    docs: Mapping[str, Mapping[str, str]] | None = None,
 ) -> tuple[Path, ...]:
-    """Write `result.json`, `report.md`, `junit.xml` and `console.log` into `out_dir`; gives their paths.
+    """Write `result.json`, `report.html`, `report.md`, `junit.xml` and `console.log` into `out_dir`; gives their paths.
 
-    Without `keep_hidden`, hidden criteria are left out and their number said. Raises OutputError.
+    Without `keep_hidden`, hidden criteria are left out and their number said. `docs` has of each check by name the
+    sections of its docstring. Raises OutputError.
     """
+    from grader.report.html import html_report  # noqa: PLC0415 - templates are slow to load, and needed here only
+
     shown = result if keep_hidden else without_hidden(result, rubric)
     hidden = len(result.criteria) - len(shown.criteria)
     files = {
         "result.json": result_bytes(shown),
+        "report.html": _encoded(html_report(shown, rubric, figures or Figures(), hidden=hidden, docs=docs)),
         "report.md": markdown_report(shown, rubric, hidden=hidden).encode(),
         "junit.xml": junit(shown),
         "console.log": _console(console).encode(),
@@ -34,6 +47,10 @@ def write_reports(
     for name, data in files.items():
         atomic_write(out_dir / name, data)
     return tuple(out_dir / name for name in files)
+
+
+def _encoded(text: str) -> bytes:
+    return text.encode("utf-8", "backslashreplace")
 
 
 def _console(text: str) -> str:

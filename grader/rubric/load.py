@@ -39,6 +39,11 @@ class LoadedRubric(Record):
             return known_checks(folder, {})
         return known_checks(folder, run_checks_file(folder.resolve() / self.rubric.checks, self.own).checks)
 
+    @property
+    def docs(self) -> dict[str, dict[str, str]]:
+        """Of each of these checks the sections of its docstring, for reports."""
+        return {name: check.sections for name, check in self.checks.items()}
+
 
 def load_rubric(name_or_path: str) -> LoadedRubric:
     """The rubric of that id (of those that come with the grader), or in that file.

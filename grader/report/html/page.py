@@ -1,0 +1,198 @@
+"""A student's report as records: what the templates put into words and order."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from markupsafe import Markup, escape
+
+from grader.model.figure import Figure, Figures
+from grader.model.result import CriterionResult, GradingResult
+from grader.model.verdict import FileCitation
+from grader.report.hidden import hidden_ids
+from grader.report.html.drawn import Drawer, Drawn, code_places
+from grader.report.html.words import MEANINGS, SIGNS, lost_words
+from grader.report.text import line
+from grader.report.view import Loss, ReportView, not_graded, places, points_of
+from grader.rubric.model import Rubric
+
+T = TypeVar("T")
+Docs = Mapping[str, Mapping[str, str]]
+"""Of each check by name the sections of its docstring, by their headings."""
+MATTERS, MEASURED, FIX = "Why it matters on a robot", "How it is measured", "How to fix"
+NOTHING = Markup()
+CODE = re.compile(r"`([^`]+)`")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Detail:
+    """How much there may be on a page: `text` characters in one text, `cards` in all."""
+
+    text: int = 1000
+    console: int = 120_000
+    cards: int = 300
+    figures: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Card:
+    """One criterion. `anchor` is its id on the page. `lost` says what it cost, with what it holds back."""
+
+    anchor: str
+    criterion: CriterionResult
+    hidden: bool
+    sign: str
+    meaning: str
+    points: str
+    lost: str = ""
+    why: Markup = NOTHING
+    how: Markup = NOTHING
+    fix: Markup = NOTHING
+    hint: Markup = NOTHING
+    where: Sequence[str] = ()
+    figures: Sequence[Drawn] = ()
+    blocked: Sequence[Card] = ()
+    alike: Sequence[Card] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ran:
+    """One scenario: what was printed, and who was joined with whom."""
+
+    anchor: str
+    name: str
+    title: str
+    graph: Drawn | None
+    console: Drawn | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Page:
+    """`lost`, `open` and `advice` are cards that stand for themselves, `rest` all other criteria, folded."""
+
+    lost: Sequence[Card]
+    open: Sequence[Card]
+    advice: Sequence[Card]
+    rest: Sequence[Card]
+    table: Sequence[Card]
+    ran: Sequence[Ran]
+    cut: int = 0
+
+
+class Maker:
+    """Makes the page of one result. What is shown in several places is made once."""
+
+    def __init__(
+        self, result: GradingResult, rubric: Rubric, figures: Figures, docs: Docs, detail: Detail
+    ) -> None:
+        self._result, self._rubric, self._docs, self._detail = result, rubric, docs, detail
+        self._figures = figures if detail.figures else Figures()
+        self._drawer = Drawer(console_chars=detail.console)
+        self._hidden = hidden_ids(rubric)
+        self._anchors = {c.id: f"criterion-{i}" for i, c in enumerate(result.criteria, start=1)}
+        self._room = detail.cards
+
+    def page(self, view: ReportView) -> Page:
+        whole = not not_graded(self._result)
+        lost = [self._loss(loss) for loss in self._first(view.lost if whole else ())]
+        still = [self._loss(loss) for loss in self._first(view.open if whole else ())]
+        advice = [self._card(criterion) for criterion in self._first(view.advice)]
+        shown = {card.criterion.id for card in (*lost, *still, *advice)}
+        others = [c for c in self._result.criteria if c.id not in shown] if whole else []
+        rest = [self._card(criterion) for criterion in self._first(others)]
+        told = shown | {card.criterion.id for card in rest}
+        return Page(
+            lost=lost,
+            open=still,
+            advice=advice,
+            rest=rest,
+            table=[self._short(c, linked=c.id in told) for c in self._result.criteria],
+            ran=list(self._ran()),
+            cut=len(self._result.criteria) - len(told) if whole else 0,
+        )
+
+    def _first(self, items: Sequence[T]) -> Sequence[T]:
+        kept = items[: self._room]
+        self._room -= len(kept)
+        return kept
+
+    def _loss(self, loss: Loss) -> Card:
+        blocked = sum(c.max_points - c.points for c in loss.blocked)
+        return replace(
+            self._card(loss.criterion, self._with_graph(loss.criterion)),
+            lost=lost_words(loss.criterion, blocked),
+            blocked=[self._short(c) for c in loss.blocked],
+            alike=[self._short(c) for c in loss.alike],
+        )
+
+    def _with_graph(self, criterion: CriterionResult) -> list[Figure]:
+        """What was lost in a run, and has no plot, shows who was joined with whom in it."""
+        figures = list(self._figures.by_criterion.get(criterion.id, ()))
+        graph = self._figures.graphs.get(criterion.scenario or "")
+        if graph and graph.nodes and all(figure.kind == "code" for figure in figures):
+            figures.append(graph)
+        return figures
+
+    def _card(self, criterion: CriterionResult, figures: Sequence[Figure] | None = None) -> Card:
+        own = self._figures.by_criterion.get(criterion.id, ()) if figures is None else figures
+        docs = self._docs.get(criterion.check, {})
+        return replace(
+            self._short(criterion),
+            why=self._prose(docs.get(MATTERS, "")),
+            how=self._prose(docs.get(MEASURED, "")),
+            fix=self._prose(docs.get(FIX, "")),
+            hint=self._prose(criterion.hint),
+            where=self._where(criterion),
+            figures=[self._drawer.draw(figure) for figure in own],
+        )
+
+    def _short(self, criterion: CriterionResult, *, linked: bool = True) -> Card:
+        return Card(
+            anchor=self._anchors[criterion.id] if linked else "",
+            criterion=criterion,
+            hidden=criterion.id in self._hidden,
+            sign=SIGNS[criterion.status],
+            meaning=MEANINGS[criterion.status],
+            points=points_of(criterion),
+        )
+
+    def _where(self, criterion: CriterionResult) -> list[str]:
+        """Places that no code beside them shows."""
+        shown = code_places(self._figures.by_criterion.get(criterion.id, ()))
+        cited = criterion.citations
+        return [
+            place
+            for place, citation in zip(places(criterion), cited, strict=False)
+            if not (isinstance(citation, FileCitation) and (citation.file, citation.line) in shown)
+        ]
+
+    def _prose(self, text: str) -> Markup:
+        return prose(line(text.replace("\n\n", " "), self._detail.text))
+
+    def _ran(self) -> Iterator[Ran]:
+        titles = {name: scenario.title for name, scenario in self._rubric.scenarios.items()}
+        names = dict.fromkeys(["package", *titles, *self._figures.graphs, *self._figures.consoles])
+        used = {c.scenario for c in self._result.criteria} | {"package"}
+        for i, name in enumerate((n for n in names if n in used or n not in titles), start=1):
+            graph, console = self._figures.graphs.get(name), self._figures.consoles.get(name)
+            graph = graph if graph and graph.nodes else None
+            console = console if console and console.lines else None
+            if graph or console:
+                yield Ran(
+                    anchor=f"run-{i}",
+                    name=name,
+                    title="The build" if name == "package" else titles.get(name, name),
+                    graph=self._drawer.draw(graph) if graph else None,
+                    console=self._drawer.draw(console) if console else None,
+                )
+
+
+def prose(text: str) -> Markup:
+    """A text with what stands between backticks as code."""
+    parts = CODE.split(text)
+    return Markup("").join(
+        Markup("<code>{}</code>").format(part) if i % 2 else escape(part) for i, part in enumerate(parts)
+    )

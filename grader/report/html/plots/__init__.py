@@ -1,0 +1,1 @@
+"""Plots as SVG, drawn here: no script is needed to see them."""

@@ -1,0 +1,82 @@
+"""What every page shares: templates in which nobody's text becomes markup, the look, and what a page may load."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import DictLoader, Environment, StrictUndefined, pass_context
+from jinja2.runtime import Context
+from markupsafe import Markup
+
+from grader.report.text import line, number
+
+LIMIT = 1000
+SUFFIX = ".html"
+
+
+@cache
+def environment() -> Environment:
+    """The templates. A text that a template puts out is one visible line of at most `limit` characters, escaped."""
+    made = Environment(
+        autoescape=True,
+        finalize=_shown,
+        loader=DictLoader(_templates()),
+        lstrip_blocks=True,
+        trim_blocks=True,
+        undefined=StrictUndefined,
+    )
+    made.filters["number"] = number
+    return made
+
+
+def own_file(name: str) -> str:
+    """The text of a file beside this one."""
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+@cache
+def style() -> Markup:
+    """The look of all pages, for a `<style>`."""
+    return Markup(_unindented(own_file("style.css")))  # noqa: S704 - ours
+
+
+@cache
+def script(name: str) -> Markup:
+    """A script of ours, for a `<script>`; `policy` has to name it."""
+    return Markup(own_file(name))  # noqa: S704 - ours
+
+
+def policy(*scripts: str) -> str:
+    """The Content-Security-Policy of a page that loads nothing and runs these scripts alone."""
+    digests = (base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in scripts)
+    allowed = " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
+    return (
+        f"default-src 'none'; style-src 'unsafe-inline'; script-src {allowed}; "
+        "img-src data:; base-uri 'none'; form-action 'none'"
+    )
+
+
+def _templates() -> dict[str, str]:
+    folder = files(__package__).joinpath("templates")
+    return {
+        file.name: _unindented(file.read_text(encoding="utf-8"))
+        for file in folder.iterdir()
+        if file.name.endswith(SUFFIX)
+    }
+
+
+def _unindented(text: str) -> str:
+    """Without the blanks that lines begin with: no page of ours needs them."""
+    return "\n".join(row.strip() for row in text.splitlines())
+
+
+@pass_context
+def _shown(context: Context, value: Any) -> Any:  # noqa: ANN401 - whatever a template puts out
+    """Foreign text made visible. Markup that was drawn here and what is no text stay as they are."""
+    if isinstance(value, str) and not isinstance(value, Markup):
+        return line(value, context.get("limit", LIMIT))
+    return value

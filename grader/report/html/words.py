@@ -1,0 +1,123 @@
+"""The sentences of a student's report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from grader.errors import GraderError
+from grader.judge.summary import passed
+from grader.model.result import CriterionResult, GradingResult
+from grader.model.verdict import Status
+from grader.report.text import number
+from grader.report.view import ReportView, not_graded
+from grader.rubric.model import Rubric
+
+SIGNS = {
+    Status.PASS: "✓",
+    Status.PARTIAL: "◐",
+    Status.FAIL: "✗",
+    Status.BLOCKED: "⊘",
+    Status.INCONCLUSIVE: "?",
+    Status.ERROR: "!",
+    Status.MANUAL: "•",
+}
+MEANINGS = {
+    Status.PASS: "reached",
+    Status.PARTIAL: "partly reached",
+    Status.FAIL: "not reached",
+    Status.BLOCKED: "could not be judged because something before it was not reached",
+    Status.INCONCLUSIVE: "could not be told this time; no points are lost for good",
+    Status.ERROR: "the grader could not judge it; no points are lost for good",
+    Status.MANUAL: "a person gives these points",
+}
+FAULTS = {
+    "submission": "This is about what was handed in: mend it and hand it in again.",
+    "machine": "This is the fault of the machine that graded, not yours. No points are lost for good: "
+    "it only has to be graded again.",
+    "grader": "This is the grader's own fault, not yours. No points are lost for good: "
+    "your teacher can have it graded again.",
+}
+
+
+def blame(kind: str) -> str:
+    """Whose fault an error of this kind is: `submission`, `machine` or `grader`."""
+    return next((found.blame for found in _kinds(GraderError) if found.kind == kind), "grader")
+
+
+def _kinds(error: type[GraderError]) -> Iterator[type[GraderError]]:
+    yield error
+    for below in error.__subclasses__():
+        yield from _kinds(below)
+
+
+def points(value: float) -> str:
+    """`1 point`, `2.5 points`."""
+    return f"{number(value)} {'point' if value == 1 else 'points'}"
+
+
+def count(many: int, one: str, more: str = "") -> str:
+    """`1 thing`, `3 things`."""
+    return f"{many} {one if many == 1 else more or one + 's'}"
+
+
+def verdict(result: GradingResult, rubric: Rubric, hidden: int) -> tuple[str, str]:
+    """Whether it passed as a status of the page and in a few words."""
+    if not_graded(result):
+        return "error", "Not graded"
+    if not hidden and passed(rubric, result):
+        return "pass", "Passed"
+    if result.status != "graded":
+        return "inconclusive", "Not settled yet"
+    if hidden:
+        reached = all(c.status is Status.PASS for c in result.criteria if c.max_points > 0)
+        return ("pass", "So far, so good") if reached else ("partial", "There is something to mend")
+    return "fail", "Not passed yet"
+
+
+def pass_mark(result: GradingResult, rubric: Rubric, hidden: int) -> str:
+    """What it takes to pass."""
+    if rubric.pass_mark is None:
+        return "To pass, every criterion that counts has to be reached."
+    mark = f"To pass, it takes {points(rubric.pass_mark)} of {number(rubric.max_points)}"
+    if hidden:
+        return f"{mark}, those of criteria that run at grading included."
+    missing = rubric.pass_mark - result.points
+    return (
+        f"{mark}: {points(missing)} {'is' if missing == 1 else 'are'} missing." if missing > 0 else f"{mark}."
+    )
+
+
+def left_out(result: GradingResult, hidden: int) -> str:
+    """`12 visible checks passed; 5 more run at grading.`; empty where nothing is left out."""
+    if not hidden:
+        return ""
+    good, many = sum(c.status is Status.PASS for c in result.criteria), len(result.criteria)
+    seen = count(many, "visible check")
+    said = f"{seen} passed" if good == many else f"{good} of {seen} passed"
+    return f"{said}; {hidden} more {'runs' if hidden == 1 else 'run'} at grading."
+
+
+def in_short(result: GradingResult, view: ReportView) -> str:
+    """What was lost, in one or two sentences."""
+    lost = sum(loss.points for loss in view.lost)
+    if not_graded(result):
+        return "Nothing could be judged, so nothing is decided yet."
+    if lost <= 0 and not view.open:
+        return "Nothing was lost: every criterion that counts is reached. Well done!"
+    said = ["Nothing was lost."]
+    if lost > 0:
+        costs = "costs" if len(view.lost) == 1 else "cost"
+        said = [f"{count(len(view.lost), 'thing')} {costs} you {points(lost)}."]
+    if len(view.lost) > 1:
+        said.append(f"The first one alone is worth {points(view.lost[0].points)}.")
+    if view.open:
+        still = sum(loss.points for loss in view.open)
+        said.append(f"{points(still)} {'is' if still == 1 else 'are'} still open.")
+    return " ".join(said)
+
+
+def lost_words(criterion: CriterionResult, blocked: float) -> str:
+    """`10 points lost, and 25 more in what it holds back`."""
+    own = criterion.max_points - criterion.points
+    said = f"{points(own)} lost" if own else "costs nothing itself"
+    return f"{said}, and {number(blocked)} more in what it holds back" if blocked else said
