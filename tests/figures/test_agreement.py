@@ -64,6 +64,8 @@ def test_counters(example: Example) -> None:
     (figure,) = (f for f in figures if isinstance(f, CounterFigure))
     if result.status is Status.PASS:
         assert figure.wrong == ()
+    if example.check == "counter-start":
+        assert bool(figure.wrong) == (result.status is Status.FAIL)
     cited = [c for c in result.citations if isinstance(c, EvidenceCitation) and c.to_ns is not None]
     at_s = round(((cited[0].to_ns or 0) - run.start_ns) / 1e9, 6)
     names_a_step = "after " in result.message or example.check == "counter-start"
