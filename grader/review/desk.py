@@ -11,14 +11,16 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from grader.batch.flow import alone, ids_of, write_books
+from grader.batch.flow import GRADEBOOK, alone, ids_of, write_books
 from grader.batch.folder import BatchFolder, open_batch, read_result, write_run
 from grader.batch.settled import Settler, rewrite
 from grader.errors import Busy, GraderError, UsageError
 from grader.files import unwritable
+from grader.model.batch import State
 from grader.model.handed_in import Override
 from grader.model.result import GradingResult
 from grader.overrides import FILE, Overrides, read_overrides, write_override
+from grader.results import RESULT
 from grader.review.follower import Follower, Pace
 from grader.review.submissions import Item, Stamp, Submissions, stamp_of
 from grader.rubric.load import LoadedRubric, load_rubric
@@ -62,12 +64,14 @@ class Desk:
 
     def __init__(self, path: Path, rubric: LoadedRubric, pace: Pace) -> None:
         self.path, self.rubric = path, rubric
+        self._docs = rubric.docs
         self.submissions = Submissions(path)
         self.follower = Follower(self._follow, pace)
         self._saving, self._writing, self._guard = threading.Lock(), threading.Lock(), threading.Lock()
         self._overrides: tuple[tuple[Stamp, tuple[str, ...]], Overrides] | None = None
         self._pending: set[str] = set()
         self._caught_up = False
+        self._books_behind = False
 
     def start(self) -> None:
         """Begin to follow; what was decided while nobody reviewed is looked at first."""
@@ -106,6 +110,7 @@ class Desk:
                 found = _with(found, name, criterion, override)
         with self._guard:
             self._pending.add(item.key)
+            self._books_behind = True
         waits = self._settled_soon(item, found)
         self.follower.changed()
         return Saved(result=self.result(item, found), waits=waits)
@@ -163,7 +168,7 @@ class Desk:
         if result is not None and result.rubric.digest == self.rubric.digest:
             now = Settler(self.rubric.rubric, overrides).again(result, item.entry.id, None)
             if now != result:
-                rewrite(batch.folder_of(item.entry), now, self.rubric.rubric, self.rubric.docs)
+                rewrite(batch.folder_of(item.entry), now, self.rubric.rubric, self._docs)
         with self._guard:
             self._pending.discard(item.key)
 
@@ -171,24 +176,39 @@ class Desk:
         """Settle what is not settled yet, and write the class's files."""
         overrides = self.overrides()
         if not self._caught_up:
-            behind = set(self._all_behind(overrides))
-            with self._guard:
-                self._pending |= behind
-            self._caught_up = True
-            if not behind:
-                return
+            self._catch_up(overrides)
+        if not self._books_behind:
+            return
         with self._writing, alone(self.path):
             with self._guard:
                 pending = sorted(self._pending)
-            for item in filter(None, map(self.submissions.item, pending)):
-                self._settle(item, overrides)
-            self._write_books(self.submissions.batch())
+                self._books_behind = False
+            try:
+                for item in filter(None, map(self.submissions.item, pending)):
+                    self._settle(item, overrides)
+                self._write_books(self.submissions.batch())
+            except BaseException:
+                self._books_behind = True
+                raise
 
     def _write_books(self, batch: BatchFolder) -> None:
         run = batch.run
-        state = "interrupted" if run.state == "running" else run.state
+        state: State = "interrupted" if run.state == "running" else run.state
         written = write_books(batch, self.rubric.rubric, state, run.counts.kept)
         write_run(self.path, written.run.model_copy(update={"ended_at": run.ended_at}))
+
+    def _catch_up(self, overrides: Overrides) -> None:
+        """Find what was decided, or settled, while nobody reviewed or just before a review was killed."""
+        behind = set(self._all_behind(overrides))
+        written = stamp_of(self.path / GRADEBOOK)
+        newest = max(
+            ((stamp_of(self.path / item.key / RESULT) or (0,))[0] for item in self.submissions.items()),
+            default=0,
+        )
+        with self._guard:
+            self._pending |= behind
+            self._books_behind |= bool(behind) or written is None or newest > written[0]
+        self._caught_up = True
 
     def _all_behind(self, overrides: Overrides) -> Iterator[str]:
         for item in self.submissions.items():

@@ -9,7 +9,7 @@ from datetime import date
 from grader.model.handed_in import AUTHOR_CHARS, COMMENT_CHARS, Override
 from grader.report.text import number
 
-POINTS = re.compile(r"\d{1,9}(?:[.,]\d{0,9})?|[.,]\d{1,9}")
+POINTS = re.compile(r"\d{1,9}(?:[.,]\d{0,9})?|[.,]\d{1,9}", re.ASCII)
 
 
 class Wrong(Exception):

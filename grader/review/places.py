@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from grader.review.submissions import ALL, FILTERS, Item
 
@@ -28,7 +29,7 @@ class Place:
     position: int = 0
 
     @property
-    def kept(self) -> dict[str, str]:
+    def kept(self) -> dict[str, Any]:
         """What addresses carry so that one stays in the same list."""
         given = {"show": "" if self.kind == ALL else self.kind, "q": self.q}
         return {name: value for name, value in given.items() if value}

@@ -6,13 +6,14 @@ import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from grader.batch.folder import RUN, BatchFolder, open_batch
 from grader.gradebook import Row
 from grader.intake import safe_name
 from grader.model.batch import MISSING, ROSTER
 from grader.model.result import GradingResult
-from grader.model.roster import Entry, RosterFault
+from grader.model.roster import Entry
 from grader.model.verdict import Status
 from grader.results import RESULT
 
@@ -97,18 +98,21 @@ class Submissions:
 
 def _each(batch: BatchFolder) -> Iterator[BatchFolder]:
     """The batch as if it had one submission only, for each of them."""
+    run = batch.run
+    ones: list[tuple[str, dict[str, Any]]] = [
+        *((entry.id, {"entries": (entry,), "faults": ()}) for entry in run.entries),
+        *((fault.id, {"entries": (), "faults": (fault,)}) for fault in run.faults if fault.id is not None),
+    ]
     known: set[str] = set()
-    for who in (*batch.run.entries, *batch.run.faults):
-        key = safe_name(who.id).casefold() if who.id is not None else ""
-        if key and key not in known:
-            known.add(key)
-            entries, faults = ((who,), ()) if isinstance(who, Entry) else ((), (who,))
-            yield BatchFolder(batch.path, batch.run.model_copy(update={"entries": entries, "faults": faults}))
+    for name, update in ones:
+        if safe_name(name).casefold() not in known:
+            known.add(safe_name(name).casefold())
+            yield BatchFolder(batch.path, run.model_copy(update=update))
 
 
 def _key(one: BatchFolder) -> str:
-    who: Entry | RosterFault = (*one.run.entries, *one.run.faults)[0]
-    return safe_name(who.id or "")
+    names = [*(entry.id for entry in one.run.entries), *(fault.id or "" for fault in one.run.faults)]
+    return safe_name(names[0])
 
 
 def item_of(row: Row) -> Item:
