@@ -58,8 +58,8 @@ ALLOWED = {
     },
     "cluster": BASE | {"arena.ros_env", "batch.child", "batch.job", "intake", "results", "rubric", "temporary"},
     "watching": {
-        *BASE, "arena.asynchronous", "arena.workspace", "faults", "intake", "package", "pipeline", "report", "rubric",
-        "temporary"
+        *BASE, "arena.asynchronous", "arena.workspace", "faults", "intake", "package", "pipeline", "report", "results",
+        "rubric", "temporary"
     },
     "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
     "cli": {

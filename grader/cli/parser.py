@@ -99,6 +99,9 @@ def _grading(add: _Adder) -> None:
     check.add_argument("path", metavar="PATH", nargs="?", default=".", help="default: this folder")
     _rubric(check, required=False)
     check.add_argument("--static", action="store_true", help="look at the files only, run nothing")
+    check.add_argument(
+        "--watch", action="store_true", help="stay, and run again what a saved file concerns, until Ctrl-C"
+    )
     _out(check, "keep the results in DIR/<submission id>/ (default: they are only shown)")
     _sandbox(check)
     _json(check)
