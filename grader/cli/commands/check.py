@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,14 +10,18 @@ from typing import TYPE_CHECKING
 from grader import pipeline
 from grader.cli.choice import choose
 from grader.cli.display import open_progress
+from grader.cli.outcome import exit_code, settled
 from grader.cli.show import show
-from grader.errors import ExitCode
+from grader.errors import ExitCode, UsageError
 from grader.files import check_writable
+from grader.model.result import GradingResult
 from grader.report.hidden import hidden_ids, without_hidden
+from grader.rubric.load import LoadedRubric
 from grader.temporary import temporary_folder
 
 if TYPE_CHECKING:
     from grader.arena.sandbox import Mode
+    from grader.watching.loop import Shown
 
 
 def run(
@@ -24,17 +29,27 @@ def run(
     path: str = ".",
     rubric: str | None = None,
     static: bool = False,
+    watch: bool = False,
     out: Path | None = None,
     sandbox: Mode = "auto",
     as_json: bool = False,
 ) -> ExitCode:
-    """Grade the package at `path` with hidden criteria left out; with `static`, from its files alone."""
+    """Grade the package at `path` with hidden criteria left out; with `static`, from its files alone.
+
+    With `watch`, again whenever a file of it is saved, until Ctrl-C.
+    """
     loaded, source = choose(Path(path), rubric)
+    if watch and not Path(source).is_dir():
+        raise UsageError(
+            f"{path} is no folder, so nothing is saved in it", hint="watch your package's folder"
+        )
     if out is not None:
         check_writable(out)
     options = pipeline.GradeOptions(
         sandbox=sandbox, submission_id=None, static_only=static, keep_hidden=False
     )
+    if watch:
+        return _watch(str(Path(source).resolve()), loaded, options, out=out, as_json=as_json)
     with ExitStack() as stack:
         folder = out or stack.enter_context(temporary_folder("check"))
         with open_progress(early=not (as_json or static)) as progress:
@@ -43,3 +58,48 @@ def run(
         kept = folder / result.submission.id if out is not None else None
         hidden = len(hidden_ids(loaded.rubric))
         return show(shown, loaded.rubric, kept, hidden=hidden, as_json=as_json, static=static)
+
+
+def _watch(
+    source: str, rubric: LoadedRubric, options: pipeline.GradeOptions, *, out: Path | None, as_json: bool
+) -> ExitCode:
+    from grader.watching.grading import Grading  # noqa: PLC0415 - nobody else needs what this loads
+    from grader.watching.kept import Kept  # noqa: PLC0415
+    from grader.watching.loop import Watched, watch  # noqa: PLC0415
+    from grader.watching.picture import take_picture  # noqa: PLC0415
+    from grader.watching.saves import WatchedFolders  # noqa: PLC0415
+
+    static = options.static_only
+
+    def code(result: GradingResult) -> ExitCode:
+        return exit_code(settled(result.criteria) if static else result.criteria, rubric.rubric)
+
+    without = out.resolve() if out is not None else None
+    with ExitStack() as stack:
+        grading = Grading(
+            source=source,
+            rubric=rubric,
+            out=without or stack.enter_context(temporary_folder("check")),
+            options=options,
+            progress=lambda first: open_progress(early=first and not (as_json or static)),
+            code=code,
+        )
+        watched = Watched(
+            folder=Path(source),
+            look=lambda: take_picture(source, rubric.rubric.package, without=without),
+            grade=grading,
+            without=without,
+            runs=not static,
+        )
+        kept = Kept(stack.enter_context(temporary_folder("check")), rubric.rubric)
+        saves = stack.enter_context(WatchedFolders())
+        return watch(watched, saves, kept, _shown(Path(source), rubric, static=static, as_json=as_json))
+
+
+def _shown(folder: Path, rubric: LoadedRubric, *, static: bool, as_json: bool) -> Shown:
+    from grader.watching.shown import JsonShown, ScreenShown  # noqa: PLC0415 - as above
+
+    if as_json:
+        return JsonShown(sys.stdout)
+    hidden = len(hidden_ids(rubric.rubric))
+    return ScreenShown(folder.name, rubric.rubric, sys.stdout, hidden=hidden, static=static)
