@@ -1,4 +1,8 @@
-"""`junit.xml`: one test case a criterion, for whatever reads JUnit (GitLab, Jenkins, GitHub's reporters)."""
+"""`junit.xml`: one test case a criterion, for whatever reads JUnit (GitLab, Jenkins, GitHub's reporters).
+
+It keeps to the schema of Jenkins' xUnit plugin (`junit-10.xsd`), which knows no properties of a single case: what a
+case is worth stands in its output, and for programs among the suite's properties.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,7 @@ from grader.model.verdict import FileCitation, Status
 from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
 from grader.report.settled import automatic_words, decision, look_again
 from grader.report.text import line, number, text_limit, visible
-from grader.report.view import places
+from grader.report.view import places, points_of
 
 OUTCOME = {
     Status.PASS: None,
@@ -25,7 +29,7 @@ LIMIT = 2000
 
 
 def junit(result: GradingResult) -> bytes:
-    """The file's bytes, UTF-8. Points are properties of each case, and of the suite."""
+    """The file's bytes, UTF-8. Among the suite's properties are `points`, `max_points` and each `points:<id>`."""
     return _Writer(text_limit(len(result.criteria), LIMIT)).document(result)
 
 
@@ -44,7 +48,8 @@ class _Writer:
             if result.late
             else {}
         )
-        self._properties(suite, {**about, **points, **late})
+        each = {f"points:{c.id}": points_of(c) for c in result.criteria}
+        self._properties(suite, {**about, **points, **late, **each})
         decided = {override.criterion: override for override in result.overrides}
         for criterion in result.criteria:
             suite.append(self._case(criterion, result.rubric.id, decided.get(criterion.id)))
@@ -52,7 +57,9 @@ class _Writer:
             self._error(suite, result.rubric.id, result.error)
         if result.notes:
             etree.SubElement(suite, "system-out").text = self._noticed(result.notes)
-        root = etree.Element("testsuites", _counts(result))
+        counts = _counts(result)
+        del counts["skipped"]  # the schema has it for suites only
+        root = etree.Element("testsuites", counts)
         root.append(suite)
         return etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
 
@@ -66,12 +73,11 @@ class _Writer:
             if cited.line is not None:
                 attributes["line"] = str(cited.line)
         case = etree.Element("testcase", attributes)
-        points = {"points": number(criterion.points), "max_points": number(criterion.max_points)}
-        title = {"title": criterion.title, "status": criterion.status.value}
-        self._properties(case, {**title, **points, **_decided(criterion, override)})
         outcome = OUTCOME[criterion.status]
         if outcome is not None:
             self._outcome(case, outcome, criterion.status.value, criterion.message, self._details(criterion))
+        about = {"title": criterion.title, "status": criterion.status.value, "points": points_of(criterion)}
+        etree.SubElement(case, "system-out").text = self._lines({**about, **_decided(criterion, override)})
         return case
 
     def _error(self, suite: etree._Element, rubric_id: str, error: ErrorInfo) -> None:
@@ -87,8 +93,11 @@ class _Writer:
             "see": criterion.reproduce,
             "where": ", ".join(places(criterion)),
         }
-        lines = [f"{name}: {self._text(value)}" for name, value in rows.items() if value]
-        return "\n".join([self._text(criterion.message), *lines])
+        return "\n".join([self._text(criterion.message), self._lines(rows)]).rstrip("\n")
+
+    def _lines(self, rows: dict[str, str]) -> str:
+        """`measured: 5 Hz`, a line each."""
+        return "\n".join(f"{name}: {self._text(value)}" for name, value in rows.items() if value)
 
     def _noticed(self, notes: tuple[Note, ...]) -> str:
         lines = [f"{self._text(place(note))}: {self._text(words(note))}" for note in notes]
@@ -104,7 +113,7 @@ class _Writer:
     def _properties(self, parent: etree._Element, values: dict[str, str]) -> None:
         properties = etree.SubElement(parent, "properties")
         for name, value in values.items():
-            etree.SubElement(properties, "property", name=name, value=self._text(value))
+            etree.SubElement(properties, "property", name=self._text(name), value=self._text(value))
 
     def _text(self, text: str) -> str:
         return line(text, self._limit)

@@ -1,93 +1,145 @@
-"""`report.md`: points first, then what was lost, then everything."""
+"""`report.md`: points and what was lost in a line each; details folded. For a file, a comment, a step's summary."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
 
+from grader.model.figure import Figures, GraphFigure
 from grader.model.result import CriterionResult, GradingResult, Note
 from grader.report import noticed
+from grader.report.mermaid import mermaid
 from grader.report.settled import TITLE, automatic_words, decided, decision, late_words, look_again
-from grader.report.text import line, markdown, markdown_code, number, text_limit
+from grader.report.summary import NOT_SETTLED, verdict_words, visible_words
+from grader.report.text import line, markdown, markdown_code, number
 from grader.report.view import Loss, arrange, not_graded, places, points_of
 from grader.rubric.model import Rubric
 
-LIMIT = 1000
+BYTES_MAX = 60_000
+"""A comment on GitHub has 65,536 characters, a step's summary 1 MiB."""
+GRAPHS_MAX = 3
+SHORT_CHARS = 300
+T = TypeVar("T")
 
 
-def markdown_report(result: GradingResult, rubric: Rubric, *, hidden: int = 0) -> str:
-    """The report as GitHub-flavoured Markdown. `hidden` is how many criteria are left out of it."""
-    return _Writer(text_limit(len(result.criteria), LIMIT)).report(result, rubric, hidden)
+@dataclass(frozen=True, kw_only=True)
+class Detail:
+    """How long a text may be, how many entries a list has, and what is there at all."""
+
+    text: int
+    entries: int = 300
+    graphs: bool = True
+    folded: bool = True
+
+
+DETAILS = (
+    Detail(text=1000),
+    Detail(text=400),
+    Detail(text=200, graphs=False),
+    Detail(text=100, graphs=False, entries=150),
+    Detail(text=100, graphs=False, entries=60, folded=False),
+    Detail(text=60, graphs=False, entries=15, folded=False),
+)
+
+
+def markdown_report(
+    result: GradingResult, rubric: Rubric, *, hidden: int = 0, figures: Figures | None = None
+) -> str:
+    """The report as GitHub's and GitLab's Markdown, at most 60 kB. `hidden` is how many criteria are left out of it.
+
+    Of a result with very long texts, less is said of each, and in the end the details are left out.
+    """
+    graphs = figures.graphs if figures else {}
+    text = ""
+    for detail in DETAILS:
+        text = _Writer(detail).report(result, rubric, hidden, graphs)
+        if len(text.encode()) <= BYTES_MAX:
+            break
+    return text
 
 
 class _Writer:
-    """`limit` is how long a text may be. Whatever is not the template's own goes through `_text` or `_code`."""
+    """Whatever is not the template's own goes through `_text` or `_code`. HTML has nothing but our own words."""
 
-    def __init__(self, limit: int) -> None:
-        self._limit = limit
+    def __init__(self, detail: Detail) -> None:
+        self._detail = detail
 
-    def report(self, result: GradingResult, rubric: Rubric, hidden: int) -> str:
+    def report(
+        self, result: GradingResult, rubric: Rubric, hidden: int, graphs: dict[str, GraphFigure]
+    ) -> str:
         view = arrange(result, rubric)
-        lines = [*self._head(result, rubric, hidden)]
-        lines += self._decided(result)
-        if not not_graded(result):
-            lines += self._losses("What was lost", view.lost)
-            lines += self._losses("What is still open", view.open)
-        lines += self._advice(view.advice)
-        lines += self._noticed(result.notes)
-        lines += self._table(result.criteria)
+        lost, still = ((), ()) if not_graded(result) else (view.lost, view.open)
+        lines = [*self._head(result, rubric, hidden), *self._decided(result)]
+        lines += self._listed("What was lost", lost)
+        lines += self._listed("What is still open", still)
+        if self._detail.folded:
+            told = [row for loss in (*lost, *still) for row in self._told(loss)]
+            lines += self._folded("Details, and how to mend it", told)
+            lines += self._folded(_counted("Advice, costs nothing", view.advice), self._advice(view.advice))
+            lines += self._folded(_counted(noticed.TITLE, result.notes), self._noticed(result.notes))
+            lines += self._folded("Nodes and topics", self._graphs(graphs) if self._detail.graphs else ())
+            lines += self._folded(_counted("All criteria", result.criteria), self._table(result.criteria))
+        else:
+            lines += ["The details are too long for this form: they are in the other reports.", ""]
         lines += self._foot(result)
         return "\n".join(lines) + "\n"
 
     def _head(self, result: GradingResult, rubric: Rubric, hidden: int) -> Iterator[str]:
         submission = result.submission
         graded = f"{number(result.points)} of {number(result.max_points)} points"
-        yield f"# {'Not graded' if not_graded(result) else graded}"
-        yield ""
+        yield from (f"# {'Not graded' if not_graded(result) else graded}", "")
         for words in late_words(result):
             yield from (self._text(words), "")
         if result.error is not None:
             yield from ([] if not_graded(result) else ["It could not be graded automatically:", ""])
             yield from (self._text(result.error.message), "", self._text(result.error.hint), "")
+        if result.status == "inconclusive":
+            yield from (f"**Not settled yet:** {NOT_SETTLED}", "")
+        for words in (verdict_words(result, rubric, hidden), visible_words(result, hidden)):
+            yield from (words, "") if words else ()
         version = self._text(result.rubric.version)
-        yield f"{self._text(rubric.title)} ({self._code(result.rubric.id)}, version {version})"
-        yield ""
+        yield from (
+            f"{self._text(rubric.title)} ({self._code(result.rubric.id)}, version {version})",
+            "",
+        )
         commit = f", commit {self._code(submission.commit[:12])}" if submission.commit else ""
         kind = f", package {self._code(submission.package)}" if submission.package else ", a recording"
         yield f"Submission {self._code(submission.id)}{kind if result.error is None else ''}{commit}."
         yield ""
-        if result.status == "inconclusive":
-            yield "**Not settled yet:** some criteria could not be judged; no points are lost for good."
-            yield ""
-        if hidden:
-            yield f"{hidden} hidden {'criterion is' if hidden == 1 else 'criteria are'} not part of this report."
-            yield ""
 
     def _decided(self, result: GradingResult) -> Iterator[str]:
         found = decided(result)
         if not found:
             return
-        yield f"## {TITLE}"
-        yield ""
-        for override, criterion in found:
+        yield from (f"## {TITLE}", "")
+        for override, criterion in self._first(found):
             yield f"- {self._code(criterion.id)}: {points_of(criterion)} {self._text(decision(override))}"
             yield f"  - The check says: {self._text(automatic_words(override, criterion))}"
             again = look_again(override, criterion)
             yield from [f"  - **{self._text(again)}**"] if again else []
+        yield from self._more(found)
         yield ""
 
-    def _losses(self, title: str, losses: tuple[Loss, ...]) -> Iterator[str]:
+    def _listed(self, title: str, losses: tuple[Loss, ...]) -> Iterator[str]:
+        """A line each: what it is, what it cost, why."""
         if not losses:
             return
-        yield f"## {title}"
+        yield from (f"## {title}", "")
+        for loss in self._first(losses):
+            c = loss.criterion
+            others = sum(other.max_points - other.points for other in (*loss.blocked, *loss.alike))
+            more = f", and {number(others)} more points with it" if others else ""
+            words = markdown(line(c.message or c.title, min(SHORT_CHARS, self._detail.text)))
+            yield f"- {self._code(c.id)}: {points_of(c)}{more}, {c.status.value}: {words}"
+        yield from self._more(losses)
         yield ""
-        for loss in losses:
-            criterion = loss.criterion
-            yield f"### {self._code(criterion.id)}: {points_of(criterion)}, {criterion.status.value}"
-            yield ""
-            yield self._text(criterion.message) or self._text(criterion.title)
-            yield ""
-            details = [*self._details(criterion), *self._blocked(loss)]
-            yield from ([*details, ""] if details else [])
+
+    def _told(self, loss: Loss) -> Iterator[str]:
+        criterion = loss.criterion
+        yield from (f"### {self._code(criterion.id)}: {points_of(criterion)}, {criterion.status.value}", "")
+        details = [*self._details(criterion), *self._blocked(loss)]
+        yield from (*(details or [self._text(criterion.title)]), "")
 
     def _details(self, criterion: CriterionResult) -> Iterator[str]:
         rows = {"Measured": criterion.measured, "Expected": criterion.expected, "Hint": criterion.hint}
@@ -107,32 +159,35 @@ class _Writer:
         return ", ".join(f"{self._code(c.id)} ({points_of(c)})" for c in criteria)
 
     def _advice(self, criteria: tuple[CriterionResult, ...]) -> Iterator[str]:
-        if not criteria:
-            return
-        yield "## Advice, costs nothing"
-        yield ""
-        for criterion in criteria:
+        for criterion in self._first(criteria):
             hint = f" {self._text(criterion.hint)}" if criterion.hint else ""
             yield f"- {self._code(criterion.id)}: {self._text(criterion.message)}{hint}"
-        yield ""
+        yield from self._more(criteria)
+        yield from [""] if criteria else []
 
     def _noticed(self, notes: tuple[Note, ...]) -> Iterator[str]:
         if not notes:
             return
-        yield f"## {noticed.TITLE}"
-        yield ""
-        yield noticed.COSTS_NOTHING
-        yield ""
-        for note in notes:
+        yield from (noticed.COSTS_NOTHING, "")
+        for note in self._first(notes):
             yield f"- {self._code(noticed.place(note))}: {self._text(noticed.words(note))}"
+        yield from self._more(notes)
         yield ""
 
+    def _graphs(self, graphs: dict[str, GraphFigure]) -> Iterator[str]:
+        """Runs in which the same was seen share their picture."""
+        seen: dict[str, list[str]] = {}
+        for name, graph in graphs.items():
+            if graph.nodes or graph.topics:
+                seen.setdefault(mermaid(graph), []).append(name)
+        for drawn, names in list(seen.items())[:GRAPHS_MAX]:
+            yield from (f"In {', '.join(self._code(name) for name in names)}:", "")
+            yield from ("```mermaid", drawn, "```", "")
+
     def _table(self, criteria: tuple[CriterionResult, ...]) -> Iterator[str]:
-        yield "## All criteria"
-        yield ""
         yield "| points | status | criterion | | measured |"
         yield "|---:|---|---|---|---|"
-        for c in criteria:
+        for c in self._first(criteria):
             cells = [
                 points_of(c),
                 c.status.value,
@@ -142,6 +197,7 @@ class _Writer:
             ]
             yield f"| {' | '.join(cells)} |"
         yield ""
+        yield from (*self._more(criteria), "")
 
     def _foot(self, result: GradingResult) -> Iterator[str]:
         used = result.environment
@@ -153,8 +209,26 @@ class _Writer:
             f"{kind} digest {self._code(result.submission.digest[:12])}."
         )
 
+    def _folded(self, title: str, rows: Iterable[str]) -> Iterator[str]:
+        """What is shown when somebody opens it. The empty lines make Markdown of what is inside."""
+        inside = list(rows)
+        if inside:
+            yield from ("<details>", f"<summary>{title}</summary>", "", *inside, "</details>", "")
+
+    def _first(self, items: Sequence[T]) -> Sequence[T]:
+        return items[: self._detail.entries]
+
+    def _more(self, items: Sequence[object]) -> Iterator[str]:
+        left = len(items) - self._detail.entries
+        if left > 0:
+            yield from ("", f"And {left} more.")
+
     def _text(self, text: str, *, cell: bool = False) -> str:
-        return markdown(line(text, self._limit), cell=cell)
+        return markdown(line(text, self._detail.text), cell=cell)
 
     def _code(self, text: str, *, cell: bool = False) -> str:
-        return markdown_code(line(text, self._limit), cell=cell)
+        return markdown_code(line(text, self._detail.text), cell=cell)
+
+
+def _counted(title: str, items: Sequence[object]) -> str:
+    return f"{title} ({len(items)})"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import IO
 
+from rich.cells import cell_len
 from rich.console import Console, Group, RenderableType
 from rich.padding import Padding
 from rich.table import Table
@@ -15,12 +16,14 @@ from grader.model.result import CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
 from grader.report import settled
 from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
+from grader.report.summary import visible_words
 from grader.report.text import line, number, uncommanded
 from grader.report.view import Loss, arrange, places, points_of
 from grader.rubric.model import Rubric
 
 LIMIT = 500
 NAME_LIMIT = 30
+NAME_CELLS, WORDS_CELLS = 20, 20
 MEASURED_LIMIT = 120
 STYLES = {
     Status.PASS: "green",
@@ -64,8 +67,8 @@ def emit(console: Console, parts: Iterable[RenderableType]) -> None:
     with console.capture() as capture:
         for part in parts:
             console.print(part, overflow="fold")
-    rows = capture.get().split("\n")
-    console.file.write(uncommanded("\n".join(row.rstrip() for row in rows)))
+    text = uncommanded("\n".join(row.rstrip() for row in capture.get().split("\n")))
+    console.file.write(text.encode(console.encoding, "backslashreplace").decode(console.encoding))
 
 
 def print_report(
@@ -96,8 +99,7 @@ class Terminal:
         parts += self._section(TITLE, self._noticed(result.notes))
         parts += self._section("All criteria", [self._table(result.criteria)])
         if hidden:
-            words = "1 hidden criterion is" if hidden == 1 else f"{hidden} hidden criteria are"
-            parts.append(Text(f"\n{words} left out here."))
+            parts.append(Text(f"\n{visible_words(result, hidden)}"))
         emit(self.console, parts)
 
     def _head(self, result: GradingResult, rubric: Rubric) -> Text:
@@ -116,8 +118,8 @@ class Terminal:
         return [Text(f"\n{title}", "bold"), *parts] if parts else []
 
     def _losses(self, title: str, losses: tuple[Loss, ...]) -> list[RenderableType]:
-        width = max((len(loss.criterion.id) for loss in losses), default=0)
-        parts = [self._loss(loss, min(width, 20)) for loss in losses]
+        width = max((cell_len(self._show(loss.criterion.id)) for loss in losses), default=0)
+        parts = [self._loss(loss, min(width, NAME_CELLS)) for loss in losses]
         return self._section(title, [x for part in parts for x in (part, Text())][:-1])
 
     def _unrun(self, losses: tuple[Loss, ...]) -> list[RenderableType]:
@@ -143,25 +145,30 @@ class Terminal:
             return []
         return [self._rows([(place(note), words(note)) for note in notes]), Text(COSTS_NOTHING, "dim")]
 
-    def _line(self, criterion: CriterionResult, words: str, width: int = 0) -> Table:
-        """`✗ chatter-rate  0/10  fail  /chatter came at 5.02 Hz, not 10 Hz`, wrapped in its column."""
+    def _line(self, criterion: CriterionResult, words: str, width: int = 0) -> RenderableType:
+        """`✗ chatter-rate  0/10  fail  /chatter came at 5.02 Hz, not 10 Hz`, wrapped in its column.
+
+        Where too little room is left for the words, they stand below.
+        """
+        style = STYLES[criterion.status]
+        name = Text(f"{self._mark(criterion.status)} {self._show(criterion.id)}", style)
+        status = Text(criterion.status.value, style)
+        points = points_of(criterion)
+        room = self.console.width - max(name.cell_len, width + 2) - len(points) - len(status) - 6
+        if room < WORDS_CELLS:
+            head = Text.assemble(name, "  ", points, "  ", status)
+            return Group(head, Padding(Text(self._show(words)), (0, 0, 0, 4)))
         grid = Table.grid(padding=(0, 2, 0, 0))
         grid.add_column(no_wrap=True, min_width=width + 2)
         grid.add_column(no_wrap=True, min_width=4)
         grid.add_column(no_wrap=True)
         grid.add_column(overflow="fold")
-        style = STYLES[criterion.status]
-        grid.add_row(
-            Text(f"{self._mark(criterion.status)} {self._show(criterion.id)}", style),
-            Text(points_of(criterion)),
-            Text(criterion.status.value, style),
-            Text(self._show(words)),
-        )
+        grid.add_row(name, Text(points), status, Text(self._show(words)))
         return grid
 
     def _rows(self, rows: Iterable[tuple[str, str]]) -> Table:
         grid = Table.grid(padding=(0, 2, 0, 0))
-        grid.add_column(no_wrap=True, style="dim")
+        grid.add_column(style="dim", overflow="fold", max_width=self.console.width // 3)
         grid.add_column(overflow="fold")
         for name, value in rows:
             if value:
@@ -172,7 +179,7 @@ class Terminal:
         table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False, header_style="dim", pad_edge=False)
         table.add_column("points", justify="right", no_wrap=True)
         table.add_column("status", no_wrap=True)
-        table.add_column("criterion", no_wrap=True)
+        table.add_column("criterion", overflow="fold", max_width=self.console.width // 3)
         table.add_column("measured", overflow="fold", ratio=1)
         for c in criteria:
             points = Text(points_of(c))

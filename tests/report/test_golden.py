@@ -1,37 +1,56 @@
-"""The reports of one hostile result. `GRADER_REGENERATE=1 pytest tests/report` writes them anew."""
+"""The reports of one hostile result. `GRADER_REGENERATE=1 pytest tests/report/test_golden.py` writes them anew."""
 
 from __future__ import annotations
 
 import io
 import os
+import unicodedata
 from pathlib import Path
 
 import pytest
 from rich.console import Console
 
+from grader.model.result import GradingResult
+from grader.report.annotations import github_annotations
+from grader.report.code_quality import code_quality
+from grader.report.gradescope import gradescope
+from grader.report.hidden import without_hidden
 from grader.report.junit import junit
 from grader.report.markdown import markdown_report
 from grader.report.result_json import result_bytes
+from grader.report.sarif import sarif
 from grader.report.terminal import open_console, print_report
-from tests.report.hostile import result, rubric
+from tests.report.worst import DOCS, figures, rubric, worst
 
 GOLDEN = Path(__file__).parent / "golden"
+PREFIX = "catkin_ws/src/lab 1"
 
 
-def terminal(encoding: str) -> bytes:
+def student() -> GradingResult:
+    return without_hidden(worst(), rubric())
+
+
+def terminal(encoding: str, width: int = 80) -> bytes:
     raw = io.BytesIO()
     stream = io.TextIOWrapper(raw, encoding=encoding)
-    print_report(result(), rubric(), open_console(stream), hidden=2)
+    console = open_console(stream)
+    console.width = width
+    print_report(student(), rubric(), console, hidden=3)
     stream.flush()
     return raw.getvalue()
 
 
 MADE = {
-    "report.md": lambda: markdown_report(result(), rubric(), hidden=2).encode(),
-    "junit.xml": lambda: junit(result()),
-    "result.json": lambda: result_bytes(result()),
+    "report.md": lambda: markdown_report(student(), rubric(), hidden=3, figures=figures()).encode(),
+    "junit.xml": lambda: junit(worst()),
+    "result.json": lambda: result_bytes(worst()),
     "terminal.txt": lambda: terminal("utf-8"),
+    "terminal-60.txt": lambda: terminal("utf-8", 60),
     "terminal-ascii.txt": lambda: terminal("ascii"),
+    "report.sarif": lambda: sarif(worst(), PREFIX, docs=DOCS).encode(),
+    "code-quality.json": lambda: code_quality(worst(), PREFIX).encode(),
+    "annotations.txt": lambda: github_annotations(worst(), PREFIX).encode(),
+    "gradescope.json": lambda: gradescope(worst(), rubric()).encode(),
 }
 
 
@@ -43,9 +62,27 @@ def test_report_is_as_kept(name):
     assert made.decode() == kept.read_bytes().decode()
 
 
-def test_terminal_keeps_to_80_columns_and_sends_no_escapes():
-    text = terminal("utf-8").decode()
-    assert max(len(line) for line in text.splitlines()) <= 80
+def test_no_golden_file_is_left_over():
+    assert {path.name for path in GOLDEN.iterdir()} == set(MADE)
+
+
+@pytest.mark.parametrize("name", ["report.md", "terminal.txt"])
+def test_a_students_view_counts_hidden_criteria_and_names_none(name):
+    text = (GOLDEN / name).read_text()
+    assert "1 of 22 visible checks passed; 3 more run at grading." in text
+    assert "secret" not in text
+
+
+def cells(text: str) -> int:
+    """Columns of a terminal, by Unicode's own tables."""
+    wide = sum(unicodedata.east_asian_width(character) in "WF" for character in text)
+    return len(text) + wide - sum(unicodedata.category(character) == "Mn" for character in text)
+
+
+@pytest.mark.parametrize("width", [80, 60])
+def test_terminal_keeps_to_its_columns_and_sends_no_escapes(width):
+    text = terminal("utf-8", width).decode()
+    assert max(cells(line) for line in text.splitlines()) <= width
     assert "\x1b" not in text
     assert "[bold red]not bold[/]" in text
 
@@ -61,7 +98,7 @@ def test_a_real_terminal_gets_colour_but_none_of_the_students():
         highlight=False,
         color_system="standard",
     )
-    print_report(result(), rubric(), console)
+    print_report(worst(), rubric(), console)
     assert "\x1b[31m✗" in out.getvalue()
     assert "\x1b]0;" not in out.getvalue()
 

@@ -13,7 +13,7 @@ from tests.report.hostile import criterion, result
 
 def test_one_case_a_criterion_with_its_outcome_and_points():
     suite = etree.fromstring(junit(result())).find("testsuite")
-    outcomes = {case.get("name"): [child.tag for child in case][1:] for case in suite.iter("testcase")}
+    outcomes = {case.get("name"): [child.tag for child in case][:-1] for case in suite.iter("testcase")}
     assert outcomes == {
         "manifest": [],
         "chatter-rate": ["failure"],
@@ -28,8 +28,9 @@ def test_one_case_a_criterion_with_its_outcome_and_points():
         "talker-name": ["failure"],
     }
     assert [suite.get(k) for k in ("tests", "failures", "errors", "skipped")] == ["11", "4", "2", "4"]
-    partial = suite.find("testcase[@name='listener-chatter']/properties/property[@name='points']")
-    assert partial.get("value") == "7.5"
+    partial = suite.find("properties/property[@name='points:listener-chatter']")
+    assert partial.get("value") == "7.5/15"
+    assert "\npoints: 7.5/15" in suite.findtext("testcase[@name='listener-chatter']/system-out")
 
 
 @given(st.text(st.characters(codec="utf-8"), max_size=40), st.sampled_from(list(Status)))

@@ -35,7 +35,10 @@ def test_result_json_names_them_last_and_only_where_there_are_any():
 
 def test_markdown_has_a_section():
     text = markdown_report(result(notes=NOTES), rubric())
-    assert f"## Noticed while it ran\n\n{COSTS_NOTHING}\n\n- `real, talker.py`: asked the master" in text
+    assert (
+        f"<summary>Noticed while it ran (2)</summary>\n\n{COSTS_NOTHING}\n\n- `real, talker.py`: asked the master"
+        in text
+    )
     assert "- `build`: had more than 400 processes (limited)" in text
     assert "Noticed" not in markdown_report(result(), rubric())
 

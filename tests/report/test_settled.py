@@ -118,12 +118,12 @@ def test_the_terminal_says_it_below_the_points():
     assert section.count("look again") == 1
 
 
-def test_junit_has_it_as_properties():
+def test_junit_has_it_as_properties_and_in_the_output():
     suite = etree.fromstring(junit(settled()))[0]
     values = {p.get("name"): p.get("value") for p in suite.iterfind("properties/property")}
     assert (values["points"], values["points_before"], values["late"]) == ("70", "87.5", LATE.text)
     style, rate, build = [
-        {p.get("name"): p.get("value") for p in case.iterfind("properties/property")}
+        dict(row.split(": ", 1) for row in case.findtext("system-out").splitlines())
         for case in suite.iterfind("testcase")
     ]
     assert style["decided_by_a_person"] == "by A. Miller, 2026-11-02: clear names"

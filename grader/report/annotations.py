@@ -1,0 +1,56 @@
+"""GitHub's annotations: commands to its runner, printed by a step of a workflow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from grader.model.result import GradingResult
+from grader.report.findings import Finding, Severity, findings
+from grader.report.text import line, number
+
+EACH_MAX = 10
+"""So many of each kind GitHub shows of one step."""
+_DATA = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A"})
+_PROPERTY = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A", ":": "%3A", ",": "%2C"})
+
+
+def github_annotations(result: GradingResult, prefix: str = "") -> str:
+    """A line each, the costliest first, ten of each kind at most; the rest is counted in the log.
+
+    What has no line of a file is shown at the run itself. `prefix` is the package's folder in the repository.
+    """
+    found = findings(result, prefix)
+    return "".join(f"{row}\n" for row in (*_error(result), *_rows(found), _summary(result)))
+
+
+def _rows(found: tuple[Finding, ...]) -> Iterator[str]:
+    for severity in Severity:
+        alike = [finding for finding in found if finding.severity is severity]
+        for finding in alike[:EACH_MAX]:
+            message = "\n".join(text for text in (finding.message, finding.hint) if text)
+            yield _command(severity, _properties(finding), message)
+        if len(alike) > EACH_MAX:
+            yield f"and {len(alike) - EACH_MAX} more of these: they are in the report"
+
+
+def _properties(finding: Finding) -> dict[str, str]:
+    where = {"file": finding.places[0].path, "line": str(finding.places[0].line)} if finding.places else {}
+    return {**where, "title": finding.title}
+
+
+def _error(result: GradingResult) -> Iterator[str]:
+    if result.error is not None:
+        text = "\n".join(line(part, 1000) for part in (result.error.message, result.error.hint) if part)
+        yield _command(Severity.ERROR, {"title": "It could not be graded"}, text)
+
+
+def _summary(result: GradingResult) -> str:
+    if result.status == "error":
+        return "not graded"
+    open_ = ", not settled yet: something could not be judged" if result.status == "inconclusive" else ""
+    return f"{number(result.points)} of {number(result.max_points)} points{open_}"
+
+
+def _command(severity: Severity, properties: dict[str, str], message: str) -> str:
+    told = ",".join(f"{name}={value.translate(_PROPERTY)}" for name, value in properties.items())
+    return f"::{severity.value} {told}::{message.translate(_DATA)}"
