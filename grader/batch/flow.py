@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 from grader import __version__
 from grader.batch.choice import check, chosen
-from grader.batch.folder import MISSING, RUN, BatchFolder, write_run
+from grader.batch.folder import RUN, BatchFolder, write_run
 from grader.batch.hands import Hands
 from grader.batch.job import Job, Outcome, Sandbox
 from grader.batch.settled import Settler, rewrite
@@ -24,12 +24,13 @@ from grader.files import check_writable, lock
 from grader.gradebook import write_gradebook
 from grader.intake import safe_name, without_password
 from grader.judge.summary import passed
-from grader.model.batch import BatchRun, Counts, CriterionInfo, State
+from grader.model.batch import MISSING, BatchRun, Counts, CriterionInfo, State
 from grader.model.result import RubricInfo
 from grader.model.roster import Entry, Roster, RosterFault
 from grader.overrides import FILE as OVERRIDES
 from grader.overrides import read_overrides
 from grader.pipeline import GradeOptions, prepare
+from grader.report.class_page import write_class_page
 from grader.results import finish_killed
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
@@ -88,7 +89,8 @@ def run_batch(
     hands: Hands,
     watcher: Watcher,
 ) -> BatchFolder:
-    """Grade what the roster names into `options.out`, and write `run.json`, `results.jsonl` and `gradebook.csv`.
+    """Grade what the roster names into `options.out`, and write `run.json`, `results.jsonl`, `gradebook.csv`
+    and `index.html`.
 
     What is complete is not done again. Where this is interrupted, what there is by then is in the gradebook.
     Raises UsageError for an option that does not fit the roster, Busy where another batch works in the same folder,
@@ -168,7 +170,7 @@ def _settled(batch: _Batch, entry: Entry, outcome: Outcome) -> Outcome:
     if now == earlier:
         return outcome
     try:
-        rewrite(batch.folder.folder_of(entry), now, batch.rubric.rubric)
+        rewrite(batch.folder.folder_of(entry), now, batch.rubric.rubric, batch.rubric.docs)
     except GraderError as error:
         return outcome.model_copy(update={"status": "error", "kind": error.kind, "message": error.message})
     ok = passed(batch.rubric.rubric, now)
@@ -231,11 +233,13 @@ def _gradable(roster: Roster, out: Path) -> Roster:
 
 
 def write_books(folder: BatchFolder, rubric: Rubric, state: State, kept: int) -> BatchFolder:
-    """`gradebook.csv`, `results.jsonl`, and `run.json` with what it all came to, which is given back."""
+    """`gradebook.csv`, `results.jsonl`, `index.html`, and `run.json` with what it all came to, which is given back."""
     write_gradebook(folder.book(), folder.rows(), folder.path / RESULTS, "jsonl")
     write_gradebook(folder.book(), folder.rows(), folder.path / GRADEBOOK, "csv")
     update = {"state": state, "ended_at": datetime.now(timezone.utc), "counts": _counts(folder, rubric, kept)}
     ended = BatchFolder(folder.path, folder.run.model_copy(update=update))
+    pairs = ((row.entry, row.result) for row in folder.rows())
+    write_class_page(ended.run, pairs, folder.path / INDEX)
     write_run(folder.path, ended.run)
     return ended
 

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import subprocess
+import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -37,13 +38,16 @@ def missing() -> str | None:
 def validate(path: Path) -> list[str]:
     """What html-validate has against an HTML file, a line each: `12:3 rule: text`."""
     command = ["node", str(VALIDATE), "--config", str(HERE / "htmlvalidate.mjs"), "--formatter", "json"]
-    done = subprocess.run(
-        [*command, str(path)], cwd=HERE, capture_output=True, text=True, timeout=60, check=False
-    )
-    if done.returncode not in (0, 1):
-        raise RuntimeError(done.stderr)
+    with tempfile.TemporaryFile() as out:  # into a pipe, node writes the beginning only
+        done = subprocess.run(
+            [*command, str(path)], cwd=HERE, stdout=out, stderr=subprocess.PIPE, timeout=60, check=False
+        )
+        if done.returncode not in (0, 1):
+            raise RuntimeError(done.stderr.decode())
+        out.seek(0)
+        found = json.load(out)
     return [
         f"{message['line']}:{message['column']} {message['ruleId']}: {message['message']}"
-        for file in json.loads(done.stdout)
+        for file in found
         for message in file["messages"]
     ]

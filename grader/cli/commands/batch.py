@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grader.batch.flow import GRADEBOOK, RESULTS, BatchOptions, run_batch
+from grader.batch.flow import GRADEBOOK, INDEX, RESULTS, BatchOptions, run_batch
 from grader.batch.folder import BatchFolder
 from grader.batch.hands import Hands, Processes
 from grader.batch.notable import notable
@@ -118,4 +118,4 @@ def _show(folder: BatchFolder, *, as_json: bool) -> None:
     parts += [f"{counts.missing} not graded yet"] if counts.missing else []
     parts += [f"{counts.kept} complete before"] if counts.kept else []
     say(", ".join(parts))
-    say(f"{folder.path / GRADEBOOK}  {folder.path / RESULTS}")
+    say(f"{folder.path / INDEX}  {folder.path / GRADEBOOK}  {folder.path / RESULTS}")

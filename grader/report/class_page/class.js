@@ -87,7 +87,7 @@
       cell.append(named(row));
       return cell;
     },
-    name: (row) => make("td", row.name),
+    name: (row) => make("td", row.name, "words"),
     group: (row) => make("td", row.group),
     points: (row) => make("td", judged(row) ? short(row.points) : "–", "number"),
     letters(row) {
@@ -204,7 +204,7 @@
   // What is picked elsewhere on the page
 
   function pick(words, places) {
-    find("filters").reset();
+    [text, state, lostBy, mark].forEach((field) => { if (field) { field.value = ""; } });
     picked = places && { places: new Set(places) };
     find("picked").hidden = !picked;
     find("picked").firstElementChild.textContent = words;
@@ -294,15 +294,10 @@
   heads.forEach((head) => {
     head.firstElementChild.addEventListener("click", () => sortBy(head.dataset.column));
   });
-  const form = find("filters");
-  form.addEventListener("input", update);
-  form.addEventListener("submit", (event) => event.preventDefault());
-  form.addEventListener("reset", () => {
-    picked = null;
-    find("picked").hidden = true;
-    window.setTimeout(update);
-  });
-  find("picked").lastElementChild.addEventListener("click", () => pick("", null));
+  const showAll = () => pick("", null);
+  find("filters").addEventListener("input", update);
+  find("show-all").addEventListener("click", showAll);
+  find("picked").lastElementChild.addEventListener("click", showAll);
   find("page-before").addEventListener("click", () => turn(-1));
   find("page-next").addEventListener("click", () => turn(1));
   document.querySelectorAll("details[data-diagnosis]").forEach((details) => {
@@ -317,14 +312,14 @@
   });
   document.querySelectorAll("[data-lost-show]").forEach((button) => {
     button.addEventListener("click", () => {
-      pick("", null);
+      showAll();
       lostBy.value = button.dataset.lostShow;
       update();
       goToTable();
     });
   });
   document.querySelectorAll(".heat").forEach(heatMap);
-  form.hidden = false;
+  find("filters").hidden = false;
   table.hidden = false;
   update();
 })();

@@ -9,7 +9,8 @@ from urllib.parse import quote
 from markupsafe import Markup
 
 from grader.model.batch import CriterionInfo
-from grader.report.class_page.lines import Line
+from grader.report.class_page.lines import CHARS, Line
+from grader.shown import line
 
 REPORT = "report.html"
 COLUMNS = ("id", "name", "group", "link", "state", "points", "letters", "earned", "late", "decided", "time")
@@ -23,8 +24,8 @@ def page_data(
 ) -> Markup:
     """`rows` (each as `COLUMNS` says), `criteria`, and by places in `rows` the members of diagnoses and heat map."""
     data = {
-        "rows": [_row(line) for line in lines],
-        "criteria": [[criterion.id, criterion.title, criterion.max_points] for criterion in criteria],
+        "rows": [_row(one) for one in lines],
+        "criteria": [[line(c.id, CHARS), line(c.title, CHARS), c.max_points] for c in criteria],
         "diagnoses": [list(members) for members in diagnoses],
         "heat": [list(column) for column in columns],
     }
@@ -38,24 +39,24 @@ def in_script(text: str) -> Markup:
     return Markup(text)  # noqa: S704 - what HTML looks for is written out
 
 
-def link_to(line: Line) -> str:
+def link_to(one: Line) -> str:
     """The submission's report; empty where it has none."""
-    return f"{quote(line.folder, safe='')}/{REPORT}" if line.folder else ""
+    return f"{quote(one.folder, safe='', errors='replace')}/{REPORT}" if one.folder else ""
 
 
-def _row(line: Line) -> list[object]:
-    link = link_to(line)
-    usual = link == f"{line.id}/{REPORT}"
+def _row(one: Line) -> list[object]:
+    link = link_to(one)
+    usual = link == f"{one.id}/{REPORT}"
     return [
-        line.id,
-        line.name,
-        line.group,
+        one.id,
+        one.name,
+        one.group,
         1 if usual else link or 0,
-        line.state,
-        line.points,
-        line.letters,
-        line.earned or 0,
-        round(line.late_s),
-        [line.decided, line.look_again] if line.decided else 0,
-        round(line.wall_s, 1),
+        one.state,
+        one.points,
+        one.letters,
+        one.earned or 0,
+        round(one.late_s),
+        [one.decided, one.look_again] if one.decided else 0,
+        round(one.wall_s, 1),
     ]

@@ -14,7 +14,7 @@ from grader.report.text import number
 
 BINS_MAX = 20
 STEPS = (0.1, 0.2, 0.25, 0.5, 1, 2, 2.5, 5, 10, 20, 25, 50, 100, 200, 250, 500, 1000)
-WIDTH, HEIGHT, LEFT, BOTTOM, TOP = 640, 230, 8, 24, 20
+WIDTH, HEIGHT, LEFT, BOTTOM, TOP = 520, 330, 8, 24, 20
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,106 @@
+"""Points, costs, times: what the page says in numbers."""
+
+from __future__ import annotations
+
+import pytest
+
+from grader.report.class_page.costs import costs, most_first
+from grader.report.class_page.lines import Line, line_of
+from grader.report.class_page.points import spread
+from grader.report.class_page.timing import span, timing
+from grader.report.class_page.todo import todos
+from tests.report.class_page.made_up import made_up_rows, made_up_run
+
+
+def lines(count: int, **more: int) -> list[Line]:
+    return [
+        line_of(entry, result, made_up_run(count).criteria) for entry, result in made_up_rows(count, **more)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("points", "most", "expected"),
+    [
+        ([0, 4.9, 5, 100], 100, {0: 2, 5: 1, 95: 1}),
+        ([10, 10], 10, {9.5: 2}),
+        ([0.1 + 0.2], 1, {0.3: 1}),
+        ([7], 7, {6.5: 1}),
+        ([7.5, 3], 7, {3: 1, 7.0: 1}),
+        ([3, 0], 0, {0: 1, 2.8: 1}),
+        ([0], 0, {0: 1}),
+        ([12000, 0], 12345, {0: 1, 12000: 1}),
+    ],
+)
+def test_everybody_is_in_one_bin(points, most, expected) -> None:
+    found = spread(points, most)
+    counts = {round(one.low, 6): one.count for one in found.bins if one.count}
+    assert len(found.bins) <= 20
+    assert counts == expected
+
+
+def test_nobody_has_no_spread() -> None:
+    assert spread([], 100) is None
+
+
+def test_a_criterion_costs_what_submissions_lost_by_it() -> None:
+    run, found = made_up_run(50), lines(50)
+    for cost in costs(found, run.criteria):
+        own = [
+            next(c for c in result.criteria if c.id == cost.criterion.id)
+            for _, result in made_up_rows(50)
+            if result.error is None
+        ]
+        lost = [c for c in own if c.status.value in {"partial", "fail", "blocked"}]
+        assert cost.lost == len(lost)
+        assert cost.points == pytest.approx(sum(c.max_points - c.points for c in lost))
+        assert cost.judged == len(own)
+
+
+def test_what_cost_most_comes_first() -> None:
+    found = most_first(costs(lines(50), made_up_run(50).criteria))
+    assert [cost.points for cost in found] == sorted((cost.points for cost in found), reverse=True)
+    assert all(cost.lost for cost in found)
+
+
+def test_the_slowest_ten_and_the_mean() -> None:
+    found = timing(made_up_run(50), lines(50))
+    times = sorted((r.timing.wall_s for _, r in made_up_rows(50) if r.timing.wall_s), reverse=True)
+    assert [seconds for _, seconds in found.slowest] == times[:10]
+    assert found.mean_s == pytest.approx(sum(times) / len(times))
+    assert found.wall_s == pytest.approx(205)
+
+
+def test_what_still_runs_has_no_time_yet() -> None:
+    assert timing(made_up_run(5, "running", ended_at=None), lines(5)).wall_s is None
+    assert timing(made_up_run(2), lines(2, missing=2)) is None
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [
+        (0.04, "0.0 s"),
+        (9.96, "10 s"),
+        (59.4, "59 s"),
+        (59.6, "1 min"),
+        (725, "12 min 5 s"),
+        (7_500, "2 h 5 min"),
+        (86_400, "1 day"),
+        (187_200, "2 days 4 h"),
+    ],
+)
+def test_a_time_in_words(seconds, words) -> None:
+    assert span(seconds) == words
+
+
+def test_commands_are_quoted_and_whole(tmp_path) -> None:
+    out = tmp_path / "it's $HOME; rm -rf"
+    run = made_up_run(
+        60, roster="my roster.csv", rubric_source="/a b/lab.yaml", static_only=True, cluster="tcp://h:1"
+    )
+    found = {todo.anchor: todo.command.unescape() for todo in todos(run, lines(60, missing=2), out)}
+    assert found["inconclusive"] == (
+        f"grader batch 'my roster.csv' --rubric '/a b/lab.yaml' --out '{tmp_path}/it'\"'\"'s $HOME; rm -rf' "
+        "--static --cluster tcp://h:1 --only inconclusive"
+    )
+    assert found["error"].endswith(" --only failed")
+    assert "--only" not in found["missing"]
