@@ -36,7 +36,7 @@ class Grading:
     _begun: bool = field(default=False, init=False)
 
     def __call__(self, recorded: Mapping[str, Path], stop: Stop) -> Outcome:
-        """See `loop.Watched`. Raises GraderError where no save can mend it: the command line, the machine at the start."""
+        """See `loop.Watched`. Raises GraderError where no save can mend it: UsageError, the machine at the start."""
         options = replace(self.options, recorded=recorded, stop=stop)
         try:
             with self.progress(not self._begun) as progress:

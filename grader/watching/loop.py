@@ -102,7 +102,7 @@ class _Loop:
         known = self._kept.fitting(picture) if self._watched.runs else {}
         running = self._kept.others(known) if self._watched.runs else ()
         saved = self._names(picture)
-        self._shown.begin(saved, running if known else None)
+        self._shown.begin(saved, running if known or not self._watched.runs else None)
         stop = Stop()
         try:
             with self._saves.stopping(stop):

@@ -7,6 +7,7 @@ from datetime import datetime
 from typing import IO, TextIO
 
 from rich.console import Console, RenderableType
+from rich.padding import Padding
 from rich.text import Text
 
 from grader.model.result import CriterionResult, GradingResult
@@ -49,10 +50,12 @@ class ScreenShown:
         self._package, self._rubric, self._hidden, self._static = package, rubric, hidden, static
         self._console: Console = open_console(stream)
         self._clock = clock
+        self._at = clock()
         self._last: GradingResult | None = None
 
     def begin(self, saved: tuple[str, ...], running: tuple[str, ...] | None) -> None:
         """See `loop.Shown`."""
+        self._at = self._clock()
         if running is None:
             words = "running everything"
         elif running:
@@ -67,6 +70,7 @@ class ScreenShown:
 
     def same(self, saved: tuple[str, ...]) -> None:
         """See `loop.Shown`."""
+        self._at = self._clock()
         self._say(f"{self._saved(saved)}: the package is what it was … {ENDS}")
 
     def end(self, outcome: Outcome, unchanged: frozenset[str], saved: tuple[str, ...]) -> None:
@@ -118,14 +122,16 @@ class ScreenShown:
         if not found:
             yield Text("as before", "dim")
 
-    def _losses(self, title: str, losses: Sequence[Loss], unchanged: frozenset[str]) -> Iterable[Text]:
+    def _losses(
+        self, title: str, losses: Sequence[Loss], unchanged: frozenset[str]
+    ) -> Iterable[RenderableType]:
         if losses:
             yield Text(f"\n{title}", "bold")
         for loss in losses:
             yield self._head(loss.criterion, unchanged)
             for name, words in _details(loss):
                 if words:
-                    yield Text(f"{' ' * INDENT}{name}: {self._show(words)}", "dim")
+                    yield self._indented(f"{name}: {self._show(words)}")
 
     def _head(self, criterion: CriterionResult, unchanged: frozenset[str]) -> Text:
         style = STYLES[criterion.status]
@@ -136,21 +142,28 @@ class ScreenShown:
             text.append("  (unchanged)", "dim")
         return text
 
-    def _error(self, result: GradingResult) -> Iterable[Text]:
+    def _error(self, result: GradingResult) -> Iterable[RenderableType]:
         if result.error is not None:
             yield Text(f"could not be graded: {self._show(result.error.message)}", "red")
             if result.error.hint:
-                yield Text(f"{' ' * INDENT}hint: {self._show(result.error.hint)}", "dim")
+                yield self._indented(f"hint: {self._show(result.error.hint)}")
+
+    def _indented(self, words: str) -> RenderableType:
+        return Padding(Text(words, "dim"), (0, 0, 0, INDENT))
 
     def _saved(self, saved: tuple[str, ...]) -> str:
         """`saved src/talker.py at 12:03:04`."""
         names = ", ".join(self._show(name, NAME_CHARS) for name in saved[:NAMES_SHOWN])
         more = f" and {len(saved) - NAMES_SHOWN} more" if len(saved) > NAMES_SHOWN else ""
-        return f"saved {names}{more} at {self._clock():%H:%M:%S}"
+        return f"saved {names}{more} at {self._at:%H:%M:%S}"
 
     def _say(self, words: str) -> None:
         text = self._show(f"watching {self._package} {DASH} {words}", 3 * TEXT_CHARS)
-        self._emit([Text(f"\n{text}" if self._console.is_terminal else text, "cyan")])
+        if self._console.is_terminal:
+            self._emit([Text(f"\n{text}", "cyan")])
+        else:
+            self._console.file.write(f"{text}\n")
+            self._console.file.flush()
 
     def _emit(self, parts: Iterable[RenderableType]) -> None:
         emit(self._console, parts)

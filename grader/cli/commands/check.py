@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,7 @@ from grader.cli.outcome import exit_code, settled
 from grader.cli.show import show
 from grader.errors import ExitCode, UsageError
 from grader.files import check_writable
+from grader.model.progress import Silence
 from grader.model.result import GradingResult
 from grader.report.hidden import hidden_ids, without_hidden
 from grader.rubric.load import LoadedRubric
@@ -81,7 +82,9 @@ def _watch(
             rubric=rubric,
             out=without or stack.enter_context(temporary_folder("check")),
             options=options,
-            progress=lambda first: open_progress(early=first and not (as_json or static)),
+            progress=lambda first: (
+                nullcontext(Silence()) if static else open_progress(early=first and not as_json)
+            ),
             code=code,
         )
         watched = Watched(
