@@ -11,12 +11,12 @@ from grader.model.batch import BatchRun
 from grader.report.text import html
 
 
-def again(run: BatchRun, out: Path, only: str = "") -> Markup:
-    """The batch once more, from any folder; `only` as `--only` has it."""
+def again(run: BatchRun, out: Path, only: str = "", *, static: bool | None = None) -> Markup:
+    """The batch once more, from any folder; `only` as `--only` has it. `static` if not as it was."""
     roster = Path(run.roster)
     words = ["grader", "batch", str(roster.absolute() if roster.exists() else roster)]
     words += ["--rubric", run.rubric_source or run.rubric.id, "--out", str(out.absolute())]
-    words += ["--static"] if run.static_only else []
+    words += ["--static"] if (run.static_only if static is None else static) else []
     words += ["--before", run.before.isoformat()] if run.before else []
     words += ["--cluster", run.cluster] if run.cluster else []
     words += ["--only", only] if only else []

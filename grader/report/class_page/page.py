@@ -85,7 +85,7 @@ def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
         "points": points,
         "histogram": histogram(points) if points else "",
         "costs": most_first(cost),
-        "unlost": [one.criterion.title for one in cost if one.judged and not one.lost],
+        "unlost": [one.criterion.title for one in cost if one.judged and not one.lost and not one.open],
         "late": [line for line in lines if line.late_s > 0],
         "shared": shared,
         "alone": alone,

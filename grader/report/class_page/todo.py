@@ -71,10 +71,10 @@ KINDS = (
     _Kind(
         anchor="inconclusive",
         title="Inconclusive",
-        advice="This machine could not tell this time, so nobody loses points by it. Run only these again:",
+        advice="It could not be told this time, so nobody loses points by it. Grade only these again:",
         holds=lambda found: found.state == "inconclusive",
         text=lambda found: found.why,
-        command=lambda run, out: again(run, out, "inconclusive"),
+        command=lambda run, out: again(run, out, "inconclusive", static=False),
     ),
     _Kind(
         anchor="error",
