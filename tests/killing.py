@@ -28,7 +28,7 @@ GONE_S = 2.0
 LOOK_S = 0.05
 WHOLE_EVERY = 5
 LIMIT_S = 60.0
-RESULT = {"result.json", "report.md", "junit.xml", "console.log", "evidence"}
+RESULT = {"result.json", "report.html", "report.md", "junit.xml", "console.log", "evidence"}
 
 LOCKS = "ros-lab-grader-"
 """The folder of the locks that graders share stays."""

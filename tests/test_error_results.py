@@ -41,7 +41,7 @@ ROOT = Path(__file__).resolve().parent.parent
 HOSTILE = ROOT / "tests" / "hostile"
 LAB = str(HOSTILE / "after.yaml")
 SOLUTION = HOSTILE / "victim"
-REPORTS = {"result.json", "report.md", "junit.xml"}
+REPORTS = {"result.json", "report.html", "report.md", "junit.xml"}
 
 
 def graded(source: Path | str, out: Path, *, submission_id: str | None = "ada") -> GradingResult:

@@ -135,7 +135,7 @@ def test_judging_again_gives_the_same_bytes(graded: tuple[Path, Grader], tmp_pat
 def test_all_reports_and_evidence_are_there(graded: tuple[Path, Grader]) -> None:
     folder, grader = graded
     assert {p.name for p in folder.iterdir()} == {
-        "result.json", "report.md", "junit.xml", "console.log", "evidence"
+        "result.json", "report.html", "report.md", "junit.xml", "console.log", "evidence"
     }  # fmt: skip
     names = {p.name for p in (folder / "evidence").iterdir()}
     assert names == {"package.mcap", "talker.mcap", "wraps.mcap", "listener.mcap", "launch.mcap"}

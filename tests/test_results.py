@@ -17,7 +17,7 @@ from grader import results as results_module
 from grader.errors import Busy, HostError, OutputError
 from grader.results import NEW, READY, Results, finish_killed
 
-FILES = ("result.json", "report.md", "junit.xml", "console.log")
+FILES = ("result.json", "report.html", "report.md", "junit.xml", "console.log")
 
 
 def write(folder: Path, version: int, *, files: tuple[str, ...] = FILES) -> None:

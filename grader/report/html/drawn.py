@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from markupsafe import Markup
 
@@ -24,9 +24,11 @@ from grader.report.html.plots.graph import graph_plot, graph_rows
 from grader.report.html.plots.path import path_plot, path_words
 from grader.report.html.plots.rate import rate_plots, rate_words
 from grader.report.html.words import count
+from grader.report.text import clip
 
 CONSOLE_FIRST, CONSOLE_LAST = 35, 25
 LINE_CHARS = 500
+TITLE_CHARS = 200
 HEARD_MAX = 60
 GRAPH_ROWS_MAX = 100
 
@@ -67,6 +69,7 @@ class Drawer:
             drawn = self._drawn(figure, name)
         except Exception:  # noqa: BLE001 - no report hangs on a picture
             drawn = Drawn(name=name, kind=figure.kind, title="This picture could not be drawn")
+        drawn = replace(drawn, title=clip(drawn.title, TITLE_CHARS))
         self._seen.append((figure, drawn))
         return drawn
 

@@ -29,11 +29,14 @@ CODE = re.compile(r"`([^`]+)`")
 
 @dataclass(frozen=True, kw_only=True)
 class Detail:
-    """How much there may be on a page: `text` characters in one text, `cards` in all."""
+    """How much there may be on a page: characters in one `text` and in all of the `console`, `places` in a card,
+    `cards`, and `rows` of the table."""
 
     text: int = 1000
     console: int = 120_000
+    places: int = 20
     cards: int = 300
+    rows: int = 1000
     figures: bool = True
 
 
@@ -71,7 +74,10 @@ class Ran:
 
 @dataclass(frozen=True, kw_only=True)
 class Page:
-    """`lost`, `open` and `advice` are cards that stand for themselves, `rest` all other criteria, folded."""
+    """`lost`, `open` and `advice` are cards that stand for themselves, `rest` all other criteria, folded.
+
+    `cut` criteria have no card, and `beyond` have no row in the `table` either.
+    """
 
     lost: Sequence[Card]
     open: Sequence[Card]
@@ -80,6 +86,7 @@ class Page:
     table: Sequence[Card]
     ran: Sequence[Ran]
     cut: int = 0
+    beyond: int = 0
 
 
 class Maker:
@@ -109,9 +116,10 @@ class Maker:
             open=still,
             advice=advice,
             rest=rest,
-            table=[self._short(c, linked=c.id in told) for c in self._result.criteria],
+            table=[self._short(c, linked=c.id in told) for c in self._result.criteria[: self._detail.rows]],
             ran=list(self._ran()),
             cut=len(self._result.criteria) - len(told) if whole else 0,
+            beyond=max(0, len(self._result.criteria) - self._detail.rows),
         )
 
     def _first(self, items: Sequence[T]) -> Sequence[T]:
@@ -165,7 +173,7 @@ class Maker:
         cited = criterion.citations
         return [
             place
-            for place, citation in zip(places(criterion), cited, strict=False)
+            for place, citation in zip(places(criterion)[: self._detail.places], cited, strict=False)
             if not (isinstance(citation, FileCitation) and (citation.file, citation.line) in shown)
         ]
 

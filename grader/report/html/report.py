@@ -22,9 +22,9 @@ BYTES_MAX = 400_000
 DETAILS = (
     Detail(),
     Detail(text=600, console=40_000),
-    Detail(text=300, console=10_000, cards=80),
-    Detail(text=200, console=0, cards=40, figures=False),
-    Detail(text=80, console=0, cards=20, figures=False),
+    Detail(text=300, console=10_000, places=5, cards=80),
+    Detail(text=200, console=0, places=3, cards=40, figures=False),
+    Detail(text=60, console=0, places=1, cards=15, rows=250, figures=False),
 )
 """From all that there is to what fits when a submission does its best to fill the page."""
 

@@ -9,7 +9,7 @@ from grader.judge.summary import passed
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.text import number
-from grader.report.view import ReportView, not_graded
+from grader.report.view import OPEN, ReportView, not_graded
 from grader.rubric.model import Rubric
 
 SIGNS = {
@@ -77,8 +77,10 @@ def verdict(result: GradingResult, rubric: Rubric, hidden: int) -> tuple[str, st
 def pass_mark(result: GradingResult, rubric: Rubric, hidden: int) -> str:
     """What it takes to pass."""
     if rubric.pass_mark is None:
-        return "To pass, every criterion that counts has to be reached."
+        return f"To pass, every {'visible ' if hidden else ''}criterion that counts has to be reached."
     mark = f"To pass, it takes {points(rubric.pass_mark)} of {number(rubric.max_points)}"
+    if not_graded(result):
+        return f"{mark}."
     if hidden:
         return f"{mark}, those of criteria that run at grading included."
     missing = rubric.pass_mark - result.points
@@ -101,7 +103,7 @@ def in_short(result: GradingResult, view: ReportView) -> str:
     """What was lost, in one or two sentences."""
     lost = sum(loss.points for loss in view.lost)
     if not_graded(result):
-        return "Nothing could be judged, so nothing is decided yet."
+        return "Nothing could be judged."
     if lost <= 0 and not view.open:
         return "Nothing was lost: every criterion that counts is reached. Well done!"
     said = ["Nothing was lost."]
@@ -117,7 +119,8 @@ def in_short(result: GradingResult, view: ReportView) -> str:
 
 
 def lost_words(criterion: CriterionResult, blocked: float) -> str:
-    """`10 points lost, and 25 more in what it holds back`."""
+    """`10 points lost, and 25 more in what it holds back`; points that are open are not lost."""
     own = criterion.max_points - criterion.points
-    said = f"{points(own)} lost" if own else "costs nothing itself"
+    state = "still open" if criterion.status in OPEN else "lost"
+    said = f"{points(own)} {state}" if own else "costs nothing itself"
     return f"{said}, and {number(blocked)} more in what it holds back" if blocked else said

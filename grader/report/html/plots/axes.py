@@ -12,6 +12,7 @@ from grader.report.text import number
 
 LEFT, RIGHT, TOP, BOTTOM = 46.0, 14.0, 22.0, 40.0
 TICKS = 5
+TINY = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +77,7 @@ class Frame:
 def ticks(low: float, high: float, count: int = TICKS) -> list[float]:
     """About `count` round values from `low` to `high`: 0, 0.5, 1 …"""
     span = high - low
-    if span <= 0 or not math.isfinite(span):
+    if span < TINY or not math.isfinite(span):
         return []
     rough = span / count
     size = 10.0 ** math.floor(math.log10(rough))

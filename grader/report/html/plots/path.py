@@ -82,4 +82,6 @@ def _strayed(figure: PathFigure, taken: list[tuple[float, float]]) -> Iterator[M
         return
     x, y = taken[figure.strayed]
     yield element("circle", cx=x, cy=y, r=10, class_="wrong")
-    yield text(x + 13, y + 4, "too far off", class_="alarm")
+    right = max(spot[0] for spot in taken)
+    end = "end" if x > right - 90 else "start"
+    yield text(x + (-13 if end == "end" else 13), y + 4, "too far off", class_="alarm", text_anchor=end)

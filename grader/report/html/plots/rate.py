@@ -33,15 +33,18 @@ def rate_words(figure: RateFigure) -> str:
         return f"Too few messages on {figure.topic} to draw a rate."
     gaps = figure.gaps_s
     mean = f"{number(figure.mean_hz, 2)} Hz in the mean" if figure.mean_hz is not None else "no mean"
-    allowed = f"{number(figure.low_hz, 2)} to {number(figure.high_hz, 2)} Hz"
-    words = f"{figure.topic}: {mean}; {allowed} pass. "
+    words = f"{figure.topic}: {mean}; {_allowed(figure)} (the green band) passes. Each dot is a message. "
     words += f"The gaps between messages are {_ms(min(gaps))} to {_ms(max(gaps))} ms long"
     words += _outside(figure)
     if figure.ends_silent:
         words += "; the last one is the silence at the end"
     if figure.late:
-        words += f". The grading machine itself was late {count(len(figure.late), 'time')}"
+        words += f". The grading machine itself was late {count(len(figure.late), 'time')} (hatched)"
     return words + "."
+
+
+def _allowed(figure: RateFigure) -> str:
+    return f"{number(figure.low_hz, 2)} to {number(figure.high_hz, 2)} Hz"
 
 
 def _outside(figure: RateFigure) -> str:
@@ -77,6 +80,9 @@ def _over_time(figure: RateFigure, name: str) -> Markup:
     children += frame.axes("seconds since the run began", "Hz")
     points = [(frame.x(t), frame.y(r)) for t, r in zip(figure.times_s, rates, strict=True)]
     children.append(element("path", d=dots(points), class_="dots"))
+    children.append(
+        text(frame.x(0) + 5, frame.y(figure.high_hz) - 5, f"{_allowed(figure)} passes", class_="good")
+    )
     children += _mean(frame, figure.mean_hz)
     beyond = sum(rate > frame.y_high for rate in rates)
     if beyond:
