@@ -36,8 +36,9 @@ class Detail:
 DETAILS = (
     Detail(text=1000),
     Detail(text=400),
-    Detail(text=200, graphs=False),
-    Detail(text=100, graphs=False, entries=150),
+    Detail(text=200),
+    Detail(text=100, entries=150),
+    Detail(text=100, entries=150, graphs=False),
     Detail(text=100, graphs=False, entries=60, folded=False),
     Detail(text=60, graphs=False, entries=15, folded=False),
 )
