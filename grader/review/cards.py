@@ -84,7 +84,7 @@ class Card:
 
 @dataclass(frozen=True, kw_only=True)
 class Cards:
-    """What waits for a person, what a person decided, and all the rest, each in the rubric's order."""
+    """What waits for a person, what a person decided, and the rest: what lost points first, else as in the rubric."""
 
     waiting: Sequence[Card]
     decided: Sequence[Card]
@@ -98,7 +98,7 @@ def cards(row: Row, rubric: Rubric, decided: Mapping[str, Override], drafts: Map
     mine = [c for c in found if c.override is not None]
     waiting = [c for c in found if c.override is None and _waits(c, whole=whole)]
     others = [c for c in found if c not in mine and c not in waiting]
-    return Cards(waiting=waiting, decided=mine, rest=others)
+    return Cards(waiting=waiting, decided=mine, rest=sorted(others, key=_nothing_lost))
 
 
 def card(
@@ -125,6 +125,10 @@ def _waits(card: Card, *, whole: bool) -> bool:
     """Of what could not be graded at all, only what people decide anyway waits for one."""
     status = card.criterion.status
     return card.criterion.max_points > 0 and ((status in OPEN and whole) or (card.manual and status in OPEN))
+
+
+def _nothing_lost(card: Card) -> bool:
+    return card.criterion.points >= card.criterion.max_points
 
 
 def verdict(status: Status, points: float, most: float) -> str:

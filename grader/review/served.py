@@ -11,11 +11,11 @@ from typing import BinaryIO
 from grader.results import EVIDENCE
 
 REPORTS = {
-    "report.html": "text/html; charset=utf-8",
-    "report.md": "text/plain; charset=utf-8",
-    "console.log": "text/plain; charset=utf-8",
-    "junit.xml": "text/plain; charset=utf-8",
-    "result.json": "text/plain; charset=utf-8",
+    "report.html": "text/html",
+    "report.md": "text/plain",
+    "console.log": "text/plain",
+    "junit.xml": "text/plain",
+    "result.json": "text/plain",
 }
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,150}")
 FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC

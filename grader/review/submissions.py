@@ -43,6 +43,19 @@ class Item:
     late: bool
     gradable: bool
 
+    @property
+    def state(self) -> tuple[str, str]:
+        """A status for its colour, and in words what is to be done with it."""
+        if self.status == "inconclusive":
+            return (
+                ("manual", "waiting for points")
+                if self.kinds == {"manual", ALL}
+                else ("inconclusive", "inconclusive")
+            )
+        return {"missing": ("blocked", "not graded yet"), "error": ("error", "not graded")}.get(
+            self.status, ("pass", "graded")
+        )
+
     def fits(self, kind: str, words: str) -> bool:
         """Whether a filter shows it and its id, name or group has these words."""
         entry = self.entry

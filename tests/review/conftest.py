@@ -62,6 +62,7 @@ class Client(FlaskClient):
 
     def open(self, *args, **given):
         given.setdefault("base_url", f"http://{HOST}")
+        given.setdefault("buffered", True)
         return super().open(*args, **given)
 
 

@@ -41,6 +41,7 @@ const send = async (form, submitter) => {
     put(form, answer);
     if (!response.ok) {
       told(form, answer.error || "not saved", true);
+      form.closest(".card")?.querySelector(".notes").scrollIntoView({ block: "nearest" });
       return;
     }
     if (body.get("do") === "remove" && typed(form) === before) form.querySelectorAll("input[type=text], textarea").forEach((field) => { field.value = ""; });
