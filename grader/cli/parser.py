@@ -27,6 +27,14 @@ MUTANTS_EXIT_CODES = """exit codes:
   130  interrupted
 """
 
+REPORT_EXIT_CODES = """exit codes:
+  0    written, whatever the result is
+  2    the command line or a rubric is wrong
+  3    a result cannot be read, or is none that can be shown in this form
+  130  interrupted
+"""
+FORMS = ("html", "markdown", "terminal", "junit", "sarif", "code-quality", "annotations", "gradescope")
+
 
 class Parser(argparse.ArgumentParser):
     """argparse, with its errors as ours: one line and exit code 2."""
@@ -179,6 +187,8 @@ def _class(add: _Adder) -> None:
     )
     book.add_argument("--per-criterion", action="store_true", help="a column for each criterion")
 
+    _report(add("report", "write the reports of a result or of a class again; needs no ROS"))
+
     review = add("review", "look at a class in the browser: give points, decide otherwise, comment")
     review.add_argument("folder", metavar="DIR", type=Path, help="the --out of `grader batch`")
     review.add_argument(
@@ -207,6 +217,30 @@ def _class(add: _Adder) -> None:
         help="how much of one's own code must be in the other's (default: 80)",
     )
     _json(similar)
+
+
+def _report(report: argparse.ArgumentParser) -> None:
+    report.epilog = REPORT_EXIT_CODES
+    report.add_argument(
+        "folder",
+        metavar="DIR",
+        type=Path,
+        help="a submission's folder of results, or the --out of `grader batch`",
+    )
+    _rubric(report, required=False)
+    report.add_argument(
+        "--form", choices=FORMS, default="", help="this one alone (default: all files of DIR)"
+    )
+    report.add_argument("--out", metavar="FILE", default="", help="where that one goes (default: -, stdout)")
+    report.add_argument(
+        "--prefix",
+        metavar="PATH",
+        help="the package's folder in the repository, for lines of files (default: looked for here)",
+    )
+    report.add_argument("--student", action="store_true", help="leave hidden criteria out of that one")
+    report.add_argument(
+        "--anonymous", metavar="FILE", type=Path, help="write the class's page without names there, too"
+    )
 
 
 def _evidence(add: _Adder) -> None:

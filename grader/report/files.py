@@ -40,7 +40,7 @@ def write_reports(
     files = {
         "result.json": result_bytes(shown),
         "report.html": _encoded(html_report(shown, rubric, figures or Figures(), hidden=hidden, docs=docs)),
-        "report.md": markdown_report(shown, rubric, hidden=hidden).encode(),
+        "report.md": markdown_report(shown, rubric, hidden=hidden, figures=figures).encode(),
         "junit.xml": junit(shown),
         "console.log": _console(console).encode(),
     }

@@ -1,0 +1,191 @@
+"""`grader report DIR`: the reports of results that are there already, written again. Nothing is run, no ROS needed."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from grader.batch.flow import INDEX
+from grader.batch.folder import RUN, BatchFolder, open_batch
+from grader.batch.reports import Written, figures_in, result_in, write_all, write_one
+from grader.cli.errors import report
+from grader.cli.prefix import package_prefix
+from grader.cli.say import say
+from grader.errors import EvidenceError, ExitCode, UsageError
+from grader.files import atomic_write
+from grader.model.figure import Figures
+from grader.model.result import GradingResult
+from grader.report.annotations import github_annotations
+from grader.report.class_page import salt_in, write_class_page
+from grader.report.code_quality import code_quality
+from grader.report.gradescope import gradescope
+from grader.report.hidden import without_hidden
+from grader.report.html import html_report
+from grader.report.junit import junit
+from grader.report.markdown import markdown_report
+from grader.report.sarif import sarif
+from grader.report.summary import missing_hidden
+from grader.report.terminal import open_console, print_report
+from grader.results import RESULT
+from grader.rubric.find import rubric_ids
+from grader.rubric.load import LoadedRubric, load_rubric
+from grader.shown import line
+
+STDOUT = "-"
+OF_LINES = ("sarif", "code-quality", "annotations")
+NAMES_SHOWN = 5
+LINE_CHARS = 2000
+
+
+def run(
+    *,
+    folder: Path,
+    rubric: str | None = None,
+    form: str = "",
+    out: str = "",
+    prefix: str | None = None,
+    student: bool = False,
+    anonymous: Path | None = None,
+) -> ExitCode:
+    """Write every report of a submission or of a class anew; with `form`, that one of one submission to `out`."""
+    batch = open_batch(folder) if (folder / RUN).is_file() else None
+    single = batch is None and (folder / RESULT).is_file()
+    if form:
+        if not single or anonymous:
+            raise UsageError(f"{folder}: --form is for one submission", hint="give its own folder: DIR/<id>")
+        return _one(folder, _rubric(rubric, folder), form, out or STDOUT, prefix, student=student)
+    if out or prefix is not None or student:
+        raise UsageError("--out, --prefix and --student go with --form", hint="see grader report --help")
+    if anonymous and batch is None:
+        raise UsageError(
+            f"{folder}: only a class has a page: there is no {RUN}", hint="give the batch's --out"
+        )
+    folders = [folder] if single else _folders(folder, batch)
+    loaded = _rubric(rubric, folders[0], batch)
+    code = _written(folders, loaded)
+    if batch is not None:
+        _class_pages(batch, anonymous)
+    return code
+
+
+def _folders(folder: Path, batch: BatchFolder | None) -> list[Path]:
+    """The submissions in a batch's folder, or in any folder of results."""
+    try:
+        places = sorted(folder.iterdir()) if batch is None else map(batch.folder_of, batch.run.entries)
+        found = [place for place in places if (place / RESULT).is_file()]
+    except OSError as error:
+        raise UsageError(f"{folder}: {error.strerror}", hint="give a folder of results") from error
+    if not found:
+        hint = "give the --out of `grader batch`, or a submission's folder"
+        raise UsageError(f"{folder}: no results in it", hint=hint)
+    return found
+
+
+def _rubric(given: str | None, folder: Path, batch: BatchFolder | None = None) -> LoadedRubric:
+    """What the command line says, else what the batch was graded by, else the one of that id among the grader's own."""
+    if given is None and batch is None and (folder.absolute().parent / RUN).is_file():
+        batch = open_batch(folder.absolute().parent)
+    if given is None and batch is None:
+        given = result_in(folder).rubric.id
+        if given not in rubric_ids():
+            message = f'{folder / RESULT}: its rubric "{given}" is none of those that come with the grader'
+            raise UsageError(message, hint="name its file with --rubric")
+    return load_rubric(given or (batch.run.rubric_source if batch else ""))
+
+
+def _written(folders: Sequence[Path], rubric: LoadedRubric) -> ExitCode:
+    if len(folders) == 1:
+        digest = write_one(folders[0], rubric).rubric.digest
+        done = [Written(folder=folders[0], rubric_digest=digest)]
+    else:
+        done = list(write_all(folders, rubric, len(os.sched_getaffinity(0))))
+    _say_others([w.folder.name for w in done if not w.error and w.rubric_digest != rubric.digest], rubric)
+    for failed in (w for w in done if w.error):
+        report(EvidenceError(failed.error, hint=failed.hint))
+    good = sum(not w.error for w in done)
+    where = folders[0] if len(folders) == 1 else folders[0].parent
+    say(f"{good} of {len(done)} written: {where}" if len(done) > 1 else str(where / "report.html"))
+    return ExitCode.PASSED if good == len(done) else ExitCode.NOT_GRADED
+
+
+def _say_others(names: Sequence[str], rubric: LoadedRubric) -> None:
+    if names:
+        more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
+        shown = ", ".join(names[:NAMES_SHOWN])
+        _remark(f"{shown}{more}: judged by another version of {rubric.path} than this one")
+
+
+def _remark(text: str) -> None:
+    print(f"grader: report: {line(text, LINE_CHARS)}", file=sys.stderr)
+
+
+def _class_pages(batch: BatchFolder, anonymous: Path | None) -> None:
+    targets = [(batch.path / INDEX, False), *([(anonymous, True)] if anonymous else [])]
+    for target, nameless in targets:
+        pairs = ((row.entry, row.result) for row in batch.rows())
+        salt = salt_in(batch.path) if nameless else None
+        write_class_page(batch.run, pairs, target, anonymous=nameless, salt=salt)
+        say(str(target))
+
+
+def _one(
+    folder: Path, rubric: LoadedRubric, form: str, out: str, prefix: str | None, *, student: bool
+) -> ExitCode:
+    result = result_in(folder)
+    if result.rubric.digest != rubric.digest:
+        _say_others([folder.absolute().name], rubric)
+    if form == "gradescope" and student:
+        raise UsageError("Gradescope hides hidden criteria itself", hint="leave --student away")
+    shown = without_hidden(result, rubric.rubric) if student else result
+    if form == "terminal" and out == STDOUT:
+        hidden = missing_hidden(shown, rubric.rubric)
+        print_report(shown, rubric.rubric, open_console(sys.stdout), hidden=hidden)
+        return ExitCode.PASSED
+    where = _prefix(result, prefix) if form in OF_LINES else ""
+    data = _made(form, shown, rubric, where, lambda: figures_in(folder, shown, rubric))
+    if out == STDOUT:
+        sys.stdout.buffer.write(data)
+    else:
+        atomic_write(Path(out), data)
+    return ExitCode.PASSED
+
+
+def _prefix(result: GradingResult, given: str | None) -> str:
+    found = package_prefix(result, Path.cwd()) if given is None else given
+    if found is None:
+        package = result.submission.package
+        _remark(
+            f"no package {package} with these files is here: paths begin in it; --prefix says where it is"
+        )
+    return found or ""
+
+
+def _made(
+    form: str,
+    result: GradingResult,
+    rubric: LoadedRubric,
+    prefix: str,
+    figures: Callable[[], Figures | None],
+) -> bytes:
+    """The report in that form. Only those that show figures have the evidence read."""
+    lab = rubric.rubric
+    hidden = missing_hidden(result, lab)
+    makers: dict[str, Callable[[], str]] = {
+        "html": lambda: html_report(result, lab, figures() or Figures(), hidden=hidden, docs=rubric.docs),
+        "markdown": lambda: markdown_report(result, lab, hidden=hidden, figures=figures()),
+        "sarif": lambda: sarif(result, prefix, docs=rubric.docs),
+        "code-quality": lambda: code_quality(result, prefix),
+        "annotations": lambda: github_annotations(result, prefix),
+        "gradescope": lambda: gradescope(result, lab),
+        "terminal": lambda: _printed(result, rubric, hidden),
+    }
+    return junit(result) if form == "junit" else makers[form]().encode("utf-8", "backslashreplace")
+
+
+def _printed(result: GradingResult, rubric: LoadedRubric, hidden: int) -> str:
+    text = io.StringIO()
+    print_report(result, rubric.rubric, open_console(text), hidden=hidden)
+    return text.getvalue()
