@@ -1,0 +1,210 @@
+"""A student's report in a browser: the plots have their points, it obeys nobody, and it can be used without a mouse."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from grader.checks import CHECKS
+from grader.report.html import html_report
+from tests.browser.conftest import DESKTOP, PHONE
+from tests.report.hostile import ESCAPES, result, rubric
+from tests.report.html.made import SCRIPT, counter, figures, graph, heard, hostile_figures, rate
+from tests.report.nasty import STEERING
+from tests.report.test_every_report import of, spoiled
+
+ROOT = Path(__file__).resolve().parents[2]
+LAB = "leeds-comp3631-lab1"
+DOCS = {"some-check": {**CHECKS["rate"].sections}}
+SIZES = pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+DARK = pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+# Of a path of single dots, how many there are, and whether they are somewhere.
+DOTS = "all => all.map((one) => [one.getAttribute('d').split('M').length - 1, one.getBBox().width > 1])"
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    text = html_report(
+        result(), rubric(scenarios={"real": {"title": "In real time"}}), figures(), hidden=0, docs=DOCS
+    )
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def opened(page):
+    page.locator("details").evaluate_all("all => all.forEach((one) => { one.open = true; })")
+    return page
+
+
+@SIZES
+@DARK
+def test_it_is_accessible_and_fits(visit, axe, written, size, dark) -> None:
+    page = opened(visit(written, size=size, dark=dark))
+    assert axe(page) == []
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_it_is_valid_html(validate, written) -> None:
+    assert validate(written) == []
+
+
+@SIZES
+def test_points_and_what_was_lost_are_what_one_sees_first(visit, written, size) -> None:
+    page = visit(written, size=size)
+    assert page.locator("#points").bounding_box()["y"] < size.height / 2
+    lost = page.locator("article[data-status=fail], article[data-status=partial]").first
+    assert lost.bounding_box()["y"] < 1.5 * size.height
+
+
+@SIZES
+def test_the_rate_has_a_dot_for_each_gap_its_band_and_the_gaps_histogram(visit, written, size) -> None:
+    plots = visit(written, size=size).locator("[data-criterion=chatter-rate] [data-figure=rate]")
+    assert plots.get_attribute("data-points") == str(len(rate().gaps_s))
+    assert plots.locator("path.dots").evaluate_all(DOTS) == [[len(rate().gaps_s), True]]
+    assert plots.locator("svg").count() == 2
+    over_time, gaps = plots.locator("svg").all()
+    assert over_time.locator("rect.band").count() == 1
+    assert over_time.locator("rect.late").count() == len(rate().late)
+    columns = gaps.locator("rect.column").evaluate_all("all => all.map((one) => one.getBBox().height)")
+    assert len(columns) == 1  # all gaps are of one length
+    assert columns[0] > 50
+
+
+@SIZES
+def test_the_counter_is_a_sawtooth_with_its_wraps_marked_and_the_wrong_step_circled(
+    visit, written, size
+) -> None:
+    plots = visit(written, size=size).locator("[data-criterion=counter-wrap] [data-figure=counter]")
+    plots.evaluate("one => { const card = one.closest('details'); if (card) { card.open = true; } }")
+    whole = plots.locator("svg").first
+    assert whole.locator("path.dots").evaluate_all(DOTS) == [[len(counter().values), True]]
+    assert whole.locator("path.line").evaluate("one => one.getTotalLength()") > 1000
+    assert whole.locator("line.wrap").count() == len(counter().wraps)
+    (circle,) = whole.locator("circle.wrong").all()
+    assert circle.bounding_box()["width"] > 5
+    assert "after 127 comes 1" in plots.inner_text()
+
+
+def test_what_was_sent_stands_beside_what_was_heard(visit, written) -> None:
+    table = opened(visit(written)).locator("[data-figure=heard] table")
+    assert table.locator("tbody tr").count() == len(heard().rows)
+    assert table.locator("tr.missed").all_inner_texts() == ["1.1 s\t0\t✗ not printed"]
+
+
+def test_the_graph_has_all_nodes_and_topics_with_arrows(visit, written) -> None:
+    drawn = opened(visit(written)).locator("[data-figure=graph]")
+    assert drawn.locator("svg .node").count() == len(graph().nodes)
+    assert drawn.locator("svg .topic").count() == len(graph().topics)
+    assert drawn.locator("svg .arrow").count() == len(graph().edges)
+    assert drawn.locator("details tbody tr").count() == len(graph().topics)
+
+
+def test_the_console_has_its_lines_with_times(visit, written) -> None:
+    lines = opened(visit(written)).locator("[data-figure=console] pre").inner_text().strip().splitlines()
+    assert [line.split() for line in lines] == [
+        ["0.000", "talker", "hello"],
+        ["0.100", "talker", "stderr", "Traceback"],
+    ]
+
+
+def test_the_cited_line_is_marked_among_those_around_it(visit, written) -> None:
+    shown = visit(written).locator("[data-figure=code]").first
+    assert shown.locator("pre .row").count() == 3
+    assert shown.locator("mark").all_inner_texts() == ["    rate.sleep"]
+
+
+@DARK
+def test_plots_can_be_told_from_their_ground(visit, written, dark) -> None:
+    colours = "one => [getComputedStyle(one).stroke, getComputedStyle(one.ownerSVGElement).backgroundColor]"
+    dots, ground = visit(written, dark=dark).locator("path.dots").first.evaluate(colours)
+    channels = [[int(part) for part in re.findall(r"\d+", colour)[:3]] for colour in (dots, ground)]
+    assert max(abs(one - other) for one, other in zip(*channels, strict=True)) > 90
+
+
+def test_it_can_be_used_with_keys_alone(visit, written) -> None:
+    page = visit(written)
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.textContent") == "Skip to the report"
+    assert page.locator(".skip").bounding_box()["x"] >= 0
+    summary = page.locator("details > summary").first
+    summary.focus()
+    page.keyboard.press("Enter")
+    assert page.locator("details").first.get_attribute("open") is not None
+    outline = summary.evaluate("one => getComputedStyle(one).outlineWidth")
+    assert outline not in {"", "0px"}
+
+
+def test_a_link_to_a_criterion_opens_it(visit, written) -> None:
+    page = visit(written)
+    link = page.locator("#criteria a").last
+    target = link.get_attribute("href")
+    link.click()
+    assert page.locator(target).is_visible()
+    assert page.locator(target).evaluate("one => one.tagName !== 'DETAILS' || one.open")
+
+
+def test_a_command_is_copied(visit, written) -> None:
+    page = visit(written)
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    button = page.locator("button[data-copy]").first
+    command = button.locator("xpath=..").locator("code").inner_text()
+    button.click()
+    page.get_by_role("button", name="Copied").or_(button.filter(has_text="Copied")).first.wait_for()
+    assert page.evaluate("navigator.clipboard.readText()") == command
+
+
+def test_print_shows_everything_on_white(visit, written) -> None:
+    page = visit(written, dark=True)
+    page.emulate_media(media="print")
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    closed = page.locator("details:not([open])").count()
+    assert closed == 0
+    assert not page.locator("nav").is_visible()
+    assert len(page.pdf()) > 10_000
+
+
+@SIZES
+def test_texts_of_others_stay_texts(visit, axe, validate, tmp_path, size) -> None:
+    path = tmp_path / "report.html"
+    shown = spoiled(of(f"{SCRIPT} {ESCAPES}")).model_copy(update={"error": None})
+    shown = shown.model_copy(update={"criteria": (*shown.criteria, *result().criteria)})
+    path.write_text(html_report(shown, rubric(), hostile_figures()), encoding="utf-8")
+    page = opened(visit(path, size=size))
+    assert any(SCRIPT in title for title in page.locator("h3").all_inner_texts())
+    assert page.locator("figure").count() >= 8
+    assert page.locator("img, main script, iframe, object").count() == 0
+    assert page.evaluate("document.querySelectorAll('[onerror],[onload],[onclick]').length") == 0
+    links = page.locator("a[href]").evaluate_all("all => all.map((one) => one.getAttribute('href'))")
+    assert all(link.startswith("#") for link in links)
+    assert not STEERING.search(page.locator("body").evaluate("one => one.textContent"))
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert validate(path) == []
+    assert axe(page) == []
+
+
+@pytest.mark.ros
+def test_a_real_grading_shows_what_was_recorded(visit, axe, validate, tmp_path) -> None:
+    source = ROOT / "fixtures" / LAB / "counter-resets-to-1"
+    command = [sys.executable, "-m", "grader", "grade", str(source), "--rubric", LAB, "--out", str(tmp_path)]
+    subprocess.run(
+        command, check=False, capture_output=True, timeout=240
+    )  # the browser's loop runs in this process
+    path = tmp_path / source.name / "report.html"
+    assert path.stat().st_size < 400_000
+    page = opened(visit(path))
+    plots = page.locator("[data-figure=counter]")
+    assert plots.count() >= 1
+    for plot in plots.all():
+        points = int(plot.get_attribute("data-points"))
+        assert plot.locator("svg").first.locator("path.dots").evaluate_all(DOTS) == [[points, True]]
+    assert page.locator("[data-criterion=counter-wrap] circle.wrong").count() >= 1
+    assert page.locator("[data-figure=rate] path.dots").count() >= 1
+    assert page.locator("[data-figure=graph] svg .node").count() >= 2
+    assert axe(page) == []
+    assert validate(path) == []
