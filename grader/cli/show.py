@@ -14,7 +14,7 @@ from grader.report.result_json import result_text
 from grader.report.terminal import open_console, print_report
 from grader.rubric.model import Rubric
 
-REPORTS = ("result.json", "report.md", "junit.xml", "console.log")
+REPORTS = ("report.html", "result.json", "report.md", "junit.xml", "console.log")
 
 
 def show(
