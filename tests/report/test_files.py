@@ -67,7 +67,7 @@ def test_error_is_there_only_where_there_is_one():
 
 def test_all_files_are_written_and_nothing_beside_them(tmp_path):
     paths = write_reports(result(), tmp_path / "a" / "b", console="x\x1b[2J\ny", rubric=rubric())
-    assert sorted(p.name for p in paths) == ["console.log", "junit.xml", "report.md", "result.json"]
+    assert sorted(p.name for p in paths) == ["console.log", "junit.xml", "report.html", "report.md", "result.json"]
     assert sorted(p.name for p in (tmp_path / "a" / "b").iterdir()) == sorted(p.name for p in paths)
     assert (tmp_path / "a/b/console.log").read_text() == "x\\x1b[2J\ny"
 
@@ -76,7 +76,7 @@ def test_hidden_criteria_are_left_out_everywhere(tmp_path):
     write_reports(result(), tmp_path, console="", rubric=hiding("talker-node", "build"), keep_hidden=False)
     for name in ("result.json", "junit.xml"):
         assert "the node printed" not in (tmp_path / name).read_text()
-    assert "2 hidden criteria are not part of this report" in (tmp_path / "report.md").read_text()
+    assert "0 of 9 visible checks passed; 2 more run at grading." in (tmp_path / "report.md").read_text()
 
 
 def test_without_hidden_recounts():
