@@ -70,6 +70,11 @@ def write_one(folder: Path, rubric: LoadedRubric) -> GradingResult:
     return result
 
 
+def has_result(folder: Path) -> bool:
+    """Whether it is a submission's folder of results."""
+    return (folder / RESULT).is_file()
+
+
 def result_in(folder: Path) -> GradingResult:
     """A submission's result. Raises EvidenceError."""
     result = read_result(folder)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from grader.batch.flow import INDEX
 from grader.batch.folder import RUN, BatchFolder, open_batch
-from grader.batch.reports import Written, figures_in, result_in, write_all, write_one
+from grader.batch.reports import Written, figures_in, has_result, result_in, write_all, write_one
 from grader.cli.errors import report
 from grader.cli.prefix import package_prefix
 from grader.cli.say import say
@@ -29,7 +29,6 @@ from grader.report.markdown import markdown_report
 from grader.report.sarif import sarif
 from grader.report.summary import missing_hidden
 from grader.report.terminal import open_console, print_report
-from grader.results import RESULT
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.shown import line
@@ -52,7 +51,7 @@ def run(
 ) -> ExitCode:
     """Write every report of a submission or of a class anew; with `form`, that one of one submission to `out`."""
     batch = open_batch(folder) if (folder / RUN).is_file() else None
-    single = batch is None and (folder / RESULT).is_file()
+    single = batch is None and has_result(folder)
     if form:
         if not single or anonymous:
             raise UsageError(f"{folder}: --form is for one submission", hint="give its own folder: DIR/<id>")
@@ -75,7 +74,7 @@ def _folders(folder: Path, batch: BatchFolder | None) -> list[Path]:
     """The submissions in a batch's folder, or in any folder of results."""
     try:
         places = sorted(folder.iterdir()) if batch is None else map(batch.folder_of, batch.run.entries)
-        found = [place for place in places if (place / RESULT).is_file()]
+        found = [place for place in places if has_result(place)]
     except OSError as error:
         raise UsageError(f"{folder}: {error.strerror}", hint="give a folder of results") from error
     if not found:
@@ -91,7 +90,7 @@ def _rubric(given: str | None, folder: Path, batch: BatchFolder | None = None) -
     if given is None and batch is None:
         given = result_in(folder).rubric.id
         if given not in rubric_ids():
-            message = f'{folder / RESULT}: its rubric "{given}" is none of those that come with the grader'
+            message = f'{folder}: its rubric "{given}" is none of those that come with the grader'
             raise UsageError(message, hint="name its file with --rubric")
     return load_rubric(given or (batch.run.rubric_source if batch else ""))
 
