@@ -14,7 +14,7 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation
 from grader.report.hidden import hidden_ids
 from grader.report.html.drawn import Drawer, Drawn, code_places
-from grader.report.html.words import MEANINGS, SIGNS, lost_words
+from grader.report.html.words import ADVICE, MEANINGS, MENDED, SIGNS, lost_words
 from grader.report.text import line
 from grader.report.view import Loss, ReportView, not_graded, places, points_of
 from grader.rubric.model import Rubric
@@ -42,11 +42,13 @@ class Detail:
 
 @dataclass(frozen=True, kw_only=True)
 class Card:
-    """One criterion. `anchor` is its id on the page. `lost` says what it cost, with what it holds back."""
+    """One criterion. `anchor` is its id on the page. `lost` says what it cost, with what it holds back; `advice` is the
+    title of its hint."""
 
     anchor: str
     criterion: CriterionResult
     hidden: bool
+    advice: str
     sign: str
     meaning: str
     points: str
@@ -151,7 +153,7 @@ class Maker:
             self._short(criterion),
             why=self._prose(docs.get(MATTERS, "")),
             how=self._prose(docs.get(MEASURED, "")),
-            fix=self._prose(docs.get(FIX, "")),
+            fix=self._prose(docs.get(FIX, "")) if criterion.status in MENDED else NOTHING,
             hint=self._prose(criterion.hint),
             where=self._where(criterion),
             figures=[self._drawer.draw(figure) for figure in own],
@@ -162,6 +164,7 @@ class Maker:
             anchor=self._anchors[criterion.id] if linked else "",
             criterion=criterion,
             hidden=criterion.id in self._hidden,
+            advice=ADVICE.get(criterion.status, "What to do"),
             sign=SIGNS[criterion.status],
             meaning=MEANINGS[criterion.status],
             points=points_of(criterion),

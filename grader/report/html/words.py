@@ -30,6 +30,8 @@ MEANINGS = {
     Status.ERROR: "the grader could not judge it; no points are lost for good",
     Status.MANUAL: "a person gives these points",
 }
+MENDED = frozenset({Status.FAIL, Status.PARTIAL})
+ADVICE = {Status.FAIL: "How to mend it", Status.PARTIAL: "How to mend it", Status.PASS: "Hint"}
 FAULTS = {
     "submission": "This is about what was handed in: mend it and hand it in again.",
     "machine": "This is the fault of the machine that graded, not yours. No points are lost for good: "
@@ -91,7 +93,7 @@ def pass_mark(result: GradingResult, rubric: Rubric, hidden: int) -> str:
 
 def left_out(result: GradingResult, hidden: int) -> str:
     """`12 visible checks passed; 5 more run at grading.`; empty where nothing is left out."""
-    if not hidden:
+    if not hidden or not_graded(result):
         return ""
     good, many = sum(c.status is Status.PASS for c in result.criteria), len(result.criteria)
     seen = count(many, "visible check")
@@ -104,14 +106,17 @@ def in_short(result: GradingResult, view: ReportView) -> str:
     lost = sum(loss.points for loss in view.lost)
     if not_graded(result):
         return "Nothing could be judged."
-    if lost <= 0 and not view.open:
+    late = result.late.points_before - result.late.points if result.late else 0.0
+    if lost <= 0 and late <= 0 and not view.open:
         return "Nothing was lost: every criterion that counts is reached. Well done!"
-    said = ["Nothing was lost."]
+    said = [] if late > 0 else ["Nothing was lost."]
     if lost > 0:
         costs = "costs" if len(view.lost) == 1 else "cost"
         said = [f"{count(len(view.lost), 'thing')} {costs} you {points(lost)}."]
     if len(view.lost) > 1:
         said.append(f"The first one alone is worth {points(view.lost[0].points)}.")
+    if late > 0:
+        said.append(f"Being late costs you {points(late)}.")
     if view.open:
         still = sum(loss.points for loss in view.open)
         said.append(f"{points(still)} {'is' if still == 1 else 'are'} still open.")

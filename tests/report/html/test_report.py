@@ -224,6 +224,27 @@ def test_what_a_person_decided_what_being_late_cost_and_what_was_noticed():
     assert "look again" in words(document)
     assert "15 of 100 points before, 12.5 after: a day late" in words(document.find(".//header"))
     assert "real, /talker: asked to shut down (refused)" in words(document)
+    assert "Being late costs you 2.5 points." in words(document.find(".//main"))
+
+
+def test_all_reached_but_late_is_no_congratulation():
+    shown = result(
+        criteria=(CRITERIA[0],),
+        points=4,
+        max_points=5,
+        status="graded",
+        late=Lateness(points_before=5, points=4, text="late"),
+    )
+    text = words(parsed(page(shown)).find(".//main"))
+    assert "Being late costs you 1 point." in text
+    assert "Nothing was lost" not in text
+
+
+def test_only_what_can_be_mended_says_how_to_mend_it():
+    document = parsed(page())
+    assert "How to mend it" in words(card(document, "chatter-rate"))
+    for name in ("manifest", "build", "counter-start", "style"):
+        assert "How to mend it" not in words(card(document, name))
 
 
 def test_it_says_how_to_judge_it_again():

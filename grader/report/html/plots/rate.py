@@ -13,7 +13,7 @@ from grader.report.html.svg import dots, drawing, element, text
 from grader.report.html.words import count
 from grader.report.text import number
 
-OVER_TIME = (520.0, 230.0)
+OVER_TIME = (460.0, 230.0)
 HISTOGRAM = (330.0, 230.0)
 BINS = 30
 TOO_FAR = 3.0
