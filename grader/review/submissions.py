@@ -21,7 +21,7 @@ FILTERS = {
     "manual": "Waiting for points",
     "inconclusive": "Inconclusive",
     "error": "Errors",
-    "changed": "Changed since decided",
+    "changed": "Look again",
     "all": "All",
 }
 ALL = "all"

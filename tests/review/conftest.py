@@ -31,8 +31,7 @@ def made_class(tmp_path_factory) -> Path:
 @pytest.fixture
 def out(made_class, tmp_path) -> Path:
     """The folder of a class of five."""
-    shutil.copytree(made_class, tmp_path / "out")
-    return tmp_path / "out"
+    return Path(shutil.copytree(made_class, tmp_path / "out"))
 
 
 @pytest.fixture
