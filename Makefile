@@ -7,7 +7,7 @@ MINUTES ?= 10
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test lint test-pure test-ros stress fuzz bench fixtures mutants fmt clean
+.PHONY: help setup demo test lint test-pure test-ros stress fuzz bench fixtures screenshots mutants fmt clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -46,6 +46,9 @@ bench: setup ## the figures of benchmarks/README.md, measured here
 
 fixtures: setup ## write fixtures/<lab>/ anew from fixtures/<lab>.yaml
 	@$(BIN)/python fixtures/make.py
+
+screenshots: setup ## the pictures of the README, taken anew of real gradings
+	@$(BIN)/python -m scripts.screenshots
 
 mutants: setup ## test the rubrics: every mutant of every lab has to lose what it must
 	@status=0; for lab in $(LABS); do $(BIN)/grader rubric test $$lab || status=1; done; exit $$status
