@@ -12,7 +12,7 @@ from pathlib import Path
 from grader.batch.folder import read_result
 from grader.batch.judging import fitting_runs
 from grader.batch.pool import side_by_side, workers, working
-from grader.errors import EvidenceError, GraderError
+from grader.errors import EvidenceError, GraderError, UsageError
 from grader.evidence.reader import load_evidence
 from grader.figures import figures_of
 from grader.files import unwritable
@@ -56,9 +56,9 @@ def write_one(folder: Path, rubric: LoadedRubric) -> GradingResult:
     Each appears whole; they are not flushed to the disk, for they can always be made again. Raises EvidenceError where
     there is no result that can be read, and as `Results` does.
     """
-    result_in(folder)  # before anything is made there
+    result_in(folder, rubric)  # before anything is made there
     with Results(folder) as results:
-        result = result_in(folder)
+        result = result_in(folder, rubric)
         made = _files(result, rubric, figures_in(folder, result, rubric))
         try:
             for name, data in made.items():
@@ -75,12 +75,15 @@ def has_result(folder: Path) -> bool:
     return (folder / RESULT).is_file()
 
 
-def result_in(folder: Path) -> GradingResult:
-    """A submission's result. Raises EvidenceError."""
+def result_in(folder: Path, rubric: LoadedRubric | None = None) -> GradingResult:
+    """A submission's result. Raises EvidenceError, and UsageError where it is of another lab than `rubric`."""
     result = read_result(folder)
     if result is None:
         message = f"{folder / RESULT}: there is none, or it is not what this grader writes"
         raise EvidenceError(message, hint="grade it again")
+    if rubric is not None and result.rubric.id != rubric.rubric.id:
+        message = f"{folder}: a result of {result.rubric.id}, not of {rubric.rubric.id}"
+        raise UsageError(message, hint="give the rubric that it was graded by with --rubric")
     return result
 
 

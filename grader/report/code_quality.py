@@ -16,11 +16,10 @@ def code_quality(result: GradingResult, prefix: str = "") -> str:
 
 def _issue(finding: Finding) -> dict[str, object]:
     first = finding.places[0]
-    hint = f" ({finding.hint})" if finding.hint else ""
     return {
         "type": "issue",
         "check_name": finding.criterion.id,
-        "description": f"{finding.title}: {finding.message}{hint}",
+        "description": finding.said,
         "categories": ["Bug Risk"],
         "severity": SEVERITIES[finding.severity],
         "fingerprint": finding.fingerprint,

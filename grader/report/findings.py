@@ -47,6 +47,12 @@ class Finding:
     places: tuple[Place, ...]
     fingerprint: str
 
+    @property
+    def said(self) -> str:
+        """All of it in one line: `chatter-rate: 0/10 points: it came at 5 Hz. Hint: sleep less`."""
+        hint = f". Hint: {self.hint}" if self.hint else ""
+        return f"{self.title}: {self.message.rstrip('.')}{hint}"
+
 
 def findings(result: GradingResult, prefix: str = "") -> tuple[Finding, ...]:
     """What was not reached, by its cost. `prefix` is the package's folder, relative to the repository's root.

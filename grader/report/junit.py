@@ -11,6 +11,7 @@ from lxml import etree
 from grader.model.handed_in import AppliedOverride
 from grader.model.result import CriterionResult, ErrorInfo, GradingResult, Note
 from grader.model.verdict import FileCitation, Status
+from grader.report.findings import repository_path
 from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
 from grader.report.settled import automatic_words, decision, look_again
 from grader.report.text import line, number, text_limit, visible
@@ -28,16 +29,19 @@ OUTCOME = {
 LIMIT = 2000
 
 
-def junit(result: GradingResult) -> bytes:
-    """The file's bytes, UTF-8. Among the suite's properties are `points`, `max_points` and each `points:<id>`."""
-    return _Writer(text_limit(len(result.criteria), LIMIT)).document(result)
+def junit(result: GradingResult, prefix: str = "") -> bytes:
+    """The file's bytes, UTF-8. Among the suite's properties are `points`, `max_points` and each `points:<id>`.
+
+    `prefix` is the package's folder in the repository; without it, files are relative to the package.
+    """
+    return _Writer(text_limit(len(result.criteria), LIMIT), prefix).document(result)
 
 
 class _Writer:
     """`limit` is how long a text may be. What XML cannot hold is no sign that can be seen: it is written out."""
 
-    def __init__(self, limit: int) -> None:
-        self._limit = limit
+    def __init__(self, limit: int, prefix: str) -> None:
+        self._limit, self._prefix = limit, prefix
 
     def document(self, result: GradingResult) -> bytes:
         suite = etree.Element("testsuite", {"name": self._text(result.rubric.id), **_counts(result)})
@@ -68,8 +72,9 @@ class _Writer:
     ) -> etree._Element:
         cited = next((c for c in criterion.citations if isinstance(c, FileCitation)), None)
         attributes = {"classname": self._text(rubric_id), "name": self._text(criterion.id), "time": "0"}
-        if cited is not None:
-            attributes["file"] = self._text(cited.file)
+        file = self._file(cited) if cited is not None else ""
+        if cited is not None and file:
+            attributes["file"] = file
             if cited.line is not None:
                 attributes["line"] = str(cited.line)
         case = etree.Element("testcase", attributes)
@@ -79,6 +84,9 @@ class _Writer:
         about = {"title": criterion.title, "status": criterion.status.value, "points": points_of(criterion)}
         etree.SubElement(case, "system-out").text = self._lines({**about, **_decided(criterion, override)})
         return case
+
+    def _file(self, cited: FileCitation) -> str:
+        return self._text(repository_path(self._prefix, cited.file) if self._prefix else cited.file)
 
     def _error(self, suite: etree._Element, rubric_id: str, error: ErrorInfo) -> None:
         case = etree.SubElement(suite, "testcase", classname=self._text(rubric_id), name="grading", time="0")

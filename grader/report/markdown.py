@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from grader.model.figure import Figures, GraphFigure
 from grader.model.result import CriterionResult, GradingResult, Note
+from grader.model.verdict import Status
 from grader.report import noticed
 from grader.report.mermaid import mermaid
 from grader.report.settled import TITLE, automatic_words, decided, decision, late_words, look_again
@@ -54,10 +55,19 @@ def markdown_report(
     graphs = figures.graphs if figures else {}
     text = ""
     for detail in DETAILS:
+        if _surely_too_long(result, detail):
+            continue
         text = _Writer(detail).report(result, rubric, hidden, graphs)
         if len(text.encode()) <= BYTES_MAX:
             break
     return text
+
+
+def _surely_too_long(result: GradingResult, detail: Detail) -> bool:
+    """Whether what is told of the losses alone has no room: then nothing needs to be made to see that."""
+    lost = (c for c in result.criteria if c.status in {Status.FAIL, Status.PARTIAL})
+    texts = (text for c in lost for text in (c.measured, c.expected, c.hint))
+    return detail.folded and sum(min(len(text), detail.text) for text in texts) > BYTES_MAX
 
 
 class _Writer:

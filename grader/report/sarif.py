@@ -46,14 +46,13 @@ def _rule(check: str, sections: Mapping[str, str]) -> dict[str, object]:
 
 
 def _result(finding: Finding, rule: int) -> dict[str, object]:
-    said = f"{finding.title}. {finding.message}"
     first, *others = finding.places
     related = [{"id": i, **_location(place)} for i, place in enumerate(others, start=1)]
     return {
         "ruleId": line(finding.criterion.check, 200),
         "ruleIndex": rule,
         "level": LEVELS[finding.severity],
-        "message": {"text": _unlinked(f"{said} {finding.hint}".rstrip())},
+        "message": {"text": _unlinked(finding.said)},
         "locations": [_location(first)],
         **({"relatedLocations": related} if related else {}),
         "partialFingerprints": {FINGERPRINT: finding.fingerprint},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import subprocess
@@ -63,6 +64,26 @@ def test_nothing_in_a_golden_file_steers(name):
 def test_junit_is_what_jenkins_takes(result):
     schema = etree.XMLSchema(etree.parse(JENKINS))
     schema.assertValid(etree.fromstring(junit(result)))
+
+
+@pytest.mark.parametrize("result", [worst(), hostile.result()])
+def test_junit_names_files_where_the_repository_has_them(result):
+    suite = etree.fromstring(junit(result, "ws/src/lab1"))[0]
+    files = {case.get("file") for case in suite.iter("testcase")} - {None}
+    assert "ws/src/lab1/src/numeric_talker.py" in files
+    assert not [file for file in files if not file.startswith("ws/src/lab1/") or ".." in file]
+
+
+def test_the_gradebook_reads_back_and_none_of_its_cells_is_a_formula():
+    with (GOLDEN / "gradebook.csv").open(encoding="utf-8", newline="") as file:
+        head, row = csv.reader(file, strict=True)
+    assert len(head) == len(row)
+    cells = dict(zip(head, row, strict=True))
+    assert (cells["id"], cells["points"], cells["max_points"]) == ("ada", "18", "131")
+    assert (cells["given"], cells["style"]) == ("3", "")
+    assert not [cell for cell in (*head, *row) if re.match(r"[\s\"'`]*(?<!')[=+\-@\uff1d]", cell)]
+    (line,) = kept("results.jsonl").splitlines()
+    assert json.loads(line)["submission"]["id"] == "ada"
 
 
 def test_sarif_keeps_to_its_schema():

@@ -6,11 +6,15 @@ import io
 import os
 import unicodedata
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from rich.console import Console
 
+from grader.gradebook import Book, Row, write_gradebook
+from grader.gradebook.model import Form
 from grader.model.result import GradingResult
+from grader.model.roster import Entry
 from grader.report.annotations import github_annotations
 from grader.report.code_quality import code_quality
 from grader.report.gradescope import gradescope
@@ -20,7 +24,8 @@ from grader.report.markdown import markdown_report
 from grader.report.result_json import result_bytes
 from grader.report.sarif import sarif
 from grader.report.terminal import open_console, print_report
-from tests.report.worst import DOCS, figures, rubric, worst
+from tests.report.hostile import ESCAPES
+from tests.report.worst import COMMANDS, DOCS, FORMULA, LINKS, WIDE, figures, rubric, worst
 
 GOLDEN = Path(__file__).parent / "golden"
 PREFIX = "catkin_ws/src/lab 1"
@@ -40,7 +45,23 @@ def terminal(encoding: str, width: int = 80) -> bytes:
     return raw.getvalue()
 
 
+def gradebook(form: Form) -> bytes:
+    shown = worst()
+    criteria = tuple((c.id, c.title, c.max_points) for c in shown.criteria)
+    book = Book(
+        title=FORMULA, rubric_id="hostile-lab", max_points=131, criteria=criteria, columns=("note", FORMULA)
+    )
+    extra = {"note": COMMANDS, FORMULA: LINKS}
+    entry = Entry(id="ada", source="/home/ada", name=f"{FORMULA} {WIDE}", group=ESCAPES, extra=extra)
+    with TemporaryDirectory() as folder:
+        place = Path(folder, "book")
+        write_gradebook(book, [Row(entry=entry, result=shown)], place, form)
+        return place.read_bytes()
+
+
 MADE = {
+    "gradebook.csv": lambda: gradebook("csv"),
+    "results.jsonl": lambda: gradebook("jsonl"),
     "report.md": lambda: markdown_report(student(), rubric(), hidden=3, figures=figures()).encode(),
     "junit.xml": lambda: junit(worst()),
     "result.json": lambda: result_bytes(worst()),

@@ -100,9 +100,12 @@ def test_the_rubric_is_the_batchs_or_the_one_of_that_id(lab, tmp_path, capsys):
     changed(alone, rubric={"id": "somebodys-own", "version": "0", "digest": "f" * 64})
     assert run(["report", str(alone)]) == 2
     assert 'its rubric "somebodys-own" is none of those' in capsys.readouterr().err
-    assert run(["report", str(alone), "--rubric", str(LAB)]) == 0
+    assert run(["report", str(alone), "--rubric", str(LAB)]) == 2
+    assert "a result of somebodys-own, not of leeds-comp3631-lab1" in capsys.readouterr().err
     own = tmp_path / "own.yaml"
     own.write_text(LAB.read_text().replace("id: leeds-comp3631-lab1", "id: somebodys-own", 1))
+    assert run(["report", str(alone), "--rubric", str(own)]) == 0
+    own.write_text(f"{LAB.read_text()}# changed\n")
     run_json = json.loads((lab / "run.json").read_text()) | {"rubric_source": str(own)}
     (lab / "run.json").write_text(json.dumps(run_json))
     capsys.readouterr()

@@ -34,7 +34,7 @@ from grader.rubric.load import LoadedRubric, load_rubric
 from grader.shown import line
 
 STDOUT = "-"
-OF_LINES = ("sarif", "code-quality", "annotations")
+OF_LINES = ("junit", "sarif", "code-quality", "annotations")
 NAMES_SHOWN = 5
 LINE_CHARS = 2000
 
@@ -133,7 +133,7 @@ def _class_pages(batch: BatchFolder, anonymous: Path | None) -> None:
 def _one(
     folder: Path, rubric: LoadedRubric, form: str, out: str, prefix: str | None, *, student: bool
 ) -> ExitCode:
-    result = result_in(folder)
+    result = result_in(folder, rubric)
     if result.rubric.digest != rubric.digest:
         _say_others([folder.absolute().name], rubric)
     if form == "gradescope" and student:
@@ -181,7 +181,7 @@ def _made(
         "gradescope": lambda: gradescope(result, lab),
         "terminal": lambda: _printed(result, rubric, hidden),
     }
-    return junit(result) if form == "junit" else makers[form]().encode("utf-8", "backslashreplace")
+    return junit(result, prefix) if form == "junit" else makers[form]().encode("utf-8", "backslashreplace")
 
 
 def _printed(result: GradingResult, rubric: LoadedRubric, hidden: int) -> str:
