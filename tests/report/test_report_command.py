@@ -12,6 +12,7 @@ from lxml import etree
 
 from grader.cli.main import run
 from grader.cli.prefix import package_prefix
+from grader.model.result import RubricInfo
 from grader.model.verdict import FileCitation, Status
 from grader.report.files import write_reports
 from grader.results import READY
@@ -213,7 +214,9 @@ def test_what_a_killed_grader_left_is_finished_first(lab):
 
 def cited(*files: str):
     places = tuple(FileCitation(file=file, line=2) for file in files)
-    return result(criteria=(criterion("a", Status.FAIL, 0, 5, message="wrong", citations=places),))
+    of = RubricInfo(id="leeds-comp3631-lab1", version="1", digest="e" * 64)
+    failed = criterion("a", Status.FAIL, 0, 5, message="wrong", citations=places)
+    return result(criteria=(failed,), rubric=of)
 
 
 def package(folder: Path, name: str = "lab1") -> Path:
