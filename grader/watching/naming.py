@@ -28,12 +28,13 @@ FINDS = re.compile(
     r"|roslib|roslaunch|rosparam|__file__|shutil|ctypes|load_source|np\.load|numpy\.load)\b"
 )
 FINDS_IN_SHELL = re.compile(
-    r"`|\$\(|[\w/.]\*|\*[\w/.]|\bin\s+\*|[\w/.]\$|\$\{?\w+\}?[\w/.]|\b(find|ls|eval|source|xargs|read|mapfile|rospack|roscd|cd)\b"
+    r"`|\$\(|[\w/.]\*|\*[\w/.]|\bin\s+\*|[\w/.]\$|\$\w+[/.]|\$\{\w+\}[\w/.]|\b(find|ls|eval|source|xargs|read|mapfile|rospack|roscd|cd)\b"
 )
 FINDS_IN_CODE = re.compile(
     r"\b(fopen|open|ifstream|fstream|filesystem|system|popen|exec[lv]\w*|dlopen|getPath)\b"
 )
 UNRESOLVED = re.compile(r"\$\((?!find\s|dirname\))|\$\{|&\#|<!ENTITY|\b(launch-prefix|command)\s*=")
+YAML, YAML_COMMENT = frozenset({".yaml", ".yml"}), re.compile(r"^\s*#[^\n]*", re.MULTILINE)
 WORD = re.compile(r"\w+")
 
 
@@ -61,6 +62,8 @@ def leads_to(picture: Picture, path: str) -> Iterator[str]:
         yield from named(picture, file.link)
     if text is None:
         return
+    if PurePosixPath(path).suffix.lower() in YAML:
+        text = YAML_COMMENT.sub("", text)
     modules = _imported(text) if file.python else frozenset[str]()
     for other, about in picture.files.items():
         if other != path and (_names(text, PurePosixPath(other).name) or _modules(other, about) & modules):
