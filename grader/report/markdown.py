@@ -52,7 +52,12 @@ def markdown_report(
 
     Of a result with very long texts, less is said of each, and in the end the details are left out.
     """
-    graphs = figures.graphs if figures else {}
+    used = {criterion.scenario for criterion in result.criteria}
+    graphs = {
+        name: graph
+        for name, graph in (figures.graphs if figures else {}).items()
+        if name in used or name not in rubric.scenarios  # what hidden criteria are about stays hidden
+    }
     text = ""
     for detail in DETAILS:
         if _surely_too_long(result, detail):

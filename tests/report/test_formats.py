@@ -276,6 +276,19 @@ def test_runs_with_the_same_graph_share_its_picture():
     )
 
 
+def test_a_run_that_is_for_hidden_criteria_alone_is_not_drawn():
+    scenarios = {
+        name: {"title": name, "start": ({"name": "t", "script": "t.py"},)} for name in ("real", "again")
+    }
+    lab = rubric()
+    lab = type(lab).model_validate({**lab.model_dump(by_alias=True), "scenarios": scenarios})
+    shown = worst()
+    assert {c.scenario for c in shown.criteria} == {None, "real"}
+    source = markdown_report(shown, lab, hidden=1, figures=figures())
+    assert "In `real`:" in source
+    assert "`again`" not in source
+
+
 @pytest.mark.parametrize("text", [LONG, "*&" * 5000, "\U000e0001" * 5000, "学" * 5000])
 @pytest.mark.parametrize("many", [1, 40, 400])
 def test_markdown_of_any_result_fits_into_a_comment(text, many):

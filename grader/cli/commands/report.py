@@ -101,7 +101,7 @@ def _written(folders: Sequence[Path], rubric: LoadedRubric) -> ExitCode:
         done = [Written(folder=folders[0], rubric_digest=digest)]
     else:
         done = list(write_all(folders, rubric, len(os.sched_getaffinity(0))))
-    _say_others([w.folder.name for w in done if not w.error and w.rubric_digest != rubric.digest], rubric)
+    _say_others([w.folder.absolute().name for w in done if not w.error and w.rubric_digest != rubric.digest], rubric)
     for failed in (w for w in done if w.error):
         report(EvidenceError(failed.error, hint=failed.hint))
     good = sum(not w.error for w in done)
