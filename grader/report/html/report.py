@@ -14,6 +14,7 @@ from grader.report import noticed, settled
 from grader.report.html import words
 from grader.report.html.page import Detail, Docs, Maker, Page
 from grader.report.html.shell import environment, policy, script, style
+from grader.report.summary import visible_words
 from grader.report.text import number
 from grader.report.view import OPEN, ReportView, arrange, not_graded
 from grader.rubric.model import Rubric
@@ -114,7 +115,7 @@ def _head(result: GradingResult, rubric: Rubric, view: ReportView, hidden: int) 
         pass_mark=words.pass_mark(result, rubric, hidden),
         late=settled.late_words(result),
         short=words.in_short(result, view),
-        left_out=words.left_out(result, hidden),
+        left_out=visible_words(result, hidden) if graded else "",
         fault=words.FAULTS[words.blame(result.error.kind)] if result.error else "",
         again=f"grader judge evidence --rubric {shlex.quote(result.rubric.id)}"
         if result.error is None

@@ -91,16 +91,6 @@ def pass_mark(result: GradingResult, rubric: Rubric, hidden: int) -> str:
     )
 
 
-def left_out(result: GradingResult, hidden: int) -> str:
-    """`12 visible checks passed; 5 more run at grading.`; empty where nothing is left out."""
-    if not hidden or not_graded(result):
-        return ""
-    good, many = sum(c.status is Status.PASS for c in result.criteria), len(result.criteria)
-    seen = count(many, "visible check")
-    said = f"{seen} passed" if good == many else f"{good} of {seen} passed"
-    return f"{said}; {hidden} more {'runs' if hidden == 1 else 'run'} at grading."
-
-
 def in_short(result: GradingResult, view: ReportView) -> str:
     """What was lost, in one or two sentences."""
     lost = sum(loss.points for loss in view.lost)
