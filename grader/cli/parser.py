@@ -19,6 +19,16 @@ EXIT_CODES = """exit codes:
 """
 
 
+CLASS_EXIT_CODES = """exit codes, that of the worst submission:
+  0    all passed
+  1    all graded, not all passed
+  2    the command line, the roster, the rubric or overrides.yaml is wrong
+  3    some could not be graded
+  4    some are inconclusive, or wait for a person
+  130  interrupted: the same command goes on
+"""
+
+
 MUTANTS_EXIT_CODES = """exit codes:
   0    the correct package got everything, and every mutant lost what it must, and no more
   1    it did not, or a mutant was not killed, or a criterion is worth points and costs no mutant anything
@@ -117,6 +127,7 @@ def _grading(add: _Adder) -> None:
 
 def _class(add: _Adder) -> None:
     batch = add("batch", "grade a class, and go on where an earlier batch stopped")
+    batch.epilog = CLASS_EXIT_CODES
     batch.add_argument(
         "roster",
         metavar="ROSTER|FOLDER",
@@ -156,6 +167,7 @@ def _class(add: _Adder) -> None:
     _json(batch)
 
     regrade = add("regrade", "judge a class again from its evidence; nothing is run, needs no ROS")
+    regrade.epilog = CLASS_EXIT_CODES
     regrade.add_argument("folder", metavar="DIR", type=Path, help="the --out of `grader batch`")
     _rubric(regrade, required=False)
     regrade.add_argument(
