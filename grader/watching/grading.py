@@ -57,7 +57,7 @@ class Grading:
         return without_hidden(result, self.rubric.rubric)
 
     def _error(self, error: GraderError) -> GradingResult:
-        known = identify(self.source, None) or ("", self.source)
+        known = identify(self.source) or (Path(self.source).name, self.source)
         about = SubmissionInfo(id=known[0], source=known[1], commit=None, digest="", package="")
         attempt = Attempt(
             source=self.source,

@@ -1,0 +1,112 @@
+"""The grading of a watched package: what ends it, what is shown and tried again, and how it is stopped."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from contextlib import nullcontext
+from pathlib import Path
+
+import pytest
+
+from grader import pipeline
+from grader.arena.asynchronous import Stop, Stopped, run_until_signal
+from grader.cli.parser import build_parser
+from grader.errors import Busy, ExitCode, HostError, OutputError, SandboxMissing, SubmissionError
+from grader.model.progress import Silence
+from grader.watching.grading import Grading
+from tests.report.hostile import result
+from tests.watching.labs import rubric
+
+
+@pytest.fixture
+def grading(tmp_path: Path) -> Grading:
+    return Grading(
+        source=str(tmp_path / "lab1"),
+        rubric=rubric("leeds-comp3631-lab1"),
+        out=tmp_path / "out",
+        options=pipeline.GradeOptions(keep_hidden=False),
+        progress=lambda _first: nullcontext(Silence()),
+        code=lambda _: ExitCode.BELOW_PASS_MARK,
+    )
+
+
+def outcomes(monkeypatch, *outcomes_: object) -> list[pipeline.GradeOptions]:
+    """The pipeline gives or raises these, one after the other; the options that it was asked with."""
+    left, asked = list(outcomes_), []
+
+    def grade(_source, _rubric, _out, options, _progress):
+        asked.append(options)
+        outcome = left.pop(0)
+        if isinstance(outcome, BaseException):
+            raise outcome
+        return outcome
+
+    monkeypatch.setattr(pipeline, "grade", grade)
+    return asked
+
+
+def test_evidence_and_the_stop_reach_the_pipeline(grading, monkeypatch, tmp_path) -> None:
+    asked = outcomes(monkeypatch, result(status="graded"))
+    stop, recorded = Stop(), {"talker": tmp_path / "talker.mcap"}
+    outcome = grading(recorded, stop)
+    assert (asked[0].recorded, asked[0].stop, asked[0].keep_hidden) == (recorded, stop, False)
+    assert outcome.evidence == tmp_path / "out" / result().submission.id / "evidence"
+
+
+def test_a_submission_that_cannot_be_graded_is_a_result(grading, monkeypatch) -> None:
+    outcomes(monkeypatch, SubmissionError("too much", hint="less"))
+    outcome = grading({}, Stop())
+    assert (outcome.code, outcome.evidence) == (ExitCode.NOT_GRADED, None)
+    assert outcome.result.error is not None
+    assert (outcome.result.submission.id, outcome.result.error.hint) == ("lab1", "less")
+
+
+@pytest.mark.parametrize(
+    "error", [SandboxMissing("no bwrap"), HostError("no memory"), OutputError("read-only")]
+)
+def test_what_no_save_can_mend_ends_it_at_the_start(error, grading, monkeypatch) -> None:
+    outcomes(monkeypatch, error)
+    with pytest.raises(type(error)):
+        grading({}, Stop())
+
+
+def test_a_fault_of_the_machine_later_on_is_shown_and_tried_again(grading, monkeypatch) -> None:
+    outcomes(monkeypatch, result(status="graded"), Busy("another grader"), result(status="graded"))
+    codes = [grading({}, Stop()).code for _ in range(3)]
+    assert codes[1] is ExitCode.NOT_GRADED
+    assert codes[0] == codes[2]
+
+
+def test_work_is_stopped_from_another_thread_and_ends_in_order() -> None:
+    stop, course = Stop(), []
+
+    async def work() -> None:
+        threading.Thread(target=stop.ask).start()
+        try:
+            await asyncio.sleep(60)
+        finally:
+            course.append("cleaned up")
+
+    with pytest.raises(Stopped):
+        run_until_signal(work(), stop)
+    assert course == ["cleaned up"]
+
+
+def test_work_that_begins_after_it_was_stopped_ends_at_once() -> None:
+    stop = Stop()
+    stop.ask()
+    with pytest.raises(Stopped):
+        run_until_signal(asyncio.sleep(60), stop)
+
+
+def test_a_stop_after_the_end_changes_nothing() -> None:
+    stop = Stop()
+    run_until_signal(asyncio.sleep(0), stop)
+    stop.ask()
+    assert stop.asked
+
+
+def test_the_command_line_knows_it() -> None:
+    assert build_parser().parse_args(["check", "--watch", "--static"]).watch is True
+    assert build_parser().parse_args(["check"]).watch is False
