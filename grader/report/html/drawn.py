@@ -134,7 +134,7 @@ def _counter(figure: CounterFigure, name: str) -> Drawn:
 
 
 def _thinned(shown: int, there: int) -> str:
-    return f"{shown} of {there} are shown." if there > shown else ""
+    return f"{shown} of {there} messages are shown." if there > shown else ""
 
 
 def _heard(figure: HeardFigure, name: str) -> Drawn:
