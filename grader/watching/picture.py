@@ -84,9 +84,10 @@ def folders_in(folder: Path, without: Path | None = None) -> Iterator[Path]:
 
 
 def _files(package: SourcePackage, without: Path | None) -> Iterator[tuple[str, SourceFile]]:
+    """Who says which mode a file has changes with the first commit, and no file does."""
     for file, path in read_files(package):
         if not ignored(path) and not (without and (package.folder / path).is_relative_to(without)):
-            yield file.path, file
+            yield file.path, file.model_copy(update={"mode_source": "disk"})
 
 
 def _texts(folder: Path, files: Mapping[str, SourceFile]) -> Iterator[tuple[str, str]]:

@@ -52,6 +52,7 @@ class ScreenShown:
         self._clock = clock
         self._at = clock()
         self._last: GradingResult | None = None
+        self._ended = False
 
     def begin(self, saved: tuple[str, ...], running: tuple[str, ...] | None) -> None:
         """See `loop.Shown`."""
@@ -76,15 +77,16 @@ class ScreenShown:
     def end(self, outcome: Outcome, unchanged: frozenset[str], saved: tuple[str, ...]) -> None:
         """See `loop.Shown`."""
         result = outcome.result
-        if self._console.is_terminal and self._last is not None:
+        if self._console.is_terminal and self._ended:
             self._console.clear()
+        self._ended = True
         if result.error is not None:
             self._emit(self._error(result))
         elif self._last is None:
             print_report(result, self._rubric, self._console, hidden=self._hidden, static=self._static)
         else:
             self._emit(self._short(result, unchanged))
-        self._last = result if result.error is None or self._last is None else self._last
+        self._last = result if result.error is None else self._last
         self._say(f"{self._saved(saved)} … {ENDS}" if saved else ENDS)
 
     def _short(self, result: GradingResult, unchanged: frozenset[str]) -> Iterable[RenderableType]:
@@ -106,8 +108,6 @@ class ScreenShown:
         return f"Nothing was run (--static): criteria worth {points} points are still open."
 
     def _turns(self, found: Turns) -> Iterable[Text]:
-        if self._last is None or self._last.error is not None:
-            return
         said = [
             ("now reached", found.reached, "green"),
             ("better", found.more, "green"),

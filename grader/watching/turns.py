@@ -29,7 +29,7 @@ FIELDS = ("reached", "more", "less", "lost", "open")
 
 def turns(before: GradingResult | None, after: GradingResult) -> Turns:
     """The difference; none where there is nothing to compare."""
-    known = {c.id: c for c in before.criteria} if before is not None and before.error is None else {}
+    known = {c.id: c for c in before.criteria} if before is not None else {}
     found: dict[str, list[CriterionResult]] = {name: [] for name in FIELDS}
     for criterion in after.criteria:
         earlier = known.get(criterion.id)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +13,7 @@ import pytest
 
 from grader.arena.asynchronous import Stop
 from grader.watching.ignored import ignored
-from grader.watching.picture import folders_in, take_picture
+from grader.watching.picture import differing, folders_in, take_picture
 from grader.watching.saves import WatchedFolders
 from tests.watching.labs import copy_of, write
 
@@ -170,6 +172,13 @@ def test_names_that_are_of_no_interest(name) -> None:
 )
 def test_names_that_are(name) -> None:
     assert not ignored(name)
+
+
+def test_a_first_commit_changes_no_file(package) -> None:
+    before = take_picture(str(package), "lab1")
+    for words in (["init", "-q"], ["add", "."]):
+        subprocess.run([shutil.which("git") or "git", *words], cwd=package, check=True)
+    assert differing(before, take_picture(str(package), "lab1")) == ()
 
 
 def test_permissions_are_part_of_the_picture_and_times_are_not(package) -> None:

@@ -115,6 +115,15 @@ def test_an_error_is_shown_and_the_next_result_is_compared_with_the_last_one_bef
     assert "better: wrap 7.5/15\n" in text
 
 
+def test_the_first_result_after_an_error_is_whole() -> None:
+    wrong = graded(
+        ONE, TWO, status="error", error=ErrorInfo(kind="submission", message="no package", hint="")
+    )
+    text = shown(Terminal(), wrong, graded(ONE, TWO))
+    assert text.count(CLEARED) == 1
+    assert "All criteria" in text.split(CLEARED)[1]
+
+
 def test_files_alone_leave_the_rest_open() -> None:
     open_ = criterion("rate", Status.INCONCLUSIVE, 0.0, 10.0, scenario="talker", message="not run")
     text = shown(StringIO(), graded(open_, HALF), graded(open_, TWO), static=True)
