@@ -18,7 +18,7 @@ from grader.report import settled
 from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
 from grader.report.summary import visible_words
 from grader.report.text import line, number, uncommanded
-from grader.report.view import Loss, arrange, places, points_of
+from grader.report.view import Loss, arrange, not_graded, places, points_of
 from grader.rubric.model import Rubric
 
 LIMIT = 500
@@ -104,7 +104,10 @@ class Terminal:
 
     def _head(self, result: GradingResult, rubric: Rubric) -> Text:
         points = f"{number(result.points)} of {number(result.max_points)} points"
-        text = Text.assemble((points, "bold"), "  ", self._show(result.submission.id), "\n")
+        title = "Not graded" if not_graded(result) else points
+        text = Text.assemble((title, "bold"), "  ", self._show(result.submission.id), "\n")
+        if result.error is not None and not_graded(result):
+            text.append(f"{self._show(result.error.message)}\n")
         text.append(self._show(f"{result.rubric.id}: {rubric.title}"), "dim")
         return text
 

@@ -195,6 +195,18 @@ def test_gradescope_gets_no_file_of_what_was_not_graded(lab, tmp_path, capsys):
     assert "no results.json is written" in capsys.readouterr().err
 
 
+def test_what_was_not_graded_is_never_said_to_have_points(lab, capsys):
+    error = {"kind": "host", "message": "the disk is full", "hint": "make room"}
+    changed(lab / "bob", criteria=[], status="error", points=0, error=error)
+    for form in ("terminal", "markdown", "annotations"):
+        assert run(["report", str(lab / "bob"), "--form", form]) == 0
+        out, err = capsys.readouterr()
+        assert "not graded" in out.lower()
+        assert "the disk is full" in out
+        assert "0 of 100" not in out
+        assert err == ""
+
+
 def test_a_folder_that_cannot_be_written_is_told(lab, capsys):
     (lab / "bob" / "report.md").mkdir()
     assert run(["report", str(lab / "bob")]) != 0

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from grader.batch.flow import INDEX
 from grader.batch.folder import RUN, BatchFolder, open_batch
-from grader.batch.reports import Written, figures_in, has_result, result_in, write_all, write_one
+from grader.batch.reports import Written, has_result, result_in, write_all, write_one
+from grader.batch.settled import figures_in
 from grader.cli.errors import report
 from grader.cli.prefix import package_prefix
 from grader.cli.say import say
@@ -18,6 +19,7 @@ from grader.errors import EvidenceError, ExitCode, UsageError
 from grader.files import atomic_write
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
+from grader.model.verdict import FileCitation
 from grader.report.annotations import github_annotations
 from grader.report.class_page import salt_in, write_class_page
 from grader.report.code_quality import code_quality
@@ -101,7 +103,9 @@ def _written(folders: Sequence[Path], rubric: LoadedRubric) -> ExitCode:
         done = [Written(folder=folders[0], rubric_digest=digest)]
     else:
         done = list(write_all(folders, rubric, len(os.sched_getaffinity(0))))
-    _say_others([w.folder.absolute().name for w in done if not w.error and w.rubric_digest != rubric.digest], rubric)
+    _say_others(
+        [w.folder.absolute().name for w in done if not w.error and w.rubric_digest != rubric.digest], rubric
+    )
     for failed in (w for w in done if w.error):
         report(EvidenceError(failed.error, hint=failed.hint))
     good = sum(not w.error for w in done)
@@ -144,7 +148,7 @@ def _one(
         print_report(shown, rubric.rubric, open_console(sys.stdout), hidden=hidden)
         return ExitCode.PASSED
     where = _prefix(result, prefix) if form in OF_LINES else ""
-    data = _made(form, shown, rubric, where, lambda: figures_in(folder, shown, rubric))
+    data = _made(form, shown, rubric, where, lambda: figures_in(folder, shown, rubric.rubric))
     if out == STDOUT:
         sys.stdout.buffer.write(data)
     else:
@@ -154,7 +158,8 @@ def _one(
 
 def _prefix(result: GradingResult, given: str | None) -> str:
     found = package_prefix(result, Path.cwd()) if given is None else given
-    if found is None:
+    cites = any(isinstance(cited, FileCitation) for c in result.criteria for cited in c.citations)
+    if found is None and cites:
         package = result.submission.package
         _remark(
             f"no package {package} with these files is here: paths begin in it; --prefix says where it is"
