@@ -97,7 +97,7 @@ def regrade(
             for judged in judge_all([path / EVIDENCE for path in by_folder], rubric, jobs, fitting=True)
         }
         regraded = tuple(
-            found.get(folder.folder_of(entry) / EVIDENCE) or _without_evidence(folder, settler, entry)
+            found.get(folder.folder_of(entry) / EVIDENCE) or _without_evidence(folder, rubric, settler, entry)
             for entry in entries
         )
         run = folder.run.model_copy(update=described(rubric, rubric_source) | {"grader": __version__})
@@ -139,12 +139,12 @@ def _regraded(
     return Regraded(entry=entry, before=before, after=after, missing=judged.missing)
 
 
-def _without_evidence(folder: BatchFolder, settler: Settler, entry: Entry) -> Regraded:
+def _without_evidence(folder: BatchFolder, rubric: LoadedRubric, settler: Settler, entry: Entry) -> Regraded:
     """What could not be graded has what people gave for it."""
     before = folder.earlier(entry)
     error = before.error.message if before is not None and before.error else "nothing was recorded"
     if before is not None and (settler.of(entry.id) or before.overrides):
-        rewrite(folder.folder_of(entry), settler.again(before, entry.id, None), settler.rubric)
+        rewrite(folder.folder_of(entry), settler.again(before, entry.id, None), rubric.rubric, rubric.docs)
     return Regraded(entry=entry, before=before, after=None, error=error)
 
 

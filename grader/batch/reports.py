@@ -10,11 +10,9 @@ from functools import partial
 from pathlib import Path
 
 from grader.batch.folder import read_result
-from grader.batch.judging import fitting_runs
 from grader.batch.pool import side_by_side, workers, working
+from grader.batch.settled import figures_in
 from grader.errors import EvidenceError, GraderError, UsageError
-from grader.evidence.reader import load_evidence
-from grader.figures import figures_of
 from grader.files import unwritable
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
@@ -22,7 +20,7 @@ from grader.report.html import html_report
 from grader.report.junit import junit
 from grader.report.markdown import markdown_report
 from grader.report.summary import missing_hidden
-from grader.results import EVIDENCE, RESULT, Results
+from grader.results import RESULT, Results
 from grader.rubric.load import LoadedRubric
 
 
@@ -59,7 +57,7 @@ def write_one(folder: Path, rubric: LoadedRubric) -> GradingResult:
     result_in(folder, rubric)  # before anything is made there
     with Results(folder) as results:
         result = result_in(folder, rubric)
-        made = _files(result, rubric, figures_in(folder, result, rubric))
+        made = _files(result, rubric, figures_in(folder, result, rubric.rubric))
         try:
             for name, data in made.items():
                 (results.new / name).write_bytes(data)
@@ -85,14 +83,6 @@ def result_in(folder: Path, rubric: LoadedRubric | None = None) -> GradingResult
         message = f"{folder}: a result of {result.rubric.id}, not of {rubric.rubric.id}"
         raise UsageError(message, hint="give the rubric that it was graded by with --rubric")
     return result
-
-
-def figures_in(folder: Path, result: GradingResult, rubric: LoadedRubric) -> Figures | None:
-    """Drawn from the evidence; None where there is none, or it cannot be read."""
-    with suppress(Exception):  # no mark hangs on a picture
-        runs = fitting_runs(rubric.rubric, load_evidence([folder / EVIDENCE]))
-        return figures_of(rubric.rubric, runs, result.criteria)
-    return None
 
 
 def _files(result: GradingResult, rubric: LoadedRubric, figures: Figures | None) -> dict[str, bytes]:

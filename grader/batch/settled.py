@@ -59,16 +59,16 @@ def rewrite(
     `docs` has the sections of the checks' docstrings; without them, those of the grader's own checks are taken.
     """
     with Results(folder) as results:
-        figures = _figures(folder / EVIDENCE, result, rubric)
+        figures = figures_in(folder, result, rubric)
         docs = docs or {name: check.sections for name, check in CHECKS.items()}
         write_reports(result, results.new, console="", rubric=rubric, figures=figures, docs=docs)
         (results.new / CONSOLE).unlink()
         results.commit(keep=(EVIDENCE, CONSOLE))
 
 
-def _figures(evidence: Path, result: GradingResult, rubric: Rubric) -> Figures | None:
-    """Drawn from the evidence again; None where there is none, or it cannot be read."""
+def figures_in(folder: Path, result: GradingResult, rubric: Rubric) -> Figures | None:
+    """Of a submission's folder of results, drawn from its evidence; None where there is none, or it cannot be read."""
     with suppress(Exception):  # no mark hangs on a picture
-        runs = fitting_runs(rubric, load_evidence([evidence]))
+        runs = fitting_runs(rubric, load_evidence([folder / EVIDENCE]))
         return figures_of(rubric, runs, result.criteria)
     return None
