@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import datetime
 from importlib.resources import files
-from typing import BinaryIO
 
 from flask import (
     Flask,
@@ -15,7 +14,6 @@ from flask import (
     redirect,
     render_template,
     request,
-    send_file,
     session,
     url_for,
 )
@@ -30,16 +28,15 @@ from grader.model.handed_in import Override
 from grader.report.html.shell import environment, style
 from grader.report.html.words import SIGNS
 from grader.report.text import number
+from grader.review.answers import SCRIPT, failed, graders, sent, with_code
 from grader.review.cards import MANUAL, Cards, Draft, card, cards
-from grader.review.desk import Conflict, Desk, Saved
+from grader.review.desk import Desk
 from grader.review.form import Wrong, author_of, override_of
 from grader.review.guard import FRAMED, guard
+from grader.review.meeting import Conflict, plain
 from grader.review.places import place_of
 from grader.review.served import REPORTS, evidence_of, open_evidence, open_report, reports_of
 from grader.review.submissions import FILTERS, Item
-
-SCRIPT = "X-Asked-By"
-"""The header with which our script asks: it is answered with what changed, as JSON."""
 
 
 class _Pages(Flask):
@@ -73,8 +70,8 @@ def create_app(desk: Desk, *, port: int, token: str, author: str) -> Flask:
     app.add_url_rule("/s/<key>/c/<criterion>", view_func=view.decide, methods=["POST"])
     app.add_url_rule("/s/<key>/report/<name>", view_func=view.report)
     app.add_url_rule("/s/<key>/evidence/<name>", view_func=view.evidence)
-    app.register_error_handler(HTTPException, _failed)
-    app.register_error_handler(GraderError, _graders)
+    app.register_error_handler(HTTPException, failed)
+    app.register_error_handler(GraderError, graders)
     return app
 
 
@@ -114,7 +111,7 @@ class _Views:
         typed = Draft(points=form.get("points", ""), comment=form.get("comment", ""))
         try:
             override = self._wanted(asked.points, manual=asked.check == MANUAL)
-            saved = self._desk.save(item, criterion, override, form.get("seen", ""))
+            waits = self._desk.save(item, criterion, override, form.get("seen", ""))
         except Conflict:
             return self._not_saved(item, criterion, _draft(typed, conflict=True), 409)
         except Wrong as wrong:
@@ -124,7 +121,7 @@ class _Views:
             return self._not_saved(
                 item, criterion, _draft(typed, error=f"Not saved: {error.message}.{hint}"), 422
             )
-        return self._saved(item, criterion, saved)
+        return self._saved(item, criterion, waits)
 
     def name(self) -> AnyResponse:
         """Remember who decides."""
@@ -143,7 +140,7 @@ class _Views:
     def report(self, key: str, name: str) -> Response:
         """One of the reports, for the frame in the page."""
         item = self._item(key)
-        response = _sent(open_report(self._desk.path / item.key, name), REPORTS.get(name, ""))
+        response = sent(open_report(self._desk.path / item.key, name), REPORTS.get(name, ""))
         response.headers["Content-Security-Policy"] = FRAMED
         return response
 
@@ -151,7 +148,7 @@ class _Views:
         """A recording, to be kept."""
         item = self._item(key)
         file = open_evidence(self._desk.path / item.key, name)
-        return _sent(file, "application/octet-stream", download=f"{item.key}-{name}")
+        return sent(file, "application/octet-stream", download=f"{item.key}-{name}")
 
     def look(self) -> Response:
         """The style of all pages."""
@@ -207,7 +204,7 @@ class _Views:
             row = row.model_copy(update={"result": result}) if result else row
             decided, troubles = overrides.get(item.entry.id, {}), self._troubles()
         except RubricError as error:
-            decided = {o.criterion: _plain_override(o) for o in row.result.overrides}
+            decided = {o.criterion: plain(o) for o in row.result.overrides}
             troubles = ["Nothing can be saved until overrides.yaml is mended:", *error.faults]
         return row, cards(row, rubric, decided, drafts), troubles
 
@@ -228,15 +225,15 @@ class _Views:
         if SCRIPT not in request.headers:
             return Response(self._page(item, {criterion: draft}), code)
         data = {"error": draft.error} | (self._parts(item, criterion, draft) if draft.conflict else {})
-        return _with_code(jsonify(data), code)
+        return with_code(jsonify(data), code)
 
-    def _saved(self, item: Item, criterion: str, saved: Saved) -> AnyResponse:
+    def _saved(self, item: Item, criterion: str, waits: str) -> AnyResponse:
         at = _now()
         go_on = request.form.get("do") == "next"
         place = place_of(self._desk.submissions.items(), request.form, at=item.key)
         if SCRIPT in request.headers:
             to = url_for("submission", key=place.after, **place.kept) if go_on and place.after else ""
-            said = f"saved {at}" + (f"; {saved.waits}" if saved.waits else "")
+            said = f"saved {at}" + (f"; {waits}" if waits else "")
             return jsonify(self._parts(item, criterion, None) | {"said": said, "go": to})
         if go_on and place.after:
             return redirect(url_for("submission", key=place.after, **place.kept), 303)
@@ -262,10 +259,6 @@ def _author(default: str) -> str:
     return str(session.get("author", default))
 
 
-def _plain_override(given: Override) -> Override:
-    return Override(**{name: getattr(given, name) for name in Override.model_fields})
-
-
 def _draft(typed: Draft, *, error: str = "", conflict: bool = False) -> Draft:
     return Draft(points=typed.points, comment=typed.comment, error=error, conflict=conflict)
 
@@ -276,35 +269,3 @@ def _now() -> str:
 
 def _own(name: str) -> Markup:
     return Markup(files(__package__).joinpath("look", name).read_text(encoding="utf-8"))  # noqa: S704 - ours
-
-
-def _sent(file: BinaryIO | None, mimetype: str, *, download: str = "") -> Response:
-    if file is None:
-        raise NotFound("There is no such file.")
-    return send_file(
-        file, mimetype=mimetype, as_attachment=bool(download), download_name=download or None, max_age=0
-    )
-
-
-def _with_code(response: Response, code: int) -> Response:
-    response.status_code = code
-    return response
-
-
-def _graders(error: GraderError) -> AnyResponse:
-    return _told(500, "This did not work", f"{error.message}. {error.hint}".strip(), again=False)
-
-
-def _failed(error: HTTPException) -> AnyResponse:
-    """Any other answer than a page. After a link of another site, browsers hold back the cookie that they have just
-    been given; the page itself asks once more, and that is no other site's request."""
-    code = error.code or 500
-    title = {403: "Not allowed", 404: "Not found", 413: "Too much text"}.get(code, "This did not work")
-    cross = request.headers.get("Sec-Fetch-Site") == "cross-site"
-    return _told(code, title, error.description or "", again=code == 403 and request.path == "/" and cross)
-
-
-def _told(code: int, title: str, text: str, *, again: bool) -> AnyResponse:
-    if SCRIPT in request.headers:
-        return _with_code(jsonify(error=text), code)
-    return Response(render_template("told.html", title=title, text=text, again=again), code)

@@ -11,7 +11,7 @@ from grader.model.result import CriterionResult
 from grader.model.verdict import Status
 from grader.report.html.words import SIGNS
 from grader.report.text import number
-from grader.review.desk import mark
+from grader.review.meeting import mark
 from grader.rubric.model import Rubric
 
 MANUAL = "manual"

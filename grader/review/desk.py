@@ -2,49 +2,30 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
 import threading
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from hashlib import sha256
+from collections.abc import Iterator
 from pathlib import Path
 
 from grader.batch.flow import GRADEBOOK, alone, ids_of, write_books
 from grader.batch.folder import BatchFolder, open_batch, read_result, write_run
 from grader.batch.settled import Settler, rewrite
 from grader.errors import Busy, GraderError, UsageError
-from grader.files import unwritable
 from grader.model.batch import State
 from grader.model.handed_in import Override
 from grader.model.result import GradingResult
 from grader.overrides import FILE, Overrides, read_overrides, write_override
 from grader.results import RESULT
 from grader.review.follower import Follower, Pace
+from grader.review.meeting import Conflict, alike, mark, plain, reviewing
 from grader.review.submissions import Item, Stamp, Submissions, stamp_of
 from grader.rubric.load import LoadedRubric, load_rubric
 
-LOCK = ".review.lock"
 PATIENCE_S = 0.3
 OTHER_RUBRIC = "the class has been graded by another rubric since: end this review and start it again"
 
-
-class Conflict(Exception):
-    """Somebody else decided meanwhile: `now` is what stands there, None for nothing."""
-
-    def __init__(self, now: Override | None) -> None:
-        super().__init__("decided meanwhile")
-        self.now = now
-
-
-@dataclass(frozen=True, kw_only=True)
-class Saved:
-    """What came of a decision: the result as it counts now (None where there is none), and in a line why its files do
-    not say so yet; empty where they do."""
-
-    result: GradingResult | None
-    waits: str = ""
+OLDER_RESULT = (
+    "the submission was judged by another rubric: it counts when `grader regrade` has judged it anew"
+)
 
 
 def open_desk(path: Path, pace: Pace | None = None) -> Desk:
@@ -94,26 +75,26 @@ class Desk:
                 self._overrides = found
         return found[1]
 
-    def save(self, item: Item, criterion: str, override: Override | None, seen: str) -> Saved:
+    def save(self, item: Item, criterion: str, override: Override | None, seen: str) -> str:
         """Put a decision in place of the one that was `seen` (its `mark`), or take that out (None).
+
+        Gives in a line why the submission's files do not say so yet; empty where they do.
 
         Raises Conflict where another one stands there by now, and what `write_override` raises; then nothing changed.
         """
         name = item.entry.id
-        with self._saving, _reviewing(self.path):
-            found = self.overrides()
-            now = found.get(name, {}).get(criterion)
-            if not _alike(now, override):
+        with self._saving, reviewing(self.path):
+            now = self.overrides().get(name, {}).get(criterion)
+            if not alike(now, override):
                 if mark(now) != seen:
                     raise Conflict(now)
                 write_override(self.path / FILE, name, criterion, override)
-                found = _with(found, name, criterion, override)
         with self._guard:
             self._pending.add(item.key)
             self._books_behind = True
-        waits = self._settled_soon(item, found)
+        waits = self._settled_soon(item)
         self.follower.changed()
-        return Saved(result=self.result(item, found), waits=waits)
+        return waits
 
     def result(self, item: Item, overrides: Overrides) -> GradingResult | None:
         """A submission's result as it counts with these overrides; None where it has none."""
@@ -142,7 +123,7 @@ class Desk:
         except Busy:
             return True
 
-    def _settled_soon(self, item: Item, overrides: Overrides) -> str:
+    def _settled_soon(self, item: Item) -> str:
         """Settle one submission now, or say why that comes later."""
         if not item.gradable:
             return "it counts as soon as the submission has a result"
@@ -150,42 +131,56 @@ class Desk:
             return "the report follows in a moment"
         try:
             with alone(self.path):
-                self._settle(item, overrides)
+                return self._settle({item.key})
         except Busy:
             return "a batch works in this folder just now: the report follows when it has ended"
         except GraderError as error:
             return error.message
         finally:
             self._writing.release()
-        return ""
 
-    def _settle(self, item: Item, overrides: Overrides) -> None:
-        """Let the submission's files say what was decided. Somebody holds the class's lock."""
+    def _settle(self, keys: set[str]) -> str:
+        """Let the files of these submissions say what was decided, or say why the last one's cannot. The caller holds
+        the class's lock."""
+        with self._guard:
+            self._pending -= keys  # first: who decides from here on puts it back
+        why = ""
+        try:
+            overrides = self.overrides()
+            for item in filter(None, map(self.submissions.item, sorted(keys))):
+                why = self._settle_one(item, overrides)
+        except BaseException:
+            with self._guard:
+                self._pending |= keys
+            raise
+        return why
+
+    def _settle_one(self, item: Item, overrides: Overrides) -> str:
         batch = self.submissions.batch()
         if batch.run.rubric.digest != self.rubric.digest:
             raise UsageError(OTHER_RUBRIC)
         result = batch.earlier(item.entry) if item.gradable else None
-        if result is not None and result.rubric.digest == self.rubric.digest:
-            now = Settler(self.rubric.rubric, overrides).again(result, item.entry.id, None)
-            if now != result:
-                rewrite(batch.folder_of(item.entry), now, self.rubric.rubric, self._docs)
-        with self._guard:
-            self._pending.discard(item.key)
+        if result is None:
+            return ""
+        if result.rubric.digest != self.rubric.digest:
+            return OLDER_RESULT
+        now = Settler(self.rubric.rubric, overrides).again(result, item.entry.id, None)
+        if now != result:
+            rewrite(batch.folder_of(item.entry), now, self.rubric.rubric, self._docs)
+        return ""
 
     def _follow(self) -> None:
         """Settle what is not settled yet, and write the class's files."""
-        overrides = self.overrides()
         if not self._caught_up:
-            self._catch_up(overrides)
+            self._catch_up()
         if not self._books_behind:
             return
         with self._writing, alone(self.path):
             with self._guard:
-                pending = sorted(self._pending)
+                keys = set(self._pending)
                 self._books_behind = False
             try:
-                for item in filter(None, map(self.submissions.item, pending)):
-                    self._settle(item, overrides)
+                self._settle(keys)
                 self._write_books(self.submissions.batch())
             except BaseException:
                 self._books_behind = True
@@ -197,9 +192,10 @@ class Desk:
         written = write_books(batch, self.rubric.rubric, state, run.counts.kept)
         write_run(self.path, written.run.model_copy(update={"ended_at": run.ended_at}))
 
-    def _catch_up(self, overrides: Overrides) -> None:
+    def _catch_up(self) -> None:
         """Find what was decided, or settled, while nobody reviewed or just before a review was killed."""
-        behind = set(self._all_behind(overrides))
+        batch = self.submissions.batch()
+        behind = set(self._all_behind(self.overrides()))
         written = stamp_of(self.path / GRADEBOOK)
         newest = max(
             ((stamp_of(self.path / item.key / RESULT) or (0,))[0] for item in self.submissions.items()),
@@ -207,7 +203,8 @@ class Desk:
         )
         with self._guard:
             self._pending |= behind
-            self._books_behind |= bool(behind) or written is None or newest > written[0]
+            late = batch.run.state != "running" and (written is None or newest > written[0])
+            self._books_behind |= bool(behind) or late
         self._caught_up = True
 
     def _all_behind(self, overrides: Overrides) -> Iterator[str]:
@@ -222,40 +219,4 @@ class Desk:
         """Whether a result says something else than `overrides.yaml`."""
         known = {criterion.id for criterion in result.criteria}
         given = {k: v for k, v in overrides.get(item.entry.id, {}).items() if k in known}
-        return given != {o.criterion: Override(**_fields(o)) for o in result.overrides}
-
-
-def mark(override: Override | None) -> str:
-    """What a form carries to say which decision it was made from; empty for none."""
-    return sha256(override.model_dump_json().encode()).hexdigest()[:24] if override else ""
-
-
-def _fields(override: Override) -> dict[str, object]:
-    return {name: getattr(override, name) for name in Override.model_fields}
-
-
-def _alike(one: Override | None, other: Override | None) -> bool:
-    """Whether both say the same, whenever it was said."""
-    if one is None or other is None:
-        return one is other
-    return one.model_copy(update={"date": None}) == other.model_copy(update={"date": None})
-
-
-def _with(overrides: Overrides, name: str, criterion: str, override: Override | None) -> Overrides:
-    of: Mapping[str, Override] = {k: v for k, v in overrides.get(name, {}).items() if k != criterion}
-    return {**overrides, name: of if override is None else {**of, criterion: override}}
-
-
-@contextmanager
-def _reviewing(path: Path) -> Iterator[None]:
-    """Hold what all reviews of a class hold while they compare and write: another process may review it, too."""
-    try:
-        descriptor = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
-    except OSError as error:
-        raise unwritable(path / LOCK, error) from error
-    try:
-        with suppress(OSError):  # a file system without locks: whoever shares it has to know what they do
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(descriptor)
+        return given != {o.criterion: plain(o) for o in result.overrides}

@@ -230,3 +230,37 @@ def test_the_batchs_own_times_stay(page, out, desk) -> None:
     after = json.loads((out / "run.json").read_text())
     assert after["ended_at"] == before["ended_at"]
     assert after["state"] == "complete"
+
+
+def test_a_result_of_another_rubric_waits_for_it(page, out) -> None:
+    result = result_of(out, "ada")
+    other = result.model_copy(update={"rubric": result.rubric.model_copy(update={"digest": "other"})})
+    (out / "ada" / "result.json").write_text(other.model_dump_json(by_alias=True))
+    answer = page.send("ada", "style", page.form("ada", "style"), script=True, points="4")
+    assert "judged by another rubric" in answer.json["said"]
+    assert overrides_of(out)["ada"]["style"]["points"] == 4
+    assert result_of(out, "ada") == other
+
+
+def test_a_review_beside_a_batch_that_is_ended_without_a_decision_leaves_nothing_undone(out) -> None:
+    run = json.loads((out / "run.json").read_text())
+    (out / "run.json").write_text(json.dumps(run | {"state": "running"}))
+    (out / "gradebook.csv").unlink()
+    desk = open_desk(out, QUICK)
+    with alone(out):
+        assert desk.batch_runs()
+        desk.start()
+        assert desk.close()
+    assert not desk.batch_runs()
+
+
+def test_who_changes_their_mind_quickly_gets_the_last_of_it(page, out, desk) -> None:
+    form = page.form("ada", "style")
+    for points in range(1, 11):
+        answer = page.send("ada", "style", form, script=True, points=str(points))
+        assert answer.status_code == 200
+        form["seen"] = answer.json["seen"]
+    assert desk.follower.wait(WAIT_S)
+    assert overrides_of(out)["ada"]["style"]["points"] == 10
+    assert points_of(out, "ada", "style") == 10
+    assert ",10," in (out / "gradebook.csv").read_text()
