@@ -14,5 +14,5 @@ def require_library() -> None:
     missing = [name for name in ("flask", "waitress") if find_spec(name) is None]
     if missing:
         raise UsageError(
-            f"reviewing a class needs {' and '.join(missing)}, which is not installed", hint=INSTALL
+            f"reviewing a class needs packages that are not installed: {', '.join(missing)}", hint=INSTALL
         )
