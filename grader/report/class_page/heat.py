@@ -16,7 +16,7 @@ ROW = 22
 ONE_EACH_MAX = 500
 COLUMNS_MAX = 120
 TICK = 64
-WIDTHS = ((40, 22), (60, 15), (120, 8), (160, 6), (240, 4), (320, 3), (ONE_EACH_MAX, 2))
+WIDTHS = ((40, 22), (60, 15), (120, 7), (160, 5), (225, 4), (304, 3), (ONE_EACH_MAX, 2))
 """Up to so many submissions, a column is so wide."""
 
 
