@@ -141,9 +141,7 @@ def error_result(fault: GraderError, about: SubmissionInfo, attempt: Attempt) ->
         points=0.0,
         max_points=rubric.rubric.max_points,
         criteria=tuple(_open(criterion, fault) for criterion in rubric.rubric.criteria),
-        environment=EnvironmentInfo(
-            grader=__version__, ros="", python=python_version(), sandbox=NOTHING_RUN
-        ),
+        environment=EnvironmentInfo(grader=__version__, ros="", python=python_version(), sandbox=NOTHING_RUN),
         timing=attempt.timing(),
         error=ErrorInfo(kind=fault.kind, message=fault.message, hint=fault.hint),
     )

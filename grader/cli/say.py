@@ -15,6 +15,11 @@ def say(text: str) -> None:
     print(line(text, LINE_CHARS))
 
 
+def say_beside(text: str) -> None:
+    """Print one line to stderr."""
+    print(f"grader: {line(text, LINE_CHARS)}", file=sys.stderr)
+
+
 def say_json(data: object) -> None:
     """Print JSON to stdout."""
     say_document(lambda ascii_only: json_text(data, ascii_only=ascii_only))

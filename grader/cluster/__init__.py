@@ -4,6 +4,6 @@ Results come back as files: a worker packs a submission's folder into one file a
 unpacks it into place. Nobody but the client writes into the batch's folder.
 """
 
-from grader.cluster.hands import ClusterHands, cluster_hands
+from grader.cluster.hands import ClusterHands
 
-__all__ = ["ClusterHands", "cluster_hands"]
+__all__ = ["ClusterHands"]

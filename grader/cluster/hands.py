@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import secrets
 import socket
-import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from itertools import chain
@@ -20,12 +19,10 @@ from grader.cluster.shift import Shift
 from grader.errors import GraderError
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import started
-from grader.shown import line
 
 PATIENCE_S = 60.0
 EXCHANGE = ".grader-exchange"
 TOKEN_BYTES = 6
-LINE_CHARS = 2000
 
 
 class ClusterHands:
@@ -98,12 +95,3 @@ def _place(out: Path, exchange: str | None) -> str:
         return str(out.absolute() / EXCHANGE)
     whose = hashlib.sha256(f"{socket.gethostname()}\0{out.resolve()}".encode(errors="surrogateescape"))
     return f"{checked_url(exchange).rstrip('/')}/grader-{whose.hexdigest()[:16]}"
-
-
-def cluster_hands(address: str, out: Path, exchange: str | None = None) -> ClusterHands:
-    """The hands of that cluster, for a terminal: workers that are left out are named on stderr."""
-
-    def say(text: str) -> None:
-        print(f"grader: cluster: {line(text, LINE_CHARS)}", file=sys.stderr)
-
-    return ClusterHands(address, out, exchange, say=say)

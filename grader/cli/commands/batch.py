@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +12,7 @@ from grader.batch.folder import BatchFolder
 from grader.batch.hands import Hands, Processes
 from grader.batch.notable import notable
 from grader.cli.class_display import open_class_display
-from grader.cli.say import say, say_json
+from grader.cli.say import say, say_beside, say_json
 from grader.errors import ExitCode, UsageError
 from grader.model.batch import BatchRun
 from grader.roster import read_roster
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from grader.arena.sandbox import Mode
 
 DEFAULT_OUT = Path("grader-results")
-LINE_CHARS = 2000
 JOBS_PER_CORE = 4
 """Most of a grading's time is spent in waiting for what the student's nodes send."""
 
@@ -57,7 +55,7 @@ def run(
         cluster=cluster or "",
     )
     for fault in named.faults:
-        print(f"grader: roster: {line(str(fault), LINE_CHARS)}", file=sys.stderr)
+        say_beside(f"roster: {fault}")
     with open_class_display() as watcher:
         hands = _hands(options, exchange)
         folder = run_batch(named, rubric_source(rubric), loaded, options, hands=hands, watcher=watcher)
@@ -100,9 +98,11 @@ def _hands(options: BatchOptions, exchange: str | None) -> Hands:
         if exchange is not None:
             raise UsageError("--exchange is for --cluster", hint="leave it out")
         return Processes(options.jobs)
-    from grader.cluster import cluster_hands  # noqa: PLC0415 - an extra
+    from grader.cluster import ClusterHands  # noqa: PLC0415 - an extra
 
-    return cluster_hands(options.cluster, options.out, exchange)
+    return ClusterHands(
+        options.cluster, options.out, exchange, say=lambda text: say_beside(f"cluster: {text}")
+    )
 
 
 def _show(folder: BatchFolder, *, as_json: bool) -> None:

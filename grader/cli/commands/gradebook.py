@@ -8,12 +8,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from grader.batch.folder import open_batch
-from grader.cli.say import say
+from grader.cli.say import say, say_beside
 from grader.errors import ExitCode, UsageError
 from grader.gradebook import Form, write_gradebook
-from grader.shown import line
 
-LINE_CHARS = 2000
 NAMES: dict[Form, str] = {
     "csv": "gradebook.csv",
     "jsonl": "results.jsonl",
@@ -54,7 +52,7 @@ def run(
             column=column,
         )
         for remark in remarks:
-            print(f"grader: {form}: {line(remark, LINE_CHARS)}", file=sys.stderr)
+            say_beside(f"{form}: {remark}")
         if out == STDOUT:
             with place.open("rb") as written:
                 shutil.copyfileobj(written, sys.stdout.buffer)

@@ -14,7 +14,7 @@ from grader.batch.reports import Written, has_result, result_in, write_all, writ
 from grader.batch.settled import figures_in
 from grader.cli.errors import report
 from grader.cli.prefix import package_prefix
-from grader.cli.say import say
+from grader.cli.say import say, say_beside
 from grader.errors import EvidenceError, ExitCode, UsageError
 from grader.files import atomic_write
 from grader.model.figure import Figures
@@ -33,12 +33,10 @@ from grader.report.summary import missing_hidden
 from grader.report.terminal import open_console, print_report
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import LoadedRubric, load_rubric
-from grader.shown import line
 
 STDOUT = "-"
 OF_LINES = ("junit", "sarif", "code-quality", "annotations")
 NAMES_SHOWN = 5
-LINE_CHARS = 2000
 
 
 def run(
@@ -122,7 +120,7 @@ def _say_others(names: Sequence[str], rubric: LoadedRubric) -> None:
 
 
 def _remark(text: str) -> None:
-    print(f"grader: report: {line(text, LINE_CHARS)}", file=sys.stderr)
+    say_beside(f"report: {text}")
 
 
 def _class_pages(batch: BatchFolder, anonymous: Path | None) -> None:
