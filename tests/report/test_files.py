@@ -67,7 +67,13 @@ def test_error_is_there_only_where_there_is_one():
 
 def test_all_files_are_written_and_nothing_beside_them(tmp_path):
     paths = write_reports(result(), tmp_path / "a" / "b", console="x\x1b[2J\ny", rubric=rubric())
-    assert sorted(p.name for p in paths) == ["console.log", "junit.xml", "report.html", "report.md", "result.json"]
+    assert sorted(p.name for p in paths) == [
+        "console.log",
+        "junit.xml",
+        "report.html",
+        "report.md",
+        "result.json",
+    ]
     assert sorted(p.name for p in (tmp_path / "a" / "b").iterdir()) == sorted(p.name for p in paths)
     assert (tmp_path / "a/b/console.log").read_text() == "x\\x1b[2J\ny"
 
