@@ -232,11 +232,17 @@ def _gradable(roster: Roster, out: Path) -> Roster:
     return roster.model_copy(update={"entries": tuple(entries), "faults": tuple(faults)})
 
 
-def write_books(folder: BatchFolder, rubric: Rubric, state: State, kept: int) -> BatchFolder:
-    """`gradebook.csv`, `results.jsonl`, `index.html`, and `run.json` with what it all came to, which is given back."""
+def write_books(
+    folder: BatchFolder, rubric: Rubric, state: State, kept: int, *, ended_at: datetime | None = None
+) -> BatchFolder:
+    """`gradebook.csv`, `results.jsonl`, `index.html`, and `run.json` with what it all came to, which is given back.
+
+    `ended_at` is when the batch ended, by default now.
+    """
     write_gradebook(folder.book(), folder.rows(), folder.path / RESULTS, "jsonl")
     write_gradebook(folder.book(), folder.rows(), folder.path / GRADEBOOK, "csv")
-    update = {"state": state, "ended_at": datetime.now(timezone.utc), "counts": _counts(folder, rubric, kept)}
+    at, counts = ended_at or datetime.now(timezone.utc), _counts(folder, rubric, kept)
+    update = {"state": state, "ended_at": at, "counts": counts}
     ended = BatchFolder(folder.path, folder.run.model_copy(update=update))
     pairs = ((row.entry, row.result) for row in folder.rows())
     write_class_page(ended.run, pairs, folder.path / INDEX)

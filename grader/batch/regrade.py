@@ -104,7 +104,7 @@ def regrade(
         now = BatchFolder(folder.path, run)
         write_run(now.path, now.run)
         write_changes(folder.path / CHANGES, regraded)
-        return write_books(now, rubric.rubric, run.state, run.counts.kept), regraded
+        return write_books(now, rubric.rubric, run.state, run.counts.kept, ended_at=run.ended_at), regraded
 
 
 def _regraded(

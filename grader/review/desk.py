@@ -189,7 +189,7 @@ class Desk:
     def _write_books(self, batch: BatchFolder) -> None:
         run = batch.run
         state: State = "interrupted" if run.state == "running" else run.state
-        written = write_books(batch, self.rubric.rubric, state, run.counts.kept)
+        written = write_books(batch, self.rubric.rubric, state, run.counts.kept, ended_at=run.ended_at)
         write_run(self.path, written.run.model_copy(update={"ended_at": run.ended_at}))
 
     def _catch_up(self) -> None:

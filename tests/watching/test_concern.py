@@ -37,7 +37,12 @@ SAVED = [
 ]
 
 
-@pytest.mark.parametrize(("lab", "path", "expected"), SAVED, ids=str)
+def shown(value: str | set[str]) -> str:
+    """In a test's name: the same in every process, which a set alone is not."""
+    return value if isinstance(value, str) else ",".join(sorted(value))
+
+
+@pytest.mark.parametrize(("lab", "path", "expected"), SAVED, ids=shown)
 def test_a_saved_file_concerns_the_scenarios_that_use_it(lab, path, expected, tmp_path) -> None:
     package = copy_of(lab, tmp_path)
     file = package / path
