@@ -63,7 +63,8 @@ def _walk(world: World) -> Iterator[tuple[str, Entry]]:
 
 
 def _keeps(path: str, name: str, descriptor: int, found: os.stat_result) -> bool:
-    """What graders share: locks without content, and the base workspace with nothing in it but what belongs there."""
+    """What graders share: locks without content, and the base workspace with nothing in it but what belongs there; the
+    oldest of many base workspaces goes."""
     kept, lock = KEPT.fullmatch(path), LOCKS.fullmatch(path)
     if lock is not None:
         plain = stat.S_ISREG(found.st_mode) if lock["file"] else stat.S_ISDIR(found.st_mode)
@@ -74,6 +75,8 @@ def _keeps(path: str, name: str, descriptor: int, found: os.stat_result) -> bool
         )
     if kept is None or found.st_uid not in {0, ORDINARY_UID}:
         return False
+    if kept["base"] is not None and stat.S_ISCHR(found.st_mode) and found.st_rdev == 0:
+        return True  # so an overlay says that a file is gone
     if kept["base"] is None or not stat.S_ISREG(found.st_mode):
         return stat.S_ISDIR(found.st_mode)
     with os.fdopen(os.open(name, os.O_RDONLY | os.O_NOFOLLOW, dir_fd=descriptor), "rb") as file:
