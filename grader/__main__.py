@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 
 
 def main() -> int:
+    # numpy's OpenBLAS takes memory for each core, which nothing here needs, and where it gets none it ends the process.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from grader.cli.main import run  # noqa: PLC0415 - keeps `python -m grader --help` quick to import
 
     code = run(sys.argv[1:])

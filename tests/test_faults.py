@@ -110,7 +110,7 @@ def test_limits_that_cannot_be_set(out: Path) -> None:
 
 
 def test_too_little_memory_for_the_grader(out: Path) -> None:
-    with grading(out, prefix=("prlimit", f"--as={200 << 20}:unlimited")) as short:
+    with grading(out, prefix=("prlimit", f"--as={165 << 20}:unlimited")) as short:
         code = short.end()
     assert code in {0, 3, 4}, short.err
     results = list(out.rglob("result.json"))
