@@ -126,7 +126,15 @@ def _grading(add: _Adder) -> None:
 
 
 def _class(add: _Adder) -> None:
-    batch = add("batch", "grade a class, and go on where an earlier batch stopped")
+    _batch(add("batch", "grade a class, and go on where an earlier batch stopped"))
+    _regrade(add("regrade", "judge a class again from its evidence; nothing is run, needs no ROS"))
+    _gradebook(add("gradebook", "write a class's gradebook for people, programs or a learning platform"))
+    _report(add("report", "write the reports of a result or of a class again; needs no ROS"))
+    _review(add("review", "look at a class in the browser: give points, decide otherwise, comment"))
+    _similar(add("similar", "name submissions that are nearly the same, for a person; never a mark"))
+
+
+def _batch(batch: argparse.ArgumentParser) -> None:
     batch.epilog = CLASS_EXIT_CODES
     batch.add_argument(
         "roster",
@@ -166,7 +174,8 @@ def _class(add: _Adder) -> None:
     _sandbox(batch)
     _json(batch)
 
-    regrade = add("regrade", "judge a class again from its evidence; nothing is run, needs no ROS")
+
+def _regrade(regrade: argparse.ArgumentParser) -> None:
     regrade.epilog = CLASS_EXIT_CODES
     regrade.add_argument("folder", metavar="DIR", type=Path, help="the --out of `grader batch`")
     _rubric(regrade, required=False)
@@ -180,7 +189,8 @@ def _class(add: _Adder) -> None:
     _sandbox(regrade)
     _json(regrade)
 
-    book = add("gradebook", "write a class's gradebook for people, programs or a learning platform")
+
+def _gradebook(book: argparse.ArgumentParser) -> None:
     book.add_argument("folder", metavar="DIR", type=Path, help="the --out of `grader batch`")
     book.add_argument(
         "--form",
@@ -199,9 +209,8 @@ def _class(add: _Adder) -> None:
     )
     book.add_argument("--per-criterion", action="store_true", help="a column for each criterion")
 
-    _report(add("report", "write the reports of a result or of a class again; needs no ROS"))
 
-    review = add("review", "look at a class in the browser: give points, decide otherwise, comment")
+def _review(review: argparse.ArgumentParser) -> None:
     review.add_argument("folder", metavar="DIR", type=Path, help="the --out of `grader batch`")
     review.add_argument(
         "--port", metavar="N", type=_port, default=0, help="the page's port (default: any that is free)"
@@ -211,7 +220,8 @@ def _class(add: _Adder) -> None:
         "--author", metavar="NAME", help="who decides (default: git config user.name); the page can change it"
     )
 
-    similar = add("similar", "name submissions that are nearly the same, for a person; never a mark")
+
+def _similar(similar: argparse.ArgumentParser) -> None:
     similar.add_argument("folder", metavar="DIR", type=Path, help="the --out of `grader batch`")
     similar.add_argument(
         "--starter",

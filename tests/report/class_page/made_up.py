@@ -109,7 +109,7 @@ def made_up(place: int, chance: random.Random, *, missing: bool = False) -> tupl
     if missing:
         return entry, _error(entry, "not-graded-yet", "not graded yet")
     if kind < 0.03:
-        return entry, _error(entry, "package-not-found", f"no package.xml in /tmp/work/{entry.id}")
+        return entry, _error(entry, "package-not-found", f"no package.xml in {entry.id}")
     weak = chance.betavariate(0.7, 3.5)
     criteria = [_criterion(spec, weak, chance) for spec in CRITERIA]
     if criteria[5].status is Status.FAIL:  # no talker, nothing of it
