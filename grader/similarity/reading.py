@@ -27,6 +27,7 @@ FILE_S = 5.0
 SUBMISSION_S = 30.0
 WALL_S = 300.0
 MEMORY_BYTES = 2 << 30
+"""Of addresses, beside those that the process has from the one that it was forked from."""
 ANSWER_BYTES_MAX = 64 << 20
 
 
@@ -87,10 +88,21 @@ def _start(name: str, folder: Path) -> tuple[connection.Connection, ForkProcess]
 
 
 def _work(name: str, folder: Path, answer: connection.Connection) -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    most = _addresses_bytes() + MEMORY_BYTES
+    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
     resource.setrlimit(resource.RLIMIT_CPU, (int(SUBMISSION_S), int(SUBMISSION_S) + 1))
     answer.send_bytes(pickle.dumps(_read(name, folder)))
     os._exit(0)
+
+
+def _addresses_bytes() -> int:
+    """What this process has mapped already: proc(5), statm, the first number, in pages."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    except OSError:  # no Linux
+        return 0
 
 
 def _read(name: str, folder: Path) -> Read:

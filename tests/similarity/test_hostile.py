@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 import os
 import re
 import signal
@@ -75,6 +76,15 @@ def test_what_harms_the_reader_harms_its_own_submission(tmp_path, monkeypatch, h
     assert [one.reason for one in read["bad"].left_out] == [reason]
     assert read["a"].texts
     assert read["c"].texts
+
+
+def test_a_process_that_has_many_addresses_already_can_start_readers(tmp_path, monkeypatch) -> None:
+    """Readers are forked: what their parent has mapped is not theirs to pay."""
+    folders = class_of(tmp_path, {"good": {"b.py": GOOD}})
+    monkeypatch.setattr(reading, "MEMORY_BYTES", 1 << 30)
+    with mmap.mmap(-1, 4 << 30, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | mmap.MAP_NORESERVE):
+        ((_, read),) = read_all(folders, 1)
+    assert [text.path for text in read.texts] == ["b.py"]
 
 
 def test_evidence_that_cannot_be_read_is_named(tmp_path) -> None:
