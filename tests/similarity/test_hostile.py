@@ -82,7 +82,7 @@ def test_a_process_that_has_many_addresses_already_can_start_readers(tmp_path, m
     """Readers are forked: what their parent has mapped is not theirs to pay."""
     folders = class_of(tmp_path, {"good": {"b.py": GOOD}})
     monkeypatch.setattr(reading, "MEMORY_BYTES", 1 << 30)
-    with mmap.mmap(-1, 4 << 30, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | mmap.MAP_NORESERVE):
+    with mmap.mmap(-1, 4 << 30, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS, prot=mmap.PROT_READ):
         ((_, read),) = read_all(folders, 1)
     assert [text.path for text in read.texts] == ["b.py"]
 
