@@ -23,10 +23,10 @@ from grader.evidence.run import Run
 from grader.faults import NOTHING_RUN, Attempt, told_apart
 from grader.intake import open_recorded, open_recording, open_submission
 from grader.intake.source import Source
-from grader.judge import judge
-from grader.judge.early import judge_files
-from grader.judge.notes import notes_of
-from grader.judge.summary import overall_status, total_points
+from grader.judging import judge
+from grader.judging.early import judge_files
+from grader.judging.notes import notes_of
+from grader.judging.summary import overall_status, total_points
 from grader.model.figure import Figures
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress

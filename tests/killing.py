@@ -20,7 +20,7 @@ from lxml import etree
 
 from grader.errors import GraderError
 from grader.evidence.reader import load_evidence, load_run
-from grader.judge import criteria_bytes, judge
+from grader.judging import criteria_bytes, judge
 from grader.rubric.load import load_rubric
 from tests.faulty import RUBRIC, VICTIM
 

@@ -32,14 +32,16 @@ ALLOWED = {
     "checks": BASE | {"evidence"},
     "instructor": BASE | {"checks", "temporary"},
     "rubric": BASE | {"checks", "evidence", "instructor"},
-    "judge": BASE | {"checks", "evidence", "rubric"},
-    "figures": BASE | {"checks", "evidence.run", "evidence.events", "judge.facts", "judge.recordings", "rubric.model"},
-    "report": BASE | {"files", "judge.late", "judge.summary", "rubric.model"},
+    "judging": BASE | {"checks", "evidence", "rubric"},
+    "figures": BASE | {
+        "checks", "evidence.run", "evidence.events", "judging.facts", "judging.recordings", "rubric.model"
+    },
+    "report": BASE | {"files", "judging.late", "judging.summary", "rubric.model"},
     "arena": BASE | {"admission", "evidence", "files", "package", "rubric.model", "temporary"},
     "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "pipeline": {
-        *BASE, "arena", "evidence", "faults", "figures", "files", "intake", "judge", "package", "recordings", "report",
-        "results", "rubric", "temporary"
+        *BASE, "arena", "evidence", "faults", "figures", "files", "intake", "judging", "package",
+        "recordings", "report", "results", "rubric", "temporary"
     },
     "authoring": {
         *BASE, "checks", "evidence", "intake", "package", "pipeline", "rubric", "temporary"
@@ -50,21 +52,21 @@ ALLOWED = {
     "gradebook": BASE | {"files", "report"},
     "similarity": BASE | {"evidence", "files", "intake", "report", "temporary"},
     "batch": {
-        *BASE, "checks", "evidence", "faults", "fetching", "figures", "files", "gradebook", "intake", "judge",
-        "overrides", "pipeline", "report", "results", "rubric", "temporary"
+        *BASE, "checks", "evidence", "faults", "fetching", "figures", "files", "gradebook", "intake",
+        "judging", "overrides", "pipeline", "report", "results", "rubric", "temporary"
     },
     "review": BASE | {
         "batch", "files", "gradebook", "intake", "overrides", "report", "results", "rubric", "temporary"
     },
     "cluster": BASE | {"arena.ros_env", "batch.child", "batch.job", "intake", "results", "rubric", "temporary"},
     "watching": {
-        *BASE, "arena.asynchronous", "arena.workspace", "faults", "intake", "package", "pipeline", "report", "results",
-        "rubric", "temporary"
+        *BASE, "arena.asynchronous", "arena.workspace", "faults", "intake", "package", "pipeline",
+        "report", "results", "rubric", "temporary"
     },
     "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
     "cli": {
-        *BASE, "arena", "authoring", "batch", "checks", "evidence", "files", "instructor", "intake", "judge",
-        "cluster", "gradebook", "mutation", "package", "pipeline", "report", "review", "roster", "rubric",
+        *BASE, "arena", "authoring", "batch", "checks", "evidence", "files", "instructor",
+        "intake", "judging", "cluster", "gradebook", "mutation", "package", "pipeline", "report", "review", "roster", "rubric",
         "similarity", "temporary", "watching"
     },
     "__main__": {"cli"},
@@ -82,7 +84,7 @@ def test_the_rule_itself_goes_one_way() -> None:
         station: {name.split(".")[0] for name in names} - {station} for station, names in ALLOWED.items()
     }
     order = list(TopologicalSorter(graph).static_order())
-    assert order.index("model") < order.index("judge") < order.index("pipeline") < order.index("cli")
+    assert order.index("model") < order.index("judging") < order.index("pipeline") < order.index("cli")
 
 
 def test_every_station_is_in_the_rule() -> None:

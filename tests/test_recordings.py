@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from grader.evidence.reader import load_evidence
-from grader.judge import judge
-from grader.judge.summary import total_points
+from grader.judging import judge
+from grader.judging.summary import total_points
 from grader.model.verdict import Status
 from grader.rubric.load import load_rubric
 

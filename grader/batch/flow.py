@@ -23,7 +23,7 @@ from grader.fetching import prefetch
 from grader.files import check_writable, lock
 from grader.gradebook import write_gradebook
 from grader.intake import safe_name, without_password
-from grader.judge.summary import passed
+from grader.judging.summary import passed
 from grader.model.batch import MISSING, BatchRun, Counts, CriterionInfo, State
 from grader.model.result import RubricInfo
 from grader.model.roster import Entry, Roster, RosterFault

@@ -12,7 +12,7 @@ from grader.batch.pool import side_by_side, workers, working
 from grader.errors import EvidenceError, GraderError
 from grader.evidence.reader import SUFFIXES, load_evidence
 from grader.evidence.run import Run
-from grader.judge import judge
+from grader.judging import judge
 from grader.model.result import CriterionResult
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric

@@ -18,7 +18,7 @@ from grader.batch.judging import Judged, judge_all
 from grader.batch.settled import Settler, rewrite
 from grader.errors import GraderError
 from grader.files import atomic_write
-from grader.judge.summary import overall_status, total_points
+from grader.judging.summary import overall_status, total_points
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.roster import Entry, Roster
 from grader.overrides import FILE as OVERRIDES

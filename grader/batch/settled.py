@@ -11,7 +11,7 @@ from grader.batch.judging import fitting_runs
 from grader.checks import CHECKS
 from grader.evidence.reader import load_evidence
 from grader.figures import figures_of
-from grader.judge.settle import settle, unsettled
+from grader.judging.settle import settle, unsettled
 from grader.model.figure import Figures
 from grader.model.handed_in import HandedIn, Override
 from grader.model.result import GradingResult

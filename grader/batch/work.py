@@ -12,8 +12,8 @@ from grader.errors import GraderError, SubmissionError, UsageError
 from grader.faults import NOTHING_RUN, Attempt, fault_of, told_apart
 from grader.fetching import NothingInTime, Obtained, Rule, obtain
 from grader.intake import safe_name, without_password
-from grader.judge.settle import settle
-from grader.judge.summary import passed
+from grader.judging.settle import settle
+from grader.judging.summary import passed
 from grader.model.handed_in import HandedIn
 from grader.model.progress import Silence
 from grader.model.result import GradingResult, SubmissionInfo, TimingInfo

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from grader.errors import ExitCode
-from grader.judge.summary import OPEN, overall_status, reached_pass_mark
+from grader.judging.summary import OPEN, overall_status, reached_pass_mark
 from grader.model.result import CriterionResult
 from grader.rubric.model import Rubric
 

@@ -20,8 +20,8 @@ from grader.figures.graphs import graph_of
 from grader.figures.heard import heard_figures
 from grader.figures.paths import path_figures
 from grader.figures.rates import rate_figures
-from grader.judge.facts import Facts, try_facts
-from grader.judge.recordings import PACKAGE_RUN
+from grader.judging.facts import Facts, try_facts
+from grader.judging.recordings import PACKAGE_RUN
 from grader.model.figure import Figure, Figures
 from grader.model.result import CriterionResult
 from grader.model.verdict import Verdict

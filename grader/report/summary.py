@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.judge.summary import passed
+from grader.judging.summary import passed
 from grader.model.result import GradingResult
 from grader.model.verdict import Status
 from grader.report.hidden import hidden_ids

@@ -20,7 +20,7 @@ from grader.arena.limits import Limits
 from grader.arena.session import ARENA
 from grader.checks import CHECKS
 from grader.checks.support.losses import heed_losses, losses
-from grader.judge.facts import NO_PACKAGE as PACKAGE
+from grader.judging.facts import NO_PACKAGE as PACKAGE
 from tests.arena.support import printed, run_script
 
 LIMITS = {"channel_messages": 1 << 40, "channel_bytes": 1 << 40, "run_bytes": 1 << 40, "channels": 300}

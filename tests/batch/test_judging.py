@@ -12,7 +12,7 @@ from grader.batch.judging import judge_all, submissions_in
 from grader.cli.main import run
 from grader.errors import EvidenceError
 from grader.evidence.reader import load_evidence
-from grader.judge import judge
+from grader.judging import judge
 from grader.rubric.load import load_rubric
 from tests.rubric.samples import spoiled
 

@@ -17,8 +17,8 @@ from grader.batch.flow import described
 from grader.batch.folder import open_batch, write_run
 from grader.cli.main import run
 from grader.evidence.reader import load_evidence
-from grader.judge import judge
-from grader.judge.summary import overall_status, total_points
+from grader.judging import judge
+from grader.judging.summary import overall_status, total_points
 from grader.model.batch import BatchRun
 from grader.model.result import EnvironmentInfo, GradingResult, RubricInfo, SubmissionInfo, TimingInfo
 from grader.model.roster import Entry

@@ -15,7 +15,7 @@ from grader.cli import diagnosis
 from grader.cli.diagnosis import Row
 from grader.cli.main import run
 from grader.errors import EvidenceError
-from grader.judge.summary import criteria_bytes
+from grader.judging.summary import criteria_bytes
 from grader.report.result_json import result_bytes
 from grader.rubric.find import rubric_ids
 from tests.report.hostile import result

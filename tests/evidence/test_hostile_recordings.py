@@ -19,7 +19,7 @@ from grader.evidence.events import EVIDENCE_VERSION, METADATA_NAME, ActorEvent
 from grader.evidence.inspect import inspect_run
 from grader.evidence.reader import load_evidence, load_run
 from grader.evidence.writer import EvidenceStream
-from grader.judge import judge
+from grader.judging import judge
 from grader.model.verdict import Status
 from grader.rubric.load import load_rubric
 from tests.evidence.bags import CHATTER, COUNT, mcap_bytes

@@ -7,10 +7,10 @@ from typing import Any, TypeVar
 from grader.evidence.run import Run
 from grader.evidence.timeline import build_runs
 from grader.figures import figures_of
-from grader.judge import judge
+from grader.judging import judge
 from grader.model.figure import Figures
 from grader.model.result import CriterionResult
-from tests.judge.rubrics import rubric
+from tests.judging.rubrics import rubric
 
 Kind = TypeVar("Kind")
 SCENARIO = "talker"

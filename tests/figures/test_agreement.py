@@ -9,13 +9,13 @@ import pytest
 
 from grader.evidence.run import Run
 from grader.figures import DRAWN, figures_of
-from grader.judge import judge
+from grader.judging import judge
 from grader.model.figure import CounterFigure, Figure, HeardFigure, PathFigure, RateFigure
 from grader.model.result import CriterionResult
 from grader.model.verdict import EvidenceCitation, Status
 from tests.checks.examples import TIMELINES, Example, examples, runs_of
 from tests.figures.made import criterion
-from tests.judge.rubrics import SCENARIO, rubric
+from tests.judging.rubrics import SCENARIO, rubric
 
 EXAMPLES = [e for e in examples() if e.check in DRAWN]
 NOTHING = re.compile(r"no message|no number|not started|ended|no subscription|subscribed to|no path|nothing")

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from grader.evidence.events import ActorEvent, ConsoleLine, ProcessEvent
 from grader.evidence.run import Message, Run
 from grader.figures import DRAWN, figures_of
-from grader.judge import judge
+from grader.judging import judge
 from grader.model.figure import POINTS_MAX, CounterFigure, Figures, HeardFigure, PathFigure, RateFigure
 from tests.checks.examples import runs_of
 from tests.figures.made import criterion, drawn, only
-from tests.judge.rubrics import rubric
+from tests.judging.rubrics import rubric
 
 TOPIC = "/x"
 START_NS = 1_700_000_000_000_000_000

@@ -10,7 +10,7 @@ import pytest
 from grader.evidence.reader import load_evidence
 from grader.evidence.run import Run
 from grader.figures import figures_of
-from grader.judge import judge
+from grader.judging import judge
 from grader.model.figure import CodeFigure, CounterFigure, Figures, HeardFigure, RateFigure
 from grader.rubric.load import load_rubric
 from tests.figures.made import only

@@ -7,7 +7,7 @@ from typing import Any
 
 from grader.evidence.run import Run
 from grader.evidence.timeline import build_runs
-from grader.judge import judge
+from grader.judging import judge
 from grader.model.result import CriterionResult
 from grader.rubric.load import LoadedRubric, load_rubric
 

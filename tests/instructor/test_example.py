@@ -9,8 +9,8 @@ import pytest
 from grader import checks
 from grader.checks import CHECKS, registry
 from grader.evidence.reader import load_evidence
-from grader.judge import judge
-from grader.judge.summary import total_points
+from grader.judging import judge
+from grader.judging.summary import total_points
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status
 from grader.rubric.load import load_rubric

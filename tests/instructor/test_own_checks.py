@@ -14,7 +14,7 @@ import yaml
 from grader.checks import CHECKS
 from grader.cli.main import run as grader
 from grader.errors import RubricError
-from grader.judge import judge
+from grader.judging import judge
 from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.schema import rubric_schema

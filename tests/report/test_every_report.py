@@ -17,7 +17,7 @@ from lxml import etree
 from lxml import html as parser
 from rich.console import Console
 
-from grader.judge import criteria_bytes
+from grader.judging import criteria_bytes
 from grader.model.handed_in import AUTHOR_CHARS, COMMENT_CHARS, AppliedOverride, Automatic, Lateness
 from grader.model.result import CriterionResult, ErrorInfo, GradingResult, Note, SubmissionInfo
 from grader.model.verdict import EvidenceCitation, FileCitation, Status

@@ -17,8 +17,8 @@ from grader.batch.folder import BatchFolder, write_run
 from grader.evidence.reader import load_evidence
 from grader.figures import figures_of
 from grader.intake import safe_name
-from grader.judge import judge
-from grader.judge.summary import overall_status, total_points
+from grader.judging import judge
+from grader.judging.summary import overall_status, total_points
 from grader.model.batch import BatchRun
 from grader.model.result import (
     CriterionResult,

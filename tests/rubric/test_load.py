@@ -5,7 +5,7 @@ import hashlib
 import pytest
 
 from grader.errors import RubricError
-from grader.judge.judge import MANUAL
+from grader.judging.judge import MANUAL
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import all_rubrics, find_rubric_for_package, load_rubric
 from grader.rubric.source import text_at

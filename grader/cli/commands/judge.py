@@ -13,8 +13,8 @@ from grader.cli.say import say_document
 from grader.errors import EvidenceError, ExitCode
 from grader.evidence.reader import load_evidence
 from grader.files import atomic_write
-from grader.judge import judge
-from grader.judge.summary import criteria_text, judged_text
+from grader.judging import judge
+from grader.judging.summary import criteria_text, judged_text
 from grader.model.result import CriterionResult
 from grader.rubric.load import LoadedRubric, load_rubric
 

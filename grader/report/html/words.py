@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from grader.errors import GraderError
-from grader.judge.summary import passed
+from grader.judging.summary import passed
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.text import number

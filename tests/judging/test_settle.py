@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.judge.settle import settle, unsettled
-from grader.judge.summary import overall_status, passed, total_points
+from grader.judging.settle import settle, unsettled
+from grader.judging.summary import overall_status, passed, total_points
 from grader.model.handed_in import HandedIn, Override
 from grader.model.result import CriterionResult, ErrorInfo, GradingResult
 from grader.model.verdict import Status

@@ -9,9 +9,9 @@ import pytest
 import yaml
 
 from grader.evidence.timeline import build_runs
-from grader.judge import judge, total_points
+from grader.judging import judge, total_points
 from grader.rubric.model import Rubric
-from tests.judge.two_nodes import SHEBANG, STOPPED, WORDS, assert_sound
+from tests.judging.two_nodes import SHEBANG, STOPPED, WORDS, assert_sound
 
 POINTS = {
     "manifest": 5,

@@ -10,7 +10,7 @@ import yaml
 
 from grader.checks import CHECKS
 from grader.evidence.timeline import build_runs
-from grader.judge import judge, total_points
+from grader.judging import judge, total_points
 from grader.package.launch import parse_launch_files
 from grader.rubric.model import Rubric
 

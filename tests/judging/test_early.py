@@ -7,14 +7,14 @@ import pytest
 
 from grader.checks.registry import collecting
 from grader.intake import open_submission
-from grader.judge.early import judge_files
+from grader.judging.early import judge_files
 from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts, PythonSlip
 from grader.model.result import EarlyVerdict
 from grader.model.submission import SourcePackage
 from grader.model.verdict import Status, passed
 from grader.package import read_package
 from tests.fixture_runs import loaded, source_of
-from tests.judge.rubrics import EXECUTABLE, NODE, rubric
+from tests.judging.rubrics import EXECUTABLE, NODE, rubric
 from tests.package.trees import CMAKE, MANIFEST, make_package
 from tests.package.trees import NODE as SCRIPT
 

@@ -10,7 +10,7 @@ import yaml
 
 from grader.checks import CHECKS
 from grader.evidence.timeline import build_runs
-from grader.judge import judge, reached_pass_mark, total_points
+from grader.judging import judge, reached_pass_mark, total_points
 from grader.rubric.model import Rubric
 
 POINTS = {

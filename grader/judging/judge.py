@@ -12,8 +12,8 @@ from grader.checks.evidence import NotRecorded
 from grader.checks.support.losses import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
-from grader.judge.facts import Facts, try_facts
-from grader.judge.points import round_half_up
+from grader.judging.facts import Facts, try_facts
+from grader.judging.points import round_half_up
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status, Verdict, inconclusive
 from grader.rubric.model import Criterion, Rubric

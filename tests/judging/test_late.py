@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.judge.late import deadline_of, lateness
+from grader.judging.late import deadline_of, lateness
 from grader.model.handed_in import HandedIn
 from grader.rubric.model import Rubric
 

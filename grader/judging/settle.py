@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Literal
 
-from grader.judge.late import lateness
-from grader.judge.points import round_half_up
-from grader.judge.summary import overall_status, total_points
+from grader.judging.late import lateness
+from grader.judging.points import round_half_up
+from grader.judging.summary import overall_status, total_points
 from grader.model.handed_in import AppliedOverride, Automatic, HandedIn, Override
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status

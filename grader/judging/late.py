@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime, timedelta, timezone
 from decimal import Decimal
 
-from grader.judge.points import round_half_up
+from grader.judging.points import round_half_up
 from grader.model.handed_in import HandedIn, Lateness
 from grader.rubric.model import Late, Rubric
 

@@ -9,10 +9,10 @@ import pytest
 import yaml
 
 from grader.evidence.timeline import build_runs
-from grader.judge import judge
+from grader.judging import judge
 from grader.package.launch import parse_launch_files
 from grader.rubric.model import Rubric
-from tests.judge.two_nodes import SHEBANG, STOPPED, assert_sound
+from tests.judging.two_nodes import SHEBANG, STOPPED, assert_sound
 
 POINTS = {
     "manifest": 5,

@@ -13,7 +13,7 @@ from grader.checks.evidence import Evidence
 from grader.checks.executable import find_script
 from grader.checks.registry import Check
 from grader.evidence.run import Run
-from grader.judge.recordings import PACKAGE_RUN, unread_recording, with_recordings
+from grader.judging.recordings import PACKAGE_RUN, unread_recording, with_recordings
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, inconclusive

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from decimal import Decimal
 from typing import Literal
 
-from grader.judge.points import round_half_up
+from grader.judging.points import round_half_up
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
