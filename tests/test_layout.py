@@ -66,8 +66,8 @@ ALLOWED = {
     "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
     "cli": {
         *BASE, "arena", "authoring", "batch", "checks", "evidence", "files", "instructor",
-        "intake", "judging", "cluster", "gradebook", "mutation", "package", "pipeline", "report", "review", "roster", "rubric",
-        "similarity", "temporary", "watching"
+        "intake", "judging", "cluster", "gradebook", "mutation", "package", "pipeline", "report",
+        "review", "roster", "rubric", "similarity", "temporary", "watching"
     },
     "__main__": {"cli"},
 }  # fmt: skip
