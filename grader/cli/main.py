@@ -14,7 +14,7 @@ from io import TextIOWrapper
 from types import FrameType
 
 from grader.cli.errors import guarded
-from grader.cli.parser import build_parser
+from grader.cli.parsing import build_parser
 
 
 def run(argv: Sequence[str]) -> int:

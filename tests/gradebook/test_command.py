@@ -11,7 +11,7 @@ import pytest
 
 from grader.batch.folder import write_run
 from grader.cli.main import run
-from grader.cli.parser import build_parser
+from grader.cli.parsing import build_parser
 from grader.gradebook import FORMS, Row
 from grader.gradebook.table import header
 from grader.model.batch import BatchRun
@@ -19,7 +19,7 @@ from grader.model.roster import RosterFault
 from grader.report.result_json import result_bytes
 from tests.gradebook.made import BOOK, row
 
-DOCS = Path(__file__).resolve().parents[2] / "docs" / "gradebooks.md"
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "gradebooks.md"
 ROWS = [row("ada", 87.5, name="Ada \x1b[31m", Email="ada@x.edu"), row("bob", error="no\npackage")]
 
 

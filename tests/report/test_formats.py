@@ -17,7 +17,7 @@ from lxml import etree
 from lxml import html as parser
 from markdown_it import MarkdownIt
 
-from grader.cli.parser import FORMS
+from grader.cli.parsing.reports import FORMS
 from grader.errors import GraderError
 from grader.model.figure import Edge, Figures, GraphFigure
 from grader.model.result import ErrorInfo
@@ -360,6 +360,6 @@ def test_the_worst_result_has_what_it_is_named_for():
 
 
 def test_the_docs_name_every_form_and_no_other():
-    docs = (Path(__file__).parents[2] / "docs" / "reports.md").read_text(encoding="utf-8")
+    docs = (Path(__file__).parents[2] / "docs" / "how-to" / "reports.md").read_text(encoding="utf-8")
     assert tuple(re.findall(r"^\| `([a-z][\w-]*)` \|", docs, re.MULTILINE)) == FORMS
     assert set(re.findall(r"--form (\S+)", docs)) <= set(FORMS)

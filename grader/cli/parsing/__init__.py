@@ -1,0 +1,32 @@
+"""What the command line can say. Imports nothing heavy: `--help` is quick."""
+
+from __future__ import annotations
+
+import argparse
+
+from grader import __version__
+from grader.cli.parsing.authoring import add_authoring
+from grader.cli.parsing.base import Adder, Parser, common_options
+from grader.cli.parsing.classes import add_classes
+from grader.cli.parsing.evidence import add_evidence
+from grader.cli.parsing.exit_codes import EXIT_CODES
+from grader.cli.parsing.grading import add_grading
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The whole command line. Each command sets `module`, and its options are its function's keywords."""
+    common = common_options()
+    parser = Parser(
+        prog="grader",
+        description="Grades introductory ROS 1 labs.",
+        epilog=EXIT_CODES,
+        parents=[common],
+        allow_abbrev=False,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"grader {__version__}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True, title="commands", parser_class=Parser)
+    adder = Adder(commands, common)
+    for add_group in (add_grading, add_classes, add_evidence, add_authoring):
+        add_group(adder)
+    return parser
