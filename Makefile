@@ -7,7 +7,7 @@ MINUTES ?= 10
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test lint test-pure test-ros stress fuzz bench fixtures screenshots mutants fmt clean
+.PHONY: help setup demo test lint docs test-pure test-ros stress fuzz bench fixtures screenshots mutants fmt clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -22,12 +22,15 @@ demo: ## grade the reference solution and one faulty package, for real
 	@$(BIN)/grader grade fixtures/$(LAB)/counter-resets-to-1 --rubric $(LAB) --out demo || test $$? -eq 1
 	@echo && echo "The reports:" && ls demo/*/report.md
 
-test: lint test-pure test-ros ## everything: style, types, tests without ROS, tests with ROS
+test: lint docs test-pure test-ros ## everything: style, types, documents, tests without ROS, tests with ROS
 
 lint: setup ## style and types
 	@$(BIN)/ruff check . fixtures/make.py
 	@$(BIN)/ruff format --check . fixtures/make.py
 	@$(BIN)/mypy
+
+docs: setup ## the documents as a site in site/, warnings are errors
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 test-pure: setup ## the tests that need no ROS
 	@$(BIN)/python -m pytest -m "not ros" -n 2
@@ -58,4 +61,4 @@ fmt: setup ## bring the code into shape
 	@$(BIN)/ruff format . fixtures/make.py
 
 clean: ## remove what the other targets made
-	rm -rf .venv demo dist .mypy_cache .ruff_cache .pytest_cache
+	rm -rf .venv demo dist site .mypy_cache .ruff_cache .pytest_cache

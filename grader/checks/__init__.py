@@ -1,6 +1,6 @@
 """The checks: one pure function each, in family files. No I/O in here.
 
-What an instructor's own check needs can be imported from here (docs/own-checks.md) and stays.
+What an instructor's own check needs can be imported from here (docs/how-to/own-checks.md) and stays.
 """
 
 from importlib import import_module

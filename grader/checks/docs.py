@@ -1,4 +1,7 @@
-"""`docs/checks.md`, made from the checks' own docstrings: `python -m grader.checks.docs > docs/checks.md`."""
+"""`docs/reference/checks.md`, made from the checks' own docstrings.
+
+`python -m grader.checks.docs > docs/reference/checks.md`
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ INTRODUCTION = """# Checks
 
 What each check of a rubric looks at, why, how it measures, and how to put right what it finds.
 `grader explain NAME` shows the same. This page is made from the checks' docstrings
-(`python -m grader.checks.docs > docs/checks.md`).
+(`python -m grader.checks.docs > docs/reference/checks.md`).
 """
 
 

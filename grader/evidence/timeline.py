@@ -1,4 +1,4 @@
-"""Builds evidence from its text form (docs/evidence-timelines.md), for fixtures and for trying a rubric."""
+"""Builds evidence from its text form (docs/reference/evidence-timelines.md), for fixtures and for trying a rubric."""
 
 from __future__ import annotations
 

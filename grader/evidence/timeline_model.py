@@ -1,4 +1,4 @@
-"""The text form of recorded evidence (docs/evidence-timelines.md). Seconds count from the run's beginning."""
+"""The text form of recorded evidence (docs/reference/evidence-timelines.md). Seconds count from the run's beginning."""
 
 from __future__ import annotations
 

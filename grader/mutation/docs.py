@@ -1,6 +1,6 @@
-"""`docs/mutation-operators.md`, made from the operators and the mutants files.
+"""`docs/reference/mutation-operators.md`, made from the operators and the mutants files.
 
-`python -m grader.mutation.docs > docs/mutation-operators.md`
+`python -m grader.mutation.docs > docs/reference/mutation-operators.md`
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ mistakes in the same mutant. `costs` names criteria with their statuses: `fail`,
 
 In the table, a number is how many of the lab's mutants the operator makes; a dot stands where the operator fits the
 lab's reference solution and its mutants file does not use it. This page is made from the operators and the mutants
-files (`python -m grader.mutation.docs > docs/mutation-operators.md`).
+files (`python -m grader.mutation.docs > docs/reference/mutation-operators.md`).
 """
 FITS = "·"
 

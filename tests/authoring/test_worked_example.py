@@ -1,4 +1,4 @@
-"""Every command of docs/writing-a-rubric.md, in a folder of its own and in the page's order."""
+"""Every command of docs/how-to/writing-a-rubric.md, in a folder of its own and in the page's order."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import yaml
 from grader.rubric.load import load_rubric
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "docs" / "writing-a-rubric.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "how-to" / "writing-a-rubric.md").read_text(encoding="utf-8")
 COMMANDS = [
     line[2:] for block in re.findall(r"```console\n(.*?)```", PAGE, re.DOTALL) for line in block.splitlines()
 ]

@@ -64,8 +64,8 @@ def test_timelines_are_for_checks() -> None:
 
 
 def test_docs_are_what_the_docstrings_say() -> None:
-    page = (REPOSITORY / "docs" / "checks.md").read_text(encoding="utf-8")
-    assert page == checks_page(), "run: python -m grader.checks.docs > docs/checks.md"
+    page = (REPOSITORY / "docs" / "reference" / "checks.md").read_text(encoding="utf-8")
+    assert page == checks_page(), "run: python -m grader.checks.docs > docs/reference/checks.md"
 
 
 def test_checks_touch_nothing_outside() -> None:

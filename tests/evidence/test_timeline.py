@@ -13,7 +13,7 @@ from grader.evidence.run import Channel
 from grader.evidence.stats import rate_stats
 from grader.evidence.timeline import EPOCH_NS, build_runs, write_runs
 
-PAGE = Path(__file__).parents[2] / "docs" / "evidence-timelines.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "evidence-timelines.md"
 S = 1_000_000_000
 
 

@@ -1,4 +1,4 @@
-"""The worked example of docs/own-checks.md, judged on recordings that are kept for ever."""
+"""The worked example of docs/how-to/own-checks.md, judged on recordings that are kept for ever."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from grader.rubric.load import load_rubric
 
 ROOT = Path(__file__).parent.parent.parent
 EXAMPLE = ROOT / "rubrics" / "examples" / "own-checks"
-PAGE = (ROOT / "docs" / "own-checks.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "how-to" / "own-checks.md").read_text(encoding="utf-8")
 
 
 def judged(recording: str) -> tuple[dict[str, CriterionResult], float]:

@@ -1,4 +1,4 @@
-"""The examples of docs/deadlines.md are what the grader reads."""
+"""The examples of docs/how-to/deadlines.md are what the grader reads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from grader.rubric.model import Late
 from tests.overrides.samples import IDS, rubric
 from tests.rubric.samples import spoiled
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "deadlines.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "deadlines.md"
 DEADLINE, OVERRIDES = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
 
 
