@@ -65,6 +65,18 @@ def fixture_names(lab: str) -> list[str]:
     return sorted(path.parent.name for path in (ROOT / "fixtures" / lab).glob("*/fixture.yaml"))
 
 
+def shorter_round(lab: str) -> list[str]:
+    """The fixtures that every run of the tests grades: all correct packages, and for each way of missing each criterion the
+    one that misses least beside it. `make test-all` grades the others too."""
+    expect = {name: read_fixture(lab, name).expect for name in fixture_names(lab)}
+    chosen = {name for name in expect if name.startswith("ok-")}
+    for criterion in rubric_of(lab).criteria:
+        for status in (Status.FAIL, Status.PARTIAL):
+            missed = [(len(lost), name) for name, lost in expect.items() if lost.get(criterion.id) is status]
+            chosen.update(name for _, name in sorted(missed)[:1])
+    return [name for name in expect if name in chosen]
+
+
 def source_of(lab: str, name: str) -> Path:
     """The folder to grade: of a fixture, or of the reference solution."""
     return ROOT / "reference_solutions" / lab if name == REFERENCE else ROOT / "fixtures" / lab / name
