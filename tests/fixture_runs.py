@@ -28,6 +28,7 @@ from grader.rubric.model import Rubric
 ROOT = Path(__file__).resolve().parent.parent
 GIT = shutil.which("git") or "git"
 REFERENCE = "reference"
+LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 SIDE_BY_SIDE = 4  # they wait most of the time, and take turns at starting
 
 
@@ -66,8 +67,8 @@ def fixture_names(lab: str) -> list[str]:
 
 
 def shorter_round(lab: str) -> list[str]:
-    """The fixtures that every run of the tests grades: all correct packages, and for each way of missing each criterion the
-    one that misses least beside it. `make test-all` grades the others too."""
+    """The fixtures that every run of the tests grades: all correct packages, and for each way of missing each criterion
+    the one that misses least beside it. `make test-all` grades the others too."""
     expect = {name: read_fixture(lab, name).expect for name in fixture_names(lab)}
     chosen = {name for name in expect if name.startswith("ok-")}
     for criterion in rubric_of(lab).criteria:
@@ -82,12 +83,13 @@ def source_of(lab: str, name: str) -> Path:
     return ROOT / "reference_solutions" / lab if name == REFERENCE else ROOT / "fixtures" / lab / name
 
 
+@cache
 def read_fixture(lab: str, name: str) -> Fixture:
     """What is expected; of the reference solution, that everything passes."""
     if name == REFERENCE:
         return Fixture(lab=lab, summary="The reference solution.", expect={})
     text = (source_of(lab, name) / "fixture.yaml").read_text(encoding="utf-8")
-    return Fixture.model_validate(yaml.safe_load(text))
+    return Fixture.model_validate(yaml.load(text, Loader=LOADER))  # noqa: S506 - as safe
 
 
 def grade_fixture(lab: str, name: str, out: Path) -> GradingResult:
