@@ -11,8 +11,9 @@ from grader.cli.parsing.options import count, json_option, out_option, rubric_op
 
 
 def add_authoring(add: Adder) -> None:
-    """Add `labs`, `explain`, `doctor` and `rubric`."""
+    """Add `labs`, `example`, `explain`, `doctor` and `rubric`."""
     json_option(add("labs", "list the rubrics that come with the grader"))
+    _example(add("example", "write a lab's correct package to try things with, or one with a mistake in it"))
     explain = add("explain", "explain a check or a criterion: what, why, how it is measured, how to fix")
     explain.add_argument("name", metavar="NAME", help="a check, a criterion, or LAB/criterion")
     rubric_option(explain, required=False)
@@ -25,6 +26,10 @@ def add_authoring(add: Adder) -> None:
     validate.add_argument("files", metavar="FILE", nargs="+")
     schema = inner("schema", "print the JSON Schema of rubrics, for editors", "rubric_schema")
     rubric_option(schema, required=False)
+    copy = inner("copy", "write the rubric of a lab that comes with the grader, to change it", "rubric_copy")
+    copy.add_argument("lab", metavar="LAB", help="see grader labs")
+    copy.add_argument("--out", metavar="FILE", default="-", help="where it goes (default: -)")
+    copy.add_argument("--force", action="store_true", help="write over a file that exists")
     new = inner("new", "write a first rubric from a run of a correct package", "rubric_new")
     new.add_argument(
         "--from", metavar="SOLUTION", dest="solution", required=True, help="a folder, archive or git URL"
@@ -39,6 +44,18 @@ def add_authoring(add: Adder) -> None:
     test = inner("test", "grade a correct package, then mutants of it that must lose marks", "rubric_test")
     test.epilog = MUTANTS_EXIT_CODES
     _mutants(test)
+
+
+def _example(example: argparse.ArgumentParser) -> None:
+    example.add_argument("lab", metavar="LAB", help="see grader labs")
+    example.add_argument(
+        "folder",
+        metavar="DIR",
+        nargs="?",
+        type=Path,
+        help="an empty or new folder (default: list the mistakes that --mistake knows, and what they cost)",
+    )
+    example.add_argument("--mistake", metavar="NAME", help="with this mistake of students' in it")
 
 
 def _mutants(test: argparse.ArgumentParser) -> None:
