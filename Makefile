@@ -7,7 +7,7 @@ MINUTES ?= 10
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test lint docs test-pure test-ros stress fuzz bench fixtures screenshots mutants fmt clean
+.PHONY: help setup demo test lint docs test-pure test-ros test-all stress fuzz bench fixtures screenshots mutants fmt clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -22,7 +22,7 @@ demo: ## grade the reference solution and one faulty package, for real
 	@$(BIN)/grader grade fixtures/$(LAB)/counter-resets-to-1 --rubric $(LAB) --out demo || test $$? -eq 1
 	@echo && echo "The reports:" && ls demo/*/report.md
 
-test: lint docs test-pure test-ros ## everything: style, types, documents, tests without ROS, tests with ROS
+test: lint docs test-pure test-ros ## style, types, documents, tests without ROS, tests with ROS (see test-all)
 
 lint: setup ## style and types
 	@$(BIN)/ruff check . fixtures/make.py
@@ -36,7 +36,10 @@ test-pure: setup ## the tests that need no ROS
 	@$(BIN)/python -m pytest -m "not ros" -n 2
 
 test-ros: setup ## the tests that run real nodes
-	@$(BIN)/python -m pytest -m ros -n 2 --dist loadfile
+	@$(BIN)/python -m pytest -m "ros and not full" -n 3 --dist loadfile
+
+test-all: lint docs test-pure setup ## everything, and every fixture
+	@$(BIN)/python -m pytest -m ros -n 3 --dist loadfile
 
 stress: setup ## the reference solution and every fixture, TIMES times each
 	@$(BIN)/python -m tests.stress --times $(TIMES)

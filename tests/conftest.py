@@ -1,4 +1,4 @@
-"""The longest file begins first: the others run beside it (`-n 2 --dist loadfile`). Examples of properties have no
+"""The longest file begins first: the others run beside it (`--dist loadfile`). Examples of properties have no
 deadline: on a machine that is shared, how long one takes says nothing. All gradings take turns with each other, and
 their locks lie where no test looks for what is left."""
 
