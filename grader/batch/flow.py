@@ -94,7 +94,7 @@ def run_batch(
 
     What is complete is not done again. Where this is interrupted, what there is by then is in the gradebook.
     Raises UsageError for an option that does not fit the roster, Busy where another batch works in the same folder,
-    OutputError where it cannot be written, and KeyboardInterrupt.
+    EvidenceError where a newer grader has written there, OutputError where it cannot be written, and KeyboardInterrupt.
     """
     roster = _gradable(roster, options.out)
     check(roster.entries, options.only)
@@ -104,6 +104,7 @@ def run_batch(
         finish_killed(options.out)
         overrides = read_overrides(options.out / OVERRIDES, rubric.rubric, ids_of(roster))
         folder = BatchFolder(options.out, _run_of(roster, rubric_source, rubric, options))
+        folder.refuse_newer()
         write_run(options.out, folder.run)
         batch = _Batch(
             roster=roster,

@@ -10,7 +10,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from grader import __version__
-from grader.errors import UsageError
+from grader.errors import EvidenceError, UsageError
 from grader.files import atomic_write
 from grader.gradebook import Book, Row
 from grader.intake import safe_name
@@ -25,6 +25,9 @@ from grader.model.result import (
 )
 from grader.model.roster import Entry
 from grader.model.verdict import Status
+from grader.model.version import RESULT as RESULT_FORMAT
+from grader.model.version import RUN as RUN_FORMAT
+from grader.model.version import UPDATE, Versioned
 from grader.results import EVIDENCE, RESULT
 from grader.shown import json_text
 
@@ -43,8 +46,13 @@ class BatchFolder:
         return self.path / safe_name(entry.id)
 
     def earlier(self, entry: Entry) -> GradingResult | None:
-        """The entry's result; None where there is none that can be read."""
+        """The entry's result; None where there is none that can be read. Raises EvidenceError for a newer grader's."""
         return read_result(self.folder_of(entry))
+
+    def refuse_newer(self) -> None:
+        """Raise EvidenceError where a newer grader wrote one of the results: before anything is written beside it."""
+        for entry in self.run.entries:
+            self.earlier(entry)
 
     def has_evidence(self, entry: Entry) -> bool:
         return (self.folder_of(entry) / EVIDENCE).is_dir()
@@ -113,11 +121,29 @@ class BatchFolder:
 
 
 def read_result(folder: Path) -> GradingResult | None:
-    """The result in that folder; None where there is none, or none that this grader can read."""
+    """The result in that folder, of any version that a grader wrote; None where there is none, or a damaged one.
+
+    Raises EvidenceError where a newer grader wrote it: it must not look as if there were none.
+    """
     try:
-        return GradingResult.model_validate_json((folder / RESULT).read_bytes())
-    except (OSError, ValidationError):
+        data = (folder / RESULT).read_bytes()
+    except OSError:
         return None
+    try:
+        return GradingResult.read_json(data)
+    except ValidationError:
+        if newer := _newer(data, RESULT_FORMAT):
+            raise EvidenceError(f"{folder / RESULT}: {newer}", hint=UPDATE) from None
+        return None
+
+
+def _newer(data: bytes, known: Versioned) -> str:
+    """What is wrong with a file that a newer grader wrote; nothing for any other."""
+    try:
+        found = json.loads(data)
+    except (ValueError, RecursionError):
+        return ""
+    return known.newer(found.get("schema")) if isinstance(found, dict) else ""
 
 
 def write_run(folder: Path, run: BatchRun) -> None:
@@ -130,14 +156,16 @@ def open_batch(folder: Path) -> BatchFolder:
     path = folder / RUN
     try:
         data = path.read_bytes() if path.stat().st_size <= BYTES_MAX else b""
-        return BatchFolder(folder, BatchRun.model_validate(json.loads(data), strict=False))
+        return BatchFolder(folder, BatchRun.read_json(data))
     except FileNotFoundError as error:
         raise UsageError(
             f"{folder}: no batch has been here: there is no {RUN}", hint="give the --out of `grader batch`"
         ) from error
     except OSError as error:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
+        if newer := _newer(data, RUN_FORMAT):
+            raise UsageError(f"{path}: {newer}", hint=UPDATE) from error
         raise UsageError(
             f"{path}: not what this grader writes", hint="run `grader batch` once more into the same folder"
         ) from error

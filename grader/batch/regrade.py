@@ -85,9 +85,11 @@ def regrade(
     """Judge every submission of the batch again; gives the folder as it is now and what became of each, in order.
 
     Writes each `result.json` with its reports, `run.json`, `results.jsonl`, `gradebook.csv` and `changes.csv`.
-    Raises UsageError for faulty overrides, Busy where a batch works in the folder, OutputError.
+    Raises UsageError for faulty overrides, EvidenceError where a newer grader has written there, Busy where a batch
+    works in the folder, OutputError.
     """
     with alone(folder.path):
+        folder.refuse_newer()
         entries = folder.run.entries
         overrides = read_overrides(folder.path / OVERRIDES, rubric.rubric, ids_of(folder.run))
         settler = Settler(rubric.rubric, overrides)

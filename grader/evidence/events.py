@@ -7,8 +7,9 @@ from typing import Any, Literal
 from pydantic import Field
 
 from grader.model.record import Record
+from grader.model.version import EVIDENCE
 
-EVIDENCE_VERSION = "1"
+EVIDENCE_VERSION = str(EVIDENCE.version)
 METADATA_NAME = "grader.evidence"
 RECORDING_MISSING = "recording.missing"
 RECORDING_PROBLEM = "recording.problem"

@@ -11,13 +11,15 @@ from mcap import records as mcap
 from grader.errors import EvidenceError
 from grader.evidence.channels import merged
 from grader.evidence.container import ContainerError, records
-from grader.evidence.events import EVIDENCE_VERSION, METADATA_NAME, PACKAGE_TOPIC, TOPICS
+from grader.evidence.events import METADATA_NAME, PACKAGE_TOPIC, TOPICS
 from grader.evidence.room import Room
 from grader.evidence.run import Channel, Message, Run
+from grader.model.version import EVIDENCE, UPDATE
 
 MAX_CHANNELS = 4_096
 NAMES_SHOWN = 5
 NAME_CHARS_SHOWN = 80
+READ = {str(number) for number in range(1, EVIDENCE.version + 1)}
 
 FIELDS = {
     "processes": "/grader/process",
@@ -115,10 +117,12 @@ class Loading:
         if self._metadata is None:
             return {"scenario": PurePath(self._name).stem, "clock": "real", "warp": 1.0}
         version = self._metadata.get("format", "")[:NAME_CHARS_SHOWN]
-        if version != EVIDENCE_VERSION:
+        if newer := EVIDENCE.newer(f"{EVIDENCE.name}/{version}"):
+            raise EvidenceError(f"{self._name}: {newer}", hint=UPDATE)
+        if version not in READ:
             raise EvidenceError(
-                f"{self._name}: evidence of format {version!r}, and this grader reads {EVIDENCE_VERSION!r}",
-                hint="use the version of the grader that recorded it",
+                f"{self._name}: evidence of format {version!r}, which no grader wrote",
+                hint="record it again, or copy it again",
             )
         try:
             scenario, clock = self._metadata["scenario"], self._metadata["clock"]
@@ -180,7 +184,7 @@ class Loading:
         return schema is not None and schema.encoding == "jsonschema"
 
     def _events(self, topic: str) -> tuple[tuple[int, Any], ...]:
-        read = TOPICS[topic].model_validate_json
+        read = TOPICS[topic].read_json
         return tuple((message.log_time_ns, read(message.data)) for message in self._json(topic))
 
     def _package(self) -> bytes | None:

@@ -86,7 +86,7 @@ def package_facts(run: Run) -> PackageFacts:
             f"{run.evidence}: holds no package facts", hint="give package.mcap of the same recording"
         )
     try:
-        return PackageFacts.model_validate_json(run.package_json)
+        return PackageFacts.read_json(run.package_json)
     except ValidationError as error:
         raise EvidenceError(f"{run.evidence}: the package facts cannot be read: {_first(error)}") from error
 

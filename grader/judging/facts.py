@@ -118,7 +118,7 @@ def try_facts(rubric: Rubric, runs: Mapping[str, Run]) -> Facts:
     if recorded is None or recorded.package_json is None:
         return Facts(rubric=rubric, runs=runs, package=None)
     try:
-        package = PackageFacts.model_validate_json(recorded.package_json)
+        package = PackageFacts.read_json(recorded.package_json)
     except ValidationError:
         return Facts(rubric=rubric, runs=runs, package=None)
     return Facts(rubric=rubric, runs=runs, package=package)

@@ -10,9 +10,11 @@ from typing import Any
 
 from grader.errors import RubricError
 from grader.model.record import Record
+from grader.model.version import MUTANTS
 from grader.mutation.model import Mutant, MutantsFile
 from grader.mutation.operators import OPERATORS
 from grader.rubric.faults import did_you_mean, model_faults
+from grader.rubric.load import refuse_newer
 from grader.rubric.model import Rubric
 from grader.rubric.source import Fault, KeyPath, Source, as_map, as_maps, read_source
 
@@ -35,6 +37,7 @@ def load_mutants(path: Path, rubric: Rubric) -> LoadedMutants:
         raise RubricError(
             [source.fault((), "a mutants file is a map, beginning with schema: grader.mutants/1")]
         )
+    refuse_newer(source, MUTANTS)
     found = [*source.faults, *model_faults(MutantsFile, source.data), *_cross_faults(source.data, rubric)]
     if found:
         ordered = sorted(dict.fromkeys(found), key=lambda fault: source.line(fault[0]))

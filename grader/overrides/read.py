@@ -11,12 +11,14 @@ from typing import TypeAlias
 from grader.errors import RubricError
 from grader.intake.names import safe_name
 from grader.model.handed_in import Override
+from grader.model.version import OVERRIDES
 from grader.rubric.faults import did_you_mean, model_faults, shown
+from grader.rubric.load import refuse_newer
 from grader.rubric.model import Rubric
 from grader.rubric.source import Fault, Form, Source, as_map, read_source
 
 FILE = "overrides.yaml"
-SCHEMA_KEY, SCHEMA = "schema", "grader.overrides/1"
+SCHEMA_KEY, SCHEMA = "schema", str(OVERRIDES)
 FORM = Form(
     what="an overrides file",
     usual="overrides of a class are far less",
@@ -40,6 +42,7 @@ def read_overrides(path: Path, rubric: Rubric, ids: Collection[str]) -> Override
     if not os.path.lexists(path):
         return {}
     source = read_source(path, str(path), FORM)
+    refuse_newer(source, OVERRIDES)
     reading = _Reading(source, rubric, ids)
     reading.read()
     if reading.faults:

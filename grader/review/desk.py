@@ -29,8 +29,11 @@ OLDER_RESULT = (
 
 
 def open_desk(path: Path, pace: Pace | None = None) -> Desk:
-    """The desk of the class in `path`. Raises UsageError where there is none, and where its rubric has changed."""
-    run = open_batch(path).run
+    """The desk of the class in `path`. Raises UsageError where there is none, and where its rubric has changed,
+    EvidenceError where a newer grader wrote results in it."""
+    batch = open_batch(path)
+    batch.refuse_newer()
+    run = batch.run
     rubric = load_rubric(run.rubric_source)
     if rubric.digest != run.rubric.digest:
         raise UsageError(

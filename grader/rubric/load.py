@@ -12,6 +12,7 @@ from grader.errors import RubricError, UsageError
 from grader.instructor.known import known_checks
 from grader.instructor.own import run_checks_file
 from grader.model.record import Record
+from grader.model.version import RUBRIC, UPDATE, Versioned
 from grader.rubric.cross import cross_faults
 from grader.rubric.faults import model_faults
 from grader.rubric.find import locate, rubric_ids, rubrics_folder
@@ -52,6 +53,7 @@ def load_rubric(name_or_path: str) -> LoadedRubric:
     """
     path, name = locate(name_or_path)
     source = read_source(path, name)
+    refuse_newer(source, RUBRIC)
     beside = read_instructor(source.data, path.parent)
     faults = _faults(source, beside)
     if faults:
@@ -59,6 +61,13 @@ def load_rubric(name_or_path: str) -> LoadedRubric:
     rubric = Rubric.model_validate_json(json.dumps(source.data), strict=True)
     own = beside.files[rubric.checks] if rubric.checks is not None else None
     return LoadedRubric(rubric=rubric, path=path, digest=_digest(source.raw, beside), own=own)
+
+
+def refuse_newer(source: Source, known: Versioned) -> None:
+    """Raise RubricError where the file is for a newer grader: what else may be strange in it follows from that."""
+    said = source.data.get("schema") if isinstance(source.data, dict) else None
+    if newer := known.newer(said):
+        raise RubricError([source.fault(("schema",), newer)], hint=UPDATE)
 
 
 def _digest(raw: bytes, beside: Beside) -> str:

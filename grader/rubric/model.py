@@ -185,11 +185,12 @@ class Late(Record):
 class Rubric(Record):
     """A lab. `pass_mark` in points; without one, every visible criterion must be reached.
 
-    `digits` is how many decimals points keep. `checks` is a Python file beside the rubric with checks of the
-    instructor's own. `deadline` has a time zone; `late` says what later costs, and without it nothing is lost.
+    A file without `schema` is read as version 1. `digits` is how many decimals points keep. `checks` is a Python file
+    beside the rubric with checks of the instructor's own. `deadline` has a time zone; `late` says what later costs, and
+    without it nothing is lost.
     """
 
-    schema_: Annotated[Literal["grader.rubric/1"], Field(alias="schema")]
+    schema_: Annotated[Literal["grader.rubric/1"], Field(alias="schema")] = "grader.rubric/1"
     id: Name
     title: str
     version: str

@@ -1,0 +1,38 @@
+"""Versions of formats: `grader.result/1` is version 1 of `grader.result`. `grader/formats/` says what each is."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+UPDATE = "update the grader: `pip install --upgrade ros-lab-grader`"
+_DIGITS_MAX = 9
+
+
+@dataclass(frozen=True)
+class Versioned:
+    """A format that this grader writes in `version`, and reads in all versions up to it."""
+
+    name: str
+    version: int
+
+    def __str__(self) -> str:
+        """As files say it: `grader.result/1`."""
+        return f"{self.name}/{self.version}"
+
+    def newer(self, said: object) -> str:
+        """What is wrong, in one line, where `said` is a later version than this grader reads; else nothing."""
+        found = re.fullmatch(rf"{re.escape(self.name)}/([0-9]{{1,{_DIGITS_MAX}}})", str(said)[:100])
+        if found is None or int(found[1]) <= self.version:
+            return ""
+        return f"written by a newer grader ({found[0]}); this one reads up to {self.version}"
+
+
+RESULT = Versioned("grader.result", 1)
+RUN = Versioned("grader.run", 1)
+EVIDENCE = Versioned("grader.evidence", 1)
+RUBRIC = Versioned("grader.rubric", 1)
+OVERRIDES = Versioned("grader.overrides", 1)
+MUTANTS = Versioned("grader.mutants", 1)
+RUBRIC_TEST = Versioned("grader.rubric-test", 1)
+SIMILARITY = Versioned("grader.similarity", 1)
