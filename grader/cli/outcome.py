@@ -9,6 +9,9 @@ from grader.judging.summary import OPEN, overall_status, reached_pass_mark
 from grader.model.result import CriterionResult
 from grader.rubric.model import Rubric
 
+EXACT_DIGITS = 6
+"""More than points have, and fewer than show how floating point multiplies."""
+
 
 def exit_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
     """Of the criteria that are shown: not graded where the grader itself failed, passed, not settled, or below.
@@ -34,4 +37,4 @@ def _in_proportion(rubric: Rubric, shown: tuple[CriterionResult, ...]) -> Rubric
     if rubric.pass_mark is None:
         return rubric
     share = sum(c.max_points for c in shown) / (rubric.max_points or 1.0)
-    return rubric.model_copy(update={"pass_mark": rubric.pass_mark * share})
+    return rubric.model_copy(update={"pass_mark": round(rubric.pass_mark * share, EXACT_DIGITS)})

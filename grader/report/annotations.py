@@ -10,27 +10,34 @@ from grader.report.text import line, number
 
 EACH_MAX = 10
 """So many of each kind GitHub shows of one step."""
+TEXT_CHARS = 1000
 _DATA = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A"})
 _PROPERTY = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A", ":": "%3A", ",": "%2C"})
 
 
-def github_annotations(result: GradingResult, prefix: str = "") -> str:
-    """A line each, the costliest first, ten of each kind at most; the rest is counted in the log.
+def github_annotations(result: GradingResult, prefix: str = "", *, each_max: int = EACH_MAX) -> str:
+    """A line each, the costliest first, `each_max` of each kind at most; the rest is counted in the log.
 
     What has no line of a file is shown at the run itself. `prefix` is the package's folder in the repository.
     """
     found = findings(result, prefix)
-    return "".join(f"{row}\n" for row in (*_error(result), *_rows(found), _summary(result)))
+    return "".join(f"{row}\n" for row in (*_error(result), *_rows(found, each_max), _summary(result)))
 
 
-def _rows(found: tuple[Finding, ...]) -> Iterator[str]:
+def github_annotation(severity: Severity, title: str, message: str) -> str:
+    """A line of ours, at the run itself. The texts are made visible and bounded here."""
+    told = "\n".join(line(row, TEXT_CHARS) for row in message.split("\n"))
+    return _command(severity, {"title": line(title, TEXT_CHARS)}, told) + "\n"
+
+
+def _rows(found: tuple[Finding, ...], each_max: int) -> Iterator[str]:
     for severity in Severity:
         alike = [finding for finding in found if finding.severity is severity]
-        for finding in alike[:EACH_MAX]:
+        for finding in alike[:each_max]:
             message = "\n".join(text for text in (finding.message, finding.hint) if text)
             yield _command(severity, _properties(finding), message)
-        if len(alike) > EACH_MAX:
-            yield f"and {len(alike) - EACH_MAX} more of these: they are in the report"
+        if len(alike) > each_max:
+            yield f"and {len(alike) - each_max} more of these: they are in the report"
 
 
 def _properties(finding: Finding) -> dict[str, str]:
@@ -40,7 +47,7 @@ def _properties(finding: Finding) -> dict[str, str]:
 
 def _error(result: GradingResult) -> Iterator[str]:
     if result.error is not None:
-        text = "\n".join(line(part, 1000) for part in (result.error.message, result.error.hint) if part)
+        text = "\n".join(line(part, TEXT_CHARS) for part in (result.error.message, result.error.hint) if part)
         yield _command(Severity.ERROR, {"title": "It could not be graded"}, text)
 
 

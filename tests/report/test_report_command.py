@@ -135,6 +135,7 @@ FORMS = {
     "code-quality": "[",
     "annotations": "::error ",
     "gradescope": "{",
+    "classroom": "eyJ2ZXJzaW9uIjogMSwg",
 }
 
 
@@ -146,7 +147,7 @@ def test_each_form_goes_to_stdout_and_to_a_file(lab, tmp_path, capsys, form):
     assert capsys.readouterr().out == ""
     assert (tmp_path / "new" / "file").read_text(encoding="utf-8") == out
     assert out.lower().startswith(FORMS[form].lower())
-    assert "counter-wrap" in out or form in {"sarif", "code-quality"}
+    assert "counter-wrap" in out or form in {"sarif", "code-quality", "classroom"}
     assert not (lab / "bob" / "report.md").exists()
 
 

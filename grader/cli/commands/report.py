@@ -13,6 +13,7 @@ from grader.batch.folder import RUN, BatchFolder, open_batch
 from grader.batch.reports import Written, has_result, result_in, write_all, write_one
 from grader.batch.settled import figures_in
 from grader.cli.errors import report
+from grader.cli.outcome import exit_code
 from grader.cli.prefix import package_prefix
 from grader.cli.say import say, say_beside
 from grader.errors import EvidenceError, ExitCode, UsageError
@@ -22,6 +23,7 @@ from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
 from grader.report.annotations import github_annotations
 from grader.report.class_page import salt_in, write_class_page
+from grader.report.classroom import classroom
 from grader.report.code_quality import code_quality
 from grader.report.gradescope import gradescope
 from grader.report.hidden import without_hidden
@@ -33,9 +35,10 @@ from grader.report.summary import missing_hidden
 from grader.report.terminal import open_console, print_report
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import LoadedRubric, load_rubric
+from grader.rubric.model import Rubric
 
 STDOUT = "-"
-OF_LINES = ("junit", "sarif", "code-quality", "annotations")
+OF_LINES = ("junit", "sarif", "code-quality", "annotations", "classroom")
 NAMES_SHOWN = 5
 
 
@@ -140,7 +143,7 @@ def _one(
         _say_others([folder.absolute().name], rubric)
     if form == "gradescope" and student:
         raise UsageError("Gradescope hides hidden criteria itself", hint="leave --student away")
-    shown = without_hidden(result, rubric.rubric) if student else result
+    shown = without_hidden(result, rubric.rubric) if student or form == "classroom" else result
     if form == "terminal" and out == STDOUT:
         hidden = missing_hidden(shown, rubric.rubric)
         print_report(shown, rubric.rubric, open_console(sys.stdout), hidden=hidden)
@@ -182,9 +185,14 @@ def _made(
         "code-quality": lambda: code_quality(result, prefix),
         "annotations": lambda: github_annotations(result, prefix),
         "gradescope": lambda: gradescope(result, lab),
+        "classroom": lambda: f"{classroom(result, lab, passed=_passed(result, lab), prefix=prefix)}\n",
         "terminal": lambda: _printed(result, rubric, hidden),
     }
     return junit(result, prefix) if form == "junit" else makers[form]().encode("utf-8", "backslashreplace")
+
+
+def _passed(result: GradingResult, rubric: Rubric) -> bool:
+    return result.status != "error" and exit_code(result.criteria, rubric) is ExitCode.PASSED
 
 
 def _printed(result: GradingResult, rubric: LoadedRubric, hidden: int) -> str:

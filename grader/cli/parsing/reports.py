@@ -8,7 +8,9 @@ from pathlib import Path
 from grader.cli.parsing.exit_codes import REPORT_EXIT_CODES
 from grader.cli.parsing.options import rubric_option
 
-FORMS = ("html", "markdown", "terminal", "junit", "sarif", "code-quality", "annotations", "gradescope")
+FORMS = (
+    "html", "markdown", "terminal", "junit", "sarif", "code-quality", "annotations", "gradescope", "classroom"
+)  # fmt: skip
 
 
 def add_report(report: argparse.ArgumentParser) -> None:

@@ -1,0 +1,139 @@
+"""What GitHub Classroom's autograding reporter reads: base64 of JSON, as Classroom's own graders give it.
+
+The reporter adds up the scores and hands the sum to Classroom; an environment variable carries the text to it, which
+may have 128 KiB. It prints names, messages and code as they are, so no line of ours may be a command to the runner.
+
+What could not be judged has the status `error` and no part in the maximum. Where nothing could be judged because of the
+machine or the grader, the maximum is 0: the reporter then tells Classroom no points, and earlier ones stay.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from grader.errors import PackageNotFound, SubmissionError
+from grader.model.result import CriterionResult, GradingResult
+from grader.model.verdict import FileCitation, Status
+from grader.report.findings import repository_path
+from grader.report.settled import late_words
+from grader.report.text import line, number
+from grader.report.view import OPEN, not_graded
+from grader.rubric.model import Rubric
+
+VERSION = 1
+JSON_BYTES_MAX = 60_000
+LIMITS = (600, 200, 80, 30, 0)
+"""How long a text may be: the first with which all has room."""
+NAME_CHARS = 200
+STATUSES = {Status.PASS: "pass", **dict.fromkeys(OPEN, "error")}
+
+
+def classroom(result: GradingResult, rubric: Rubric, *, passed: bool, prefix: str = "") -> str:
+    """One line of base64. `passed` is whether the pass mark is reached, `prefix` the package's folder in the
+    repository."""
+    text = ""
+    for limit in LIMITS:
+        text = json.dumps(_document(result, rubric, passed, prefix, limit), ensure_ascii=True)
+        if len(text) <= JSON_BYTES_MAX:
+            break
+    return base64.b64encode(text.encode("ascii")).decode("ascii")
+
+
+def _document(result: GradingResult, rubric: Rubric, passed: bool, prefix: str, limit: int) -> dict[str, Any]:
+    tests = [_refused(result, limit)] if not_graded(result) else [*_tests(result, rubric, prefix, limit)]
+    scores = _adding_up([test.pop("points") for test in tests], 0.0 if not_graded(result) else result.points)
+    tests = [{**test, "score": score} for test, score in zip(tests, scores, strict=True)]
+    return {"version": VERSION, "status": _status(result, passed), "max_score": _max(result), "tests": tests}
+
+
+def _status(result: GradingResult, passed: bool) -> str:
+    if result.status == "error" or (result.status == "inconclusive" and not passed):
+        return "error"
+    return "pass" if passed else "fail"
+
+
+def _max(result: GradingResult) -> float:
+    if not_graded(result):
+        students = result.error is not None and result.error.kind in {
+            SubmissionError.kind,
+            PackageNotFound.kind,
+        }
+        return result.max_points if students else 0
+    return round(sum(c.max_points for c in result.criteria if c.status not in OPEN), 3)
+
+
+def _refused(result: GradingResult, limit: int) -> dict[str, Any]:
+    said = (result.error.message, result.error.hint) if result.error else ("",)
+    message = " ".join(line(text, max(limit, NAME_CHARS)) for text in said if text)
+    return _test("it could not be graded", status="error", points=0.0, message=message)
+
+
+def _tests(result: GradingResult, rubric: Rubric, prefix: str, limit: int) -> Iterator[dict[str, Any]]:
+    reached = 0.0
+    for criterion in result.criteria:
+        reached += criterion.points
+        yield _criterion(criterion, prefix, limit)
+    late = round(result.points - reached, rubric.digits)
+    if late:
+        words = " ".join(line(text, NAME_CHARS) for text in late_words(result))
+        yield _test(words or "what people decided, or being late", status="fail", points=late)
+
+
+def _criterion(criterion: CriterionResult, prefix: str, limit: int) -> dict[str, Any]:
+    cited = next((c for c in criterion.citations if isinstance(c, FileCitation) and c.line), None)
+    where = repository_path(prefix, cited.file) if cited else ""
+    waits = criterion.status in OPEN
+    return _test(
+        line(f"{criterion.id}: {criterion.title}", NAME_CHARS),
+        status=STATUSES.get(criterion.status, "fail"),
+        points=criterion.points,
+        message=_message(criterion, limit),
+        test_code="" if waits else "\n".join(_told(criterion, limit)),
+        filename=where,
+        line_no=cited.line or 0 if cited and where else 0,
+    )
+
+
+def _message(criterion: CriterionResult, limit: int) -> str:
+    """The reporter prints it for errors alone, without the name."""
+    words = line(criterion.message, limit) if limit else ""
+    if criterion.status not in OPEN:
+        return words
+    points = f"{number(criterion.max_points)} points are not settled"
+    return f"A PERSON MUST LOOK: {line(criterion.id, NAME_CHARS)}: {points}{': ' if words else ''}{words}"
+
+
+def _told(criterion: CriterionResult, limit: int) -> Iterator[str]:
+    """Below a test that has not passed the reporter prints what stands in the place of its code."""
+    if criterion.status is Status.PASS or not limit:
+        return
+    points = f"{number(criterion.points)} of {number(criterion.max_points)} points"
+    rows = {
+        f"{points}: ": criterion.message,
+        "hint: ": criterion.hint,
+        "see it yourself: ": criterion.reproduce,
+    }
+    yield from (f"{name}{line(text, limit)}" for name, text in rows.items() if text)
+
+
+def _test(name: str, *, status: str, points: float, **more: object) -> dict[str, Any]:
+    empty = {"message": "", "test_code": "", "filename": "", "line_no": 0, "execution_time": "0s"}
+    return {"name": name, "status": status, "points": points, **empty, **more}
+
+
+def _adding_up(scores: Sequence[float], total: float) -> list[float]:
+    """The scores, whose sum by floating point, one after the other, is `total` and not 72.30000000000001."""
+    last = max((i for i, score in enumerate(scores) if score), default=-1)
+    if last < 0:
+        return list(scores)
+    before = 0.0
+    for score in scores[:last]:
+        before += score
+    closing = total - before
+    near = (closing, math.nextafter(closing, math.inf), math.nextafter(closing, -math.inf))
+    exact = next((score for score in near if before + score == total), closing)
+    return [*scores[:last], exact, *scores[last + 1 :]]
