@@ -35,7 +35,11 @@ def test_every_command_has_help_with_the_exit_codes(argv, capsys):
 
 def test_version(capsys):
     assert run(["--version"]) == 0
-    assert capsys.readouterr().out == f"grader {__version__}\n"
+    out = capsys.readouterr().out.splitlines()
+    assert out[0] == f"grader {__version__}"
+    assert out[1].startswith("Python 3.")
+    assert out[2].startswith("ROS 1 ")
+    assert len(out) == 3
 
 
 @pytest.mark.parametrize(

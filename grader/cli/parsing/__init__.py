@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-from grader import __version__
 from grader.cli.parsing.authoring import add_authoring
 from grader.cli.parsing.base import Adder, Parser, common_options
 from grader.cli.parsing.classes import add_classes
 from grader.cli.parsing.evidence import add_evidence
 from grader.cli.parsing.exit_codes import EXIT_CODES
 from grader.cli.parsing.grading import add_grading
+from grader.cli.parsing.setting_up import add_setting_up
+from grader.cli.parsing.version import VersionAction
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -24,9 +25,11 @@ def build_parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"grader {__version__}")
+    parser.add_argument(
+        "--version", action=VersionAction, help="show the versions of grader, Python and ROS, and exit"
+    )
     commands = parser.add_subparsers(metavar="COMMAND", required=True, title="commands", parser_class=Parser)
     adder = Adder(commands, common)
-    for add_group in (add_grading, add_classes, add_evidence, add_authoring):
+    for add_group in (add_grading, add_classes, add_evidence, add_authoring, add_setting_up):
         add_group(adder)
     return parser

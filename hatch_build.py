@@ -1,0 +1,41 @@
+"""Adds to the wheel what is written from the parser: the man page, and the completion of three shells."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+MAN_PAGE = "share/man/man1/grader.1"
+COMPLETIONS = {
+    "bash": "share/bash-completion/completions/grader",
+    "zsh": "share/zsh/site-functions/_grader",
+    "fish": "share/fish/vendor_completions.d/grader.fish",
+}
+"""Where the shells look of themselves, below the folder that a wheel is installed into."""
+
+
+class CustomBuildHook(BuildHookInterface):
+    """Asks the grader of this very folder. Its parser needs the standard library only, the completion argcomplete."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Write the files into a temporary folder, and name them to the builder."""
+        del version  # of the kind of wheel, not of the grader
+        sys.path.insert(0, self.root)
+        from grader.cli.completing.script import script  # noqa: PLC0415 - found only now
+        from grader.cli.manual import man_page  # noqa: PLC0415 - as above
+
+        self.folder = tempfile.TemporaryDirectory()
+        texts = {MAN_PAGE: man_page()} | {path: script(shell) for shell, path in COMPLETIONS.items()}
+        for number, (target, text) in enumerate(texts.items()):
+            source = Path(self.folder.name, str(number))
+            source.write_text(text, encoding="utf-8")
+            build_data["shared_data"][str(source)] = target
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """Remove the temporary folder."""
+        del version, build_data, artifact_path
+        self.folder.cleanup()
