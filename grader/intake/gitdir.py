@@ -41,7 +41,7 @@ def link_repository(
 
     Nothing outside of `within` is read. `objects` are needed to fetch from it. Raises Unfit, GitMissing.
     """
-    own = (top if bare else _git_dir(top, within, git)).resolve()
+    own = (top if bare else git_folder(top, within, git)).resolve()
     common = _common(own, within)
     settings = _settings(common, git)
     into.mkdir(parents=True)
@@ -62,7 +62,7 @@ def link_repository(
     return Repository(git_dir=into, top=top.resolve())
 
 
-def _git_dir(top: Path, within: Path, git: Git) -> Path:
+def git_folder(top: Path, within: Path, git: Git) -> Path:
     """`.git` is a folder, or a file that names one, as in a submodule or a further worktree."""
     place = top / ".git"
     mode = place.lstat().st_mode

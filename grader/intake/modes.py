@@ -76,7 +76,7 @@ def _tracked(folder: Path, repository: Repository, git: Git) -> dict[str, bool]:
     return index
 
 
-def _is_script(folder: Path, path: str) -> bool:
+def is_script(folder: Path, path: str) -> bool:
     """Hints are for scripts of the student's own: on a disk of Windows every file is executable."""
     if any(part in BUILD_SPACES or part.startswith((".", "__")) for part in path.split("/")[:-1]):
         return False
@@ -94,7 +94,7 @@ def _differences(folder: Path, on_disk: Mapping[str, bool], tracked: Mapping[str
     for path in differing:
         if len(hints) == _DIFFERENCES_SHOWN:
             break
-        if not _is_script(folder, path):
+        if not is_script(folder, path):
             continue
         shown = printable(path)
         if tracked[path]:
@@ -108,7 +108,7 @@ def _differences(folder: Path, on_disk: Mapping[str, bool], tracked: Mapping[str
 
 
 def _untracked(folder: Path, on_disk: Mapping[str, bool], tracked: Mapping[str, bool]) -> list[str]:
-    new = sorted(path for path in on_disk.keys() - tracked.keys() if _is_script(folder, path))
+    new = sorted(path for path in on_disk.keys() - tracked.keys() if is_script(folder, path))
     return (
         [f"not in git yet, so not handed in by a push: {listing(new)} (git add, git commit)"] if new else []
     )
