@@ -39,8 +39,12 @@ ALLOWED = {
     "report": BASE | {"files", "judging.late", "judging.summary", "rubric.model"},
     "arena": BASE | {"admission", "evidence", "files", "package", "rubric.model", "temporary"},
     "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
+    "steps": {
+        *BASE, "arena", "evidence", "faults", "figures", "intake", "judging", "package", "recordings", "report",
+        "rubric", "temporary"
+    },
     "pipeline": {
-        *BASE, "arena", "evidence", "faults", "figures", "files", "intake", "judging", "package",
+        *BASE, "steps", "arena", "evidence", "faults", "figures", "files", "intake", "judging", "package",
         "recordings", "report", "results", "rubric", "temporary"
     },
     "authoring": {
@@ -49,6 +53,7 @@ ALLOWED = {
     "roster": BASE | {"intake"},
     "overrides": BASE | {"files", "intake", "rubric"},
     "fetching": BASE | {"files", "intake", "temporary"},
+    "standing": BASE | {"intake"},
     "gradebook": BASE | {"files", "report"},
     "similarity": BASE | {"evidence", "files", "intake", "report", "temporary"},
     "batch": {
@@ -67,7 +72,7 @@ ALLOWED = {
     "cli": {
         *BASE, "arena", "authoring", "batch", "checks", "evidence", "files", "instructor",
         "intake", "judging", "cluster", "gradebook", "mutation", "package", "pipeline", "report",
-        "review", "roster", "rubric", "similarity", "temporary", "watching"
+        "review", "roster", "rubric", "similarity", "standing", "temporary", "watching"
     },
     "__main__": {"cli"},
 }  # fmt: skip
