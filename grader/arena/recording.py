@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import os
 import shutil
+import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -64,6 +65,8 @@ WAITING = "for its turn"
 WAITING_ALONE = "to be run again, alone"
 STATIC_ONLY = "nothing was run: only the files were asked for"
 STILL_HOLDS = "unchanged: what was recorded before still holds"
+_UMASK = threading.Lock()
+"""It is the whole process's: two gradings in threads of one would leave each other's behind."""
 
 
 @dataclass(kw_only=True)
@@ -305,11 +308,12 @@ class Recorder:
 @contextmanager
 def _readable_by_all() -> Iterator[None]:
     """Whatever the user's umask: root's student is somebody else. The folder around it has a name that nobody knows."""
-    before = os.umask(0o022)
-    try:
-        yield
-    finally:
-        os.umask(before)
+    with _UMASK:
+        before = os.umask(0o022)
+        try:
+            yield
+        finally:
+            os.umask(before)
 
 
 def _needs_answer(facts: PackageFacts, path: str) -> bool:
