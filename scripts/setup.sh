@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Sets up what `make demo` and `make test` need: ROS 1 where it is missing, and .venv with the grader in it; for the
 # tests of pages a browser too, but with `--no-browser`. Runs again in a moment when there is nothing to do.
+# `--system-only` installs the packages of the system that grading needs, and nothing else: for images of containers.
 set -euo pipefail
 cd -P "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -22,6 +23,8 @@ ros_extras=(
 tools=(bwrap:bubblewrap git:git cmake:cmake make:make g++:g++ ip:iproute2)
 browser_tools=(chromium:chromium node:nodejs npm:npm)
 page_tools=tests/browser # with its own package.json
+# What an image needs besides: to make a virtual environment, and to fetch repositories over https.
+image_packages=(ca-certificates python3-venv)
 
 say() { printf 'setup: %s\n' "$*"; }
 
@@ -193,7 +196,24 @@ make_venv() {
   printf '%s\n' "$1" >.venv/setup-stamp
 }
 
+install_system() {
+  local known
+  mapfile -t -O "${#missing[@]}" missing < <(not_installed "${image_packages[@]}")
+  if [ "${#missing[@]}" -gt 0 ]; then
+    apt_install "${missing[@]}"
+  fi
+  if ! ros_elsewhere; then
+    mapfile -t known < <(known_to_apt $(not_installed "${ros_extras[@]}"))
+    if [ "${#known[@]}" -gt 0 ]; then apt_try "${known[@]}"; fi
+  fi
+  find_python || die "this needs Python 3.10 or newer with its venv module, as python3 on PATH"
+}
+
 find_missing
+if [ "${1:-}" = --system-only ]; then
+  install_system
+  exit
+fi
 if [ "${#missing[@]}" -gt 0 ]; then
   apt_install "${missing[@]}"
 fi
