@@ -30,7 +30,7 @@ def judged_again(evidence: Path, rubric: LoadedRubric) -> Judged:
 def judged_recording(
     submission: RecordedSubmission, rubric: LoadedRubric, evidence: Path, progress: Progress
 ) -> Judged:
-    """A recording that was handed in, kept in the folder and judged. It is the submission's fault if it cannot be read."""
+    """A recording that was handed in, kept and judged. It is the submission's fault if it cannot be read."""
     from grader.recordings import keep_recording, keep_scenarios  # noqa: PLC0415 - see recorded.LATER
 
     if submission.file is None:
