@@ -37,6 +37,7 @@ ALLOWED = {
         "checks", "evidence.run", "evidence.events", "judging.facts", "judging.recordings", "rubric.model"
     },
     "report": BASE | {"files", "judging.late", "judging.summary", "rubric.model"},
+    "ci": BASE | {"files", "report", "rubric"},
     "arena": BASE | {"admission", "evidence", "files", "package", "rubric.model", "temporary"},
     "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "steps": {
@@ -70,7 +71,7 @@ ALLOWED = {
     },
     "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
     "cli": {
-        *BASE, "arena", "authoring", "batch", "checks", "evidence", "files", "instructor",
+        *BASE, "arena", "authoring", "batch", "checks", "ci", "evidence", "files", "instructor",
         "intake", "judging", "cluster", "gradebook", "mutation", "package", "pipeline", "report",
         "review", "roster", "rubric", "similarity", "standing", "temporary", "watching"
     },

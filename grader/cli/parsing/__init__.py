@@ -6,6 +6,7 @@ import argparse
 
 from grader.cli.parsing.authoring import add_authoring
 from grader.cli.parsing.base import Adder, Parser, common_options
+from grader.cli.parsing.ci import add_ci
 from grader.cli.parsing.classes import add_classes
 from grader.cli.parsing.evidence import add_evidence
 from grader.cli.parsing.exit_codes import EXIT_CODES
@@ -30,6 +31,6 @@ def build_parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(metavar="COMMAND", required=True, title="commands", parser_class=Parser)
     adder = Adder(commands, common)
-    for add_group in (add_grading, add_classes, add_evidence, add_authoring, add_setting_up):
+    for add_group in (add_grading, add_ci, add_classes, add_evidence, add_authoring, add_setting_up):
         add_group(adder)
     return parser

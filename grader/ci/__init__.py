@@ -1,0 +1,1 @@
+"""What `grader ci` asks of a CI system's variables, and tells it."""
