@@ -6,13 +6,14 @@ import os
 import shlex
 from collections.abc import Iterable, Mapping
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.intake.find import BUILD_SPACES
 from grader.intake.git import Git, GitFailed, GitMissing, Repository
 from grader.intake.gitdir import Repositories, Unfit
 from grader.intake.names import brief, listing, printable
+from grader.intake.source import GivenModes
 from grader.intake.tree import Entry, read_file
 from grader.model.submission import ModeSource
 
@@ -47,6 +48,18 @@ def folder_modes(entries: Iterable[Entry], folder: Path, repositories: Repositor
         return Modes(source="disk", executable=dict(on_disk), hints=hints)
     hints = (*hints, *_differences(folder, on_disk, tracked), *_untracked(folder, on_disk, tracked))
     return Modes(source="git", executable={**on_disk, **tracked}, hints=hints)
+
+
+def uploaded_modes(modes: Modes, given: GivenModes) -> Modes:
+    """What is known where an upload may have lost the modes: git and an archive that carries them are believed, and a
+    disk on which some files are executable and others are not."""
+    mixed = len(set(modes.executable.values())) > 1
+    if given == "kept" or modes.source in {"git", "archive"} or (modes.source == "disk" and mixed):
+        return modes
+    if given == "lost":
+        return replace(modes, source="none", executable=dict.fromkeys(modes.executable))
+    hint = "the upload carries no file modes: every file counts as executable here"
+    return Modes(source="none", executable=dict.fromkeys(modes.executable, True), hints=(*modes.hints, hint))
 
 
 def _index(folder: Path, repositories: Repositories) -> tuple[dict[str, bool], tuple[str, ...]]:

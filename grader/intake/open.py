@@ -15,7 +15,7 @@ from grader.intake.find import Candidate, enclosing_package, find_candidates, li
 from grader.intake.git import Git, Repository
 from grader.intake.gitdir import Repositories
 from grader.intake.limits import Limits
-from grader.intake.modes import Modes, archive_modes, folder_modes
+from grader.intake.modes import Modes, archive_modes, folder_modes, uploaded_modes
 from grader.intake.names import encodable, printable, safe_name
 from grader.intake.remarks import remarks
 from grader.intake.repository import clone
@@ -139,8 +139,10 @@ def _commit(opened: Opened, chosen: Candidate, modes: Modes, repositories: Repos
 
 def _modes(opened: Opened, candidate: Candidate, entries: list[Entry], repositories: Repositories) -> Modes:
     if opened.archive_modes is not None:
-        return archive_modes(entries, opened.archive_modes, path=candidate.path)
-    return folder_modes(entries, candidate.folder, repositories)
+        modes = archive_modes(entries, opened.archive_modes, path=candidate.path)
+    else:
+        modes = folder_modes(entries, candidate.folder, repositories)
+    return uploaded_modes(modes, opened.source.modes)
 
 
 def _others(

@@ -14,6 +14,7 @@ from grader.intake.credentials import split_address
 from grader.intake.names import archive_stem, brief, printable
 from grader.intake.tree import is_file, is_there
 
+GivenModes = Literal["kept", "lost", "granted"]
 _LONGEST = 4096
 _SCHEMES = ("https", "http", "ssh", "git", "file")
 _URL = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<authority>[^/]*)(?P<path>/.*)?", re.DOTALL)
@@ -32,7 +33,8 @@ class Source:
 
     `url`, `ref` and `inside` (the folder of it that was asked for) are for a repository; `remote` tells
     whether reaching it takes the user's own git settings. `top` is where one on this machine lies. `hints` are what
-    whoever brought it here has to say about it.
+    whoever brought it here has to say about it. `modes` says what a platform that takes uploads did to file modes:
+    `lost` where nobody knows them, `granted` where every file then counts as executable.
     """
 
     kind: Literal["folder", "archive", "repository"]
@@ -45,6 +47,7 @@ class Source:
     remote: bool = False
     top: Path | None = None
     hints: tuple[str, ...] = ()
+    modes: GivenModes = "kept"
 
 
 def parse_source(text: str) -> Source:
