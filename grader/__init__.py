@@ -1,3 +1,78 @@
-"""An automated grader for introductory ROS 1 labs (rospy, catkin)."""
+"""An automated grader for introductory ROS 1 labs (rospy, catkin).
+
+`from grader import grade, judge, load_rubric` gives the Python API (docs/how-to/python-api.md). It is loaded when it is
+first asked for, so that `import grader` costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from grader.api import grade, judge, load_result, load_rubric
+    from grader.errors import (
+        EvidenceError,
+        GraderError,
+        HostError,
+        RubricError,
+        SubmissionError,
+        UsageError,
+    )
+    from grader.model.result import CriterionResult, GradingResult
+    from grader.model.verdict import EvidenceCitation, FileCitation, Status
+    from grader.rubric.load import LoadedRubric
+    from grader.rubric.model import Criterion, Rubric, Scenario
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "Criterion",
+    "CriterionResult",
+    "EvidenceCitation",
+    "EvidenceError",
+    "FileCitation",
+    "GraderError",
+    "GradingResult",
+    "HostError",
+    "LoadedRubric",
+    "Rubric",
+    "RubricError",
+    "Scenario",
+    "Status",
+    "SubmissionError",
+    "UsageError",
+    "__version__",
+    "grade",
+    "judge",
+    "load_result",
+    "load_rubric",
+]
+
+_PLACES = {
+    "grader.api": ("grade", "judge", "load_result", "load_rubric"),
+    "grader.errors": (
+        "EvidenceError",
+        "GraderError",
+        "HostError",
+        "RubricError",
+        "SubmissionError",
+        "UsageError",
+    ),
+    "grader.model.result": ("CriterionResult", "GradingResult"),
+    "grader.model.verdict": ("EvidenceCitation", "FileCitation", "Status"),
+    "grader.rubric.load": ("LoadedRubric",),
+    "grader.rubric.model": ("Criterion", "Rubric", "Scenario"),
+}
+_MODULE_OF = {name: module for module, names in _PLACES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - whatever the name stands for; type checkers read the imports above
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_MODULE_OF[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

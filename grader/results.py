@@ -15,10 +15,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 
+from pydantic import ValidationError
 from typing_extensions import Self
 
-from grader.errors import Busy
+from grader.errors import Busy, EvidenceError
 from grader.files import lock, sync, sync_tree, unwritable
+from grader.model.result import GradingResult
+from grader.model.version import RESULT as FORMAT
+from grader.model.version import UPDATE
 
 NEW, READY = ".grader-new", ".grader-ready"
 NAMES, REPLACED = "names.json", "replaced"
@@ -96,6 +100,27 @@ class Results:
             yield
         except OSError as error:
             raise unwritable(self.folder, error) from error
+
+
+def read_result(folder: Path) -> GradingResult | None:
+    """The result in a submission's folder, of any version that a grader wrote; None where there is none, or a damaged
+    one. Raises EvidenceError where a newer grader wrote it: it must not look as if there were none.
+    """
+    try:
+        return read_result_file(folder / RESULT)
+    except OSError:
+        return None
+
+
+def read_result_file(file: Path) -> GradingResult | None:
+    """The same of a file of any name. Raises OSError, too."""
+    data = file.read_bytes()
+    try:
+        return GradingResult.read_json(data)
+    except ValidationError:
+        if newer := FORMAT.newer_in(data):
+            raise EvidenceError(f"{file}: {newer}", hint=UPDATE) from None
+        return None
 
 
 def finish_killed(out: Path) -> None:

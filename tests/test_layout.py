@@ -16,7 +16,7 @@ ROS_SIDE = GRADER / "arena" / "ros"
 # Who may import whom, beside itself. `rubric.model` holds records only: whoever may see records may see it.
 BASE = {"model", "errors", "shown"}
 ALLOWED = {
-    "__init__": set[str](),
+    "__init__": {"api", "errors", "model", "rubric"},
     "model": set[str](),
     "errors": set[str](),
     "shown": set[str](),
@@ -24,7 +24,7 @@ ALLOWED = {
     "admission": {"files"},
     "files": {"errors"},
     "temporary": {"errors", "files"},
-    "results": {"errors", "files"},
+    "results": BASE | {"files"},
     "faults": BASE | {"files", "intake", "report", "results", "rubric"},
     "evidence": BASE | {"files"},
     "package": BASE,
@@ -70,10 +70,14 @@ ALLOWED = {
         "report", "results", "rubric", "temporary"
     },
     "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
+    "deliver": BASE | {"faults", "files", "intake", "pipeline", "report", "results", "rubric"},
     "cli": {
         *BASE, "arena", "authoring", "batch", "checks", "ci", "evidence", "files", "instructor",
-        "intake", "judging", "cluster", "gradebook", "mutation", "package", "pipeline", "report",
+        "intake", "judging", "cluster", "deliver", "gradebook", "mutation", "package", "pipeline", "report",
         "review", "roster", "rubric", "similarity", "standing", "temporary", "watching"
+    },
+    "api": {
+        *BASE, "arena.asynchronous", "evidence", "files", "judging", "pipeline", "results", "rubric", "steps"
     },
     "__main__": {"cli"},
 }  # fmt: skip

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from grader import __version__
-from grader.errors import EvidenceError, UsageError
+from grader.errors import UsageError
 from grader.files import atomic_write
 from grader.gradebook import Book, Row
 from grader.intake import safe_name
@@ -25,10 +22,10 @@ from grader.model.result import (
 )
 from grader.model.roster import Entry
 from grader.model.verdict import Status
-from grader.model.version import RESULT as RESULT_FORMAT
 from grader.model.version import RUN as RUN_FORMAT
-from grader.model.version import UPDATE, Versioned
-from grader.results import EVIDENCE, RESULT
+from grader.model.version import UPDATE
+from grader.results import EVIDENCE
+from grader.results import read_result as read_result  # noqa: PLC0414 - for whoever has a batch's folder
 from grader.shown import json_text
 
 RUN = "run.json"
@@ -120,32 +117,6 @@ class BatchFolder:
         )
 
 
-def read_result(folder: Path) -> GradingResult | None:
-    """The result in that folder, of any version that a grader wrote; None where there is none, or a damaged one.
-
-    Raises EvidenceError where a newer grader wrote it: it must not look as if there were none.
-    """
-    try:
-        data = (folder / RESULT).read_bytes()
-    except OSError:
-        return None
-    try:
-        return GradingResult.read_json(data)
-    except ValidationError:
-        if newer := _newer(data, RESULT_FORMAT):
-            raise EvidenceError(f"{folder / RESULT}: {newer}", hint=UPDATE) from None
-        return None
-
-
-def _newer(data: bytes, known: Versioned) -> str:
-    """What is wrong with a file that a newer grader wrote; nothing for any other."""
-    try:
-        found = json.loads(data)
-    except (ValueError, RecursionError):
-        return ""
-    return known.newer(found.get("schema")) if isinstance(found, dict) else ""
-
-
 def write_run(folder: Path, run: BatchRun) -> None:
     """Raises OutputError."""
     atomic_write(folder / RUN, json_text(run.model_dump(mode="json", by_alias=True)).encode())
@@ -164,7 +135,7 @@ def open_batch(folder: Path) -> BatchFolder:
     except OSError as error:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
     except ValueError as error:
-        if newer := _newer(data, RUN_FORMAT):
+        if newer := RUN_FORMAT.newer_in(data):
             raise UsageError(f"{path}: {newer}", hint=UPDATE) from error
         raise UsageError(
             f"{path}: not what this grader writes", hint="run `grader batch` once more into the same folder"

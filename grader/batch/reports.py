@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from grader.batch.folder import read_result
 from grader.batch.pool import side_by_side, workers, working
 from grader.batch.settled import figures_in
 from grader.errors import EvidenceError, GraderError, UsageError
@@ -20,7 +19,7 @@ from grader.report.html import html_report
 from grader.report.junit import junit
 from grader.report.markdown import markdown_report
 from grader.report.summary import missing_hidden
-from grader.results import RESULT, Results
+from grader.results import RESULT, Results, read_result
 from grader.rubric.load import LoadedRubric
 
 

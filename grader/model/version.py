@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import dataclass
 
@@ -26,6 +27,14 @@ class Versioned:
         if found is None or int(found[1]) <= self.version:
             return ""
         return f"written by a newer grader ({found[0]}); this one reads up to {self.version}"
+
+    def newer_in(self, data: bytes) -> str:
+        """The same of a JSON file with these bytes; nothing where it is none."""
+        try:
+            found = json.loads(data)
+        except (ValueError, RecursionError):
+            return ""
+        return self.newer(found.get("schema")) if isinstance(found, dict) else ""
 
 
 RESULT = Versioned("grader.result", 1)

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from grader.batch.flow import GRADEBOOK, alone, ids_of, write_books
-from grader.batch.folder import BatchFolder, open_batch, read_result, write_run
+from grader.batch.folder import BatchFolder, open_batch, write_run
 from grader.batch.settled import Settler, rewrite
 from grader.errors import Busy, GraderError, UsageError
 from grader.model.batch import State
 from grader.model.handed_in import Override
 from grader.model.result import GradingResult
 from grader.overrides import FILE, Overrides, read_overrides, write_override
-from grader.results import RESULT
+from grader.results import RESULT, read_result
 from grader.review.follower import Follower, Pace
 from grader.review.meeting import Conflict, alike, mark, plain, reviewing
 from grader.review.submissions import Item, Stamp, Submissions, stamp_of

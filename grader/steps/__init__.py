@@ -1,12 +1,14 @@
 """The steps that `grader/pipeline.py` names, each in a module of what it gives."""
 
+from grader.steps.aside import run_aside
 from grader.steps.judged import Judged, figures_of, judged_again, judged_recording
 from grader.steps.opened import about, opened
 from grader.steps.options import GradeOptions
-from grader.steps.outcome import Clock, console_log, outcome
+from grader.steps.outcome import NOTHING_TOOK, Clock, console_log, outcome
 from grader.steps.recorded import keep_scenarios, loaded_meanwhile, read_facts, recorded_and_judged, recorder
 
 __all__ = [
+    "NOTHING_TOOK",
     "Clock",
     "GradeOptions",
     "Judged",
@@ -22,4 +24,5 @@ __all__ = [
     "read_facts",
     "recorded_and_judged",
     "recorder",
+    "run_aside",
 ]

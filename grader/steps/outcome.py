@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from grader.arena.recording import Recording
 
 
+NOTHING_TOOK = TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0)
+
+
 class Clock:
     """Seconds since now: of the wall, and of this process's CPU."""
 
