@@ -6,6 +6,7 @@ from pathlib import Path
 
 from grader.cli.parsing.base import Adder, Parser
 from grader.cli.parsing.options import count, json_option, out_option, rubric_option, sandbox_option
+from grader.cli.parsing.platforms import add_platforms
 
 
 def add_evidence(add: Adder) -> None:
@@ -36,9 +37,11 @@ def add_evidence(add: Adder) -> None:
     out_option(record, "evidence goes to DIR/<submission id>/evidence/", required=True)
     sandbox_option(record)
 
-    export = add("export", "write recorded evidence in another form")
+    export = add("export", "write evidence in another form, or the grader for another platform")
     forms = export.add_subparsers(metavar="FORM", required=True, title="forms", parser_class=Parser)
-    bag = Adder(forms, add.common)("bag", "write recorded evidence as a ROS 1 bag", "export_bag")
+    form = Adder(forms, add.common)
+    add_platforms(form)
+    bag = form("bag", "write recorded evidence as a ROS 1 bag", "export_bag")
     bag.add_argument("evidence", metavar="EVIDENCE", type=Path, help="a recording, or a folder of them")
     bag.add_argument("--out", metavar="FILE", type=Path, help="the bag, or a folder (default: here)")
     bag.add_argument(
