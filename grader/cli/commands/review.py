@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+import sys
 from pathlib import Path
 
 from grader.cli.say import say
@@ -28,6 +29,7 @@ def run(*, folder: Path, port: int = 0, no_browser: bool = False, author: str | 
             tried = stack.enter_context(browser(address, wanted=not no_browser))
             say(f"{'Opening' if tried else 'Open'} {address}")
             say("Only this machine reaches it, and only with this address. Ctrl-C ends it.")
+            sys.stdout.flush()  # whoever reads it from a pipe needs the address now
 
         done = serve(desk, port=port, author=name, opened=opened)
     if done:
