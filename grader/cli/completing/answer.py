@@ -14,7 +14,7 @@ from grader.cli.parsing.walk import commands, options
 
 def answer() -> None:
     """Tell the shell that asks (by the environment) what fits, and end the process."""
-    argcomplete.autocomplete(completing_parser(), always_complete_options="long")
+    argcomplete.autocomplete(completing_parser(), always_complete_options=False)
 
 
 def completing_parser() -> argparse.ArgumentParser:

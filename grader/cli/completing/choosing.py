@@ -15,9 +15,9 @@ RUBRICS = (".yaml", ".yml")
 ARCHIVES = (".bag", ".mcap", ".tar", ".tar.bz2", ".tar.gz", ".tar.xz", ".tgz", ".zip")
 RECORDINGS = (".bag", ".mcap")
 WHICH = {
-    "failed": "those that could not be graded, or did not pass",
+    "failed": "those that could not be graded, or have no result",
     "inconclusive": "those with something that could not be judged",
-    "changed": "those whose source is another one now",
+    "changed": "those of which the submission, the rubric or the grader is another one now",
 }
 
 

@@ -28,13 +28,13 @@ def explained(*, prefix: str, parsed_args: argparse.Namespace, **_asked: object)
     rubric = getattr(parsed_args, "rubric", None)
     if rubric:
         path = _shipped(rubric) if rubric in rubric_ids() else Path(rubric)
-        return {**dict(_criteria(path)), **_checks()}
+        return {**_checks(), **dict(_criteria(path))}
     if "/" in prefix:
         lab = prefix.partition("/")[0]
         return {f"{lab}/{name}": title for name, title in _criteria(_shipped(lab))}
     criteria = {name: title for lab in rubric_ids() for name, title in _criteria(_shipped(lab))}
     labs = {f"{lab}/": "a criterion of this lab" for lab in rubric_ids()}
-    return {**criteria, **_checks(), **labs}
+    return {**_checks(), **criteria, **labs}
 
 
 def operators(*, parsed_args: argparse.Namespace, **_asked: object) -> dict[str, str]:
