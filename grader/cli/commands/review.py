@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
 from grader.cli.say import say
