@@ -2,6 +2,7 @@
 # Sets up what `make demo` and `make test` need: ROS 1 where it is missing, and .venv with the grader in it; for the
 # tests of pages a browser too, but with `--no-browser`. Runs again in a moment when there is nothing to do.
 # `--system-only` installs the packages of the system that grading needs, and nothing else: for images of containers.
+# `--has-ros` only says, by its exit code, whether ROS 1 is here or could be installed.
 set -euo pipefail
 cd -P "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -209,6 +210,23 @@ install_system() {
   find_python || die "this needs Python 3.10 or newer with its venv module, as python3 on PATH"
 }
 
+ros_possible() {
+  local package
+  if ros_elsewhere; then return 0; fi
+  command -v dpkg-query >/dev/null && command -v apt-get >/dev/null || return 1
+  mapfile -t missing < <(not_installed "${ros_packages[@]}")
+  if [ "${#missing[@]}" -eq 0 ]; then return 0; fi
+  find_root || return 1
+  "${as_root[@]}" apt-get -q update </dev/null || true
+  for package in "${missing[@]}"; do
+    apt-cache show "$package" >/dev/null 2>&1 || return 1
+  done
+}
+
+if [ "${1:-}" = --has-ros ]; then
+  ros_possible
+  exit
+fi
 find_missing
 if [ "${1:-}" = --system-only ]; then
   install_system
