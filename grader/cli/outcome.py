@@ -27,6 +27,12 @@ def exit_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
     return ExitCode.INCONCLUSIVE if status == "inconclusive" else ExitCode.BELOW_PASS_MARK
 
 
+def worst(codes: Iterable[ExitCode]) -> ExitCode:
+    """How several ended together. Not graded is worse than below the mark, that than not settled."""
+    order = (ExitCode.PASSED, ExitCode.INCONCLUSIVE, ExitCode.BELOW_PASS_MARK, ExitCode.NOT_GRADED)
+    return max(codes, key=order.index)
+
+
 def settled(criteria: Iterable[CriterionResult]) -> tuple[CriterionResult, ...]:
     """Those that could be judged."""
     return tuple(c for c in criteria if c.status not in OPEN)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
+import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from grader.errors import SubmissionError
 from grader.intake.manifest import MANIFEST, manifest_name
 from grader.intake.names import encodable, printable
 from grader.intake.tree import NO_CONTENT, Folder, is_file, is_there, walk
 
 # Where catkin puts what it makes: a copy of a package in there is none.
 BUILD_SPACES = frozenset({"build", "devel", "install"})
+FOLDERS_LOOKED_AT, ENTRIES_LOOKED_AT, SECONDS_LOOKED = 3000, 300_000, 3.0
 IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "AMENT_IGNORE", "COLCON_IGNORE"})
 
 
@@ -46,17 +50,39 @@ def find_candidates(root: Path, *, leave_out: Path | None = None) -> list[Candid
     Not entered: packages, `build/`, `devel/`, `install/`, hidden folders, links, `leave_out`.
     Raises OSError where `root` itself cannot be read.
     """
-    found = []
+    return [candidate for _, candidate in _looked_at(root, leave_out) if candidate is not None]
+
+
+def find_nearest(root: Path) -> tuple[list[Candidate], bool]:
+    """As `find_candidates`, in a folder of any size (a home, a whole disk): what is found within FOLDERS_LOOKED_AT
+    folders, ENTRIES_LOOKED_AT entries and SECONDS_LOOKED seconds, nearest first, and whether that was everything.
+
+    Raises OSError where `root` itself cannot be read.
+    """
+    found: list[Candidate] = []
+    end, entries = time.monotonic() + SECONDS_LOOKED, 0
+    try:
+        for number, (folder, candidate) in enumerate(_looked_at(root, None)):
+            found += [candidate] if candidate is not None else []
+            entries += len(folder.others) + len(folder.folders)
+            spent = number >= FOLDERS_LOOKED_AT or entries >= ENTRIES_LOOKED_AT
+            if spent or time.monotonic() > end:
+                return found, False
+    except SubmissionError:  # more in one folder than anybody looks at
+        return found, False
+    return found, True
+
+
+def _looked_at(root: Path, leave_out: Path | None) -> Iterator[tuple[Folder, Candidate | None]]:
+    """Each folder that catkin would look into, with the candidate that it is."""
     ignored: dict[str, str] = {}
     for folder in walk(root, tolerant=True):
         hidden = ignored.get(folder.path) or _marker(folder)
         candidate = _candidate(root, folder, hidden)
-        if candidate is not None:
-            found.append(candidate)
+        yield folder, candidate
         folder.folders[:] = [] if candidate and candidate.has_manifest else _entered(root, folder, leave_out)
         if hidden:
             ignored.update({folder.inside(name): hidden for name in folder.folders})
-    return found
 
 
 def linked_candidate(root: Path, wanted: str) -> Candidate | None:

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from grader.model.handed_in import AppliedOverride, HandedIn, Lateness
 from grader.model.record import Record
+from grader.model.standing import Standing
 from grader.model.verdict import EvidenceCitation, FileCitation, Status
 
 
@@ -86,7 +87,10 @@ class ErrorInfo(Record):
 
 
 class GradingResult(Record):
-    """`points` are those that count in the end: with what a person decided, and without what being late cost."""
+    """`points` are those that count in the end: with what a person decided, and without what being late cost.
+
+    `standing` is what `grader check --json` says of git; no file of results has it.
+    """
 
     schema_: Literal["grader.result/1"] = Field(default="grader.result/1", alias="schema")
     submission: SubmissionInfo
@@ -101,4 +105,5 @@ class GradingResult(Record):
     overrides: tuple[AppliedOverride, ...] = ()
     handed_in: HandedIn | None = None
     late: Lateness | None = None
+    standing: Standing | None = None
     error: ErrorInfo | None = None

@@ -98,6 +98,11 @@ def find_rubric_for_package(name: str) -> str | None:
     return found[0] if found else None
 
 
+def packages_of_labs() -> dict[str, str]:
+    """By the id of each rubric that comes with the grader, the package that it is for."""
+    return dict(_packages(rubrics_folder()))
+
+
 @cache
 def _packages(folder: Path) -> dict[str, str]:
     """The package of each rubric that comes with the grader: one line of its file, so the rest is not read."""

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import sys
 from contextlib import ExitStack, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader import pipeline
-from grader.cli.choice import choose
+from grader.cli.choice import Chosen, choose_all, only
 from grader.cli.display import open_progress
-from grader.cli.outcome import exit_code, settled
+from grader.cli.handing_in import Inquiry, news, print_beside, print_standing
+from grader.cli.outcome import exit_code, settled, worst
+from grader.cli.say import say, say_beside
 from grader.cli.show import show
 from grader.errors import ExitCode, UsageError
 from grader.files import check_writable
+from grader.intake import safe_name
 from grader.model.progress import Silence
 from grader.model.result import GradingResult
+from grader.model.standing import Standing
 from grader.report.hidden import hidden_ids, without_hidden
+from grader.report.terminal import open_console
 from grader.rubric.load import LoadedRubric
 from grader.temporary import temporary_folder
 
@@ -37,10 +43,13 @@ def run(
 ) -> ExitCode:
     """Grade the package at `path` with hidden criteria left out; with `static`, from its files alone.
 
-    With `watch`, again whenever a file of it is saved, until Ctrl-C.
+    Where packages of several labs are there, one after the other. With `watch`, again whenever a file of it is saved,
+    until Ctrl-C.
     """
-    loaded, source = choose(Path(path), rubric)
-    if watch and not Path(source).is_dir():
+    chosen = choose_all(Path(path), rubric)
+    if watch or as_json:
+        only(chosen)
+    if watch and not Path(chosen[0].source).is_dir():
         raise UsageError(
             f"{path} is no folder, so nothing is saved in it", hint="watch your package's folder"
         )
@@ -50,15 +59,52 @@ def run(
         sandbox=sandbox, submission_id=None, static_only=static, keep_hidden=False
     )
     if watch:
-        return _watch(str(Path(source).resolve()), loaded, options, out=out, as_json=as_json)
+        _tell(chosen[0])
+        source = str(Path(chosen[0].source).resolve())
+        return _watch(source, chosen[0].rubric, options, out=out, as_json=as_json)
+    several, told = len(chosen) > 1, set[str]()
+    return worst(_check(one, options, out, as_json=as_json, several=several, told=told) for one in chosen)
+
+
+def _tell(chosen: Chosen) -> None:
+    """What was chosen, before anything else is said."""
+    if chosen.words:
+        say_beside(chosen.words)
+
+
+def _check(
+    chosen: Chosen,
+    options: pipeline.GradeOptions,
+    out: Path | None,
+    *,
+    as_json: bool,
+    several: bool,
+    told: set[str],
+) -> ExitCode:
+    """One package. What git's state has `told` already, for another one, is not said again."""
+    _tell(chosen)
+    static, rubric = options.static_only, chosen.rubric.rubric
+    if several and chosen.package is not None:
+        options = replace(options, submission_id=safe_name(chosen.package.resolve().name))
+        say("")
     with ExitStack() as stack:
-        folder = out or stack.enter_context(temporary_folder("check"))
+        own = stack.enter_context(temporary_folder("check"))
+        inquiry = Inquiry(chosen.package, own / "git") if chosen.package is not None else None
+        folder = out or own
         with open_progress(early=not (as_json or static)) as progress:
-            result = pipeline.grade(source, loaded, folder, options, progress)
-        shown = without_hidden(result, loaded.rubric)
+            result = pipeline.grade(chosen.source, chosen.rubric, folder, options, progress)
+        shown = without_hidden(result, rubric)
         kept = folder / result.submission.id if out is not None else None
-        hidden = len(hidden_ids(loaded.rubric))
-        return show(shown, loaded.rubric, kept, hidden=hidden, as_json=as_json, static=static)
+        standing = inquiry.result() if inquiry is not None else Standing()
+        if as_json:
+            shown = shown.model_copy(update={"standing": standing})
+        hidden = len(hidden_ids(rubric))
+        code = show(shown, rubric, kept, hidden=hidden, as_json=as_json, static=static)
+        if as_json:
+            print_beside(standing)
+        else:
+            print_standing(news(standing, told), open_console(sys.stdout))
+        return code
 
 
 def _watch(

@@ -1,0 +1,110 @@
+"""Which packages `grader check` is about, in whatever folder it is called: below it, around it, or beside it."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.errors import UsageError
+from grader.intake.find import BUILD_SPACES, Candidate, enclosing_package, find_nearest
+from grader.intake.gitdir import repository_around
+from grader.intake.manifest import manifest_name
+from grader.intake.names import printable
+from grader.intake.tree import is_file, is_there
+
+_MADE = BUILD_SPACES | {"logs"}
+_MARKS = (".catkin_workspace", ".catkin_tools", "src/CMakeLists.txt")
+_MADE_MARKS = ("CMakeCache.txt", ".catkin", "setup.sh", ".catkin_tools.yaml", ".built_by")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """`candidates` may be packages, nearest first. `root` is the folder that they were looked for in; where it is not
+    the one that was asked about, `moved` says why. `whole` is false where not everything was looked at."""
+
+    root: Path
+    candidates: tuple[Candidate, ...]
+    moved: str = ""
+    whole: bool = True
+
+    @property
+    def packages(self) -> tuple[Candidate, ...]:
+        """Those with a manifest, as catkin sees them."""
+        return tuple(c for c in self.candidates if c.has_manifest and c.ignored_by is None)
+
+
+def find(path: Path) -> Found:
+    """The packages below the folder `path`; else the one around it; else those of its repository or workspace.
+
+    What git or a build keeps for itself is left first. Raises UsageError where `path` cannot be read.
+    """
+    try:
+        return _find(path)
+    except OSError as error:
+        reason = "does not exist" if not is_there(path) else error.strerror or "cannot be read"
+        raise UsageError(f"{path} {reason}", hint="give your package's folder") from error
+
+
+def _find(path: Path) -> Found:
+    here = path.resolve()
+    outside, moved = _outside(here)
+    root = path if outside == here else outside
+    candidates, whole = find_nearest(root)
+    found = Found(root=root, candidates=tuple(candidates), moved=moved, whole=whole)
+    if found.packages:
+        return found
+    around = enclosing_package(outside)
+    if around is not None:
+        return Found(root=around, candidates=(_as_candidate(around),), moved=moved)
+    return _beside(outside) or found
+
+
+def _outside(here: Path) -> tuple[Path, str]:
+    """The folder to look in instead of one in which there are copies of packages, or none at all."""
+    for folder in (*reversed(here.parents), here):
+        if folder.name == ".git":
+            return folder.parent, "this folder is git's own"
+        if folder.name in _MADE and _is_made(folder):
+            return folder.parent, f"what is in {folder.name}/ was made by a build"
+    return here, ""
+
+
+def _is_made(folder: Path) -> bool:
+    """Whether catkin (or CMake) made it: of a package's own folders some are named alike."""
+    if any(is_there(folder / mark) for mark in _MADE_MARKS):
+        return True
+    return any(is_there(folder.parent / mark) for mark in _MARKS)
+
+
+def _beside(here: Path) -> Found | None:
+    """In the rest of the repository or the workspace that the folder is part of."""
+    repository = repository_around(here)
+    workspace = next((f for f in here.parents if any(is_there(f / mark) for mark in _MARKS)), None)
+    for root, what in ((workspace, "workspace"), (repository, "repository")):
+        if root is not None and root not in (here, Path(root.anchor)):
+            candidates, whole = find_nearest(root)
+            found = Found(
+                root=root,
+                candidates=tuple(candidates),
+                whole=whole,
+                moved=f"there is no package here, but in the {what}",
+            )
+            if found.packages:
+                return found
+    return None
+
+
+def _as_candidate(folder: Path) -> Candidate:
+    name = manifest_name(folder, root=folder) or printable(folder.name)
+    return Candidate(path=".", folder=folder, manifest=name, has_cmake=is_file(folder / "CMakeLists.txt"))
+
+
+def shown(folder: Path) -> str:
+    """A folder as somebody here would call it."""
+    try:
+        near = os.path.relpath(folder.resolve(), Path.cwd())
+    except (OSError, ValueError):
+        return printable(str(folder))
+    steps = Path(near).parts.count("..")
+    return printable(near if steps <= 2 else str(folder))
