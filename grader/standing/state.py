@@ -48,8 +48,8 @@ class Head:
 class Remote:
     """What is known of the server, from the last fetch or push. `ref` is the branch there that this one is pushed to,
     as `origin/main`, or None where it never was; `ahead` and `behind` count commits against it, None where they cannot
-    be told. `default` is what is usually marked, or None where that is not known. `differing` are the package's files that
-    differ between the commit here and the one that is marked (`default`, else `ref`)."""
+    be told. `default` is what is usually marked, or None where that is not known. `differing` are the package's files
+    that differ between the commit here and the one that is marked (`default`, else `ref`)."""
 
     names: tuple[str, ...] = ()
     name: str | None = None
