@@ -72,10 +72,11 @@ ALLOWED = {
     "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
     "deliver": BASE | {"faults", "files", "intake", "pipeline", "report", "results", "rubric"},
     "cli": {
-        *BASE, "arena", "authoring", "batch", "checks", "ci", "evidence", "files", "instructor",
+        *BASE, "arena", "authoring", "batch", "checks", "ci", "evidence", "files", "formats", "instructor",
         "intake", "judging", "cluster", "deliver", "gradebook", "mutation", "package", "pipeline", "report",
         "review", "roster", "rubric", "similarity", "standing", "temporary", "watching"
     },
+    "formats": BASE | {"evidence.events", "mutation.model", "rubric"},
     "api": {
         *BASE, "arena.asynchronous", "evidence", "files", "judging", "pipeline", "results", "rubric", "steps"
     },

@@ -21,6 +21,11 @@ class Versioned:
         """As files say it: `grader.result/1`."""
         return f"{self.name}/{self.version}"
 
+    @property
+    def short(self) -> str:
+        """As people say it: `result`."""
+        return self.name.removeprefix("grader.")
+
     def newer(self, said: object) -> str:
         """What is wrong, in one line, where `said` is a later version than this grader reads; else nothing."""
         found = re.fullmatch(rf"{re.escape(self.name)}/([0-9]{{1,{_DIGITS_MAX}}})", str(said)[:100])
@@ -45,3 +50,4 @@ OVERRIDES = Versioned("grader.overrides", 1)
 MUTANTS = Versioned("grader.mutants", 1)
 RUBRIC_TEST = Versioned("grader.rubric-test", 1)
 SIMILARITY = Versioned("grader.similarity", 1)
+ALL = (RESULT, EVIDENCE, RUBRIC, OVERRIDES, RUN, SIMILARITY, MUTANTS, RUBRIC_TEST)

@@ -10,6 +10,7 @@ from grader.cli.parsing.ci import add_ci
 from grader.cli.parsing.classes import add_classes
 from grader.cli.parsing.evidence import add_evidence
 from grader.cli.parsing.exit_codes import EXIT_CODES
+from grader.cli.parsing.formats import add_formats
 from grader.cli.parsing.grading import add_grading
 from grader.cli.parsing.setting_up import add_setting_up
 from grader.cli.parsing.version import VersionAction
@@ -31,6 +32,14 @@ def build_parser() -> argparse.ArgumentParser:
     )
     commands = parser.add_subparsers(metavar="COMMAND", required=True, title="commands", parser_class=Parser)
     adder = Adder(commands, common)
-    for add_group in (add_grading, add_ci, add_classes, add_evidence, add_authoring, add_setting_up):
+    for add_group in (
+        add_grading,
+        add_ci,
+        add_classes,
+        add_evidence,
+        add_authoring,
+        add_formats,
+        add_setting_up,
+    ):
         add_group(adder)
     return parser
