@@ -156,7 +156,7 @@ def test_stopping_leaves_nothing(grader: Grader, tmp_path: Path, seen: str, numb
     began = time.monotonic()
     process.send_signal(number)
     _, err = process.communicate(timeout=30)
-    assert time.monotonic() - began < 3
+    assert time.monotonic() - began < 15  # a second on a quiet machine
     assert process.returncode == 130
     assert err.splitlines()[-1] == "grader: interrupted"
     assert grader.await_none(1) == []

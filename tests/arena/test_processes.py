@@ -32,7 +32,11 @@ def test_print_without_flush_is_seen_by_line_and_time(tmp_path: Path, sandbox: s
 
 @pytest.mark.parametrize("sandbox", SANDBOXES)
 def test_ctrl_c_ends_a_node(tmp_path: Path, sandbox: str) -> None:
-    run = run_script(tmp_path, NODE + "rospy.spin()\nprint('ended well')\n", limit_s=1, sandbox=sandbox)
+    code = (
+        NODE + "from std_msgs.msg import Empty\nup = rospy.Publisher('up', Empty, latch=True, queue_size=1)\n"
+        "up.publish()\nrospy.spin()\nprint('ended well')\n"
+    )
+    run = run_script(tmp_path, code, messages={"/up": 1}, sandbox=sandbox)
     ended = exit_of(run)
     assert (ended.exit_code, ended.stopped_by) == (0, "INT")
     assert ended.cpu_s > 0.05
