@@ -1,0 +1,115 @@
+"""`results.json` of both platforms, for results of every kind, and where there is no result at all."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from grader.deliver import gradescope, prairielearn
+from grader.deliver.grading import Form, Place, deliver
+from grader.deliver.settings import FILE, Settings
+from grader.errors import HostError
+from grader.model.result import ErrorInfo
+from grader.model.verdict import Status
+from grader.rubric.load import LoadedRubric
+from tests.report.hostile import criterion
+from tests.report.nasty import STEERING
+from tests.report.worst import LONG, MERMAID, rubric, worst
+
+FORMS = {
+    "gradescope": (gradescope.place, gradescope.FORM),
+    "prairielearn": (prairielearn.place, prairielearn.FORM),
+}
+RUBRIC = LoadedRubric.model_construct(rubric=rubric(), path=Path("lab.yaml"), digest="0" * 64)
+SOUND = (
+    criterion("good", Status.PASS, 6, 6),
+    criterion("half", Status.PARTIAL, 1, 4, message="half of it"),
+    criterion("secret", Status.FAIL, 0, 10, message="the secret was not found"),
+)
+
+
+def test_prairielearn_gives_a_share_and_a_test_for_each_criterion_but_the_hidden() -> None:
+    result = worst(criteria=SOUND, points=7, max_points=20, late=None, overrides=(), status="graded")
+    document = prairielearn.graded(result, RUBRIC)
+    assert (document["gradable"], document["score"]) == (True, 0.35)
+    assert [(t["points"], t["max_points"]) for t in document["tests"]] == [(6, 6), (1, 4), (0, 10)]
+    assert "secret" not in json.dumps(document)
+    assert document["tests"][-1]["name"] == "1 criteria that are not shown"
+
+
+def test_prairielearn_says_what_is_open() -> None:
+    waiting = criterion("waiting", Status.INCONCLUSIVE, 0, 5)
+    result = worst(criteria=(*SOUND, waiting), points=7, max_points=25, late=None, overrides=())
+    document = prairielearn.graded(result, RUBRIC)
+    assert document["message"].startswith("A PERSON MUST LOOK: 5 points")
+    assert document["tests"][2]["name"].startswith("A PERSON MUST LOOK")
+
+
+def test_prairielearn_is_given_nothing_that_steers_and_less_than_it_takes() -> None:
+    document = prairielearn.graded(worst(error=None), RUBRIC)
+    text = json.dumps(document, ensure_ascii=False)
+    assert STEERING.search(text) is None
+    assert len(text.encode()) < 1_000_000
+
+
+@pytest.mark.parametrize("kind", ["host", "submission"])
+def test_prairielearn_takes_no_attempt_for_what_was_not_graded(kind) -> None:
+    error = ErrorInfo(kind=kind, message=LONG, hint=MERMAID)
+    document = prairielearn.graded(worst(error=error, status="error"), RUBRIC)
+    assert document["gradable"] is False
+    assert STEERING.search(json.dumps(document, ensure_ascii=False)) is None
+
+
+def laid_out(root: Path, platform: str, settings: str | None) -> tuple[Place, Form]:
+    make, form = FORMS[platform]
+    place = make(root)
+    place.lab.mkdir(parents=True)
+    place.handed_in.mkdir()
+    if settings is not None:
+        (place.lab / FILE).write_text(settings)
+    return place, form
+
+
+@pytest.mark.parametrize("platform", FORMS)
+@pytest.mark.parametrize(
+    "settings", [None, "{", Settings(rubric="rubric/none.yaml", minutes=10).to_json().decode()]
+)
+def test_a_grader_that_cannot_grade_says_so_and_gives_no_score(platform, settings, tmp_path, capsys) -> None:
+    place, form = laid_out(tmp_path, platform, settings)
+    assert deliver(place, form) is False
+    document = json.loads((place.results / "results.json").read_bytes())
+    assert not document.get("gradable", False)
+    assert document.get("score", 0) == 0
+    assert ("score" in document) == (platform == "prairielearn")  # there, it says that nothing was gradable
+    assert "NOT GRADED" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("platform", FORMS)
+def test_an_interrupted_grading_says_that_it_took_too_long(platform, tmp_path, monkeypatch) -> None:
+    lab = Path(__file__).parents[2] / "rubrics" / "mcr2-basic-comms.yaml"
+    place, form = laid_out(tmp_path, platform, Settings(rubric=str(lab), minutes=10).to_json().decode())
+    (place.handed_in / "package.xml").touch()
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("grader.pipeline.grade", interrupted)
+    assert deliver(place, form) is False
+    assert "took longer than the 10 minutes" in (place.results / "results.json").read_text()
+
+
+def test_gradescope_hears_of_a_fault_in_plain_text_and_without_a_score() -> None:
+    document = gradescope.not_graded(HostError(LONG, hint=MERMAID))
+    text = json.dumps(document, ensure_ascii=False)
+    assert "score" not in text
+    assert document["output_format"] == "text"
+    assert STEERING.search(text) is None
+    assert len(text) < 10_000
+
+
+def test_gradescope_is_told_by_what_it_was_graded() -> None:
+    document = gradescope.graded(worst(error=None, status="graded"), RUBRIC)
+    assert set(document["extra_data"]) == {"grader", "sandbox", "rubric", "submission"}
+    assert "secret" not in json.dumps(document["extra_data"])
