@@ -8,7 +8,7 @@ set -uo pipefail
 
 options=(
   --rm --init --network none --cap-drop ALL
-  --user "$(id -u):$(id -g)" --env HOME=/tmp
+  --user "$(id -u):$(id -g)"
   --security-opt seccomp=unconfined --security-opt apparmor=unconfined --security-opt systempaths=unconfined
   --mount "type=bind,source=$GITHUB_WORKSPACE,target=$GITHUB_WORKSPACE,readonly" --workdir "$GITHUB_WORKSPACE"
 )

@@ -41,11 +41,13 @@ class GitHub:
 
     def tell(self, graded: Graded) -> None:
         """Annotations, summary and outputs of a result. Raises OutputError."""
-        _print(github_annotation(_severity(graded), TITLES[graded.outcome], graded.said))
-        _print(github_annotations(graded.result, graded.prefix, each_max=EACH_MAX - 1))
+        told = graded.result.model_copy(update={"error": None})  # it is said here, with whose fault it is
+        said = "\n".join(part for part in (graded.said, graded.hint) if part)
+        _print(github_annotation(_severity(graded), TITLES[graded.outcome], said))
+        _print(github_annotations(told, graded.prefix, each_max=EACH_MAX - 1))
         report = graded.folder / "report.md"
-        told = report.read_text(encoding="utf-8") if report.is_file() else ""
-        self._add(self._summary, f"{_heading(graded.outcome, graded.said)}\n\n{told}\n")
+        text = report.read_text(encoding="utf-8") if report.is_file() else ""
+        self._add(self._summary, f"{_heading(graded.outcome, graded.said)}\n\n{text}\n")
         self._write_outputs(_values(graded))
 
     def refuse(self, error: GraderError) -> None:
@@ -81,11 +83,11 @@ class GitHub:
 def _values(graded: Graded) -> dict[str, str]:
     counted = graded.outcome is not Outcome.NOT_GRADED
     passed = graded.outcome is Outcome.PASSED
-    encoded = classroom(graded.result, graded.rubric, passed=passed, prefix=graded.prefix)
+    encoded = classroom(graded.counted, graded.rubric, passed=passed, prefix=graded.prefix)
     report = graded.folder / "report.html"
     return {
-        "points": number(graded.points) if counted else "",
-        "max-points": number(graded.max_points),
+        "points": number(graded.counted.points) if counted else "",
+        "max-points": number(graded.counted.max_points),
         "status": graded.outcome.value,
         "passed": str(passed).lower(),
         "report": str(report) if report.is_file() else "",

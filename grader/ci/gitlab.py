@@ -30,8 +30,8 @@ class GitLab:
         counted = graded.outcome is not Outcome.NOT_GRADED
         self._write(
             {
-                "GRADER_POINTS": number(graded.points) if counted else "",
-                "GRADER_MAX_POINTS": number(graded.max_points),
+                "GRADER_POINTS": number(graded.counted.points) if counted else "",
+                "GRADER_MAX_POINTS": number(graded.counted.max_points),
                 "GRADER_STATUS": graded.outcome.value,
             }
         )

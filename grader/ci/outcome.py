@@ -39,16 +39,18 @@ TITLES = {
 
 @dataclass(frozen=True, kw_only=True)
 class Graded:
-    """A result that there is, without its hidden criteria: `folder` has its files, `prefix` is the package's folder in
-    the repository, `said` one line about the outcome, `fails` whether the job is to fail. `points` are of `max_points`:
-    of what was asked for, which may be the files alone."""
+    """A result that there is, without its hidden criteria. `fails`: whether the job is to fail.
+
+    `said` and `hint` are a line each about the outcome. `counted` is the result of what was asked for, which may be the
+    files alone. `folder` has the result's files, `prefix` is the package's folder in the repository.
+    """
 
     outcome: Outcome
     fails: bool
-    points: float
-    max_points: float
     said: str
+    hint: str
     result: GradingResult
+    counted: GradingResult
     rubric: Rubric
     folder: Path
     prefix: str

@@ -3,8 +3,8 @@
 The reporter adds up the scores and hands the sum to Classroom; an environment variable carries the text to it, which
 may have 128 KiB. It prints names, messages and code as they are, so no line of ours may be a command to the runner.
 
-What could not be judged has the status `error` and no part in the maximum. Where nothing could be judged because of the
-machine or the grader, the maximum is 0: the reporter then tells Classroom no points, and earlier ones stay.
+What a person has to judge has the status `error` and no part in the maximum. Where anything else could not be judged,
+the maximum is 0: the reporter then tells Classroom no points, and earlier ones stay until it is run again.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ JSON_BYTES_MAX = 60_000
 LIMITS = (600, 200, 80, 30, 0)
 """How long a text may be: the first with which all has room."""
 NAME_CHARS = 200
+RUN_AGAIN = OPEN - {Status.MANUAL}
 STATUSES = {Status.PASS: "pass", **dict.fromkeys(OPEN, "error")}
 
 
@@ -63,6 +64,8 @@ def _max(result: GradingResult) -> float:
             PackageNotFound.kind,
         }
         return result.max_points if students else 0
+    if any(c.status in RUN_AGAIN and c.max_points > 0 for c in result.criteria):
+        return 0
     return round(sum(c.max_points for c in result.criteria if c.status not in OPEN), 3)
 
 

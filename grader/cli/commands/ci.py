@@ -11,25 +11,26 @@ from grader.batch.folder import read_result
 from grader.ci.files import add_forms, clear, keep
 from grader.ci.github import GitHub
 from grader.ci.gitlab import GitLab
-from grader.ci.mark import needed_words, with_mark
+from grader.ci.mark import with_mark
 from grader.ci.outcome import OF_CODE, Graded, Outcome
+from grader.ci.said import STUDENTS, said_of
 from grader.ci.settings import Settings, read_settings
-from grader.cli.choice import choose
+from grader.cli.choice import Chosen, choose_all, only
 from grader.cli.display import open_progress
 from grader.cli.errors import report
 from grader.cli.outcome import exit_code, settled
 from grader.cli.prefix import package_prefix
-from grader.cli.say import say
-from grader.errors import ExitCode, GraderError, PackageNotFound, SubmissionError
-from grader.judging.summary import total_points
+from grader.cli.say import say, say_beside
+from grader.errors import ExitCode, GraderError, RubricError, UsageError
+from grader.judging.summary import overall_status, total_points
 from grader.model.result import GradingResult
 from grader.report.hidden import hidden_ids, without_hidden
 from grader.report.terminal import open_console, print_report
-from grader.report.text import number
 from grader.rubric.load import LoadedRubric
+from grader.rubric.model import Rubric
 from grader.temporary import temporary_folder
 
-STUDENTS = {SubmissionError.kind, PackageNotFound.kind}
+WHICH = "say where the package is by path (GRADER_PATH), and which lab it is by lab (GRADER_LAB)"
 RESULT = "result.json"
 
 
@@ -56,8 +57,10 @@ def run(*, system: str) -> ExitCode:
 
 
 def _graded(settings: Settings) -> Graded:
-    loaded, source = choose(settings.path, settings.lab)
-    rubric = with_mark(loaded, settings.mark)
+    chosen = _chosen(settings)
+    source, rubric = chosen.source, with_mark(chosen.rubric, settings.mark)
+    if chosen.words:
+        say_beside(chosen.words)
     clear(settings.out)
     options = pipeline.GradeOptions(
         sandbox=settings.sandbox, submission_id=None, static_only=settings.static, keep_hidden=False
@@ -75,6 +78,15 @@ def _graded(settings: Settings) -> Graded:
     hidden = len(hidden_ids(rubric.rubric))
     print_report(result, rubric.rubric, open_console(sys.stdout), hidden=hidden, static=settings.static)
     return _judged(result, rubric, settings, prefix)
+
+
+def _chosen(settings: Settings) -> Chosen:
+    try:
+        return only(choose_all(settings.path, settings.lab))
+    except RubricError:
+        raise
+    except UsageError as error:  # its hint is for who sits at a terminal
+        raise UsageError(error.message, hint=WHICH) from error
 
 
 def _left(folder: Path, error: GraderError) -> tuple[GradingResult, Path]:
@@ -95,38 +107,35 @@ def _prefix(result: GradingResult, source: Path) -> str:
 
 
 def _judged(result: GradingResult, rubric: LoadedRubric, settings: Settings, prefix: str) -> Graded:
-    criteria = settled(result.criteria) if settings.static else result.criteria
-    refused = result.error is not None and result.status == "error"
-    code = ExitCode.NOT_GRADED if refused or not criteria else exit_code(criteria, rubric.rubric)
+    counted = _counted(result, rubric.rubric, static=settings.static)
+    error = result.error if result.status == "error" else None
+    lab = rubric.rubric
+    code = ExitCode.NOT_GRADED if error or not counted.criteria else exit_code(counted.criteria, lab)
     outcome = OF_CODE[code]
-    students = result.error is not None and result.error.kind in STUDENTS
-    points, most = total_points(rubric.rubric, criteria), sum(c.max_points for c in criteria)
+    said, hint = said_of(counted, lab, outcome, static=settings.static)
+    students = error is not None and error.kind in STUDENTS
     return Graded(
         outcome=outcome,
         fails=outcome in settings.fail_on or (students and Outcome.BELOW in settings.fail_on),
-        points=points,
-        max_points=most,
-        said=_said_of_error(result)
-        if outcome is Outcome.NOT_GRADED
-        else _said(points, most, rubric, outcome, static=settings.static),
+        said=said,
+        hint=hint,
         result=result,
-        rubric=rubric.rubric,
+        counted=counted,
+        rubric=lab,
         folder=settings.out.absolute(),
         prefix=prefix,
     )
 
 
-def _said_of_error(result: GradingResult) -> str:
-    own = result.error is not None and result.error.kind in STUDENTS
-    why = result.error.message if result.error else "a check of the grader failed"
-    return why if own else f"{why}; this is not the submission's fault, and no mark is lost"
-
-
-def _said(points: float, most: float, rubric: LoadedRubric, outcome: Outcome, *, static: bool) -> str:
-    files = " that the files alone decide (nothing was run)" if static else ""
-    told = f"{number(points)} of {number(most)} points{files}"
-    if outcome is Outcome.INCONCLUSIVE:
-        return (
-            f"{told}, and something could not be judged: run it again, or a person decides; no mark is lost"
-        )
-    return f"{told}; {needed_words(rubric.rubric, most)}"
+def _counted(result: GradingResult, rubric: Rubric, *, static: bool) -> GradingResult:
+    """With `static`, the result of the criteria that the files alone decide."""
+    if not static or result.error is not None:
+        return result
+    criteria = settled(result.criteria)
+    update = {
+        "criteria": criteria,
+        "points": total_points(rubric, criteria),
+        "max_points": sum(c.max_points for c in criteria),
+        "status": overall_status(criteria),
+    }
+    return result.model_copy(update=update)
