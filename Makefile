@@ -7,7 +7,7 @@ MINUTES ?= 10
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test lint docs test-pure test-ros test-all stress fuzz bench fixtures screenshots mutants fmt clean
+.PHONY: help setup demo test lint docs reference links test-pure test-ros test-all stress fuzz bench fixtures screenshots mutants fmt clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -31,6 +31,12 @@ lint: setup ## style and types
 
 docs: setup ## the documents as a site in site/, warnings are errors
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
+reference: setup ## the pages of docs/reference/ that are made from the code
+	@$(BIN)/python -m scripts.reference
+
+links: setup ## whether the pages' links to other sites still work; needs the network
+	@$(BIN)/python -m scripts.links
 
 test-pure: setup ## the tests that need no ROS
 	@$(BIN)/python -m pytest -m "not ros" -n 2

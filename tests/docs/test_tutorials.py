@@ -1,0 +1,139 @@
+"""Every command of the tutorials works as printed: from a fresh clone, and from the wheel in a clean environment."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tests.docs.console import Command, Session, steps
+
+ROOT = Path(__file__).resolve().parents[2]
+TUTORIALS = ("student", "instructor", "ci")
+SYSTEM = "/usr/bin:/bin"
+GIT = "[user]\nname = A Student\nemail = student@example.org\n[init]\ndefaultBranch = main\n"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Installed:
+    """A grader that somebody has installed: where its programs are, and where its code must come from."""
+
+    programs: Path
+    code: Path
+
+
+def _done(*words: str | Path, folder: Path, environment: Mapping[str, str] | None = None) -> str:
+    done = subprocess.run(
+        [str(word) for word in words],
+        cwd=folder,
+        env=environment and dict(environment),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=280,
+    )
+    assert done.returncode == 0, f"{words}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What is committed, and nothing else."""
+    folder = tmp_path_factory.mktemp("fresh") / "clone"
+    _done("git", "clone", "-q", "--no-hardlinks", ROOT, folder, folder=ROOT)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def from_clone(clone: Path) -> Installed:
+    """The clone with the environment that `make setup` made here: the same packages, the clone's own code."""
+    environment = clone / ".venv"
+    _done(sys.executable, "-m", "venv", "--without-pip", environment, folder=clone)
+    [packages] = environment.glob("lib/python3*/site-packages")
+    (packages / "clone.pth").write_text(f"{clone}\n{sysconfig.get_path('purelib')}\n", encoding="utf-8")
+    program = environment / "bin" / "grader"
+    program.write_text(f'#!/bin/sh\nexec "{environment}/bin/python" -m grader "$@"\n', encoding="utf-8")
+    program.chmod(0o755)
+    return Installed(programs=environment / "bin", code=clone)
+
+
+@pytest.fixture(scope="module")
+def from_wheel(clone: Path, tmp_path_factory: pytest.TempPathFactory) -> Installed:
+    """The wheel, built of the clone and installed with what it needs into an environment of its own."""
+    folder = tmp_path_factory.mktemp("wheel")
+    source = folder / "source"
+    shutil.copytree(clone, source, ignore=shutil.ignore_patterns(".venv"))
+    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--no-input", "-q")
+    _done(*pip, "wheel", "--no-deps", "--wheel-dir", folder, source, folder=folder)
+    shutil.rmtree(source)
+    [wheel] = folder.glob("*.whl")
+    environment = folder / "environment"
+    _done(sys.executable, "-m", "venv", environment, folder=folder)
+    _done(
+        environment / "bin" / "python",
+        *pip[1:],
+        "install",
+        f"{wheel}[review]",
+        folder=folder,
+        environment=_environment(environment / "bin", folder),
+    )
+    return Installed(programs=environment / "bin", code=environment)
+
+
+@pytest.fixture(params=["from_clone", "from_wheel"])
+def installed(request: pytest.FixtureRequest) -> Installed:
+    found = request.getfixturevalue(request.param)
+    assert isinstance(found, Installed)
+    return found
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Path:
+    """A home with a folder to work in; git knows who works there, as it does for everybody who commits."""
+    (tmp_path / ".gitconfig").write_text(GIT, encoding="utf-8")
+    (tmp_path / "work").mkdir()
+    return tmp_path / "work"
+
+
+def _environment(programs: Path, home: Path) -> dict[str, str]:
+    """Of this process's variables only those that say where ROS, the package index and the temporary folders are."""
+    kept = ("GRADER_ROS_SETUP", "LANG", "LC_ALL", "TMPDIR", "XDG_RUNTIME_DIR", "XDG_CACHE_HOME")
+    taken = {key: value for key, value in os.environ.items() if key in kept or key.startswith("PIP_")}
+    cache = {"XDG_CACHE_HOME": str(Path.home() / ".cache")}
+    return {**cache, **taken, "PATH": f"{programs}:{SYSTEM}", "HOME": str(home), "COLUMNS": "80"}
+
+
+def page(name: str, folder: Path = ROOT) -> str:
+    return (folder / "docs" / "tutorials" / f"{name}.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", TUTORIALS)
+def test_a_tutorial_uses_the_grader_and_shows_what_it_prints(name: str) -> None:
+    commands = [step for step in steps(page(name)) if isinstance(step, Command)]
+    graded = [command for command in commands if "grader " in command.text]
+    assert len(graded) >= 5
+    assert sum(bool(command.shown) for command in graded) >= 4
+
+
+@pytest.mark.ros
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TUTORIALS)
+def test_every_command_works_as_printed(name: str, installed: Installed, clone: Path, desk: Path) -> None:
+    environment = _environment(installed.programs, desk.parent)
+    where = _done(
+        installed.programs / "python",
+        "-P" if sys.version_info >= (3, 11) else "-s",
+        "-c",
+        "import grader; print(grader.__file__)",
+        folder=desk,
+        environment=environment,
+    )
+    assert Path(where.strip()).is_relative_to(installed.code)
+    assert Session(desk, environment).run_page(page(name, clone)) > 5
