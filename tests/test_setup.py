@@ -180,3 +180,18 @@ def test_the_second_time_there_is_nothing_to_do() -> None:
             [SCRIPT], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=250, check=False
         )
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_for_an_image_it_installs_the_system_and_nothing_else(machine) -> None:
+    done = machine.run({**BARE, "id": "echo 0"}, "--system-only")
+    update, install = machine.calls()
+    assert update == UPDATE
+    assert {"python3-rospy", "ca-certificates", "python3-venv"} <= set(install.split())
+    assert (done.returncode, (machine.project / ".venv").exists()) == (1, False)  # this apt installs nothing
+
+
+def test_an_image_that_has_everything_is_left_alone(machine) -> None:
+    installed = 'shift 2; for name; do echo "installed $name"; done'
+    done = machine.run({**BARE, "dpkg-query": installed}, "--system-only")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert machine.calls() == []
