@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import os
 import secrets
 import tempfile
@@ -11,10 +10,18 @@ from contextlib import suppress
 from pathlib import Path
 
 from grader.errors import GraderError, HostError, OutputError
+from grader.portable import CLOEXEC, NOFOLLOW
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    HAS_LOCKS = False
+else:
+    HAS_LOCKS = True
 
 FULL = {
     errno.ENOSPC: "the disk is full",
-    errno.EDQUOT: "the disk quota is used up",
+    getattr(errno, "EDQUOT", errno.ENOSPC): "the disk quota is used up",
     errno.EIO: "the disk failed",
     errno.EFBIG: "files may not be that large here (ulimit -f)",
 }
@@ -86,7 +93,9 @@ def sync_tree(folder: Path) -> None:
 
 def sync(path: Path) -> None:
     """Flush one file, or one folder's list of names, to the disk. Raises OSError."""
-    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    if not hasattr(os, "O_DIRECTORY"):  # Windows: what is closed is as safe there as it gets
+        return
+    descriptor = os.open(path, os.O_RDONLY | NOFOLLOW | CLOEXEC)
     try:
         os.fsync(descriptor)
     finally:
@@ -96,10 +105,12 @@ def sync(path: Path) -> None:
 def lock(descriptor: int, *, shared: bool = False) -> bool:
     """Lock an open file or folder until it is closed or this process ends; False where another process has it.
 
-    Those that lock it `shared` do not keep each other out.
+    Those that lock it `shared` do not keep each other out. Where the system has no such locks, nobody is kept out.
 
     Raises OSError where the file system knows no locks.
     """
+    if not HAS_LOCKS:
+        return True
     try:
         fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -23,6 +23,7 @@ from grader.files import lock, sync, sync_tree, unwritable
 from grader.model.result import GradingResult
 from grader.model.version import RESULT as FORMAT
 from grader.model.version import UPDATE
+from grader.portable import close, open_folder
 
 NEW, READY = ".grader-new", ".grader-ready"
 NAMES, REPLACED = "names.json", "replaced"
@@ -92,7 +93,7 @@ class Results:
         for path in self._made:
             with suppress(OSError):  # not empty: it is in use
                 path.rmdir()
-        os.close(self._lock)
+        close(self._lock)
 
     @contextmanager
     def _writable(self) -> Iterator[None]:
@@ -133,13 +134,13 @@ def finish_killed(out: Path) -> None:
 
 
 def _finish(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    descriptor = open_folder(folder)
     try:
         if lock(descriptor):
             _recover(folder)
             folder.rmdir()  # where it holds nothing else
     finally:
-        os.close(descriptor)
+        close(descriptor)
 
 
 def _locked(folder: Path) -> int:
@@ -147,13 +148,13 @@ def _locked(folder: Path) -> int:
     for _ in range(ATTEMPTS):
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+            descriptor = open_folder(folder)
         except FileNotFoundError:
             continue
         held = _held(descriptor)
         if held and _is_at(descriptor, folder):
             return descriptor
-        os.close(descriptor)
+        close(descriptor)
         if not held:
             break
     raise Busy(
@@ -163,6 +164,8 @@ def _locked(folder: Path) -> int:
 
 
 def _is_at(descriptor: int, folder: Path) -> bool:
+    if descriptor < 0:
+        return True
     try:
         return os.path.samestat(os.fstat(descriptor), folder.stat())
     except FileNotFoundError:

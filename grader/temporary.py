@@ -14,7 +14,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from grader.errors import HostError
-from grader.files import lock
+from grader.files import HAS_LOCKS, lock
+from grader.portable import CLOEXEC, NOFOLLOW, READ, user_id
 
 MARK = ".grader"
 NAME = re.compile(r"grader-(source|fetch|run|check|new|mutants|tests)-[a-z0-9_]{8}")
@@ -33,12 +34,17 @@ def temporary_folder(kind: str, base: Path | None = None) -> Iterator[Path]:
     try:
         yield folder
     finally:
+        if not HAS_LOCKS:  # on Windows, what is open cannot be removed
+            os.close(descriptor)
         _remove(folder)
-        os.close(descriptor)
+        if HAS_LOCKS:
+            os.close(descriptor)
 
 
 def sweep(place: Path) -> None:
     """Remove those of our user's temporary folders in `place` whose graders have ended."""
+    if not HAS_LOCKS:  # nothing tells which have
+        return
     with suppress(OSError):  # housekeeping: what cannot be looked at is not ours
         for entry in os.scandir(place):
             if NAME.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False):
@@ -47,12 +53,12 @@ def sweep(place: Path) -> None:
 
 def _sweep(folder: Path) -> None:
     with suppress(OSError):  # another grader sweeps here too, or it is somebody else's
-        if folder.lstat().st_uid != os.geteuid():
+        if folder.lstat().st_uid != user_id():
             return
         if not any(folder.iterdir()):
             folder.rmdir()
             return
-        descriptor = os.open(folder / MARK, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+        descriptor = os.open(folder / MARK, READ | NOFOLLOW)
         try:
             if lock(descriptor):
                 _remove(folder)
@@ -66,7 +72,7 @@ def _new(prefix: str, place: Path) -> tuple[Path, int]:
         for _ in range(ATTEMPTS):
             folder = Path(tempfile.mkdtemp(prefix=prefix, dir=place))
             with suppress(FileNotFoundError):
-                descriptor = os.open(folder / MARK, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+                descriptor = os.open(folder / MARK, os.O_RDWR | os.O_CREAT | os.O_EXCL | CLOEXEC, 0o600)
                 if _held(descriptor) and (folder / MARK).exists():
                     return folder, descriptor
                 os.close(descriptor)

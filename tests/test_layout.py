@@ -14,16 +14,17 @@ GRADER = Path(__file__).resolve().parent.parent / "grader"
 ROS_SIDE = GRADER / "arena" / "ros"
 
 # Who may import whom, beside itself. `rubric.model` holds records only: whoever may see records may see it.
-BASE = {"model", "errors", "shown"}
+BASE = {"model", "errors", "portable", "shown"}
 ALLOWED = {
     "__init__": {"api", "errors", "model", "rubric"},
     "model": set[str](),
     "errors": set[str](),
     "shown": set[str](),
+    "portable": set[str](),
     "standins": set[str](),
-    "admission": {"files"},
-    "files": {"errors"},
-    "temporary": {"errors", "files"},
+    "admission": {"files", "portable"},
+    "files": {"errors", "portable"},
+    "temporary": {"errors", "files", "portable"},
     "results": BASE | {"files"},
     "faults": BASE | {"files", "intake", "report", "results", "rubric"},
     "evidence": BASE | {"files"},
@@ -76,9 +77,9 @@ ALLOWED = {
         "intake", "judging", "cluster", "deliver", "gradebook", "mutation", "package", "pipeline", "report",
         "review", "roster", "rubric", "similarity", "standing", "temporary", "watching"
     },
-    "formats": BASE | {"evidence.events", "mutation.model", "rubric"},
+    "formats": BASE | {"evidence.events", "files", "mutation.model", "rubric"},
     "api": {
-        *BASE, "arena.asynchronous", "evidence", "files", "judging", "pipeline", "results", "rubric", "steps"
+        *BASE, "arena.asynchronous", "evidence", "faults", "files", "judging", "pipeline", "results", "rubric", "steps"
     },
     "__main__": {"cli"},
 }  # fmt: skip

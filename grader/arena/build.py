@@ -13,9 +13,10 @@ from grader.arena.base import NAME as BASE_NAME
 from grader.arena.base import base_spec, catkin_make, has_base, keep_base
 from grader.arena.built import read_member
 from grader.arena.place import ARCHIVE, Place
+from grader.arena.recorded import READ_MAX, read_untrusted
 from grader.arena.ros_env import keep_ros_variables, parse_env
 from grader.arena.session import ArenaSession
-from grader.arena.workspace import READ_MAX, read_untrusted, run_in_place
+from grader.arena.workspace import run_in_place
 from grader.evidence.events import ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.record import Record

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from grader.arena.place import Place
+from grader.arena.recorded import read_untrusted
 from grader.arena.session import ArenaSession
-from grader.arena.workspace import read_untrusted
 from grader.evidence.events import ActorEvent
 from grader.rubric.model import Call, Scenario
 

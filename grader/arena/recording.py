@@ -13,23 +13,31 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from typing_extensions import Self
 
-from grader import __version__
 from grader.admission import Admission, shared_folder
 from grader.arena.asynchronous import Stop, run_until_signal, side_by_side
-from grader.arena.build import BUILD_EXPECTED_S, BuildOutcome, build
+from grader.arena.build import BUILD_EXPECTED_S, build
 from grader.arena.inside import prepare
 from grader.arena.limits import Limits
 from grader.arena.order import in_order
 from grader.arena.place import Place
+from grader.arena.recorded import (
+    NO_ROS,
+    PACKAGE,
+    RETRIES,
+    STATIC_ONLY,
+    STILL_HOLDS,
+    Recording,
+    attachments,
+    metadata,
+)
 from grader.arena.ros_env import RosInstallation, find_ros
 from grader.arena.sandbox import Mode, Sandbox, choose, temporary_base
-from grader.arena.scenario import ScenarioCost, expected_s, run_scenario
-from grader.arena.workspace import Workspace, make_workspace, read_untrusted
+from grader.arena.scenario import expected_s, run_scenario
+from grader.arena.workspace import Workspace, make_workspace
 from grader.errors import ArenaError
 from grader.evidence.events import ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
@@ -41,49 +49,10 @@ from grader.package import python_paths, read_syntax_report, with_build_facts
 from grader.rubric.model import Rubric
 from grader.temporary import temporary_folder
 
-PACKAGE = "package"
-RETRIES = 2
-"""So often a run is recorded again that could not be judged."""
-ATTACHED_BYTES_MAX = 256 << 10
-ATTACHED_FILES_MAX = 60
-ATTACHED_SUFFIXES = (
-    ".py",
-    ".xml",
-    ".txt",
-    ".launch",
-    ".yaml",
-    ".yml",
-    ".cfg",
-    ".sh",
-    ".cpp",
-    ".h",
-    ".msg",
-    ".srv",
-)
-NO_ROS = "no ROS 1 on this machine"
 WAITING = "for its turn"
 WAITING_ALONE = "to be run again, alone"
-STATIC_ONLY = "nothing was run: only the files were asked for"
-STILL_HOLDS = "unchanged: what was recorded before still holds"
 _UMASK = threading.Lock()
 """It is the whole process's: two gradings in threads of one would leave each other's behind."""
-
-
-@dataclass(kw_only=True)
-class Recording:
-    """What was recorded, where, by what, and at what cost (CPU seconds)."""
-
-    folder: Path
-    facts: PackageFacts
-    ros: RosInstallation | None
-    sandbox: Sandbox | None
-    cpu_s: float = 0.0
-    student_cpu_s: float = 0.0
-    files: list[Path] = field(default_factory=list)
-
-    def add(self, cost: ScenarioCost | BuildOutcome) -> None:
-        self.cpu_s += cost.cpu_s
-        self.student_cpu_s += cost.student_cpu_s
 
 
 class Recorder:
@@ -180,15 +149,15 @@ class Recorder:
     async def _write_package(self, folder: Path, *, last: bool) -> None:
         recording = self.recording
         path = recording.folder / f"{PACKAGE}.mcap"
-        metadata = self._metadata() | ({"not_run": self._not_run} if self._not_run else {})
-        with EvidenceWriter(path, scenario=PACKAGE, clock="real", warp=1.0, metadata=metadata) as writer:
+        about = self._metadata() | ({"not_run": self._not_run} if self._not_run else {})
+        with EvidenceWriter(path, scenario=PACKAGE, clock="real", warp=1.0, metadata=about) as writer:
             if recording.ros is not None and recording.sandbox is not None:
                 await self._build(
                     self._make_place(folder, recording.ros, recording.sandbox), writer, last=last
                 )
             now_ns = time.time_ns()
             writer.package(recording.facts, now_ns)
-            for name, data in _attachments(self._submission.package.folder, recording.facts):
+            for name, data in attachments(self._submission.package.folder, recording.facts):
                 writer.attach(name, data, now_ns, "text/plain")
         recording.files.append(path)
 
@@ -290,19 +259,7 @@ class Recorder:
         self._progress.step(name, "done")
 
     def _metadata(self) -> dict[str, str]:
-        submission, recording = self._submission, self.recording
-        return {
-            "submission.id": submission.id,
-            "submission.source": submission.source,
-            "submission.commit": submission.commit or "",
-            "submission.digest": submission.digest,
-            "submission.package": submission.package.name,
-            "grader": __version__,
-            "ros": recording.ros.label if recording.ros else "",
-            "python": recording.ros.python if recording.ros else "",
-            "sandbox": recording.sandbox.label if recording.sandbox else "",
-            "limits": self._limits.model_dump_json(),
-        }
+        return metadata(self._submission, self.recording, self._limits)
 
 
 @contextmanager
@@ -322,14 +279,3 @@ def _needs_answer(facts: PackageFacts, path: str) -> bool:
         return False
     shebang = file.shebang
     return file.executable is False or shebang is None or shebang.crlf or shebang.found is False
-
-
-def _attachments(folder: Path, facts: PackageFacts) -> Iterable[tuple[str, bytes]]:
-    """The package's own text files that were judged, as far as they are of a size to be looked at."""
-    chosen = [
-        f for f in facts.files if not f.binary and f.link is None and f.path.endswith(ATTACHED_SUFFIXES)
-    ]
-    for file in chosen[:ATTACHED_FILES_MAX]:
-        data = read_untrusted(folder / file.path, ATTACHED_BYTES_MAX)
-        if data is not None:
-            yield file.path, data

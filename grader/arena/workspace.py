@@ -11,7 +11,6 @@ import hashlib
 import os
 import re
 import shutil
-import stat
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -30,7 +29,6 @@ BROWSER_PATH = re.compile(
     rb"(?<![\w./-])/(?:usr/|usr/local/|snap/)?bin/(" + "|".join(BROWSERS).encode() + rb")(?![\w./-])"
 )
 LARGE_BYTES = 4 << 20
-READ_MAX = 8 << 20
 MANIFEST = """<package format="2"><name>{}</name><version>0.0.0</version><description>A repair</description>
 <maintainer email="student@example.org">student</maintainer><license>TODO</license>
 <buildtool_depend>catkin</buildtool_depend></package>
@@ -99,19 +97,6 @@ def needed_packages(submission: Submission) -> list[SourcePackage]:
         names = sorted({d.name for d in manifest.dependencies} & others.keys()) if manifest else ()
         needed.extend(others.pop(name) for name in names)
     return needed
-
-
-def read_untrusted(path: Path, limit_bytes: int = READ_MAX) -> bytes | None:
-    """A regular file that student code may have written, or None: no link is followed, no pipe waited for."""
-    try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
-    except OSError:
-        return None
-    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-        os.close(descriptor)
-        return None
-    with os.fdopen(descriptor, "rb") as file:
-        return file.read(limit_bytes)
 
 
 def _folder_name(package: SourcePackage) -> str:

@@ -40,6 +40,9 @@ def _dispatch(argv: Sequence[str]) -> int:
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
     """Hold Ctrl-C back for a moment: a compiled module that is interrupted while it loads panics."""
+    if sys.platform == "win32":
+        yield
+        return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
     try:
         yield

@@ -117,7 +117,7 @@ def _parsed(source: str | Source) -> Source:
 
 def unreadable(given: str, error: OSError) -> GraderError:
     """The error for a source that this machine could not read, or had no room for."""
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+    if error.errno in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)):
         return OutputError(f"{given}: the disk is full", hint="Free some room (`df -h`) and try again.")
     where = f" at {brief(str(error.filename))}" if error.filename else ""
     return SubmissionError(

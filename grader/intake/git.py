@@ -9,15 +9,18 @@ import shlex
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
+import threading
 import time
 from collections.abc import Generator, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from grader.intake.credentials import Access, refused, scrubbed
+from grader.portable import kill_group
 
 _QUIET = {
     "core.hooksPath": os.devnull,
@@ -49,6 +52,8 @@ _NETWORK_KEPT = re.compile(
 _ANSWER_BYTES = 16 << 20
 _SILENCE_S = 20.0
 _SAID_BYTES = 64 << 10
+_XFSZ = int(getattr(signal, "SIGXFSZ", 25))
+_TOO_LARGE = (-_XFSZ, 128 + _XFSZ)
 _TOO_MUCH = re.compile(r"File too large|signal 25\b|[Oo]ut of memory|cannot allocate|mmap failed")
 
 
@@ -126,7 +131,7 @@ class Git:
                     raise GitTimeout(f"no answer within {self.timeout_s:g} s") from None
             out.seek(0)
             err.seek(0)
-            if code in (-signal.SIGXFSZ, 128 + signal.SIGXFSZ):
+            if code in _TOO_LARGE:
                 raise GitTooMuch("larger than the limit")
             if code != 0:
                 said = scrubbed(err.read(_SAID_BYTES).decode("utf-8", "replace"), access.secrets)
@@ -146,7 +151,7 @@ class Git:
             stream = process.stdout
             assert stream is not None  # noqa: S101 - opened with PIPE
             rest = b""
-            with stream:
+            with stream, self._ended_in_time(process):
                 while block := self._read(stream.fileno()):
                     *ended, rest = (rest + block).split(b"\0")
                     yield from ended
@@ -156,11 +161,27 @@ class Git:
     def _read(self, descriptor: int) -> bytes:
         """What there is, as soon as there is something. git can look through empty folders for years, in silence."""
         left_s = min(max(0.0, self._deadline - time.monotonic()), _SILENCE_S)
+        if sys.platform == "win32":  # no pipe can be asked there; git's own end comes by `_ended_in_time`
+            return os.read(descriptor, 1 << 16)
         poll = select.poll()
         poll.register(descriptor, select.POLLIN)
         if not poll.poll(left_s * 1000):
             raise GitTimeout(f"no end within {min(self.timeout_s, _SILENCE_S):g} s")
         return os.read(descriptor, 1 << 16)
+
+    @contextmanager
+    def _ended_in_time(self, process: subprocess.Popen[bytes]) -> Iterator[None]:
+        """Where nobody can wait for output with a limit, the process is ended when its time is up."""
+        if sys.platform != "win32":
+            yield
+            return
+        timer = threading.Timer(max(0.0, self._deadline - time.monotonic()), process.kill)
+        timer.daemon = True
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
 
     @contextmanager
     def _started(
@@ -190,7 +211,7 @@ class Git:
         try:
             yield process
         finally:
-            _end(process)
+            kill_group(process)
 
     def _local_environment(self) -> dict[str, str]:
         """For repositories on this machine: no settings but ours, so no filter, no helper and no network."""
@@ -273,11 +294,3 @@ def _configured_ssh(environment: dict[str, str], cwd: Path) -> str:
     command = ["git", "config", "--get", "core.sshCommand"]
     found = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False)
     return found.stdout.strip()
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    """Ends git and whatever it started (ssh, a helper), also where Ctrl-C came first."""
-    if process.poll() is None:
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()

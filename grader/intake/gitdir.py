@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import suppress
@@ -51,15 +52,32 @@ def link_repository(
     for folder, names in ((common, _DATA), (own, ("index", *shared))):
         for name in names:
             if _is_plain(folder / name):
-                (into / name).symlink_to(folder / name)
+                _show(folder / name, into / name)
     if not (into / "refs").exists():
         (into / "refs").mkdir()
     if objects:
         _refuse_borrowed(common / "objects")
-        (into / "objects").symlink_to(common / "objects")
+        _show_objects(common / "objects", into / "objects")
     else:
         (into / "objects").mkdir()
     return Repository(git_dir=into, top=top.resolve())
+
+
+def _show(place: Path, at: Path) -> None:
+    """By a link; a copy where none may be made, as on Windows. There is no link in what `_is_plain` has seen."""
+    try:
+        at.symlink_to(place)
+    except OSError:
+        (shutil.copytree if place.is_dir() else shutil.copyfile)(place, at)
+
+
+def _show_objects(place: Path, at: Path) -> None:
+    """As `_show`, but objects may be many: git itself is told where they are."""
+    try:
+        at.symlink_to(place)
+    except OSError:
+        (at / "info").mkdir(parents=True)
+        (at / "info" / "alternates").write_text(f"{place.as_posix()}\n", encoding="utf-8")
 
 
 def git_folder(top: Path, within: Path, git: Git) -> Path:

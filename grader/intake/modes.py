@@ -16,6 +16,7 @@ from grader.intake.names import brief, listing, printable
 from grader.intake.source import GivenModes
 from grader.intake.tree import Entry, read_file
 from grader.model.submission import ModeSource
+from grader.portable import MODES_ON_DISK
 
 _SCRIPTS = (".py", ".sh", ".bash")
 _MAX_TRACKED = 200_000
@@ -40,12 +41,13 @@ def archive_modes(entries: Iterable[Entry], known: Mapping[str, bool | None], *,
 
 
 def folder_modes(entries: Iterable[Entry], folder: Path, repositories: Repositories) -> Modes:
-    """git's word where the folder has tracked files, the disk's for the rest and where there is no git."""
-    on_disk = {entry.path: entry.executable for entry in entries if entry.kind == "file"}
+    """git's word where the folder has tracked files, the disk's for the rest and where there is no git. Nobody's where
+    the disk knows no modes."""
+    on_disk = {e.path: e.executable if MODES_ON_DISK else None for e in entries if e.kind == "file"}
     index, hints = _index(folder, repositories)
     tracked = {path: bit for path, bit in index.items() if path in on_disk}
     if not tracked:
-        return Modes(source="disk", executable=dict(on_disk), hints=hints)
+        return Modes(source="disk" if MODES_ON_DISK else "none", executable=dict(on_disk), hints=hints)
     hints = (*hints, *_differences(folder, on_disk, tracked), *_untracked(folder, on_disk, tracked))
     return Modes(source="git", executable={**on_disk, **tracked}, hints=hints)
 
@@ -101,9 +103,9 @@ def is_script(folder: Path, path: str) -> bool:
         return False
 
 
-def _differences(folder: Path, on_disk: Mapping[str, bool], tracked: Mapping[str, bool]) -> list[str]:
+def _differences(folder: Path, on_disk: Mapping[str, bool | None], tracked: Mapping[str, bool]) -> list[str]:
     hints: list[str] = []
-    differing = (path for path, in_git in sorted(tracked.items()) if on_disk[path] != in_git)
+    differing = (path for path, in_git in sorted(tracked.items()) if on_disk[path] not in (None, in_git))
     for path in differing:
         if len(hints) == _DIFFERENCES_SHOWN:
             break
@@ -120,7 +122,7 @@ def _differences(folder: Path, on_disk: Mapping[str, bool], tracked: Mapping[str
     return hints
 
 
-def _untracked(folder: Path, on_disk: Mapping[str, bool], tracked: Mapping[str, bool]) -> list[str]:
+def _untracked(folder: Path, on_disk: Mapping[str, bool | None], tracked: Mapping[str, bool]) -> list[str]:
     new = sorted(path for path in on_disk.keys() - tracked.keys() if is_script(folder, path))
     return (
         [f"not in git yet, so not handed in by a push: {listing(new)} (git add, git commit)"] if new else []

@@ -13,6 +13,7 @@ from typing import Literal
 
 from grader.errors import SubmissionError
 from grader.intake.names import brief
+from grader.portable import READ
 
 # Far more than any workspace; much deeper, and Python's own functions for trees fail.
 MAX_DEPTH = 60
@@ -147,7 +148,7 @@ def read_file(path: Path, limit_bytes: int) -> bytes | None:
 
     Raises OSError where it cannot be read.
     """
-    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    descriptor = os.open(path, READ)
     with os.fdopen(descriptor, "rb") as stream:
         return stream.read(limit_bytes) if stat.S_ISREG(os.fstat(descriptor).st_mode) else None
 

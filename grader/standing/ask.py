@@ -10,6 +10,7 @@ from grader.errors import GraderError
 from grader.intake.git import Git, GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.gitdir import Unfit, git_folder, repository_around
 from grader.intake.names import brief
+from grader.portable import user_id
 from grader.standing.files import files_of
 from grader.standing.refs import remote_of
 from grader.standing.state import Files, Head, Remote, State
@@ -89,5 +90,5 @@ def _head_and_files(view: View, package: Path, own: Path) -> tuple[Head, Files]:
 
 def _owned(place: Path) -> bool:
     """Whether git itself would work there: it refuses what belongs to another user."""
-    uid = getattr(os, "geteuid", lambda: None)()
+    uid = user_id()
     return uid is None or place.stat().st_uid in (uid, int(os.environ.get("SUDO_UID") or uid))

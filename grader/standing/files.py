@@ -13,6 +13,7 @@ from grader.errors import SubmissionError
 from grader.intake.find import BUILD_SPACES
 from grader.intake.modes import is_script
 from grader.intake.tree import list_entries
+from grader.portable import MODES_ON_DISK
 from grader.standing.state import Change, Files, What
 from grader.standing.view import View
 
@@ -122,7 +123,7 @@ def _folded(path: str) -> str:
 
 def _bits(package: Path, index: dict[str, tuple[str, str]]) -> Iterator[str]:
     """Scripts that may be run here and not where they are marked. A disk on which all may be run says nothing."""
-    if os.name != "posix" or _may_run(package / "package.xml"):
+    if not MODES_ON_DISK or _may_run(package / "package.xml"):
         return
     for path, (_, mode) in index.items():
         if mode == "100644" and _may_run(package / path) and is_script(package, path):

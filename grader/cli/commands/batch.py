@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +14,7 @@ from grader.cli.class_display import open_class_display
 from grader.cli.say import say, say_beside, say_json
 from grader.errors import ExitCode, UsageError
 from grader.model.batch import BatchRun
+from grader.portable import cores
 from grader.roster import read_roster
 from grader.roster.times import parse_time
 from grader.rubric.load import LoadedRubric, load_rubric
@@ -80,8 +80,7 @@ def exit_code(run: BatchRun) -> ExitCode:
 
 
 def _jobs(rubric: LoadedRubric, *, static: bool) -> int:
-    cores = len(os.sched_getaffinity(0))
-    return cores if static or not rubric.rubric.scenarios else cores * JOBS_PER_CORE
+    return cores() if static or not rubric.rubric.scenarios else cores() * JOBS_PER_CORE
 
 
 def _time(text: str | None) -> datetime | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from grader.files import atomic_write
 from grader.judging import judge
 from grader.judging.summary import criteria_text, judged_text
 from grader.model.result import CriterionResult
+from grader.portable import cores
 from grader.rubric.load import LoadedRubric, load_rubric
 
 WORST_FIRST = (ExitCode.NOT_GRADED, ExitCode.BELOW_PASS_MARK, ExitCode.INCONCLUSIVE)
@@ -26,7 +26,7 @@ def run(*, evidence: list[Path], rubric: str, out: str = "-", jobs: int | None =
     loaded = load_rubric(rubric)
     several = submissions_in(evidence)
     if several:
-        return _several(several, loaded, out, jobs or len(os.sched_getaffinity(0)))
+        return _several(several, loaded, out, jobs or cores())
     criteria = judge(loaded.rubric, load_evidence(evidence), loaded.checks)
     _write(out, lambda ascii_only: criteria_text(criteria, ascii_only=ascii_only))
     return exit_code(criteria, loaded.rubric)

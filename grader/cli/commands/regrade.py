@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +14,7 @@ from grader.cli.class_display import open_class_display
 from grader.cli.commands.batch import JOBS_PER_CORE, exit_code, rubric_source
 from grader.cli.say import say, say_json
 from grader.errors import ExitCode
+from grader.portable import cores
 from grader.report.text import number
 from grader.rubric.load import load_rubric
 
@@ -38,12 +38,12 @@ def run(
     batch = open_batch(folder)
     source = rubric or batch.run.rubric_source
     loaded = load_rubric(source)
-    cores = len(os.sched_getaffinity(0))
-    batch, regraded = regrade(batch, loaded, rubric_source(source), jobs or cores)
+    own = cores()
+    batch, regraded = regrade(batch, loaded, rubric_source(source), jobs or own)
     missing = [one for one in regraded if one.missing]
     if missing and run_missing_too:
         with open_class_display() as watcher:
-            hands = Processes(jobs or cores * JOBS_PER_CORE)
+            hands = Processes(jobs or own * JOBS_PER_CORE)
             batch, regraded = run_missing(
                 batch, loaded, regraded, hands=hands, watcher=watcher, sandbox=sandbox
             )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,6 +20,7 @@ from grader.files import atomic_write
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
+from grader.portable import cores
 from grader.report.annotations import github_annotations
 from grader.report.class_page import salt_in, write_class_page
 from grader.report.classroom import classroom
@@ -103,7 +103,7 @@ def _written(folders: Sequence[Path], rubric: LoadedRubric) -> ExitCode:
         digest = write_one(folders[0], rubric).rubric.digest
         done = [Written(folder=folders[0], rubric_digest=digest)]
     else:
-        done = list(write_all(folders, rubric, len(os.sched_getaffinity(0))))
+        done = list(write_all(folders, rubric, cores()))
     _say_others(
         [w.folder.absolute().name for w in done if not w.error and w.rubric_digest != rubric.digest], rubric
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -16,6 +15,7 @@ from grader.batch.folder import RUN, open_batch
 from grader.cli.say import say_json
 from grader.errors import ExitCode, UsageError
 from grader.model.similarity import NotCompared, Pair, Similarity
+from grader.portable import cores
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
 from grader.similarity import compare, write_similarity
@@ -40,7 +40,7 @@ def run(*, folder: Path, starter: list[Path], threshold: float, as_json: bool = 
         starter=starter,
         groups=groups,
         threshold=threshold / 100,
-        jobs=len(os.sched_getaffinity(0)),
+        jobs=cores(),
     )
     written = write_similarity(similarity, folder, names)
     if as_json:

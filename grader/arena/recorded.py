@@ -1,0 +1,103 @@
+"""What a recording of a submission consists of, whether or not anything of it is run."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from grader import __version__
+from grader.arena.limits import Limits
+from grader.model.package import PackageFacts
+from grader.model.submission import Submission
+from grader.portable import NOFOLLOW, READ
+
+if TYPE_CHECKING:
+    from grader.arena.build import BuildOutcome
+    from grader.arena.ros_env import RosInstallation
+    from grader.arena.sandbox import Sandbox
+    from grader.arena.scenario import ScenarioCost
+
+PACKAGE = "package"
+RETRIES = 2
+"""So often a run is recorded again that could not be judged."""
+READ_MAX = 8 << 20
+ATTACHED_BYTES_MAX = 256 << 10
+ATTACHED_FILES_MAX = 60
+ATTACHED_SUFFIXES = (
+    ".py",
+    ".xml",
+    ".txt",
+    ".launch",
+    ".yaml",
+    ".yml",
+    ".cfg",
+    ".sh",
+    ".cpp",
+    ".h",
+    ".msg",
+    ".srv",
+)
+NO_ROS = "no ROS 1 on this machine"
+STATIC_ONLY = "nothing was run: only the files were asked for"
+STILL_HOLDS = "unchanged: what was recorded before still holds"
+
+
+@dataclass(kw_only=True)
+class Recording:
+    """What was recorded, where, by what, and at what cost (CPU seconds)."""
+
+    folder: Path
+    facts: PackageFacts
+    ros: RosInstallation | None = None
+    sandbox: Sandbox | None = None
+    cpu_s: float = 0.0
+    student_cpu_s: float = 0.0
+    files: list[Path] = field(default_factory=list)
+
+    def add(self, cost: ScenarioCost | BuildOutcome) -> None:
+        self.cpu_s += cost.cpu_s
+        self.student_cpu_s += cost.student_cpu_s
+
+
+def metadata(submission: Submission, recording: Recording, limits: Limits) -> dict[str, str]:
+    """What every file of evidence says of where it comes from."""
+    return {
+        "submission.id": submission.id,
+        "submission.source": submission.source,
+        "submission.commit": submission.commit or "",
+        "submission.digest": submission.digest,
+        "submission.package": submission.package.name,
+        "grader": __version__,
+        "ros": recording.ros.label if recording.ros else "",
+        "python": recording.ros.python if recording.ros else "",
+        "sandbox": recording.sandbox.label if recording.sandbox else "",
+        "limits": limits.model_dump_json(),
+    }
+
+
+def attachments(folder: Path, facts: PackageFacts) -> Iterable[tuple[str, bytes]]:
+    """The package's own text files that were judged, as far as they are of a size to be looked at."""
+    chosen = [
+        f for f in facts.files if not f.binary and f.link is None and f.path.endswith(ATTACHED_SUFFIXES)
+    ]
+    for file in chosen[:ATTACHED_FILES_MAX]:
+        data = read_untrusted(folder / file.path, ATTACHED_BYTES_MAX)
+        if data is not None:
+            yield file.path, data
+
+
+def read_untrusted(path: Path, limit_bytes: int = READ_MAX) -> bytes | None:
+    """A regular file that student code may have written, or None: no link is followed, no pipe waited for."""
+    try:
+        descriptor = os.open(path, READ | NOFOLLOW)
+    except OSError:
+        return None
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        return None
+    with os.fdopen(descriptor, "rb") as file:
+        return file.read(limit_bytes)

@@ -1,0 +1,62 @@
+"""What of the system is there on Linux, and elsewhere only in part: whatever judges files alone does without the rest.
+
+On Windows no file says whether it may be run, and no folder can be opened or locked. Where a flag is not known it is 0.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from contextlib import suppress
+
+NONBLOCK: int = getattr(os, "O_NONBLOCK", 0)
+NOFOLLOW: int = getattr(os, "O_NOFOLLOW", 0)
+CLOEXEC: int = getattr(os, "O_CLOEXEC", 0)
+BINARY: int = getattr(os, "O_BINARY", 0)
+READ = os.O_RDONLY | NONBLOCK | CLOEXEC | BINARY
+"""For files of somebody else: a pipe is not waited for."""
+MODES_ON_DISK = os.name == "posix"
+"""Whether a file's mode on the disk says that it may be run."""
+SYSTEMS = {"win32": "Windows", "darwin": "macOS"}
+
+
+def system() -> str:
+    """What people call this system; "" for Linux, the only one on which ROS 1's nodes are run."""
+    return "" if sys.platform == "linux" else SYSTEMS.get(sys.platform, sys.platform)
+
+
+def user_id() -> int | None:
+    """The user whose files these are; None where users have no numbers."""
+    return getattr(os, "geteuid", lambda: None)()
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def open_folder(path: os.PathLike[str]) -> int:
+    """A descriptor of a folder, to lock or to flush it; -1 where folders cannot be opened. Raises OSError."""
+    flag: int = getattr(os, "O_DIRECTORY", 0)
+    return os.open(path, os.O_RDONLY | flag | CLOEXEC) if flag else -1
+
+
+def close(descriptor: int) -> None:
+    """Close what `open_folder` gave."""
+    if descriptor >= 0:
+        os.close(descriptor)
+
+
+def kill_group(process: subprocess.Popen[bytes]) -> None:
+    """End a process that has a session of its own, with all that it started; it is waited for."""
+    if process.poll() is None:
+        with suppress(ProcessLookupError, PermissionError):
+            if sys.platform == "win32":
+                process.kill()
+            else:
+                os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
