@@ -9,16 +9,14 @@ from grader.checks.docs import checks_page
 from grader.mutation.docs import operators_page
 from scripts.reference.commands import commands_page, exit_codes_page
 from scripts.reference.labs import labs_page
-from scripts.reference.records import evidence_page, result_page, rubric_page
+from scripts.reference.records import rubric_page
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "reference"
 PAGES: dict[str, Callable[[], str]] = {
     "checks.md": checks_page,
     "commands.md": commands_page,
-    "evidence.md": evidence_page,
     "exit-codes.md": exit_codes_page,
     "labs.md": labs_page,
     "mutation-operators.md": operators_page,
-    "result.md": result_page,
     "rubric.md": rubric_page,
 }

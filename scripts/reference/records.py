@@ -1,4 +1,4 @@
-"""`rubric.md`, `result.md` and `evidence.md`, made from the records that read and write these files."""
+"""`rubric.md`, made from the records that a rubric is read into."""
 
 from __future__ import annotations
 
@@ -10,9 +10,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from grader.evidence.events import METADATA_NAME, TOPICS
 from grader.model.record import Record
-from grader.model.result import GradingResult
 from grader.rubric.model import Rubric
 from scripts.reference.table import MADE, code, table
 
@@ -22,52 +20,12 @@ Every key of a rubric's YAML file. [Writing a rubric](../how-to/writing-a-rubric
 [labs](labs.md) has those that come with the grader, and `grader rubric schema` gives the same to editors as a JSON
 Schema. {MADE}
 """
-RESULT = f"""# The result's keys
-
-Every key of `result.json`, schema `grader.result/1`. [What the statuses mean](../explanation/statuses.md) has more
-about `status`. {MADE}
-"""
-EVIDENCE = f"""# The evidence file
-
-One [MCAP](https://mcap.dev) file for each run, profile `ros1`, that every MCAP reader opens. {MADE}
-
-- **What the nodes published**: a channel for each topic and publisher, encoding `ros1`, with the message's full
-  definition as schema (`ros1msg`) and the metadata `topic`, `callerid`, `md5sum` and `latching`. The log time is the
-  arrival; sequence numbers count per channel.
-- **What the grader saw beside that**: the JSON channels below, with their JSON schemas.
-- **What was judged**: `package.mcap` has the package's files as attachments, and the facts that were read from them as
-  one message on `/grader/package`.
-- **What it is**: the metadata record `{METADATA_NAME}` names the format's version, the scenario, its clock, the
-  submission (source, commit, digest), the versions of grader, ROS and Python, the sandbox and its limits.
-
-`grader inspect FILE` says what is in a file. `grader export bag` writes it as a ROS 1 bag.
-"""
 
 
 def rubric_page() -> str:
     """The rubric, record by record."""
-    return _page(RUBRIC, [Rubric])
-
-
-def result_page() -> str:
-    """The result, record by record."""
-    return _page(RESULT, [GradingResult])
-
-
-def evidence_page() -> str:
-    """The JSON channels of the evidence."""
-    lines = [EVIDENCE]
-    for topic, record in TOPICS.items():
-        lines += [f"## {topic}", "", *_body(record)]
-    others = [found for found in _reachable(list(TOPICS.values())) if found not in TOPICS.values()]
-    for record in others:
-        lines += [f"## {record.__name__}", "", *_body(record)]
-    return "\n".join(lines).rstrip() + "\n"
-
-
-def _page(introduction: str, roots: list[type[Record]]) -> str:
-    lines = [introduction]
-    for record in _reachable(roots):
+    lines = [RUBRIC]
+    for record in _reachable(Rubric):
         lines += [f"## {record.__name__}", "", *_body(record)]
     return "\n".join(lines).rstrip() + "\n"
 
@@ -110,10 +68,10 @@ def _type(hint: Any) -> str:  # noqa: ANN401 - a type is any object
     return words.get(hint, "time with its time zone" if "datetime" in str(hint).lower() else str(hint))
 
 
-def _reachable(roots: list[type[Record]]) -> list[type[Record]]:
-    """The records, and those that their keys hold, each once."""
+def _reachable(root: type[Record]) -> list[type[Record]]:
+    """The record, and those that its keys hold, each once."""
     found: dict[type[Record], None] = {}
-    todo = list(roots)
+    todo = [root]
     while todo:
         record = todo.pop(0)
         if record not in found:
