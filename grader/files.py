@@ -116,3 +116,9 @@ def lock(descriptor: int, *, shared: bool = False) -> bool:
     except BlockingIOError:
         return False
     return True
+
+
+def wait_for_lock(descriptor: int) -> None:
+    """As `lock`, when those that hold it let it go. Raises OSError where the file system knows no locks."""
+    if HAS_LOCKS:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)

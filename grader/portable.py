@@ -13,6 +13,7 @@ from contextlib import suppress
 
 NONBLOCK: int = getattr(os, "O_NONBLOCK", 0)
 NOFOLLOW: int = getattr(os, "O_NOFOLLOW", 0)
+DIRECTORY: int = getattr(os, "O_DIRECTORY", 0)
 CLOEXEC: int = getattr(os, "O_CLOEXEC", 0)
 BINARY: int = getattr(os, "O_BINARY", 0)
 READ = os.O_RDONLY | NONBLOCK | CLOEXEC | BINARY
@@ -41,8 +42,7 @@ def cores() -> int:
 
 def open_folder(path: os.PathLike[str]) -> int:
     """A descriptor of a folder, to lock or to flush it; -1 where folders cannot be opened. Raises OSError."""
-    flag: int = getattr(os, "O_DIRECTORY", 0)
-    return os.open(path, os.O_RDONLY | flag | CLOEXEC) if flag else -1
+    return os.open(path, os.O_RDONLY | DIRECTORY | CLOEXEC) if DIRECTORY else -1
 
 
 def close(descriptor: int) -> None:
@@ -52,11 +52,16 @@ def close(descriptor: int) -> None:
 
 
 def kill_group(process: subprocess.Popen[bytes]) -> None:
-    """End a process that has a session of its own, with all that it started; it is waited for."""
+    """End a process that has a session of its own, with all that it started, if it is still alive; it is waited for."""
     if process.poll() is None:
-        with suppress(ProcessLookupError, PermissionError):
-            if sys.platform == "win32":
-                process.kill()
-            else:
-                os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        end_group(process)
+
+
+def end_group(process: subprocess.Popen[bytes]) -> None:
+    """End all that a process with a session of its own started, and itself; it is waited for."""
+    with suppress(ProcessLookupError):
+        if sys.platform == "win32":
+            process.kill()
+        else:
+            os.killpg(process.pid, signal.SIGKILL)
+    process.wait()

@@ -23,7 +23,7 @@ from grader.rubric.model import Rubric
 def why_unrun() -> str:
     """Why no node can be run here, "" where one can. Raises RosMissing where ROS is not where it should be."""
     if system():
-        return f"the nodes of ROS 1 are run on Linux, and this is {system()}"
+        return f"ROS 1's nodes run on Linux, and this is {system()}"
     return "" if find_ros() is not None else NO_ROS
 
 

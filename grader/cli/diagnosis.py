@@ -15,9 +15,11 @@ from pathlib import Path
 
 from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
 from grader.arena.standins import missing_packages
+from grader.cli.elsewhere import elsewhere
 from grader.cli.row import Row
 from grader.cli.walls import walls
 from grader.errors import RosMissing
+from grader.portable import cores, system, user_id
 
 PROGRAMS = {"git": "git", "cmake": "cmake", "make": "make", "c++": "g++"}
 ROS_PROGRAMS = ("catkin_make", "roslaunch", "rosrun", "rospack")
@@ -39,7 +41,9 @@ MIN_MEMORY_BYTES, MIN_DISK_BYTES = GIB, GIB
 
 
 def diagnose() -> tuple[Row, ...]:
-    """Every row, in the order in which things are needed."""
+    """Every row, in the order in which things are needed. Where it is not Linux, what is there without it."""
+    if system():
+        return (_python(), _git(), *elsewhere(), *_resources(), _encoding())
     return (_python(), *_programs(), *_ros(), *walls(), _user(), *_resources(), _hostname(), _encoding())
 
 
@@ -54,6 +58,12 @@ def _programs() -> Iterator[Row]:
             yield Row(name=name, state="ok", detail=path)
         else:
             yield Row(name=name, state="missing", detail="not found", mend=f"apt-get install {package}")
+
+
+def _git() -> Row:
+    path = shutil.which("git")
+    mend = "" if path else "https://git-scm.com/downloads"
+    return Row(name="git", state="ok" if path else "limited", detail=path or "not found", mend=mend)
 
 
 def _ros() -> Iterator[Row]:
@@ -99,22 +109,23 @@ def _standins(ros: RosInstallation) -> Row:
 
 
 def _user() -> Row:
-    if os.geteuid() == 0:
+    if user_id() == 0:
         return Row(
             name="user", state="ok", detail="root; students' code runs as an unprivileged user in the sandbox"
         )
-    return Row(name="user", state="ok", detail=f"uid {os.geteuid()}")
+    return Row(name="user", state="ok", detail=f"uid {user_id()}")
 
 
 def _resources() -> Iterator[Row]:
-    cores = len(os.sched_getaffinity(0))
+    number = cores()
     yield Row(
         name="cores",
-        state="ok" if cores >= 2 else "limited",
-        detail=f"{cores}" if cores >= 2 else "1: runs go one after another, rates may be inconclusive",
+        state="ok" if number >= 2 else "limited",
+        detail=f"{number}" if number >= 2 else "1: runs go one after another, rates may be inconclusive",
     )
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    yield _amount("memory", memory, MIN_MEMORY_BYTES, "GiB")
+    if sys.platform != "win32":
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        yield _amount("memory", memory, MIN_MEMORY_BYTES, "GiB")
     folder = Path(tempfile.gettempdir())
     yield _amount("disk", shutil.disk_usage(folder).free, MIN_DISK_BYTES, f"GiB free in {folder}")
 

@@ -25,15 +25,17 @@ def show(
     hidden: int = 0,
     as_json: bool = False,
     static: bool = False,
+    unrun: str = "",
 ) -> ExitCode:
     """Print the result (`hidden` criteria are left out of it already) and give its exit code.
 
-    With `static` nothing was run on purpose: the exit code is that of the criteria that could be judged.
+    With `static` nothing was run on purpose: the exit code is that of the criteria that could be judged. `unrun` says
+    why nothing was run, on purpose or not: what is open is then only counted.
     """
     if as_json:
         say_document(lambda ascii_only: result_text(result, ascii_only=ascii_only))
     else:
-        print_report(result, rubric, open_console(sys.stdout), hidden=hidden, static=static)
+        print_report(result, rubric, open_console(sys.stdout), hidden=hidden, static=static, unrun=unrun)
         _paths(folder)
     if result.error is not None:
         report(GraderError(result.error.message, hint=result.error.hint))

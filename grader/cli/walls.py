@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import sys
@@ -13,6 +12,7 @@ from grader.arena.cgroups import describe, find_cgroups
 from grader.arena.sandbox import NETWORK, ULIMIT_HINT, choose, refused_limits, why_not
 from grader.cli.row import Row
 from grader.errors import HostError
+from grader.portable import user_id
 
 PROGRAMS = {"bwrap": "bubblewrap", "setpriv": "util-linux", "prlimit": "util-linux"}
 PROBE_S = 20
@@ -32,7 +32,7 @@ DELEGATE = "systemd-run --user --scope -p Delegate=yes grader …, or run it as 
 def walls() -> Iterator[Row]:
     """A row for each part, then one for what `--sandbox auto` makes of them."""
     yield from map(_program, PROGRAMS)
-    yield _probe("user namespaces", ["unshare", "--user", "--pid", "--fork", "true"], drop=os.geteuid() == 0)
+    yield _probe("user namespaces", ["unshare", "--user", "--pid", "--fork", "true"], drop=user_id() == 0)
     yield _probe("network", [sys.executable, "-I", str(NETWORK), "true"], drop=False)
     held = find_cgroups().memory is not None
     yield Row(

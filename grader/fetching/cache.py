@@ -7,7 +7,6 @@ the network has failed since.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
 import os
@@ -19,13 +18,14 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from grader.files import lock
+from grader.files import lock, wait_for_lock
+from grader.portable import CLOEXEC, DIRECTORY, NOFOLLOW, user_id
 
 BYTES_MAX = 4 << 30
 TIDY_EVERY_S = 30.0
 UNFINISHED_S = 3600.0
-_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
-_LOCK = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
+_FOLDER = os.O_RDONLY | DIRECTORY | NOFOLLOW | CLOEXEC
+_LOCK = os.O_RDWR | os.O_CREAT | NOFOLLOW | CLOEXEC
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,7 +192,7 @@ def _held(folder: Path, *, wait: bool) -> int | None:
             descriptor = os.open(folder / "lock", _LOCK, 0o600)
             try:
                 if wait:
-                    fcntl.flock(descriptor, fcntl.LOCK_EX)
+                    wait_for_lock(descriptor)
                 elif not lock(descriptor):
                     os.close(descriptor)
                     return None
@@ -210,7 +210,7 @@ def _is_own(folder: Path) -> bool:
     descriptor = os.open(folder, _FOLDER)
     try:
         status = os.fstat(descriptor)
-        if status.st_uid != os.geteuid():
+        if status.st_uid != user_id():
             return False
         if stat.S_IMODE(status.st_mode) != stat.S_IRWXU:
             os.fchmod(descriptor, stat.S_IRWXU)

@@ -5,10 +5,8 @@ from __future__ import annotations
 import inspect
 import os
 import pickle
-import signal
 import subprocess
 import sys
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -22,6 +20,7 @@ from grader.checks.registry import parts
 from grader.instructor.files import FileFault, read_beside
 from grader.instructor.job import SessionOutcome, TestOutcome
 from grader.model.verdict import Status
+from grader.portable import end_group
 from grader.temporary import temporary_folder
 
 HINTS = 4
@@ -145,9 +144,7 @@ def _run(command: list[str], folder: Path, timeout_s: float) -> int:
         except subprocess.TimeoutExpired as error:
             raise TestsBroken(f"the tests took longer than {timeout_s:g} s") from error
         finally:
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+            end_group(process)
 
 
 def _last_words(folder: Path, code: int) -> str:

@@ -72,10 +72,19 @@ def emit(console: Console, parts: Iterable[RenderableType]) -> None:
 
 
 def print_report(
-    result: GradingResult, rubric: Rubric, console: Console, *, hidden: int = 0, static: bool = False
+    result: GradingResult,
+    rubric: Rubric,
+    console: Console,
+    *,
+    hidden: int = 0,
+    static: bool = False,
+    unrun: str = "",
 ) -> None:
-    """Print the whole report. `hidden` is how many criteria are left out; with `static`, open ones are only counted."""
-    Terminal(console).report(result, rubric, hidden, static)
+    """Print the whole report. `hidden` is how many criteria are left out.
+
+    With `static`, open ones are only counted, as they are where `unrun` says why nothing was run.
+    """
+    Terminal(console).report(result, rubric, hidden, unrun or ("--static" if static else ""))
 
 
 class Terminal:
@@ -85,14 +94,14 @@ class Terminal:
         self.console = console
         self.plain = not _has_marks(console.encoding)
 
-    def report(self, result: GradingResult, rubric: Rubric, hidden: int, static: bool) -> None:
+    def report(self, result: GradingResult, rubric: Rubric, hidden: int, unrun: str) -> None:
         view = arrange(result, rubric)
         parts: list[RenderableType] = [self._head(result, rubric)]
         parts += [Text(self._show(words)) for words in settled.late_words(result)]
         parts += self._section(settled.TITLE, [self._decision(o, c) for o, c in settled.decided(result)])
         parts += self._losses("Lost", view.lost)
-        if static:
-            parts += self._unrun(view.open)
+        if unrun:
+            parts += self._unrun(view.open, unrun)
         else:
             parts += self._losses("Still open: no points are lost for good", view.open)
         parts += self._section("Advice, costs nothing", [self._advice(c) for c in view.advice])
@@ -125,10 +134,10 @@ class Terminal:
         parts = [self._loss(loss, min(width, NAME_CELLS)) for loss in losses]
         return self._section(title, [x for part in parts for x in (part, Text())][:-1])
 
-    def _unrun(self, losses: tuple[Loss, ...]) -> list[RenderableType]:
+    def _unrun(self, losses: tuple[Loss, ...], why: str) -> list[RenderableType]:
         points = number(sum(loss.points for loss in losses))
         still = f"criteria worth {points} points are still open" if losses else "nothing is open"
-        return [Text(f"\nNothing was run (--static): {still}.")]
+        return [Text(f"\nNothing was run ({why}): {still}.")]
 
     def _loss(self, loss: Loss, width: int) -> RenderableType:
         c = loss.criterion

@@ -8,23 +8,22 @@ says that it may be run.
 
 from __future__ import annotations
 
+# The standard library that is needed is loaded as it is here, before this system becomes another one.
+import asyncio  # noqa: F401
 import builtins
 import errno
 import importlib.abc
-import os
-import pathlib
-import select
-import signal
-import subprocess
-import sys
-
-# The standard library that is needed is loaded as it is here, before this system becomes another one.
-import asyncio  # noqa: F401
 import locale  # noqa: F401
 import multiprocessing.connection  # noqa: F401
+import os
+import pathlib
 import platform
+import select
 import shutil
+import signal
 import socket
+import subprocess
+import sys
 import tempfile
 import threading  # noqa: F401
 
@@ -34,21 +33,97 @@ MODULES = {
 }
 OS_LACKS = {
     "win32": (
-        *("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_DIRECTORY", "O_PATH", "O_TMPFILE", "O_SYNC", "O_NOCTTY"),
-        *("getuid", "geteuid", "getgid", "getegid", "getgroups", "fork", "forkpty", "killpg", "setsid", "chown"),
-        *("fchmod", "fchown", "lchown", "chroot", "mkfifo", "mknod", "uname", "sysconf", "sched_getaffinity", "nice"),
-        *("getpgid", "setpgid", "getpriority", "initgroups", "setuid", "setgid", "wait4", "WIFEXITED", "statvfs"),
-        *("pidfd_open", "memfd_create", "posix_fadvise", "sched_yield", "getloadavg", "pipe2", "confstr", "ctermid"),
+        *(
+            "O_NOFOLLOW",
+            "O_NONBLOCK",
+            "O_CLOEXEC",
+            "O_DIRECTORY",
+            "O_PATH",
+            "O_TMPFILE",
+            "O_SYNC",
+            "O_NOCTTY",
+        ),
+        *(
+            "getuid",
+            "geteuid",
+            "getgid",
+            "getegid",
+            "getgroups",
+            "fork",
+            "forkpty",
+            "killpg",
+            "setsid",
+            "chown",
+        ),
+        *(
+            "fchmod",
+            "fchown",
+            "lchown",
+            "chroot",
+            "mkfifo",
+            "mknod",
+            "uname",
+            "sysconf",
+            "sched_getaffinity",
+            "nice",
+        ),
+        *(
+            "getpgid",
+            "setpgid",
+            "getpriority",
+            "initgroups",
+            "setuid",
+            "setgid",
+            "wait4",
+            "WIFEXITED",
+            "statvfs",
+        ),
+        *(
+            "pidfd_open",
+            "memfd_create",
+            "posix_fadvise",
+            "sched_yield",
+            "getloadavg",
+            "pipe2",
+            "confstr",
+            "ctermid",
+        ),
     ),
     "darwin": (
-        *("O_PATH", "O_TMPFILE", "sched_getaffinity", "sched_setaffinity", "pidfd_open", "memfd_create", "pipe2"),
-        *("posix_fadvise", "getxattr", "setxattr", "listxattr", "getrandom", "eventfd", "splice", "getresuid"),
+        *(
+            "O_PATH",
+            "O_TMPFILE",
+            "sched_getaffinity",
+            "sched_setaffinity",
+            "pidfd_open",
+            "memfd_create",
+            "pipe2",
+        ),
+        *(
+            "posix_fadvise",
+            "getxattr",
+            "setxattr",
+            "listxattr",
+            "getrandom",
+            "eventfd",
+            "splice",
+            "getresuid",
+        ),
     ),
 }
 SIGNAL_LACKS = {
     "win32": (
         *("SIGKILL", "SIGVTALRM", "SIGALRM", "SIGXFSZ", "SIGXCPU", "SIGHUP", "SIGQUIT", "SIGCHLD", "SIGPIPE"),
-        *("setitimer", "getitimer", "alarm", "pthread_sigmask", "SIG_BLOCK", "SIG_SETMASK", "SIGSTOP", "SIGCONT"),
+        *(
+            "setitimer",
+            "getitimer",
+            "alarm",
+            "pthread_sigmask",
+            "SIG_BLOCK",
+            "SIG_SETMASK",
+            "SIGSTOP",
+            "SIGCONT",
+        ),
         *("SIGUSR1", "SIGUSR2", "SIGTSTP", "SIGWINCH", "pthread_kill", "sigwait"),
     ),
     "darwin": ("sigtimedwait", "SIGRTMIN", "SIGRTMAX", "SIGPWR"),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from grader import pipeline
 from grader.cli.choice import Chosen, choose_all, only
 from grader.cli.display import open_progress
+from grader.cli.elsewhere import nothing_runs, the_rest
 from grader.cli.handing_in import Inquiry, news, print_beside, print_standing
 from grader.cli.outcome import exit_code, settled, worst
 from grader.cli.say import say, say_beside
@@ -24,6 +25,7 @@ from grader.model.standing import Standing
 from grader.report.hidden import hidden_ids, without_hidden
 from grader.report.terminal import open_console
 from grader.rubric.load import LoadedRubric
+from grader.rubric.needs import needs_ros
 from grader.temporary import temporary_folder
 
 if TYPE_CHECKING:
@@ -89,9 +91,10 @@ def _check(
         say("")
     with ExitStack() as stack:
         own = stack.enter_context(temporary_folder("check"))
+        unrun = "--static" if static else nothing_runs() if needs_ros(chosen.rubric) else ""
         inquiry = Inquiry(chosen.package, own / "git") if chosen.package is not None else None
         folder = out or own
-        with open_progress(early=not (as_json or static)) as progress:
+        with open_progress(early=not (as_json or unrun)) as progress:
             result = pipeline.grade(chosen.source, chosen.rubric, folder, options, progress)
         shown = without_hidden(result, rubric)
         kept = folder / result.submission.id if out is not None else None
@@ -99,7 +102,9 @@ def _check(
         if as_json:
             shown = shown.model_copy(update={"standing": standing})
         hidden = len(hidden_ids(rubric))
-        code = show(shown, rubric, kept, hidden=hidden, as_json=as_json, static=static)
+        code = show(shown, rubric, kept, hidden=hidden, as_json=as_json, static=static, unrun=unrun)
+        for words in () if static or not unrun else the_rest():
+            (say_beside if as_json else say)(words)
         if as_json:
             print_beside(standing)
         else:
