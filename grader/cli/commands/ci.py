@@ -22,6 +22,7 @@ from grader.cli.outcome import exit_code, settled
 from grader.cli.prefix import package_prefix
 from grader.cli.say import say, say_beside
 from grader.errors import ExitCode, GraderError, RubricError, UsageError
+from grader.faults import fault_of
 from grader.judging.summary import overall_status, total_points
 from grader.model.result import GradingResult
 from grader.report.hidden import hidden_ids, without_hidden
@@ -46,8 +47,8 @@ def run(*, system: str) -> ExitCode:
         settings = read_settings(variables)
         with teller.unheard():
             graded = _graded(settings)
-    except GraderError as error:
-        teller.refuse(error)
+    except Exception as error:
+        teller.refuse(fault_of(error))
         raise
     teller.tell(graded)
     say(f"{graded.outcome.value}: {graded.said}")

@@ -1,0 +1,98 @@
+"""What the variables of a job may say."""
+
+from __future__ import annotations
+
+import pytest
+
+from grader.ci.mark import Mark, needed_words, read_mark, with_mark
+from grader.ci.outcome import Outcome
+from grader.ci.settings import FAILING, read_settings
+from grader.cli.outcome import exit_code
+from grader.errors import ExitCode, UsageError
+from grader.rubric.load import load_rubric
+from tests.report.hostile import criterion
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "percent"),
+    [("60%", 60, True), ("60 %", 60, True), ("12.5", 12.5, False), ("0", 0, False), ("100%", 100, True)],
+)
+def test_a_mark_is_points_or_a_percentage(text, value, percent):
+    assert read_mark(text) == Mark(value=value, percent=percent)
+
+
+@pytest.mark.parametrize(
+    "text", ["101%", "-1", "1e3", "60%%", "½", "60,5", "nan", "inf", "0x10", "60 points"]
+)
+def test_what_is_no_mark_is_named(text):
+    with pytest.raises(UsageError, match="pass-mark: "):
+        read_mark(text)
+
+
+def test_a_mark_is_of_the_visible_points():
+    lab = load_rubric("leeds-comp3631-lab1")
+    first, *others = lab.rubric.criteria
+    hiding = lab.rubric.model_copy(
+        update={"criteria": (first, *(c.model_copy(update={"visibility": "hidden"}) for c in others))}
+    )
+    loaded = lab.model_copy(update={"rubric": hiding})
+    with pytest.raises(UsageError, match="has 5 visible ones"):
+        with_mark(loaded, Mark(value=6, percent=False))
+    for points, code in ((3, ExitCode.PASSED), (2.9, ExitCode.BELOW_PASS_MARK)):
+        for mark in (Mark(value=60, percent=True), Mark(value=3, percent=False)):
+            marked = with_mark(loaded, mark).rubric
+            seen = (criterion(first.id, "partial", points, 5),)
+            assert exit_code(seen, marked) is code
+            assert needed_words(marked, 5) == "to pass, it takes 3"
+
+
+@pytest.mark.parametrize("tenths", range(1, 1000, 37))
+def test_just_the_mark_is_reached_whatever_floating_point_says(tenths):
+    lab = load_rubric("leeds-comp3631-lab1").rubric
+    third = lab.model_copy(
+        update={
+            "pass_mark": None,
+            "criteria": (*lab.criteria, lab.criteria[0].model_copy(update={"points": 23.3})),
+        }
+    )
+    loaded = load_rubric("leeds-comp3631-lab1").model_copy(update={"rubric": third})
+    marked = with_mark(loaded, Mark(value=tenths / 10, percent=False)).rubric
+    assert exit_code((criterion("a", "partial", tenths / 10, 71.3),), marked) in {0, 1}
+    whole = sum(c.points for c in third.criteria)
+    assert exit_code((criterion("a", "partial", tenths / 10, whole),), marked) is ExitCode.PASSED
+
+
+@pytest.mark.parametrize(
+    ("text", "outcomes"),
+    [
+        ("", set(FAILING)),
+        ("never", set()),
+        ("below-pass-mark", {Outcome.BELOW}),
+        (" Not-Graded ,\n inconclusive ", {Outcome.NOT_GRADED, Outcome.INCONCLUSIVE}),
+    ],
+)
+def test_when_a_job_fails(text, outcomes):
+    assert read_settings({"GRADER_FAIL_ON": text}).fail_on == outcomes
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("FAIL_ON", "never, inconclusive"),
+        ("FAIL_ON", "passed"),
+        ("STATIC", "2"),
+        ("SANDBOX", "NONE"),
+        ("PASS_MARK", "\n::error::x"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(name, text):
+    with pytest.raises(UsageError) as raised:
+        read_settings({f"GRADER_{name}": text})
+    assert "\n" not in raised.value.message
+    assert raised.value.hint
+
+
+def test_nothing_said_is_the_package_here_with_the_rubrics_mark():
+    settings = read_settings({"GRADER_LAB": " ", "GRADER_STATIC": "False"})
+    assert (settings.lab, str(settings.path), settings.mark) == (None, ".", None)
+    assert (settings.static, settings.sandbox, str(settings.out)) == (False, "auto", "grader-results")

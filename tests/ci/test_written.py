@@ -1,0 +1,102 @@
+"""The files that CI systems read keep to the systems' own schemas; what they run is sound shell."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.ci.runner import ACTION, ROOT
+
+PROGRAMS = Path(sys.executable).parent
+EXAMPLES = sorted((ROOT / "ci" / "examples").glob("github*.yml"))
+SCRIPTS = sorted((ROOT / "ci").glob("*.sh"))
+TEMPLATE = ROOT / "ci" / "gitlab.yml"
+
+
+def _runs(*command: object) -> None:
+    done = subprocess.run(
+        [str(word) for word in command], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    ("schema", "files"),
+    [
+        (["github-actions"], [ROOT / "action.yml"]),
+        (["github-workflows"], EXAMPLES),
+        (["gitlab-ci", "--data-transform", "gitlab-ci"], [TEMPLATE]),
+    ],
+    ids=["action", "workflows", "gitlab"],
+)
+def test_the_schemas(schema, files):
+    name, *more = schema
+    _runs(PROGRAMS / "check-jsonschema", "--builtin-schema", f"vendor.{name}", *more, *files)
+
+
+def test_the_shell_scripts():
+    assert SCRIPTS
+    _runs(PROGRAMS / "shellcheck", *SCRIPTS)
+    assert all(path.stat().st_mode & 0o111 for path in SCRIPTS)
+
+
+def test_the_template_of_gitlab_is_plain_shell(tmp_path):
+    job = yaml.safe_load(TEMPLATE.read_text(encoding="utf-8"))["ros-lab"]
+    script = tmp_path / "script.sh"
+    for part in ("before_script", "script", "after_script"):
+        script.write_text("#!/bin/sh\n" + "\n".join(job[part]) + "\n")
+        _runs(PROGRAMS / "shellcheck", "--shell", "sh", script)
+
+
+def test_no_security_fault_is_known_of_the_workflows(tmp_path):
+    """The examples name this action by its tag: users of hashes are told how. Everything else is pinned."""
+    (tmp_path / "zizmor.yml").write_text(
+        "rules:\n  unpinned-uses:\n    config:\n      policies:\n"
+        "        OWNER/ros-lab-grader: ref-pin\n        classroom-resources/*: ref-pin\n        '*': hash-pin\n"
+    )
+    _runs(
+        PROGRAMS / "zizmor", "--offline", "--config", tmp_path / "zizmor.yml", ROOT / "action.yml", *EXAMPLES
+    )
+
+
+def test_no_input_is_pasted_into_a_script():
+    for step in ACTION["runs"]["steps"]:
+        assert "${{" not in step.get("run", "")
+
+
+def test_every_variable_of_the_grader_can_be_set_by_an_input():
+    from grader.cli.parsing.ci import CI_VARIABLES  # noqa: PLC0415 - the help's text
+
+    known = set(re.findall(r"GRADER_\w+", CI_VARIABLES))
+    grade = next(step for step in ACTION["runs"]["steps"] if step.get("id") == "grade")
+    assert known <= set(grade["env"])
+    assert known - {"GRADER_OUT"} <= set(yaml.safe_load(TEMPLATE.read_text(encoding="utf-8"))["variables"])
+
+
+@pytest.mark.parametrize("page", ["github", "gitlab"])
+def test_the_docs_name_every_input(page):
+    text = (ROOT / "docs" / "how-to" / f"{page}.md").read_text(encoding="utf-8")
+    if page == "github":
+        wanted = [f"`{name}`" for name in (*ACTION["inputs"], *ACTION["outputs"])]
+    else:
+        wanted = [f"`{name}`" for name in yaml.safe_load(TEMPLATE.read_text(encoding="utf-8"))["variables"]]
+    assert [name for name in wanted if name not in text] == []
+    for example in EXAMPLES if page == "github" else ():
+        steps = example.read_text(encoding="utf-8").split("steps:\n")[1]
+        assert steps.strip() in text, f"{example.name} is not as the page prints it"
+
+
+def test_the_reporter_finds_the_result_by_its_id():
+    job = yaml.safe_load((ROOT / "ci" / "examples" / "github-classroom.yml").read_text(encoding="utf-8"))[
+        "jobs"
+    ]
+    *_, lab, reporter = job["run-autograding-tests"]["steps"]
+    assert reporter["with"]["runners"] == lab["id"]
+    assert reporter["env"] == {f"{lab['id'].upper()}_RESULTS": f"${{{{ steps.{lab['id']}.outputs.result }}}}"}
+    assert re.fullmatch(r"([a-zA-Z0-9]+,)*[a-zA-Z0-9]+", reporter["with"]["runners"])
+    assert set(lab["with"]) <= set(ACTION["inputs"])
