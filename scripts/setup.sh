@@ -23,6 +23,7 @@ ros_extras=(
 # without those of the second line, and so do its tests: those of pages are skipped.
 tools=(bwrap:bubblewrap git:git cmake:cmake make:make g++:g++ ip:iproute2)
 browser_tools=(chromium:chromium node:nodejs npm:npm)
+debootstrap=mmdebstrap # makes the bare Debian of the tests in fresh roots, which only root can run
 page_tools=tests/browser # with its own package.json
 # What an image needs besides: to make a virtual environment, and to fetch repositories over https.
 image_packages=(ca-certificates python3-venv)
@@ -139,6 +140,14 @@ install_browser() {
   install_page_tools
 }
 
+# Tried once.
+install_debootstrap() {
+  local tried=.venv/setup-debootstrap
+  if [ "$(id -u)" -ne 0 ] || command -v "$debootstrap" >/dev/null || [ -e "$tried" ]; then return; fi
+  touch "$tried"
+  apt_try "$debootstrap" || say "no $debootstrap here: the tests in fresh roots will be skipped"
+}
+
 apt_try() { # as far as it can be done without asking anybody
   command -v apt-get >/dev/null && find_root || return 1
   say "installing $*"
@@ -242,4 +251,5 @@ fi
 install_extras
 if [ "${1:-}" != --no-browser ]; then
   install_browser
+  install_debootstrap
 fi

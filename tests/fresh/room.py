@@ -189,9 +189,9 @@ class Rooms:
             archive = debian.archive()
             (self.seen / "bare").mkdir()
             self._inside("tar", "--numeric-owner", "--xattrs", "-xf", str(archive), "-C", "bare")
-            (self.seen / "bare" / "etc" / "hosts").write_text(
-                "127.0.0.1 localhost\n"
-            )  # as containers have it
+            etc = self.seen / "bare" / "etc"
+            (etc / "hosts").write_text("127.0.0.1 localhost\n")  # as containers have it
+            (etc / "resolv.conf").write_text("")
             self.seconds["bare Debian"] = time.monotonic() - began
         return "bare"
 
