@@ -53,6 +53,8 @@ def grade(
 ) -> GradingResult:
     """Grade one submission into `out/<its id>/`: evidence and reports, which replace older ones together.
 
+    Without `options.files`, `out` is only where it is worked, and nothing stays there.
+
     Raises GraderError where it cannot; the result then says why, with the status `error`.
     """
     clock = Clock()
@@ -82,6 +84,8 @@ def grade(
             timing = clock.timing(recording)
             graded = outcome(attempt.about, rubric, runs, criteria, recording=recording, timing=timing)
             result = options.settled(graded)
+            if not options.files:
+                return result
             write_reports(
                 result,
                 results.new,

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 class GradeOptions:
     """`static_only` judges files alone; without `keep_hidden`, the reports leave hidden criteria out.
 
-    With `tidy`, what killed graders left beside the submission's folder is put in order first; a batch does that once.
+    Without `files`, the result alone is wanted, and neither reports nor evidence. With `tidy`, what killed graders left
+    beside the submission's folder is put in order first; a batch does that once.
     `kept` is asked when the submission is open: a result that it gives stays, and nothing is done. `settled` makes of
     the automatic result the one that counts. `recorded` is evidence by scenario that still holds: these are not run
     again. `stop` ends what runs, in order, from another thread; then `arena.asynchronous.Stopped` is raised.
@@ -29,6 +30,7 @@ class GradeOptions:
     static_only: bool = False
     keep_hidden: bool = True
     tidy: bool = True
+    files: bool = True
     kept: Callable[[SubmissionInfo], GradingResult | None] = lambda _: None
     settled: Callable[[GradingResult], GradingResult] = lambda result: result
     recorded: Mapping[str, Path] = field(default_factory=dict)

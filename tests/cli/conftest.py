@@ -24,6 +24,7 @@ class GradeOptions:
     submission_id: str | None
     static_only: bool
     keep_hidden: bool
+    files: bool = True
 
 
 class FakePipeline(ModuleType):

@@ -58,7 +58,7 @@ def run(
     if out is not None:
         check_writable(out)
     options = pipeline.GradeOptions(
-        sandbox=sandbox, submission_id=None, static_only=static, keep_hidden=False
+        sandbox=sandbox, submission_id=None, static_only=static, keep_hidden=False, files=watch or out is not None
     )
     if watch:
         _tell(chosen[0])
