@@ -30,7 +30,7 @@ lint: setup ## style and types
 	@$(BIN)/mypy
 
 docs: setup ## the documents as a site in site/, warnings are errors
-	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 
 reference: setup ## the pages of docs/reference/ that are made from the code
 	@$(BIN)/python -m scripts.reference
