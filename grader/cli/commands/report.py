@@ -54,6 +54,8 @@ def run(
 ) -> ExitCode:
     """Write every report of a submission or of a class anew; with `form`, that one of one submission to `out`."""
     batch = open_batch(folder) if (folder / RUN).is_file() else None
+    if batch is not None:
+        batch.refuse_newer()
     single = batch is None and has_result(folder)
     if form:
         if not single or anonymous:
