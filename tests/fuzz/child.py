@@ -9,7 +9,7 @@ import warnings
 from tests.fuzz.loop import serve
 from tests.fuzz.readers import READERS
 
-CPU_S = 5.0
+CPU_S = 10.0
 MEMORY_BYTES = 200 << 20
 
 

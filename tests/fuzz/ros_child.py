@@ -17,7 +17,7 @@ import strict  # noqa: E402
 import tcpros  # noqa: E402
 from loop import serve  # noqa: E402
 
-CPU_S = 5.0
+CPU_S = 10.0
 MEMORY_BYTES = 200 << 20
 PIECE_BYTES = 7
 
