@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from grader.errors import ExitCode
 from grader.judging.summary import OPEN, overall_status, reached_pass_mark
 from grader.model.result import CriterionResult
+from grader.model.verdict import Status
 from grader.rubric.model import Rubric
 
 EXACT_DIGITS = 6
@@ -31,6 +32,13 @@ def worst(codes: Iterable[ExitCode]) -> ExitCode:
     """How several ended together. Not graded is worse than below the mark, that than not settled."""
     order = (ExitCode.PASSED, ExitCode.INCONCLUSIVE, ExitCode.BELOW_PASS_MARK, ExitCode.NOT_GRADED)
     return max(codes, key=order.index)
+
+
+def staged_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
+    """Of a hook before a commit: what fails, fails it, whatever the pass mark is. What is open does not."""
+    judged = settled(criteria)
+    counted = [c for c in judged if c.max_points > 0 or c.status is Status.ERROR]
+    return exit_code(judged, rubric.model_copy(update={"pass_mark": None})) if counted else ExitCode.PASSED
 
 
 def settled(criteria: Iterable[CriterionResult]) -> tuple[CriterionResult, ...]:

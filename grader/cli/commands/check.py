@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
@@ -13,7 +14,7 @@ from grader.cli.choice import Chosen, choose_all, only
 from grader.cli.display import open_progress
 from grader.cli.elsewhere import nothing_runs, the_rest
 from grader.cli.handing_in import Inquiry, news, print_beside, print_standing
-from grader.cli.outcome import exit_code, settled, worst
+from grader.cli.outcome import exit_code, settled, staged_code, worst
 from grader.cli.say import say, say_beside
 from grader.cli.show import show
 from grader.errors import ExitCode, UsageError
@@ -26,6 +27,7 @@ from grader.report.hidden import hidden_ids, without_hidden
 from grader.report.terminal import open_console
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_ros
+from grader.standing import write_staged
 from grader.temporary import temporary_folder
 
 if TYPE_CHECKING:
@@ -38,6 +40,7 @@ def run(
     path: str = ".",
     rubric: str | None = None,
     static: bool = False,
+    staged: bool = False,
     watch: bool = False,
     out: Path | None = None,
     sandbox: Mode = "auto",
@@ -45,9 +48,12 @@ def run(
 ) -> ExitCode:
     """Grade the package at `path` with hidden criteria left out; with `static`, from its files alone.
 
-    Where packages of several labs are there, one after the other. With `watch`, again whenever a file of it is saved,
+    Where packages of several labs are there, one after the other. `staged` looks at git's index instead of the disk,
+    and gives the code of a hook: what fails, fails it, and nothing else. With `watch`, again whenever a file of it is saved,
     until Ctrl-C.
     """
+    if staged and (watch or not static):
+        raise UsageError("--staged goes with --static, and not with --watch", hint="add --static")
     chosen = choose_all(Path(path), rubric)
     if watch or as_json:
         only(chosen)
@@ -58,14 +64,21 @@ def run(
     if out is not None:
         check_writable(out)
     options = pipeline.GradeOptions(
-        sandbox=sandbox, submission_id=None, static_only=static, keep_hidden=False, files=watch or out is not None
+        sandbox=sandbox,
+        submission_id=None,
+        static_only=static,
+        keep_hidden=False,
+        files=watch or out is not None,
     )
     if watch:
         _tell(chosen[0])
         source = str(Path(chosen[0].source).resolve())
         return _watch(source, chosen[0].rubric, options, out=out, as_json=as_json)
     several, told = len(chosen) > 1, set[str]()
-    return worst(_check(one, options, out, as_json=as_json, several=several, told=told) for one in chosen)
+    return worst(
+        _check(one, options, out, as_json=as_json, staged=staged, several=several, told=told)
+        for one in chosen
+    )
 
 
 def _tell(chosen: Chosen) -> None:
@@ -80,6 +93,7 @@ def _check(
     out: Path | None,
     *,
     as_json: bool,
+    staged: bool,
     several: bool,
     told: set[str],
 ) -> ExitCode:
@@ -91,11 +105,17 @@ def _check(
         say("")
     with ExitStack() as stack:
         own = stack.enter_context(temporary_folder("check"))
+        source = chosen.source
+        if staged:
+            source = str(
+                write_staged(_package(chosen), own / "index", index=os.environ.get("GIT_INDEX_FILE", ""))
+            )
+            options = replace(options, submission_id=safe_name(_package(chosen).resolve().name))
         unrun = "--static" if static else nothing_runs() if needs_ros(chosen.rubric) else ""
         inquiry = Inquiry(chosen.package, own / "git") if chosen.package is not None else None
         folder = out or own
         with open_progress(early=not (as_json or unrun)) as progress:
-            result = pipeline.grade(chosen.source, chosen.rubric, folder, options, progress)
+            result = pipeline.grade(source, chosen.rubric, folder, options, progress)
         shown = without_hidden(result, rubric)
         kept = folder / result.submission.id if out is not None else None
         standing = inquiry.result() if inquiry is not None else Standing()
@@ -109,7 +129,14 @@ def _check(
             print_beside(standing)
         else:
             print_standing(news(standing, told), open_console(sys.stdout))
-        return code
+        graded = shown.status != "error"
+        return staged_code(shown.criteria, rubric) if staged and graded else code
+
+
+def _package(chosen: Chosen) -> Path:
+    if chosen.package is None:
+        raise UsageError(f"there is no package in {chosen.source}", hint="leave out --staged")
+    return chosen.package
 
 
 def _watch(

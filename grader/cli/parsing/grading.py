@@ -21,6 +21,11 @@ def add_grading(add: Adder) -> None:
     rubric_option(check, required=False)
     check.add_argument("--static", action="store_true", help="look at the files only, run nothing")
     check.add_argument(
+        "--staged",
+        action="store_true",
+        help="with --static: look at what git has staged, for a pre-commit hook; only what fails fails it",
+    )
+    check.add_argument(
         "--watch", action="store_true", help="stay, and run again what a saved file concerns, until Ctrl-C"
     )
     out_option(check, "keep the results in DIR/<submission id>/ (default: they are only shown)")
