@@ -49,8 +49,8 @@ def run(
     """Grade the package at `path` with hidden criteria left out; with `static`, from its files alone.
 
     Where packages of several labs are there, one after the other. `staged` looks at git's index instead of the disk,
-    and gives the code of a hook: what fails, fails it, and nothing else. With `watch`, again whenever a file of it is saved,
-    until Ctrl-C.
+    and gives the code of a hook: what fails, fails it, and nothing else. With `watch`, again whenever a file of it is
+    saved, until Ctrl-C.
     """
     if staged and (watch or not static):
         raise UsageError("--staged goes with --static, and not with --watch", hint="add --static")
@@ -114,7 +114,8 @@ def _check(
         unrun = "--static" if static else nothing_runs() if needs_ros(chosen.rubric) else ""
         inquiry = Inquiry(chosen.package, own / "git") if chosen.package is not None else None
         folder = out or own
-        with open_progress(early=not (as_json or unrun)) as progress:
+        early = not (as_json or unrun)
+        with nullcontext(Silence()) if staged else open_progress(early=early) as progress:
             result = pipeline.grade(source, chosen.rubric, folder, options, progress)
         shown = without_hidden(result, rubric)
         kept = folder / result.submission.id if out is not None else None
