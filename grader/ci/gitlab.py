@@ -38,7 +38,7 @@ class GitLab:
 
     def refuse(self, error: GraderError) -> None:
         """The same where there is no result. Raises OutputError."""
-        if self._out.is_dir() and not self._out.is_symlink():
+        if not self._out.is_symlink() and (self._out.is_dir() or not self._out.exists()):
             self._write({"GRADER_STATUS": of_error(error).value})
 
     def _write(self, values: dict[str, str]) -> None:

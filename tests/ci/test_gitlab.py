@@ -18,6 +18,7 @@ from tests.ci.runner import ROOT, SYSTEM_PATH, grader, version
 
 TEMPLATE = yaml.safe_load((ROOT / "ci" / "gitlab.yml").read_text(encoding="utf-8"))
 JOB = TEMPLATE["ros-lab"]
+ALL, MOST = {"GRADER_PASS_MARK": "100%"}, {"GRADER_PASS_MARK": "80%"}
 VARIABLE = re.compile(r"\$(\w+)|\$\{(\w+)\}")
 
 
@@ -40,7 +41,7 @@ class Job:
         return self.project / "grader-results"
 
     def run(self, **given: str) -> Job:
-        """With these variables of the including file. before_script and script are one shell, after_script is another."""
+        """With these variables of the including file. before_script and script are one shell, after_script its own."""
         own = {
             "CI": "true",
             "CI_COMMIT_SHORT_SHA": "0a1b2c3d",
@@ -109,7 +110,7 @@ def test_every_report_is_where_gitlab_looks_for_it(job):
 
 def test_a_package_without_mistakes_passes(job):
     handed_in(job.project, "src/lab1")
-    assert job.run(GRADER_STATIC="true", GRADER_PASS_MARK="100%").code == 0, job.log
+    assert job.run(GRADER_STATIC="true", **ALL).code == 0, job.log
     assert job.log.rstrip().endswith("sandbox: nothing was run")
 
 
@@ -126,9 +127,7 @@ def test_wrong_variables(job, given):
     handed_in(job.project)
     assert job.run(GRADER_STATIC="true", **given).code == 2, job.log
     assert "grader: error: " in job.log
-    assert (
-        job.results / "grader.env"
-    ).read_text() == "GRADER_STATUS=wrong-input\n" or not job.results.exists()
+    assert (job.results / "grader.env").read_text() == "GRADER_STATUS=wrong-input\n"
 
 
 def test_results_that_were_handed_in_are_not_kept(job):
@@ -229,5 +228,5 @@ def test_the_installation_is_made_once_and_kept_apart(tmp_path):
 def test_nodes_are_run(job):
     handed_in(job.project, ".")
     del job.more["GRADER_ROS_SETUP"]
-    assert job.run(GRADER_PASS_MARK="80%").code == 0, job.log
+    assert job.run(**MOST).code == 0, job.log
     assert (job.results / "evidence" / "wraps.mcap").is_file()
