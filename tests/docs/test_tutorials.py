@@ -69,7 +69,7 @@ def from_wheel(clone: Path, tmp_path_factory: pytest.TempPathFactory) -> Install
     """The wheel, built of the clone and installed with what it needs into an environment of its own."""
     folder = tmp_path_factory.mktemp("wheel")
     source = folder / "source"
-    shutil.copytree(clone, source, ignore=shutil.ignore_patterns(".venv"))
+    _done("git", "clone", "-q", clone, source, folder=folder)
     pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--no-input", "-q")
     _done(*pip, "wheel", "--no-deps", "--wheel-dir", folder, source, folder=folder)
     shutil.rmtree(source)
