@@ -47,7 +47,6 @@ class Form:
 
 def deliver(place: Place, form: Form) -> bool:
     """Grade what was handed in and write `results.json`; False where that says that nothing was graded."""
-    done = True
     try:
         settings = read_settings(place.lab)
         try:
@@ -55,13 +54,18 @@ def deliver(place: Place, form: Form) -> bool:
         except KeyboardInterrupt:
             raise InternalError(TOO_LONG.format(minutes=settings.minutes), hint=AGAIN) from None
         document = form.graded(result, rubric)
-        print_report(result, rubric.rubric, open_console(sys.stdout))
     except Exception as error:  # noqa: BLE001 - a student who gets no answer is worse off than with any
         fault = fault_of(error)
+        _write(place, form.not_graded(fault))
         print(f"NOT GRADED: {line(fault.message, LIMIT)}\n{line(fault.hint, LIMIT)}")
-        document, done = form.not_graded(fault), False
+        return False
+    _write(place, document)
+    print_report(result, rubric.rubric, open_console(sys.stdout))
+    return True
+
+
+def _write(place: Place, document: dict[str, object]) -> None:
     atomic_write(place.results / "results.json", json_text(document).encode())
-    return done
 
 
 def _grade(place: Place, settings: Settings) -> tuple[GradingResult, LoadedRubric]:

@@ -25,7 +25,8 @@ def upload(folder: Path, modes: Modes) -> Source:
         raise SubmissionError(
             "nothing was handed in", hint="hand in the folder of your package, as a .zip or .tar.gz"
         )
-    archives = [path for path in entries if path.is_file() and path.name.lower().endswith(ARCHIVES)]
+    files = [path for path in entries if path.is_file() and not path.is_symlink()]
+    archives = [path for path in files if path.name.lower().endswith(ARCHIVES)]
     folders = [path for path in entries if path.is_dir()]
     single = len(archives) == 1 and not folders and not (folder / "package.xml").exists()
     chosen = archives[0] if single else folder

@@ -92,6 +92,12 @@ def test_an_archive_beside_a_package_is_the_students_own_business(handed_in, tmp
     assert opened(handed_in, tmp_path).package.name == "lab1"
 
 
+def test_a_link_to_an_archive_is_not_followed(handed_in, tmp_path) -> None:
+    (tmp_path / "solution.zip").write_bytes(b"PK")
+    (handed_in / "lab1.zip").symlink_to(tmp_path / "solution.zip")
+    assert upload(handed_in, "lost").kind == "folder"
+
+
 def test_files_of_a_package_without_its_folder_are_the_package(handed_in, tmp_path) -> None:
     put(handed_in, {path.removeprefix("lab1/"): 0o644 for path in FILES})
     assert opened(handed_in, tmp_path).package.path == "."

@@ -25,10 +25,13 @@ def rooms(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rooms]:
 @pytest.fixture(scope="session")
 def system(rooms: Rooms) -> Root:
     """Bare Debian, and then what `scripts/setup.sh --system-only` made of it."""
-    root = rooms.fresh_root()
-    root.copy_in(SETUP, "/tmp/scripts/setup.sh")
-    root.run(["bash", "/tmp/scripts/setup.sh", "--system-only"], network=True, timeout=900)
-    return root
+
+    def install(root: Root) -> None:
+        root.copy_in(SETUP, "/tmp/scripts/setup.sh")
+        root.run(["bash", "/tmp/scripts/setup.sh", "--system-only"], network=True, timeout=900)
+        root.run(["apt-get", "clean"])  # as images of Debian do of themselves
+
+    return rooms.prepared_root("system", SETUP.read_bytes(), install)
 
 
 @pytest.fixture(scope="session")

@@ -12,16 +12,18 @@ own, without a network unless they ask for it. With a network they have the sett
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
 import subprocess
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self
 
 from tests.fresh import debian
+from tests.fresh.kept import kept, sweep
 from tests.fresh.settings import HOST, network_settings
 
 SIZE = "8g"
@@ -85,7 +87,7 @@ class Root:
         check: bool = True,
         timeout: float = 280,
     ) -> subprocess.CompletedProcess[str]:
-        """Run a command in the root as root, or as `user`, with a container's capabilities; stderr goes into stdout.
+        """Run a command in the root as root, or as `user` (a name or a number), with what a container may do.
 
         With the folder of their `locks`, graders in the root and those of this machine take turns.
         Raises Failed where `check` is set and it ends with another code than 0.
@@ -95,11 +97,8 @@ class Root:
             binds = [*binds, "--bind", str(locks), f"{HOST}/locks"]
             settings["XDG_RUNTIME_DIR"] = f"{HOST}/locks"
         variables = {"PATH": PATH, "HOME": "/root", **settings, **self.env, **(env or {})}
-        who = (
-            ["setpriv", f"--reuid={user}", f"--regid={user}", "--init-groups", "--inh-caps=-all"]
-            if user
-            else []
-        )
+        groups = "--clear-groups" if (user or "").isdecimal() else "--init-groups"  # a number may be nobody's
+        who = ["setpriv", f"--reuid={user}", f"--regid={user}", groups, "--inh-caps=-all"] if user else []
         command = [
             *self.rooms.enter, "bwrap", "--die-with-parent", "--bind", f"{self.rooms.tmpfs}/{self.place}/root", "/",
             "--proc", "/proc", "--dev", "/dev", "--unshare-pid", "--unshare-ipc", "--unshare-uts",
@@ -111,15 +110,16 @@ class Root:
         done = subprocess.run(
             command,
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
+            capture_output=True,
             timeout=timeout,
             check=False,
             encoding="utf-8",
             errors="backslashreplace",
         )
         if check and done.returncode != 0:
-            raise Failed(f"{' '.join(argv)} ended with {done.returncode}:\n{done.stdout[-6000:]}")
+            raise Failed(
+                f"{' '.join(argv)} ended with {done.returncode}:\n{done.stdout[-4000:]}\n{done.stderr[-4000:]}"
+            )
         return done
 
     def copy_in(self, source: Path, target: str) -> None:
@@ -172,28 +172,53 @@ class Rooms:
 
     def fresh_root(self, *, on: Root | None = None) -> Root:
         """A new root: bare Debian, or what `on` has become."""
-        lower = (f"{on.place}/upper", *on.lower) if on else (self._bare(),)
+        if on is not None:
+            return self._overlay((f"{on.place}/upper", *on.lower), dict(on.env))
+        bare = self._unpacked(debian.ARCHIVE, lambda: kept(debian.ARCHIVE, debian.make))
+        etc = self.seen / bare / "etc"
+        (etc / "hosts").write_text("127.0.0.1 localhost\n")  # as containers have it
+        (etc / "resolv.conf").write_text("")
+        return self._overlay((bare,), {})
+
+    def prepared_root(self, name: str, key: bytes, make: Callable[[Root], None]) -> Root:
+        """A bare root that `make` has worked on. What came of it is kept for a day under the digest of `key`, which has
+        to be all that `make` reads of this machine."""
+        archive = f"{name}-{hashlib.sha256(key).hexdigest()[:16]}.tar.zst"
+        made: list[Root] = []
+
+        def pack(target: Path) -> None:
+            made.append(self.fresh_root())
+            make(made[0])
+            tar = 'tar --numeric-owner -C "$0" -cf - . | zstd -q -1 -T0 -o "$1"'
+            self._inside("sh", "-c", tar, f"{made[0].place}/root", str(target))
+
+        if not shutil.which("zstd"):
+            make(root := self.fresh_root())
+            return root
+        file = kept(archive, pack)
+        sweep(f"{name}-*.tar.zst", but=archive)
+        return made[0] if made else self._overlay((self._unpacked(archive, lambda: file),), {})
+
+    def _overlay(self, lower: tuple[str, ...], env: dict[str, str]) -> Root:
         self._count += 1
         place = f"r{self._count}"
         for name in ("upper", "work", "root"):
             (self.seen / place / name).mkdir(parents=True)
         (self.seen / place / "upper").chmod(0o755)
-        below = ":".join(lower)  # relative: mount's options are short
-        options = f"lowerdir={below},upperdir={place}/upper,workdir={place}/work"
+        # relative paths, since the options of a mount have to be short
+        options = f"lowerdir={':'.join(lower)},upperdir={place}/upper,workdir={place}/work"
         self._inside("mount", "-t", "overlay", "overlay", "-o", options, f"{place}/root")
-        return Root(rooms=self, place=place, lower=lower, env=dict(on.env) if on else {})
+        return Root(rooms=self, place=place, lower=lower, env=env)
 
-    def _bare(self) -> str:
-        if not (self.seen / "bare").exists():
+    def _unpacked(self, archive: str, file: Callable[[], Path]) -> str:
+        place = archive.partition(".")[0]
+        if not (self.seen / place).exists():
             began = time.monotonic()
-            archive = debian.archive()
-            (self.seen / "bare").mkdir()
-            self._inside("tar", "--numeric-owner", "--xattrs", "-xf", str(archive), "-C", "bare")
-            etc = self.seen / "bare" / "etc"
-            (etc / "hosts").write_text("127.0.0.1 localhost\n")  # as containers have it
-            (etc / "resolv.conf").write_text("")
-            self.seconds["bare Debian"] = time.monotonic() - began
-        return "bare"
+            source = file()
+            (self.seen / place).mkdir()
+            self._inside("tar", "--numeric-owner", "-xf", str(source), "-C", place)
+            self.seconds[archive] = time.monotonic() - began
+        return place
 
     def _inside(self, *argv: str) -> None:
         """Run a command of this machine in the roots' mount namespace, in their folder."""
