@@ -73,7 +73,7 @@ ALLOWED = {
     "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
     "deliver": BASE | {"faults", "files", "intake", "pipeline", "report", "results", "rubric"},
     "cli": {
-        *BASE, "arena", "authoring", "batch", "checks", "ci", "evidence", "files", "formats", "instructor",
+        *BASE, "arena", "authoring", "batch", "checks", "ci", "evidence", "faults", "files", "formats", "instructor",
         "intake", "judging", "cluster", "deliver", "gradebook", "mutation", "package", "pipeline", "report",
         "review", "roster", "rubric", "similarity", "standing", "temporary", "watching"
     },

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import base64
 import json
-import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -29,6 +28,7 @@ JSON_BYTES_MAX = 60_000
 LIMITS = (600, 200, 80, 30, 0)
 """How long a text may be: the first with which all has room."""
 NAME_CHARS = 200
+FINE = 2**30
 RUN_AGAIN = OPEN - {Status.MANUAL}
 STATUSES = {Status.PASS: "pass", **dict.fromkeys(OPEN, "error")}
 
@@ -129,14 +129,18 @@ def _test(name: str, *, status: str, points: float, **more: object) -> dict[str,
 
 
 def _adding_up(scores: Sequence[float], total: float) -> list[float]:
-    """The scores, whose sum by floating point, one after the other, is `total` and not 72.30000000000001."""
-    last = max((i for i, score in enumerate(scores) if score), default=-1)
-    if last < 0:
+    """The scores, or such as hardly differ, whose sum by floating point, one after the other, is `total` and not
+    72.30000000000001."""
+    if _sum(scores) == total or not any(scores):
         return list(scores)
-    before = 0.0
-    for score in scores[:last]:
-        before += score
-    closing = total - before
-    near = (closing, math.nextafter(closing, math.inf), math.nextafter(closing, -math.inf))
-    exact = next((score for score in near if before + score == total), closing)
-    return [*scores[:last], exact, *scores[last + 1 :]]
+    last = max(i for i, score in enumerate(scores) if score)
+    before = [round(score * FINE) / FINE for score in scores[:last]]  # these are added without rounding
+    return [*before, total - _sum(before), *scores[last + 1 :]]
+
+
+def _sum(scores: Sequence[float]) -> float:
+    """As JavaScript adds; Python's own `sum` compensates."""
+    total = 0.0
+    for score in scores:
+        total += score
+    return total
