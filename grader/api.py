@@ -82,7 +82,7 @@ def grade(
     It takes as long as the rubric's scenarios (half a minute, usually), and may be called where an event loop runs, as
     in a notebook: that waits meanwhile. `await asyncio.to_thread(grade, …)` lets it go on. Ctrl-C ends what runs in
     order and raises KeyboardInterrupt. `progress` is called with a step (`intake`, `build`, a scenario's name), its
-    state and a detail, from whatever thread is at it; what it raises ends the run in order, and is raised from here.
+    state and a detail, from whatever thread is at it; what it raises ends what runs in order, and is raised from here.
 
     Points are those of the rubric, times seconds. Raises GraderError where it cannot be graded: SubmissionError where
     the submission is at fault, HostError where this machine is, RubricError and UsageError for wrong arguments. All but
@@ -105,11 +105,13 @@ def grade(
         stop=stop,
     )
     try:
-        return run_aside(lambda: pipeline.grade(given, loaded, folder, options, telling), stop.ask)
+        result = run_aside(lambda: pipeline.grade(given, loaded, folder, options, telling), stop.ask)
     except Stopped:
         if telling.error is None:
             raise
-        raise telling.error from None
+    if telling.error is not None:
+        raise telling.error
+    return result
 
 
 def judge(evidence: StrPath | Sequence[StrPath], rubric: StrPath | LoadedRubric) -> GradingResult:

@@ -54,6 +54,8 @@ class GraderError(Exception):
 
 
 class UsageError(GraderError):
+    """What was asked for cannot be; nothing was graded, and no result says so."""
+
     kind = "usage"
     exit_code = ExitCode.USAGE
 
@@ -74,6 +76,8 @@ class RubricError(UsageError):
 
 
 class SubmissionError(GraderError):
+    """The submission is at fault."""
+
     kind = "submission"
     blame: Blame = "submission"
 
@@ -88,6 +92,8 @@ class Unreachable(SubmissionError):
 
 
 class EvidenceError(GraderError):
+    """Evidence, or a result, cannot be read, or a newer grader wrote it."""
+
     kind = "evidence"
 
 
@@ -96,6 +102,8 @@ class InternalError(GraderError):
 
 
 class HostError(GraderError):
+    """This machine cannot do what is asked. It costs nobody a mark."""
+
     kind = "host"
     blame = "machine"
 

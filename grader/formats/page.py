@@ -99,7 +99,8 @@ def _type(schema: Schema) -> str:
     if isinstance(inner, dict):
         return f"map to {_type(inner)}"
     found = next((make for key, make in makers.items() if key in schema), None)
-    return found() if found else PLAIN.get(schema.get("type", ""), schema.get("type", "any"))
+    plain = str(schema.get("type", "any"))
+    return found() if found else PLAIN.get(plain, plain)
 
 
 def _metadata() -> Iterator[str]:

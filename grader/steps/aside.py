@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import TypeVar
 
 T = TypeVar("T")
@@ -19,10 +22,24 @@ def run_aside(work: Callable[[], T], stop: Callable[[], None]) -> T:
     with ThreadPoolExecutor(1, thread_name_prefix="grader") as aside:
         future = aside.submit(work)
         try:
-            return future.result()
+            with _interruptible():
+                return future.result()
         except KeyboardInterrupt:
             stop()
             raise
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let Ctrl-C be heard at once: asyncio hears it when its loop goes on, which is when all is done."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before or signal.default_int_handler)
 
 
 def _loop_runs_here() -> bool:
