@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from tests.docs.console import Command, Session, steps
+from tests.packaging.making import install, tool, virtual
 
 ROOT = Path(__file__).resolve().parents[2]
 TUTORIALS = ("student", "instructor", "ci")
@@ -70,21 +71,14 @@ def from_wheel(clone: Path, tmp_path_factory: pytest.TempPathFactory) -> Install
     folder = tmp_path_factory.mktemp("wheel")
     source = folder / "source"
     _done("git", "clone", "-q", clone, source, folder=folder)
-    pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--no-input", "-q")
-    _done(*pip, "wheel", "--no-deps", "--wheel-dir", folder, source, folder=folder)
+    with pytest.MonkeyPatch.context() as patch:
+        if "SSL_CERT_FILE" not in os.environ:
+            patch.setenv("UV_SYSTEM_CERTS", "1")
+        tool("build", "--wheel", "--installer", "uv", "--outdir", folder, source)
+        [wheel] = folder.glob("*.whl")
+        install(virtual(sys.executable, folder / "environment"), f"{wheel}[review]")
     shutil.rmtree(source)
-    [wheel] = folder.glob("*.whl")
-    environment = folder / "environment"
-    _done(sys.executable, "-m", "venv", environment, folder=folder)
-    _done(
-        environment / "bin" / "python",
-        *pip[1:],
-        "install",
-        f"{wheel}[review]",
-        folder=folder,
-        environment=_environment(environment / "bin", folder),
-    )
-    return Installed(programs=environment / "bin", code=environment)
+    return Installed(programs=folder / "environment" / "bin", code=folder / "environment")
 
 
 @pytest.fixture(params=["from_clone", "from_wheel"])
