@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import secrets
+import sys
 import tempfile
 from contextlib import suppress
 from pathlib import Path
@@ -12,12 +13,10 @@ from pathlib import Path
 from grader.errors import GraderError, HostError, OutputError
 from grader.portable import CLOEXEC, NOFOLLOW
 
-try:
+if sys.platform != "win32":
     import fcntl
-except ImportError:  # Windows
-    HAS_LOCKS = False
-else:
-    HAS_LOCKS = True
+
+HAS_LOCKS = sys.platform != "win32"
 
 FULL = {
     errno.ENOSPC: "the disk is full",
@@ -109,16 +108,15 @@ def lock(descriptor: int, *, shared: bool = False) -> bool:
 
     Raises OSError where the file system knows no locks.
     """
-    if not HAS_LOCKS:
-        return True
-    try:
-        fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
+    if sys.platform != "win32":
+        try:
+            fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
     return True
 
 
 def wait_for_lock(descriptor: int) -> None:
     """As `lock`, when those that hold it let it go. Raises OSError where the file system knows no locks."""
-    if HAS_LOCKS:
+    if sys.platform != "win32":
         fcntl.flock(descriptor, fcntl.LOCK_EX)

@@ -56,7 +56,7 @@ def _in_git(state: State, commands: Commands, around: Surroundings) -> Iterator[
     else:
         changes = () if around.committing else files.changes
         yield from _changed(changes, commands)
-        yield from _new(state, commands)
+        yield from _new(state, commands, "in the package" if around.committing else "checked")
     yield from _bits(files.bits, commands)
 
 
@@ -82,10 +82,11 @@ def _changed(changes: tuple[Change, ...], commands: Commands) -> Iterator[Point]
         yield Point(kind="mode", text=text, mend=commands.commit())
 
 
-def _new(state: State, commands: Commands) -> Iterator[Point]:
+def _new(state: State, commands: Commands, where: str) -> Iterator[Point]:
     paths = list(state.files.untracked)
     if paths:
-        text = f"{_count(len(paths), 'file')} that {_were(paths)} checked {_are(paths)} not in git: {listing(paths)}"
+        number = _count(len(paths), "file")
+        text = f"{number} that {_were(paths)} {where} {_are(paths)} not in git: {listing(paths)}"
         yield Point(kind="untracked", text=text, mend=commands.add_and_commit(paths))
 
 

@@ -76,7 +76,7 @@ OS_LACKS = {
             "setgid",
             "wait4",
             "WIFEXITED",
-            "statvfs",
+            "sched_get_priority_max",
         ),
         *(
             "pidfd_open",
