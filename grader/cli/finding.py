@@ -106,5 +106,5 @@ def shown(folder: Path) -> str:
         near = os.path.relpath(folder.resolve(), Path.cwd())
     except (OSError, ValueError):
         return printable(str(folder))
-    steps = Path(near).parts.count("..")
-    return printable(near if steps <= 2 else str(folder))
+    whole = str(folder.resolve())
+    return printable(near if len(near) < len(whole) else whole)
