@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from markdown_it import MarkdownIt
@@ -30,9 +31,10 @@ def external_links(page: str) -> Iterator[str]:
     return (target for target in links(page) if "://" in target)
 
 
-def anchors(page: str) -> set[str]:
+@cache
+def anchors(page: str) -> frozenset[str]:
     """The names of its headings, as GitHub makes them."""
-    return {str(token.attrGet("id")) for token in _parsed(page) if token.type == "heading_open"}
+    return frozenset(str(token.attrGet("id")) for token in _parsed(page) if token.type == "heading_open")
 
 
 def _parsed(page: str) -> list[Token]:

@@ -1,0 +1,47 @@
+"""The pages are spelt, and all of them as the British spell."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from markdown_it import MarkdownIt
+
+from scripts.pages import ROOT, pages
+
+AMERICAN = re.compile(
+    r"\b(behaviors?|colors?|centers?|licenses?|gray|favor\w*|catalogs?|dialogs?|canceled|labeled|modeled|fulfill|"
+    r"(?:analy|recogni|organi|seriali|normali|initiali|summari|visuali|optimi)z\w+)\b",
+    re.IGNORECASE,
+)
+
+NAMES = ("Grade Center",)  # Blackboard's
+
+
+def prose(page: str) -> str:
+    """The page's text without its code and its addresses."""
+    tokens = MarkdownIt("commonmark").enable("table").parse(page)
+    return "\n".join(
+        child.content for token in tokens for child in token.children or () if child.type == "text"
+    )
+
+
+@pytest.mark.parametrize("path", pages(), ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_page_is_british(path: Path) -> None:
+    assert AMERICAN.findall(prose(path.read_text(encoding="utf-8"))) == []
+
+
+def test_an_american_word_is_found_and_code_is_no_prose() -> None:
+    page = "The color of a `license`, [recognized](center.md).\n\n```\ngray\n```\n"
+    assert AMERICAN.findall(prose(page)) == ["color", "recognized"]
+
+
+def test_no_page_has_a_common_slip() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "codespell_lib", *pages()], capture_output=True, text=True, check=False
+    )
+    assert done.stdout == ""
+    assert done.returncode == 0
