@@ -16,8 +16,10 @@ die() { # the texts are ours: nothing in them is anybody else's
 
 output() { printf '%s=%s\n' "$1" "$2" >>"$GITHUB_OUTPUT"; }
 
+static="${GRADER_STATIC:-false}"
+
 is_static() {
-  case "${GRADER_STATIC,,}" in true | yes | on | 1) return 0 ;; *) return 1 ;; esac
+  case "${static,,}" in true | yes | on | 1) return 0 ;; *) return 1 ;; esac
 }
 
 docker_works() { command -v docker >/dev/null && docker info >/dev/null 2>&1; }

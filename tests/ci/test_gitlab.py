@@ -10,16 +10,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-import yaml
 from lxml import etree
 
 from tests.ci.conftest import handed_in
+from tests.ci.gitlab import JOB, variables_of
 from tests.ci.runner import ROOT, SYSTEM_PATH, grader, version
 
-TEMPLATE = yaml.safe_load((ROOT / "ci" / "gitlab.yml").read_text(encoding="utf-8"))
-JOB = TEMPLATE["ros-lab"]
 ALL, MOST = {"GRADER_PASS_MARK": "100%"}, {"GRADER_PASS_MARK": "80%"}
-VARIABLE = re.compile(r"\$(\w+)|\$\{(\w+)\}")
 
 
 @dataclass(kw_only=True)
@@ -42,17 +39,11 @@ class Job:
 
     def run(self, **given: str) -> Job:
         """With these variables of the including file. before_script and script are one shell, after_script its own."""
-        own = {
-            "CI": "true",
-            "CI_COMMIT_SHORT_SHA": "0a1b2c3d",
-            "CI_JOB_ID": "4711",
-            "CI_PROJECT_DIR": str(self.project),
-            "GITLAB_CI": "true",
-            "HOME": str(self.folder),
-            "PATH": self.path,
-        }
-        variables = own | {**TEMPLATE["variables"], **given} | JOB["variables"]
-        told = {name: _filled(text, variables) for name, text in variables.items()} | self.more
+        told = (
+            variables_of(str(self.project), **given)
+            | {"HOME": str(self.folder), "PATH": self.path}
+            | self.more
+        )
         self.code = self._shell([*JOB["before_script"], *JOB["script"]], told)
         self._shell(JOB["after_script"], told)
         return self
@@ -70,10 +61,6 @@ class Job:
         )
         self.log += done.stdout.decode(errors="replace")
         return done.returncode
-
-
-def _filled(text: str, variables: dict[str, str]) -> str:
-    return VARIABLE.sub(lambda found: variables.get(found[1] or found[2], ""), text)
 
 
 @pytest.fixture
