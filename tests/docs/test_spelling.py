@@ -24,9 +24,11 @@ NAMES = ("Grade Center",)  # Blackboard's
 def prose(page: str) -> str:
     """The page's text without its code and its addresses."""
     tokens = MarkdownIt("commonmark").enable("table").parse(page)
-    return "\n".join(
-        child.content for token in tokens for child in token.children or () if child.type == "text"
-    )
+    inline = (child for token in tokens for child in token.children or ())
+    text = " ".join(child.content for child in inline if child.type == "text")
+    for name in NAMES:
+        text = text.replace(name, "")
+    return text
 
 
 @pytest.mark.parametrize("path", pages(), ids=lambda path: str(path.relative_to(ROOT)))
