@@ -30,7 +30,8 @@ def _standing(state: State, around: Surroundings) -> Standing:
     commands = Commands(state, around.here)
     points = [*_in_git(state, commands, around), *_hidden(state, commands)]
     if not around.ci and not around.committing:
-        points += [*pushed_points(state, commands), *_around(state)]
+        points += pushed_points(state, commands)
+        points += _around(state, mends=bool(points))
     if points or around.ci or around.committing:
         return Standing(points=tuple(points))
     return Standing(summary=_summary(state))
@@ -116,8 +117,9 @@ def _hidden(state: State, commands: Commands) -> Iterator[Point]:
         yield Point(kind="pointer", text=text, mend=commands.git("submodule", "status"))
 
 
-def _around(state: State) -> Iterator[Point]:
-    if not state.owned:
+def _around(state: State, *, mends: bool) -> Iterator[Point]:
+    """What else there is to know; of the repository's owner only where commands are named that git would refuse."""
+    if not state.owned and mends:
         text = "The repository belongs to another user: git refuses to work in it."
         yield Point(kind="owner", text=text, mend=Commands.trust(state.top), remark=True)
     if state.submodule and state.around is not None:

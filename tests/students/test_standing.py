@@ -328,7 +328,9 @@ def test_a_repository_that_cannot_be_read(clone: Clone, tmp_path: Path) -> None:
 def test_another_users_repository(clone: Clone, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(os, "geteuid", lambda: 54321)
     monkeypatch.delenv("SUDO_UID", raising=False)
-    (point,) = clone.standing(tmp_path).points
+    assert clone.kinds(tmp_path / "clean") == []
+    (clone.package / "scripts" / "new.py").write_text(SCRIPT)
+    _, point = clone.standing(tmp_path).points
     assert point.mend == f"git config --global --add safe.directory {clone.top}"
 
 
