@@ -59,3 +59,10 @@ def test_addresses_are_found() -> None:
         "https://a.org",
         "https://b.org",
     ]
+
+
+@pytest.mark.parametrize("folder", ["tutorials", "how-to", "reference", "explanation"])
+def test_a_folder_s_first_page_leads_to_all_others(folder: str) -> None:
+    there = {path.name for path in (ROOT / "docs" / folder).glob("*.md")} - {"index.md"}
+    first = (ROOT / "docs" / folder / "index.md").read_text(encoding="utf-8")
+    assert there - {target.partition("#")[0] for target in links(first)} == set()
