@@ -14,6 +14,7 @@ from tests.ci.runner import ACTION, ROOT
 
 PROGRAMS = Path(sys.executable).parent
 EXAMPLES = sorted((ROOT / "ci" / "examples").glob("github*.yml"))
+OWN = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 SCRIPTS = sorted((ROOT / "ci").glob("*.sh"))
 TEMPLATE = ROOT / "ci" / "gitlab.yml"
 
@@ -29,7 +30,7 @@ def _runs(*command: object) -> None:
     ("schema", "files"),
     [
         (["github-actions"], [ROOT / "action.yml"]),
-        (["github-workflows"], EXAMPLES),
+        (["github-workflows"], [*EXAMPLES, *OWN]),
         (["gitlab-ci", "--data-transform", "gitlab-ci"], [TEMPLATE]),
     ],
     ids=["action", "workflows", "gitlab"],
