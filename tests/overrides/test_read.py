@@ -83,7 +83,7 @@ def test_a_file_from_windows(tmp_path):
 
 def test_every_fault_at_once(tmp_path):
     text = """\
-schema: grader.overrides/2
+schema: grader.override/1
 alic:
   style: {points: 7}
 alice:
@@ -100,7 +100,7 @@ zoe-muller:
   style: {comment: "", points: }
 """
     assert faults(tmp_path, text) == [
-        '1: schema: must be "grader.overrides/1", not "grader.overrides/2"',
+        '1: schema: must be "grader.overrides/1", not "grader.override/1"',
         '2: alic: there is no submission "alic" (did you mean "alice"?)',
         '5: alice.sytle: there is no criterion "sytle" (did you mean "style"?)',
         "6: alice.chatter-rate.points: 91 is more than the criterion has: 90",
