@@ -15,6 +15,7 @@ from grader.intake.find import Candidate, enclosing_package, find_candidates, li
 from grader.intake.git import Git, Repository
 from grader.intake.gitdir import Repositories
 from grader.intake.limits import Limits
+from grader.intake.line_ends import right_in_git
 from grader.intake.modes import Modes, archive_modes, folder_modes, uploaded_modes
 from grader.intake.names import encodable, printable, safe_name
 from grader.intake.remarks import remarks
@@ -123,7 +124,7 @@ def describe(located: Located, git: Git, limits: Limits) -> Submission:
         commit=_commit(opened, chosen, modes, repositories),
         archive_sha256=opened.archive_sha256,
         digest=tree_digest(chosen.folder, content.entries, modes.executable, content.left_out),
-        package=_package(chosen, modes, content),
+        package=_package(chosen, modes, content, _right_in_git(opened, chosen, content, git)),
         packages=tuple(_others(opened, others[:_OTHERS_AT_MOST], repositories, limits)),
         hints=(*opened.hints, *choice.hints, *modes.hints, *content.hints, *notes),
     )
@@ -159,7 +160,15 @@ def _others(
         yield _package(candidate, _modes(opened, candidate, content.entries, repositories), content)
 
 
-def _package(candidate: Candidate, modes: Modes, content: Content) -> SourcePackage:
+def _right_in_git(opened: Opened, chosen: Candidate, content: Content, git: Git) -> frozenset[str]:
+    if not opened.in_place:
+        return frozenset()
+    return right_in_git(chosen.folder, content.entries, git, opened.leave_out)
+
+
+def _package(
+    candidate: Candidate, modes: Modes, content: Content, right: frozenset[str] = frozenset()
+) -> SourcePackage:
     """A name that is not UTF-8 fits no record; the digest counts its file all the same."""
     return SourcePackage(
         name=candidate.name,
@@ -167,5 +176,6 @@ def _package(candidate: Candidate, modes: Modes, content: Content) -> SourcePack
         path=printable(candidate.path),
         mode_source=modes.source,
         executable={path: bit for path, bit in modes.executable.items() if encodable(path)},
+        right_in_git=frozenset(path for path in right if encodable(path)),
         left_out=frozenset(path.encode("utf-8", "backslashreplace").decode() for path in content.left_out),
     )

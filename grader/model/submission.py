@@ -16,7 +16,8 @@ class SourcePackage(Record):
     `folder` is absolute on this machine, `path` the same relative to the submission's root (posix, `.` for the
     root itself). `executable` maps each regular file's path, relative to `folder`, to its executable bit, or to
     None where the source carries no modes (`mode_source` "none"). `left_out` are the paths, as in `SourceFile.path`, of
-    what nobody opens or copies: files too large or not readable here, pipes and devices.
+    what nobody opens or copies: files too large or not readable here, pipes and devices. `right_in_git` are those whose
+    Windows line ends are this disk's alone: git hands them in without.
     """
 
     name: str
@@ -25,6 +26,7 @@ class SourcePackage(Record):
     mode_source: ModeSource
     executable: dict[str, bool | None]
     left_out: frozenset[str] = frozenset()
+    right_in_git: frozenset[str] = frozenset()
 
 
 class Submission(Record):

@@ -76,6 +76,8 @@ def _source_file(package: SourcePackage, path: str, interpreters: Interpreters |
         size, digest, head = _contents(file)
     except OSError:
         return SourceFile(**common, size_bytes=0, sha256="", executable=executable)
+    if path in package.right_in_git:
+        head = head.replace(b"\r\n", b"\n")
     text = _text_facts(head, path, executable=executable, interpreters=interpreters)
     return SourceFile(**common, size_bytes=size, sha256=digest, executable=executable, **text)
 

@@ -78,6 +78,35 @@ def test_where_nobody_knows_a_mode_nothing_is_lost(work: Path, tmp_path: Path) -
     assert {c["id"]: c["status"] for c in found["criteria"]}["talker-executable"] == "inconclusive"
 
 
+@pytest.mark.parametrize(("kept_by_git", "status"), [("lf", "pass"), ("crlf", "fail")])
+def test_line_ends_of_a_checkout_on_windows_are_not_the_students(
+    kept_by_git: str, status: str, work: Path
+) -> None:
+    script = work / "src" / "numeric_talker.py"
+    turned = script.read_bytes().replace(b"\n", b"\r\n")
+    if kept_by_git == "crlf":
+        script.write_bytes(turned)
+        git(work, "commit", "-q", "-a", "-m", "From an editor of Windows")
+    else:
+        git(work, "config", "core.autocrlf", "true")
+        script.unlink()
+        git(work, "checkout", "-q", "--", "src")
+    assert script.read_bytes() == turned
+    found = json.loads(run("win32", "check", "--static", "--json", cwd=work).stdout)
+    assert {c["id"]: c["status"] for c in found["criteria"]}["talker-executable"] == status
+
+
+@pytest.mark.parametrize("system", ["win32", "darwin"])
+def test_a_shell_of_linux_is_known(system: str, tmp_path: Path) -> None:
+    """The lab asks for a shell script that begins with `#!/bin/bash`."""
+    top = tmp_path / "top"
+    shutil.copytree(ROOT / "reference_solutions" / "eyantra-ros-basics", top)
+    git(top, "init", "-q", "-b", "main")
+    git(top, "add", "-A")
+    found = json.loads(run(system, "check", "--static", "--json", cwd=top).stdout)
+    assert [c["id"] for c in found["criteria"] if c["status"] in ("fail", "partial")] == []
+
+
 @pytest.mark.parametrize("encoding", ["cp1252", "ascii", "cp437"])
 def test_a_console_without_signs_gets_plain_ones(encoding: str, work: Path) -> None:
     ran = run("win32", "check", "--static", cwd=work, PYTHONIOENCODING=encoding)
