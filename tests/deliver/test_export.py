@@ -126,6 +126,14 @@ def test_what_cannot_be_is_refused(arguments, tmp_path, monkeypatch, capsys) -> 
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_folder_takes_the_zip_under_its_own_name_and_stdout_takes_it_alone(tmp_path, capfdbinary) -> None:
+    assert run(["export", "gradescope", LAB, "--out", str(tmp_path)]) == 0
+    data = (tmp_path / f"{LAB}-gradescope.zip").read_bytes()
+    capfdbinary.readouterr()
+    assert run(["export", "gradescope", LAB, "--out", "-"]) == 0
+    assert capfdbinary.readouterr().out == data
+
+
 def test_prairielearn_gets_a_question_and_the_files_of_its_image(tmp_path) -> None:
     out = tmp_path / "out"
     assert run(["export", "prairielearn", LAB, "--out", str(out), "--image", "me/ros", "--minutes", "5"]) == 0
@@ -159,6 +167,6 @@ def test_prairielearn_again_is_the_same_question_and_nobody_elses_folder_is_writ
 
 
 def test_prairielearn_takes_a_zip_too(tmp_path) -> None:
-    assert run(["export", "prairielearn", LAB, "--out", str(tmp_path / "q.zip")]) == 0
-    with zipfile.ZipFile(tmp_path / "q.zip") as archive:
+    assert run(["export", "prairielearn", LAB, "--out", str(tmp_path / "q.ZIP")]) == 0
+    with zipfile.ZipFile(tmp_path / "q.ZIP") as archive:
         assert "question/info.json" in archive.namelist()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,8 @@ from grader.rubric.load import load_rubric
 if TYPE_CHECKING:
     from grader.arena.sandbox import Mode
 
+STDOUT = "-"
+
 
 def run(
     *,
@@ -24,12 +27,20 @@ def run(
     sandbox: Mode = "auto",
     assume_executable: bool = False,
 ) -> ExitCode:
-    """Write the zip to `out`. Raises UsageError where the grader is not installed, RubricError for a faulty rubric."""
+    """Write the zip to `out`, or into it where it is a folder, or to stdout where it is `-`.
+
+    Raises UsageError where the grader is not installed, RubricError for a faulty rubric.
+    """
     rubric = load_rubric(lab)
     settings = Settings(
         rubric="", minutes=minutes, sandbox=sandbox, modes="granted" if assume_executable else "lost"
     )
-    target = out or Path(f"{rubric.rubric.id}-gradescope.zip")
-    atomic_write(target, autograder(rubric, settings))
+    data = autograder(rubric, settings)
+    if str(out) == STDOUT:
+        sys.stdout.buffer.write(data)
+        return ExitCode.PASSED
+    name = f"{rubric.rubric.id}-gradescope.zip"
+    target = out / name if out is not None and out.is_dir() else out or Path(name)
+    atomic_write(target, data)
     say(f"{target}: upload it under Configure Autograder, with Ubuntu 22.04 as the base image")
     return ExitCode.PASSED

@@ -32,7 +32,7 @@ def run(
     )
     target = out or Path(f"{rubric.rubric.id}-prairielearn")
     parcel = question(rubric, settings, image)
-    if target.suffix == ".zip":
+    if target.suffix.lower() == ".zip":
         atomic_write(target, parcel.zipped())
     else:
         _check_free(target)

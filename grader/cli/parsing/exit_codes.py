@@ -34,3 +34,9 @@ REPORT_EXIT_CODES = """exit codes:
   3    a result cannot be read, or is none that can be shown in this form
   130  interrupted
 """
+
+EXPORT_EXIT_CODES = """exit codes:
+  0    written
+  2    the command line or the rubric is wrong, or the grader is not installed
+  130  interrupted
+"""

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from grader.cli.parsing.base import Adder
+from grader.cli.parsing.exit_codes import EXPORT_EXIT_CODES
 from grader.cli.parsing.options import sandbox_option
 
 
@@ -15,7 +16,10 @@ def add_platforms(add: Adder) -> None:
     gradescope = add("gradescope", "write an autograder's zip for Gradescope", "export_gradescope")
     _lab(gradescope)
     gradescope.add_argument(
-        "--out", metavar="FILE", type=Path, help="where it goes (default: ./<lab>-gradescope.zip)"
+        "--out",
+        metavar="FILE",
+        type=Path,
+        help="where it goes; - is stdout (default: ./<lab>-gradescope.zip)",
     )
     gradescope.add_argument(
         "--minutes",
@@ -49,6 +53,7 @@ def add_platforms(add: Adder) -> None:
 
 
 def _lab(parser: argparse.ArgumentParser) -> None:
+    parser.epilog = EXPORT_EXIT_CODES
     parser.add_argument("lab", metavar="LAB|FILE", help="a lab's id or a rubric's file; see grader labs")
 
 
