@@ -32,6 +32,8 @@ def read_mark(text: str) -> Mark | None:
     if found is None:
         raise UsageError(f'pass-mark: "{line(text, SHOWN_CHARS)}" is no mark', hint=HINT)
     mark = Mark(value=float(found[1]), percent=bool(found[2]))
+    if not mark.percent and 0 < mark.value < 1:  # 0.6 is more likely to be meant as 60%
+        raise UsageError(f"pass-mark: {found[1]} is less than a point", hint=HINT)
     if mark.percent and mark.value > 100:
         raise UsageError(f"pass-mark: {number(mark.value)}% is more than 100%", hint=HINT)
     return mark
