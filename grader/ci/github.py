@@ -107,7 +107,6 @@ def _heading(outcome: Outcome, said: str) -> str:
 
 def _print(text: str) -> None:
     """At once, and in order with what the terminal's report prints."""
-    sys.stdout.write(
-        text.encode(sys.stdout.encoding or "ascii", "backslashreplace").decode(sys.stdout.encoding)
-    )
+    encoding = sys.stdout.encoding or "ascii"
+    sys.stdout.write(text.encode(encoding, "backslashreplace").decode(encoding))
     sys.stdout.flush()

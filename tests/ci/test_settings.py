@@ -22,7 +22,7 @@ def test_a_mark_is_points_or_a_percentage(text, value, percent):
 
 
 @pytest.mark.parametrize(
-    "text", ["101%", "-1", "1e3", "60%%", "½", "60,5", "nan", "inf", "0x10", "60 points"]
+    "text", ["101%", "-1", "1e3", "60%%", "½", "60,5", "nan", "inf", "0x10", "60 points", "0.6"]
 )
 def test_what_is_no_mark_is_named(text):
     with pytest.raises(UsageError, match="pass-mark: "):

@@ -101,3 +101,20 @@ def test_the_reporter_finds_the_result_by_its_id():
     assert reporter["env"] == {f"{lab['id'].upper()}_RESULTS": f"${{{{ steps.{lab['id']}.outputs.result }}}}"}
     assert re.fullmatch(r"([a-zA-Z0-9]+,)*[a-zA-Z0-9]+", reporter["with"]["runners"])
     assert set(lab["with"]) <= set(ACTION["inputs"])
+
+
+BLOCK = re.compile(r"^```yaml\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.parametrize(("page", "schema"), [("github", "github-workflows"), ("gitlab", "gitlab-ci")])
+def test_what_the_pages_print_is_what_the_systems_read(tmp_path, page, schema):
+    """Whole files by their schema; parts of one are YAML at least."""
+    text = (ROOT / "docs" / "how-to" / f"{page}.md").read_text(encoding="utf-8")
+    whole = []
+    for number, block in enumerate(BLOCK.findall(text)):
+        data = yaml.safe_load(block)
+        if page == "gitlab" or "jobs" in data:
+            whole.append(tmp_path / f"{number}.yml")
+            whole[-1].write_text(block)
+    assert len(whole) >= 3
+    _runs(PROGRAMS / "check-jsonschema", "--builtin-schema", f"vendor.{schema}", *whole)
