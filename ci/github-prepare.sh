@@ -53,7 +53,7 @@ allow_namespaces() {
 
 build_image() {
   printf '::group::Building the image\n'
-  docker build --quiet --tag "$local_image" "$root" ||
+  docker build --tag "$local_image" "$root" ||
     die "Not graded" "the grader's image could not be built: see the log" not-graded 3
   printf '::endgroup::\n'
 }
