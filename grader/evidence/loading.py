@@ -36,11 +36,11 @@ FIELDS = {
 class Loading:
     """Collects by channel and decodes nothing; only the grader's own JSON channels are read into records.
 
-    `room` is what all that is loaded together may take.
+    `room` is what all that is loaded together may take, `shown` what messages call the file.
     """
 
-    def __init__(self, name: str, room: Room) -> None:
-        self._name = name
+    def __init__(self, name: str, room: Room, shown: str) -> None:
+        self._name, self._shown = name, shown
         self._room = room
         self._schemas: dict[int, mcap.Schema] = {}
         self._channels: dict[int, mcap.Channel] = {}
@@ -118,10 +118,10 @@ class Loading:
             return {"scenario": PurePath(self._name).stem, "clock": "real", "warp": 1.0}
         version = self._metadata.get("format", "")[:NAME_CHARS_SHOWN]
         if newer := EVIDENCE.newer(f"{EVIDENCE.name}/{version}"):
-            raise EvidenceError(f"{self._name}: {newer}", hint=UPDATE)
+            raise EvidenceError(f"{self._shown}: {newer}", hint=UPDATE)
         if version not in READ:
             raise EvidenceError(
-                f"{self._name}: evidence of format {version!r}, which no grader wrote",
+                f"{self._shown}: evidence of format {version!r}, which no grader wrote",
                 hint="record it again, or copy it again",
             )
         try:
@@ -135,17 +135,17 @@ class Loading:
         encodings = {channel.message_encoding for channel in self._channels.values()}
         if self._profile == "ros2" or "cdr" in encodings:
             raise EvidenceError(
-                f"{self._name}: a recording of ROS 2, and this grader reads those of ROS 1",
+                f"{self._shown}: a recording of ROS 2, and this grader reads those of ROS 1",
                 hint="record again with ROS 1: `rosbag record`",
             )
         if encodings and "ros1" not in encodings:
             names = ", ".join(map(_shown, sorted(encodings)[:NAMES_SHOWN]))
-            raise EvidenceError(f"{self._name}: no message of ROS 1 in it, only {names}")
+            raise EvidenceError(f"{self._shown}: no message of ROS 1 in it, only {names}")
         for channel in self._channels.values():
             schema = self._schemas.get(channel.schema_id)
             if channel.message_encoding == "ros1" and (schema is None or schema.encoding != "ros1msg"):
                 raise EvidenceError(
-                    f"{self._name}: {_shown(channel.topic)} has no message definition (ros1msg)"
+                    f"{self._shown}: {_shown(channel.topic)} has no message definition (ros1msg)"
                 )
 
     def _ros_channels(self) -> tuple[Channel, ...]:

@@ -100,7 +100,7 @@ def _load(name: str, stream: BinaryIO, room: Room, *, shown: str = "") -> Run:
     if not size_bytes:
         raise EvidenceError(f"{shown}: the file is empty")
     try:
-        return Loading(name, room).read(stream)
+        return Loading(name, room, shown).read(stream)
     except ValidationError as error:
         raise EvidenceError(
             f"{shown}: a record of the grader's own cannot be read: {_first(error)}"

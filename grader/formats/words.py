@@ -14,8 +14,9 @@ POLICY = """## What may change
 Each format has a version of its own, a whole number. A grader reads every version that was ever written, and writes
 the newest. Files of all times are kept in `fixtures/formats/` and read by the tests.
 
-**A newer version** than a grader knows is refused in one line, and nothing is overwritten:
+**A newer version** than a grader knows is refused in one line by whatever reads it, and what is there stays as it is:
 `results/ada/result.json: written by a newer grader (grader.result/2); this one reads up to 1`. Update the grader.
+(`grader grade` reads no earlier result: it replaces what is in its folder, whoever wrote it.)
 
 **Without a new version** there may come
 

@@ -31,6 +31,7 @@ from tests.formats.old import FOLDER, ROOT, classes
 
 REFERENCE = ROOT / "docs" / "reference"
 SCHEMAS = {name: schema_of(name) for name in FORMATS}
+PAGES = pages()
 EVIDENCE = sorted(FOLDER.rglob("*.mcap"))
 RESULTS = sorted([*FOLDER.rglob(RESULT), *(ROOT / "tests" / "report").rglob("golden/" + RESULT)])
 LABS = sorted([*(ROOT / "rubrics").glob("*.yaml"), *(ROOT / "rubrics" / "examples").glob("*.yaml")])
@@ -181,7 +182,7 @@ def test_a_later_graders_keys_fit_and_a_persons_do_not() -> None:
     assert not validator("overrides").is_valid({"ada": {"build": {"points": 1, "later": 1}}})
 
 
-@pytest.mark.parametrize("path", pages())
+@pytest.mark.parametrize("path", PAGES)
 def test_what_is_in_the_docs_is_what_the_code_says(path: str) -> None:
     file = REFERENCE / path
     if os.environ.get("GRADER_REGENERATE"):
@@ -189,8 +190,8 @@ def test_what_is_in_the_docs_is_what_the_code_says(path: str) -> None:
         if file.exists() and name in FORMATS:
             assert faults(name, json.loads(file.read_bytes()), SCHEMAS[name], FORMATS[name]) == []
         file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(pages()[path])
-    assert file.read_text() == pages()[path], "GRADER_REGENERATE=1 pytest tests/formats writes it anew"
+        file.write_text(PAGES[path])
+    assert file.read_text() == PAGES[path], "GRADER_REGENERATE=1 pytest tests/formats writes it anew"
 
 
 @named
