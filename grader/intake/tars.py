@@ -49,7 +49,7 @@ def unpack_tar(path: Path, unpacker: Unpacker, *, name: str, limits: Limits) -> 
             tarinfo=_Member,
         ) as archive,
     ):
-        while (member := archive.next()) is not None:
+        while (member := _next(archive)) is not None:
             archive.members = []  # type: ignore[attr-defined] # nobody looks back, and there may be many
             _unpack_member(archive, member, unpacker)
         plain.seek(archive.offset)
@@ -57,6 +57,12 @@ def unpack_tar(path: Path, unpacker: Unpacker, *, name: str, limits: Limits) -> 
             raise tarfile.ReadError("the end is missing")
         while plain.read(_CHUNK_BYTES):  # a packed one has its checksum at the end
             pass
+
+
+def _next(archive: tarfile.TarFile) -> tarfile.TarInfo | None:
+    """As `archive.next()`, which in Python 3.10 seeks before the beginning of a tar that holds nothing."""
+    empty = archive.offset == 0 and archive.firstmember is None  # type: ignore[attr-defined]
+    return None if empty else archive.next()
 
 
 def _unpack_member(archive: tarfile.TarFile, member: tarfile.TarInfo, unpacker: Unpacker) -> None:

@@ -42,6 +42,7 @@ ANY = partial(paths, endings=None)
 BY_VALUE: dict[str, Completer] = {
     "ADDRESS": nothing,
     "DIR": FOLDERS,
+    "DIR|ZIP": partial(paths, endings=(".zip",)),
     "EVIDENCE": partial(paths, endings=RECORDINGS),
     "FILE": ANY,
     "ID|FILE": _either(lab_ids, partial(paths, endings=RUBRICS)),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import platform
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from grader import __version__
@@ -19,22 +19,22 @@ class VersionAction(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, *_rest: object) -> NoReturn:
         """Raise SystemExit with code 0."""
-        print(f"grader {__version__}")
-        print(f"Python {platform.python_version()} ({sys.executable})")
-        for line in _ros():
-            print(line)
+        from grader.cli.say import say  # noqa: PLC0415 - `--help` does without
+
+        say(f"grader {__version__}")
+        say(f"Python {platform.python_version()} ({sys.executable})")
+        say(_ros())
         parser.exit()
 
 
-def _ros() -> Iterator[str]:
+def _ros() -> str:
     """What ROS 1 the grader would use here; whatever is wrong with it is for `grader doctor` to say at length."""
-    from grader.errors import GraderError  # noqa: PLC0415 - as below
+    from grader.errors import GraderError  # noqa: PLC0415 - as above
 
     try:
-        from grader.arena.ros_env import find_ros  # noqa: PLC0415 - `--help` does without
+        from grader.arena.ros_env import find_ros  # noqa: PLC0415 - as above
 
         ros = find_ros()
     except (GraderError, ImportError, OSError) as error:
-        yield f"ROS 1 not usable: {error}"
-        return
-    yield f"ROS 1 {ros.label}" if ros else "ROS 1 not found"
+        return f"ROS 1 not usable: {error}"
+    return f"ROS 1 {ros.label}" if ros else "ROS 1 not found"
