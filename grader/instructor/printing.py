@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from typing import TextIO
@@ -11,6 +12,8 @@ from typing import TextIO
 from grader.shown import visible
 
 LINE_CHARS = 65_536
+_STREAMS = threading.RLock()
+"""Stdout is the whole process's: two threads would leave each other's behind."""
 
 
 class Shown(io.TextIOBase):
@@ -42,9 +45,10 @@ class Shown(io.TextIOBase):
 @contextmanager
 def printing_to_stderr() -> Iterator[None]:
     """Stdout may be JSON: nothing that is printed in the block gets there."""
-    shown = Shown(sys.stderr)
-    try:
-        with redirect_stdout(shown), redirect_stderr(shown):
-            yield
-    finally:
-        shown.finish()
+    with _STREAMS:
+        shown = Shown(sys.stderr)
+        try:
+            with redirect_stdout(shown), redirect_stderr(shown):
+                yield
+        finally:
+            shown.finish()

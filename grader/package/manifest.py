@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,6 +23,8 @@ _CONDITIONS = 200
 _CONDITION_LETTERS = 300
 _CONDITION_BRACKETS = 20
 _MESSAGE_LETTERS = 500
+_FILTERS = threading.Lock()
+"""Filters of warnings are the whole process's: two threads would leave each other's behind."""
 
 # What `condition="$ROS_VERSION == 1"` (REP 149) is measured by: the labs are ROS 1 on its last distribution.
 _CONTEXT = {"ROS_VERSION": "1", "ROS_DISTRO": "noetic", "ROS_PYTHON_VERSION": "3"}
@@ -61,7 +64,7 @@ def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
         return None, fault
     said: list[str] = []
     try:
-        with warnings.catch_warnings():
+        with _FILTERS, warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # catkin_pkg's own use of pyparsing
             return _manifest(_meaning(root, said), root, said), None
     except (InvalidPackage, AssertionError, ValueError, RecursionError) as error:

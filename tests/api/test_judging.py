@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -145,6 +146,53 @@ def test_many_threads_judge_alike() -> None:
     with ThreadPoolExecutor(4) as pool:
         found = list(pool.map(lambda _: judge(KEPT / "notes", lab), range(4)))
     assert all(one == found[0] for one in found)
+
+
+def test_an_instructors_own_checks_in_threads_leave_stdout_as_it_was(tmp_path: Path, capfd) -> None:
+    (tmp_path / "own.py").write_text(OWN)
+    text = (ROOT / "rubrics" / f"{LAB}.yaml").read_text()
+    criterion = "  - {id: own, title: Own, points: 0, check: says-so}\n"
+    (tmp_path / "lab.yaml").write_text(text.replace("digits: 1\n", "digits: 1\nchecks: own.py\n") + criterion)
+    lab, out, err = load_rubric(tmp_path / "lab.yaml"), sys.stdout, sys.stderr
+    with ThreadPoolExecutor(6) as pool:
+        found = list(pool.map(lambda _: judge(KEPT / "files", lab).criteria[-1].status, range(12)))
+    assert set(found) == {Status.PASS}
+    assert (sys.stdout, sys.stderr) == (out, err)
+    said = capfd.readouterr()
+    assert said.out == ""
+    assert said.err == "said\n" * 12
+
+
+OWN = '''
+import time
+
+from grader.checks import PackageFacts, Record, check, passed
+
+
+class Nothing(Record):
+    """No parameters."""
+
+
+@check("says-so", params=Nothing)
+def says_so(package: PackageFacts, params: Nothing):
+    """Says so.
+
+    What it checks
+        Nothing.
+
+    Why it matters on a robot
+        It does not.
+
+    How it is measured
+        It is not.
+
+    How to fix
+        There is nothing to fix.
+    """
+    print("said")
+    time.sleep(0.01)
+    return passed("it does")
+'''
 
 
 def test_nothing_is_written(tmp_path: Path, capfd, monkeypatch) -> None:
