@@ -141,6 +141,19 @@ def test_what_is_cached_is_no_part_of_the_submission(job):
     assert json.loads((job.results / "result.json").read_text())["submission"]["digest"] == digest
 
 
+def test_a_cache_that_was_handed_in_is_not_used(job):
+    """What pip would install from it would do the grading."""
+    handed_in(job.project, ".")
+    poison = job.project / ".grader-cache" / "pip" / "wheel"
+    poison.parent.mkdir(parents=True)
+    poison.write_text("a grader that gives full marks")
+    for words in (["init", "-q"], ["add", "--force", "."]):
+        subprocess.run(["/usr/bin/git", "-C", str(job.project), *words], check=True, capture_output=True)
+    job.run(GRADER_STATIC="true")
+    assert "it is not used" in job.log
+    assert not list(job.folder.glob("builds/**/wheel"))
+
+
 def test_an_image_without_the_grader_has_to_be_told_where_it_is(job):
     job.path = SYSTEM_PATH
     handed_in(job.project)
