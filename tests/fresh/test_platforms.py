@@ -184,6 +184,7 @@ def _graded_by_prairielearn(
     (student / name).write_bytes(data)
     (root.path / "grade" / "data").mkdir()
     root.run(image.entrypoint, env=image.env, cwd=image.folder, locks=locks)
+    assert (root.path / "grade" / "tests").stat().st_mode & 0o077 == 0  # students cannot read the rubric
     document: dict[str, Any] = json.loads((root.path / "grade/results/results.json").read_bytes())
     return document
 
