@@ -11,6 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from grader.judging.summary import OPEN
 from grader.model.handed_in import AppliedOverride
 from grader.model.result import CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
@@ -106,7 +107,9 @@ class Terminal:
             parts += self._losses("Still open: no points are lost for good", view.open)
         parts += self._section("Advice, costs nothing", [self._advice(c) for c in view.advice])
         parts += self._section(TITLE, self._noticed(result.notes))
-        parts += self._section("All criteria", [self._table(result.criteria)])
+        judged = [c for c in result.criteria if not unrun or c.status not in OPEN]
+        title = "All criteria that could be judged" if unrun else "All criteria"
+        parts += self._section(title, [self._table(judged)] if judged else [])
         if hidden:
             parts.append(Text(f"\n{visible_words(result, hidden)}"))
         emit(self.console, parts)
