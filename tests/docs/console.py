@@ -19,7 +19,7 @@ from pathlib import Path
 
 from markdown_it import MarkdownIt
 
-LIMIT_S = 120
+LIMIT_S = 200
 TITLE = re.compile(r'title="([^"]+)"')
 KEEP = '\n__code=$?\n{ export -p; printf \'cd %q\\n\' "$PWD"; } >"$__STATE"\nexit $__code\n'
 

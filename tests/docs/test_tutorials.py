@@ -8,6 +8,7 @@ import subprocess
 import sys
 import sysconfig
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -81,19 +82,11 @@ def from_wheel(clone: Path, tmp_path_factory: pytest.TempPathFactory) -> Install
     return Installed(programs=folder / "environment" / "bin", code=folder / "environment")
 
 
-@pytest.fixture(params=["from_clone", "from_wheel"])
-def installed(request: pytest.FixtureRequest) -> Installed:
-    found = request.getfixturevalue(request.param)
-    assert isinstance(found, Installed)
-    return found
-
-
-@pytest.fixture
-def desk(tmp_path: Path) -> Path:
-    """A home with a folder to work in; git knows who works there, as it does for everybody who commits."""
-    (tmp_path / ".gitconfig").write_text(GIT, encoding="utf-8")
-    (tmp_path / "work").mkdir()
-    return tmp_path / "work"
+def desk(home: Path) -> Path:
+    """A folder to work in, in a home of its own; git knows who works there, as it does for everybody who commits."""
+    (home / "work").mkdir(parents=True)
+    (home / ".gitconfig").write_text(GIT, encoding="utf-8")
+    return home / "work"
 
 
 def _environment(programs: Path, home: Path) -> dict[str, str]:
@@ -119,15 +112,23 @@ def test_a_tutorial_uses_the_grader_and_shows_what_it_prints(name: str) -> None:
 @pytest.mark.ros
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TUTORIALS)
-def test_every_command_works_as_printed(name: str, installed: Installed, clone: Path, desk: Path) -> None:
-    environment = _environment(installed.programs, desk.parent)
-    where = _done(
-        installed.programs / "python",
-        "-P" if sys.version_info >= (3, 11) else "-s",
-        "-c",
-        "import grader; print(grader.__file__)",
-        folder=desk,
-        environment=environment,
-    )
+def test_every_command_works_as_printed(
+    name: str, from_clone: Installed, from_wheel: Installed, clone: Path, tmp_path: Path
+) -> None:
+    """With both at once: nearly all of the time is spent watching nodes."""
+    text = page(name, clone)
+    with ThreadPoolExecutor() as pool:
+        of_clone = pool.submit(run_page, from_clone, text, desk(tmp_path / "clone"))
+        of_wheel = pool.submit(run_page, from_wheel, text, desk(tmp_path / "wheel"))
+    assert of_clone.exception() is None, f"from the clone: {of_clone.exception()}"
+    assert of_wheel.exception() is None, f"from the wheel: {of_wheel.exception()}"
+    assert of_clone.result() == of_wheel.result() > 5
+
+
+def run_page(installed: Installed, text: str, folder: Path) -> int:
+    """Type in a page with that grader; gives the number of commands."""
+    environment = _environment(installed.programs, folder.parent)
+    code = "import grader; print(grader.__file__)"
+    where = _done(installed.programs / "python", "-c", code, folder=folder, environment=environment)
     assert Path(where.strip()).is_relative_to(installed.code)
-    assert Session(desk, environment).run_page(page(name, clone)) > 5
+    return Session(folder, environment).run_page(text)
