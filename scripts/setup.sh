@@ -23,6 +23,7 @@ ros_extras=(
 # without those of the second line, and so do its tests: those of pages are skipped.
 tools=(bwrap:bubblewrap git:git cmake:cmake make:make g++:g++ ip:iproute2)
 browser_tools=(chromium:chromium node:nodejs npm:npm)
+shell_tools=(zsh:zsh fish:fish man:man-db groff:groff-base mandoc:mandoc)
 debootstrap=mmdebstrap # makes the bare Debian of the tests in fresh roots, which only root can run
 page_tools=tests/browser # with its own package.json
 # What an image needs besides: to make a virtual environment, and to fetch repositories over https.
@@ -140,6 +141,17 @@ install_browser() {
   install_page_tools
 }
 
+# For the tests of completion and of the man page, which do without any of them. Tried once.
+install_shells() {
+  local tool wanted=() tried=.venv/setup-shells
+  for tool in "${shell_tools[@]}"; do
+    command -v "${tool%%:*}" >/dev/null || wanted+=("${tool#*:}")
+  done
+  if [ "${#wanted[@]}" -eq 0 ] || [ "$(cat "$tried" 2>/dev/null)" = "${wanted[*]}" ]; then return; fi
+  printf '%s' "${wanted[*]}" >"$tried"
+  apt_try "${wanted[@]}" || say "no ${wanted[*]} here: the tests that need them will be skipped"
+}
+
 # Tried once.
 install_debootstrap() {
   local tried=.venv/setup-debootstrap
@@ -251,5 +263,6 @@ fi
 install_extras
 if [ "${1:-}" != --no-browser ]; then
   install_browser
+  install_shells
   install_debootstrap
 fi

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
@@ -21,6 +21,7 @@ BARE = {
     "apt-cache": "exit 0",
     "apt-get": f'{LOG}case "$*" in *update) exit 0 ;; esac; exit 100',
 }
+SHELLS = ("zsh", "fish", "man", "groff", "mandoc")
 UPDATE = "apt-get -q -y -o DPkg::Lock::Timeout=300 update"
 
 
@@ -126,12 +127,15 @@ class Ready(Machine):
         for name in ("bash", "env", "dirname", "cat", "cksum", "grep", "sed", "ls"):
             (self.programs / name).symlink_to(shutil.which(name))
 
-    def setup(self, *arguments: str, **programs: str) -> subprocess.CompletedProcess[str]:
+    def setup(
+        self, *arguments: str, without: Sequence[str] = (), **programs: str
+    ) -> subprocess.CompletedProcess[str]:
         installed = {
             "dpkg-query": 'shift 2; for name; do echo "installed $name"; done',
-            **dict.fromkeys(("bwrap", "git", "cmake", "make", "g++", "ip"), "exit 0"),
+            **dict.fromkeys(("bwrap", "git", "cmake", "make", "g++", "ip", *SHELLS), "exit 0"),
         }
-        return self.run({**BARE, **installed, **programs}, *arguments, rest="/nowhere")
+        here = {name: text for name, text in {**BARE, **installed, **programs}.items() if name not in without}
+        return self.run(here, *arguments, rest="/nowhere")
 
 
 @pytest.fixture
@@ -154,6 +158,14 @@ def test_a_browser_is_installed_by_root(ready) -> None:
     update, install = ready.calls()
     assert update == UPDATE
     assert install.endswith("install --no-install-recommends chromium npm")
+
+
+def test_shells_that_cannot_be_had_are_no_obstacle_and_said_once(ready) -> None:
+    pages = {"chromium": "exit 0", "node": "exit 0", "npm": "exit 0"}
+    done = ready.setup(**pages, without=("fish", "mandoc"))
+    again = ready.setup(**pages, without=("fish", "mandoc"))
+    assert done.stdout == "setup: no fish mandoc here: the tests that need them will be skipped\n"
+    assert (done.returncode, again.returncode, again.stdout) == (0, 0, "")
 
 
 def test_a_browser_is_not_for_everybody(ready) -> None:

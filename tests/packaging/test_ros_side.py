@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.packaging.making import ROOT
+from tests.packaging.making import BIN, ROOT
 from tests.packaging.test_pythons import find
 
 SIDES = ("grader/arena/ros", "grader/standins")
