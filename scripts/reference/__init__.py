@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from grader.checks.docs import checks_page
+from grader.formats.page import pages as format_pages
 from grader.mutation.docs import operators_page
 from scripts.reference.commands import commands_page, exit_codes_page
 from scripts.reference.labs import labs_page
@@ -20,3 +21,8 @@ PAGES: dict[str, Callable[[], str]] = {
     "mutation-operators.md": operators_page,
     "rubric.md": rubric_page,
 }
+
+
+def made() -> dict[str, str]:
+    """Every file that is made, by its path below the folder of the reference."""
+    return {**{name: page() for name, page in PAGES.items()}, **format_pages()}

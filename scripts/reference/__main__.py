@@ -1,6 +1,7 @@
 """`python -m scripts.reference`: write the pages that are made from the code."""
 
-from scripts.reference import FOLDER, PAGES
+from scripts.reference import FOLDER, made
 
-for name, page in PAGES.items():
-    (FOLDER / name).write_text(page(), encoding="utf-8")
+for name, text in made().items():
+    (FOLDER / name).parent.mkdir(parents=True, exist_ok=True)
+    (FOLDER / name).write_text(text, encoding="utf-8")
