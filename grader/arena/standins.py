@@ -1,4 +1,4 @@
-"""Packages that stand in for those that a grading machine lacks (docs/how-to/standins.md): which, and how ROS finds them."""
+"""Packages that stand in for those that a machine lacks (docs/how-to/standins.md): which, and how ROS finds them."""
 
 from __future__ import annotations
 

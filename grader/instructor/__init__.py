@@ -1,1 +1,1 @@
-"""What an instructor adds to a rubric: checks in a Python file beside it, and tests for pytest (docs/how-to/own-checks.md)."""
+"""What an instructor adds to a rubric: checks in a file beside it, and tests for pytest (docs/how-to/own-checks.md)."""
