@@ -10,7 +10,8 @@ from tests.rubric.samples import spoiled
 
 def test_the_page_is_up_to_date():
     """`python -m grader.mutation.docs > docs/reference/mutation-operators.md` brings it up to date."""
-    assert (ROOT / "docs" / "reference" / "mutation-operators.md").read_text(encoding="utf-8") == operators_page()
+    page = ROOT / "docs" / "reference" / "mutation-operators.md"
+    assert page.read_text(encoding="utf-8") == operators_page()
 
 
 def test_the_example_is_sound(tmp_path):
