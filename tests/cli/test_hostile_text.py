@@ -35,6 +35,8 @@ MAY_PRINT = {
     "cli/display.py",
     "cli/class_display.py",
     "checks/docs.py",
+    "ci/github.py",  # annotations; tests/ci
+    "deliver/grading.py",  # a report as in a terminal; tests/deliver
     "mutation/docs.py",
     "similarity/job.py",  # JSON for the process that started it
 }
