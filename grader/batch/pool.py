@@ -8,7 +8,7 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing import connection
 from types import FrameType
 from typing import TypeVar
@@ -36,7 +36,8 @@ def workers(count: int) -> Iterator[ProcessPoolExecutor]:
     except BaseException:
         for child in multiprocessing.active_children():
             if child.pid is not None:
-                os.kill(child.pid, signal.SIGINT)
+                with suppress(ProcessLookupError):  # it has ended by itself
+                    os.kill(child.pid, signal.SIGINT)
         raise
     finally:
         pool.shutdown(cancel_futures=True)
