@@ -28,6 +28,7 @@ from grader.rubric.model import Rubric
 ROOT = Path(__file__).resolve().parent.parent
 GIT = shutil.which("git") or "git"
 REFERENCE = "reference"
+MANY = 10
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 SIDE_BY_SIDE = 4  # they wait most of the time, and take turns at starting
 
@@ -67,10 +68,11 @@ def fixture_names(lab: str) -> list[str]:
 
 
 def shorter_round(lab: str) -> list[str]:
-    """The fixtures that every run of the tests grades: all correct packages, and for each way of missing each criterion
-    the one that misses least beside it. `make test-all` grades the others too."""
+    """The fixtures that every run of the tests grades: the correct packages (where there are many, every second),
+    and for each way of missing each criterion the one that misses least beside it. `make test-all` grades all."""
     expect = {name: read_fixture(lab, name).expect for name in fixture_names(lab)}
-    chosen = {name for name in expect if name.startswith("ok-")}
+    correct = [name for name in expect if name.startswith("ok-")]
+    chosen = set(correct[:: 2 if len(correct) > MANY else 1])
     for criterion in rubric_of(lab).criteria:
         for status in (Status.FAIL, Status.PARTIAL):
             missed = [(len(lost), name) for name, lost in expect.items() if lost.get(criterion.id) is status]

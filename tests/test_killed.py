@@ -19,7 +19,7 @@ pytestmark = [
     pytest.mark.ros,
     pytest.mark.skipif(bool(why_not()), reason=why_not()),
 ]
-KILLS, SIDE_BY_SIDE = 20, 4
+KILLS, SIDE_BY_SIDE = 12, 4
 
 
 def test_killed_at_random_moments(open_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
