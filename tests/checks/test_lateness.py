@@ -132,6 +132,26 @@ def test_the_verdict_says_what_the_machine_did() -> None:
     assert "the grading machine was late itself" in verdict.message
 
 
+@pytest.mark.parametrize(
+    ("gaps_ms", "busy", "expected"),
+    [
+        ([100] * 30 + [633] + [100] * 24, 1.0, Status.INCONCLUSIVE),  # a node that waited for its turn, once
+        ([100] * 30 + [633] + [100] * 24, 0.6, Status.FAIL),  # there was time to spare
+        ([100] * 20 + [400] + [100] * 20 + [300] + [100] * 20, 0.95, Status.INCONCLUSIVE),
+        ([108.7] * 60, 1.0, Status.FAIL),  # 9.2 Hz in each turn
+        ([108.7] * 30 + [633] + [108.7] * 24, 1.0, Status.FAIL),  # and a stall does not excuse it
+        ([100] * 10 * 5 + [900] * 10, 1.0, Status.FAIL),  # too many
+        ([10, 10, 10, 10, 460] * 12, 1.0, Status.FAIL),  # bursts
+    ],
+)
+def test_a_full_machine_lets_a_node_wait_now_and_then(
+    gaps_ms: list[float], busy: float, expected: Status
+) -> None:
+    run = run_of(gaps_ms, IDLE)
+    host = tuple((t, e.model_copy(update={"busy": busy})) for t, e in run.host)
+    assert status(Run(**{**run.__dict__, "host": host})) is expected
+
+
 def test_how_busy_the_machine_was_is_said() -> None:
     run = run_of([100] * 60, IDLE)
     host = tuple((t, e.model_copy(update={"busy": 0.5 + 0.5 * (i % 2)})) for i, (t, e) in enumerate(run.host))
