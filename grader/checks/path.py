@@ -23,9 +23,7 @@ from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive
 
 LATE_MS = 25.0
 LATE_P95_MS = 5.0
-BUSY = 0.9
-"""Each turn may be late: at 1.6 rad/s, 25 ms in each of four are 0.16 rad, and 0.3 m beside a line of 2 m.
-A simulator that computes all the time gets too little of a busy machine, also where nobody who sleeps is woken late."""
+"""Each turn may be late: at 1.6 rad/s, 25 ms in each of four are 0.16 rad, and 0.3 m beside a line of 2 m."""
 ORIGIN = (0.0, 0.0)
 
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -130,10 +128,9 @@ def _excused(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
     late = lateness(run, run.start_ns, run.end_ns)
     if not nearly or late is None:
         return verdict
-    busy = (late.busy or 0.0) >= BUSY
-    if not busy and late.max_ms < LATE_MS and late.p95_ms < LATE_P95_MS:
+    if not late.full and late.max_ms < LATE_MS and late.p95_ms < LATE_P95_MS:
         return verdict
     late_by = f"late itself, by up to {late.max_ms:.0f} ms"
-    message = f"{verdict.message}; but the grading machine was {'busy' if busy else late_by}"
+    message = f"{verdict.message}; but the grading machine was {'busy' if late.full else late_by}"
     hint = "grade again while the machine has less to do"
     return inconclusive(message, hint=hint, measured=verdict.measured)

@@ -32,7 +32,6 @@ from grader.model.verdict import (
 FLOOD_FACTOR = 5
 LATE_P95_SHARE = 0.2
 LATE_MAX_SHARE = 0.5
-BUSY = 0.9
 STALLS_SHARE = 0.1
 """Of the gaps: who is kept waiting by a full machine is so now and then, and keeps its rate otherwise."""
 
@@ -263,7 +262,7 @@ def stalls_explain(found: Rhythm, late: Lateness, params: RateParams) -> bool:
     """On a full machine a node that has work to do gets its turn late, though nobody who only sleeps is woken late.
     With its few long gaps as long as they should be, its rate would be right."""
     stalls = [gap for gap in found.gaps_ns if gap > params.bounds_ns[1]]
-    if (late.busy or 0.0) < BUSY or not 0 < len(stalls) <= max(1, STALLS_SHARE * len(found.gaps_ns)):
+    if not late.full or not 0 < len(stalls) <= max(1, STALLS_SHARE * len(found.gaps_ns)):
         return False
     without_ns = found.span_ns - sum(stalls) + len(stalls) * params.period_ns
     return params.low_hz <= len(found.gaps_ns) * 1e9 / without_ns <= params.high_hz

@@ -14,6 +14,8 @@ CALIBRATION = "/grader/calibration"
 CALIBRATION_TYPE = "std_msgs/Header"
 PERIOD_NS = 100_000_000
 STAMP = struct.Struct("<III")
+FULL = 0.9
+"""The share of the processors' time from which who has work to do may wait for a turn, though sleepers wake in time."""
 
 
 class Lateness(NamedTuple):
@@ -29,6 +31,11 @@ class Lateness(NamedTuple):
     sleep_ms: float | None = None
     calibration_hz: float | None = None
     busy: float | None = None
+
+    @property
+    def full(self) -> bool:
+        """Whether the machine had next to no time to spare."""
+        return (self.busy or 0.0) >= FULL
 
     @property
     def described(self) -> str:
