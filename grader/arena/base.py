@@ -154,7 +154,7 @@ def _file_name(place: Place) -> str:
     known = {
         "grader": __version__,
         "kernel": [platform.system(), platform.release(), platform.machine()],
-        "argv": spec["argv_shown"],
+        "argv": spec["argv"],
         "env": spec["env"],
         "shims": [name for name in PROGRAMS if (place.folder / "bin" / name).exists()],
         "files": list(_looks(place)),

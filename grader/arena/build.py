@@ -14,10 +14,10 @@ from grader.arena.base import base_spec, catkin_make, has_base, keep_base
 from grader.arena.built import read_member
 from grader.arena.place import ARCHIVE, Place
 from grader.arena.recorded import READ_MAX, read_untrusted
-from grader.arena.ros_env import keep_ros_variables, parse_env
+from grader.arena.ros_env import DUMP_BYTES, excess_of, keep_ros_variables, parse_env
 from grader.arena.session import ArenaSession
 from grader.arena.workspace import run_in_place
-from grader.evidence.events import ScenarioEvent
+from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.record import Record
 from grader.package.cmake_written import written_calls
@@ -32,6 +32,9 @@ INCLUDED_MAX = 20
 TRACE = "cmake-trace.json"
 SYNTAX = "syntax.jsonl"
 ENVIRONMENT = "environment"
+SETUP = "setup.bash"
+DUMP = """for name in $(compgen -e); do printf '%s=%s\\0' "$name" "${!name}"; done;"""
+"""As `env -0` does, which could not even be started where a variable is too large for the kernel."""
 
 
 class BuildOutcome(Record):
@@ -120,14 +123,23 @@ def _target(place: Place, name: str) -> str:
 
 async def _with_setup(place: Place, arena: ArenaSession) -> Place:
     """The environment that `source devel/setup.bash` gives."""
-    script = 'source "$1/devel/setup.bash" && env -0 >' + _target(place, ENVIRONMENT)
+    script = f'source "$1/devel/setup.bash" && {{ {DUMP} }} >' + _target(place, ENVIRONMENT)
     argv = ["/bin/bash", "-c", script, "bash", place.inside_workspace]
-    arena.start(place.spec("setup.bash", argv, role="build", as_handed_in=True, collect=ENVIRONMENT))
-    await arena.wait(lambda: "setup.bash" in arena.exit_codes, STEP_S)
+    room = DUMP_BYTES + 1
+    spec = place.spec(SETUP, argv, role="build", as_handed_in=True, collect=ENVIRONMENT, collect_bytes=room)
+    arena.start(spec)
+    if not await arena.wait(lambda: SETUP in arena.exit_codes, STEP_S):
+        await arena.interrupt(SETUP, int_s=1.0, term_s=1.0)
     path = _kept(place, ENVIRONMENT)
-    if path is None or arena.exit_codes.get("setup.bash") != 0:
+    dump = path.read_bytes() if path and arena.exit_codes.get(SETUP) == 0 else None
+    excess = excess_of(dump) if dump else ""
+    if excess:
+        arena.note(
+            ActorEvent(action="limit", actor=SETUP, detail=f"it sets {excess}: nodes run without them")
+        )
+    if not dump or excess:
         return place.from_source()
-    return replace(place, env=keep_ros_variables(parse_env(path.read_bytes())))
+    return replace(place, env=keep_ros_variables(parse_env(dump)))
 
 
 async def _answer(place: Place, arena: ArenaSession, script: str) -> None:

@@ -11,9 +11,9 @@ LEAST_RUN_BYTES = 8 << 20
 
 
 class Limits(Record):
-    """Memory, processes, tasks (threads count), CPU seconds, output and `home_bytes` (what its home may hold besides
-    the workspace's own files) are of one process tree; messages and bytes of one channel, or of one run (`run_bytes`,
-    `channels`)."""
+    """Memory, processes, tasks (threads count), CPU seconds, output, `home_bytes` (what its home may hold besides the
+    workspace's own files) and the number of files in each folder are of one process tree; messages and bytes of one
+    channel, or of one run (`run_bytes`, `channels`)."""
 
     memory_bytes: int = 1 << 30
     processes: int = 200
@@ -22,8 +22,12 @@ class Limits(Record):
     output_lines: int = 20_000
     output_bytes: int = 8 << 20
     home_bytes: int = 256 << 20
+    home_files: int = 40_000
     tmp_bytes: int = 128 << 20
+    tmp_files: int = 10_000
     shared_bytes: int = 64 << 20
+    shared_files: int = 1_000
+    locked_bytes: int = 1 << 20
     file_bytes: int = 64 << 20
     open_files: int = 1024
     address_space_bytes: int = 8 << 30

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from grader.arena.built import Built, read_archive, read_folder
+from grader.arena.host_programs import host_program
 from grader.arena.inside import (
     BASE_WORKSPACE,
     BUILT,
@@ -23,33 +25,44 @@ from grader.arena.inside import (
 )
 from grader.arena.limits import Limits
 from grader.arena.ros_env import SYSTEM_PATH, RosInstallation
-from grader.arena.sandbox import Sandbox
+from grader.arena.sandbox import Sandbox, Word, copy_of, scratch
 from grader.arena.standins import SOURCES as STANDIN_SOURCES
 from grader.arena.standins import with_standins
+from grader.arena.system_calls import system_call_filter
 from grader.arena.workspace import Workspace
 
 LOOPBACK = "127.0.0.1"
 """As an address: not every machine knows the name localhost."""
 LIBSTDBUF = Path("/usr/libexec/coreutils/libstdbuf.so")
-LIFELINE = "echo >&{lifeline} && read -r _ <&{lifeline} && exec {lifeline}>&- || exit 125; "
-"""The first thing that runs says that it is there and waits for leave: an arena that has died gives none."""
-PLAIN_STEP = 'cd "$HOME" && exec "$@"'
-COPY_STEP = (
+HEAD = (
+    "echo >&{lifeline} && read -r _ <&{lifeline} && exec {lifeline}>&-"
+    ' && mapfile -d "" -t words <&{words} && exec {words}<&- || exit 125; '
+)
+"""The first thing that runs says that it is there and waits for leave: an arena that has died gives none. Then it reads
+its variables and arguments (`ros/launching.py`)."""
+TAKE = 'export -- "${words[@]:1:words[0]}"; set -- "${words[@]:1+words[0]}"; unset words; '
+"""From here on what is the package's holds: until then, every program runs as it does anywhere."""
+RUN = 'cd "$HOME" && exec "$@"'
+COPY = (
     f"mkdir {INSIDE_WORKSPACE} && cp -R --preserve=mode,links {SOURCES} {INSIDE_WORKSPACE}/"
-    f" && {{ [ ! -e {BUILT} ] || tar -xpf {BUILT} -C {INSIDE_WORKSPACE} devel 2>/dev/null || true; }}"
-    ' && cd "$HOME" && exec "$@"'
+    f" && {{ [ ! -e {BUILT} ] || tar -xpf {BUILT} -C {INSIDE_WORKSPACE} devel 2>/dev/null || true; }} || exit 125; "
 )
 """Each process tree has a workspace of its own: the sources, and what the build made of them."""
-BUILD_STEP = (
+BUILD_COPY = (
     f"mkdir {INSIDE_WORKSPACE} && cp -R --preserve=mode,links {SOURCES} {INSIDE_WORKSPACE}/"
     f" && {{ [ ! -e {BASE_WORKSPACE} ] || tar -xmf {BASE_WORKSPACE} -C {INSIDE_WORKSPACE} build"
-    f" || rm -rf {INSIDE_WORKSPACE}/build; }}"
-    ' && cd "$HOME" && { "$@" {collect}>&-; code=$?; }; '
+    f" || rm -rf {INSIDE_WORKSPACE}/build; }} || exit 125; "
+)
+BUILD_RUN = (
+    'cd "$HOME" && { "$@" {collect}>&-; code=$?; }; '
     f"tar -cf - -C {INSIDE_WORKSPACE} --ignore-failed-read devel -C {OUTPUT} . >&{{collect}} 2>/dev/null; exit $code"
 )
 """What the build made is handed over through a pipe, whatever came of it. The base workspace is as old as the build."""
 ARCHIVE = "built.tar"
 BASE = "base.tar"
+STAGE = "stage"
+"""The folder over which the arena mounts what sandboxes see (`ros/stage.py`)."""
+OUTPUT_FILES = 1_000
 OWN_VARIABLES = (
     "ROS_MASTER_URI",
     "ROS_IP",
@@ -170,54 +183,80 @@ class Place:
         copy: bool = True,
         as_handed_in: bool = False,
         collect: str | None = None,
+        collect_bytes: int | None = None,
         build: bool = False,
         **more: Any,  # noqa: ANN401 - fields of the spec
     ) -> dict[str, Any]:
         """What the arena needs to start a process. With `copy` it gets a workspace of its own: the sources with the
         repairs, or `as_handed_in`, and what the build made. `build` is the build itself. What the process writes to
-        `{collect}` becomes the file of that name in `workspace.kept`."""
+        `{collect}`, `collect_bytes` at most, becomes the file of that name in `workspace.kept`."""
         boxed = self.sandbox.bubblewrap
-        step = (BUILD_STEP if build else COPY_STEP) if copy and boxed else PLAIN_STEP
-        words = LIFELINE + self.sandbox.first_words(self.limits) + step
+        limits = self._limits(copy=copy)
         kept = None if collect is None else str(self.workspace.kept / collect)
-        command = self.sandbox.command(
-            ["/bin/bash", "-c", words, "bash", *argv],
-            ros=self.ros,
-            place=self.folder,
-            limits=self._limits(copy=copy),
-            binds=self._binds(copy=copy, as_handed_in=as_handed_in or build, output=build),
-            net=not (build or as_handed_in),
-            info=True,
-        )
+        filtered = system_call_filter() if boxed else None
         return {
             "name": name,
             "role": role,
-            "argv": command,
-            "argv_shown": list(argv),
+            "argv": list(argv),
             "env": self._process_env(),
-            "cwd": "/" if boxed else str(self.folder / "home"),
-            "sandboxed": boxed,
-            "collect": {"file": kept, "bytes": self.limits.built_bytes} if kept and boxed else None,
+            "outer": self.sandbox.outer(limits),
+            "bwrap": host_program("bwrap"),
+            "wall": self.sandbox.wall(
+                ros=self.ros,
+                place=self.folder,
+                limits=limits,
+                binds=self._binds(copy=copy, as_handed_in=as_handed_in or build, output=build),
+                net=role != "grader" or not as_handed_in,
+            ),
+            "filter": base64.b64encode(filtered).decode() if filtered else None,
+            "shell": ["/bin/bash", "-c", self._words(copy=copy and boxed, build=build), "bash"],
+            "collect": {"file": kept, "bytes": collect_bytes or self.limits.built_bytes}
+            if kept and boxed
+            else None,
             "script": None,
             "repairs": [],
             **more,
         }
+
+    def _words(self, *, copy: bool, build: bool) -> str:
+        """The script of the first shell. Nothing of the submission is in it."""
+        before, run = (BUILD_COPY, BUILD_RUN) if build else (COPY, RUN)
+        first = self.sandbox.first_words(self.limits) + HEAD
+        return first + (before + TAKE + run if copy else TAKE + RUN)
 
     def _limits(self, *, copy: bool) -> Limits:
         """A workspace of the size that was handed in has room beside what else may be written."""
         room = self.limits.home_bytes + (2 * self.workspace.copied_bytes if copy else 0)
         return self.limits.model_copy(update={"home_bytes": room})
 
-    def _binds(self, *, copy: bool, as_handed_in: bool, output: bool) -> list[str]:
+    def _binds(self, *, copy: bool, as_handed_in: bool, output: bool) -> list[Word]:
         if not copy:
             return []
         workspace = self.workspace
         sources = workspace.built / "src" if as_handed_in else workspace.repaired
-        binds = ["--ro-bind", str(workspace.large), LARGE, "--ro-bind", str(sources), SOURCES]
+        binds: list[Word] = [
+            "--ro-bind",
+            copy_of(workspace.large),
+            LARGE,
+            "--ro-bind",
+            copy_of(sources),
+            SOURCES,
+        ]
         if output:
-            base = ["--ro-bind", str(self.base), BASE_WORKSPACE] if self.base.is_file() else []
-            return [*binds, *base, "--size", str(self.limits.tmp_bytes), "--tmpfs", OUTPUT]
-        return [*binds, "--ro-bind", str(self.archive), BUILT] if self.archive.is_file() else binds
+            base: list[Word] = (
+                ["--ro-bind", copy_of(self.base), BASE_WORKSPACE] if self.base.is_file() else []
+            )
+            return [*binds, *base, "--bind", scratch(self.limits.tmp_bytes, OUTPUT_FILES), OUTPUT]
+        return [*binds, "--ro-bind", copy_of(self.archive), BUILT] if self.archive.is_file() else binds
+
+    def stage(self) -> dict[str, Any] | None:
+        """Where the arena makes its stage, and the user who writes there; None without a sandbox."""
+        if not self.sandbox.bubblewrap:
+            return None
+        folder = self.folder / STAGE
+        folder.mkdir(mode=0o711, exist_ok=True)
+        folder.chmod(0o711)
+        return {"folder": str(folder), "owner": self.sandbox.uid or os.geteuid()}
 
     def _process_env(self) -> dict[str, str]:
         home = HOME if self.sandbox.bubblewrap else str(self.folder / "home")

@@ -19,7 +19,16 @@ DEBIAN_PACKAGES = (
 )
 INSTALL_HINT = f"on Debian 12: apt-get install {DEBIAN_PACKAGES} (or: make setup)"
 SYSTEM_PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
-KEPT = ("ROS_", "PYTHONPATH", "CMAKE_PREFIX_PATH", "LD_LIBRARY_PATH", "PKG_CONFIG_PATH", "PATH")
+ROS_VARIABLES = frozenset(
+    (
+        "CMAKE_PREFIX_PATH", "LD_LIBRARY_PATH", "PATH", "PKG_CONFIG_PATH", "PYTHONPATH", "ROSCONSOLE_FORMAT",
+        "ROSLISP_PACKAGE_DIRECTORIES", "ROS_DISTRO", "ROS_ETC_DIR", "ROS_LANG_DISABLE", "ROS_OS_OVERRIDE",
+        "ROS_PACKAGE_PATH", "ROS_PYTHON_VERSION", "ROS_ROOT", "ROS_VERSION",
+    )
+)  # fmt: skip
+"""What ROS's `setup.bash` sets, and a workspace's extends. Nothing else of an environment is passed on."""
+DUMP_BYTES, NAMES_MAX, VALUE_BYTES = 64 << 10, 200, 8 << 10
+NAME_SHOWN = 60
 
 
 class RosInstallation(Record):
@@ -131,9 +140,20 @@ def parse_env(dump: bytes) -> dict[str, str]:
     return {name: value for name, _, value in pairs}
 
 
+def excess_of(dump: bytes) -> str:
+    """What an environment that `env -0` printed has too much of, in words; empty where it keeps within bounds."""
+    entries = [entry for entry in dump.split(b"\0") if entry]
+    longest = max(entries, key=len, default=b"")
+    if len(dump) > DUMP_BYTES:
+        return f"more than {DUMP_BYTES >> 10} kB of variables"
+    if len(entries) > NAMES_MAX:
+        return f"{len(entries)} variables, of which {NAMES_MAX} are allowed"
+    if len(longest) > VALUE_BYTES:
+        name = longest.partition(b"=")[0][:NAME_SHOWN].decode(errors="replace")
+        return f"a variable of more than {VALUE_BYTES >> 10} kB ({name})"
+    return ""
+
+
 def keep_ros_variables(env: Mapping[str, str]) -> dict[str, str]:
-    """Only what ROS set: no secret of the shell's goes on to a student's process."""
-    kept = {k: v for k, v in env.items() if k.startswith(KEPT)}
-    for name in ("ROS_MASTER_URI", "ROS_IP", "ROS_HOSTNAME"):
-        kept.pop(name, None)
-    return kept
+    """Only what ROS sets: no secret of the shell's goes on to a student's process, and no other program's setting."""
+    return {name: value for name, value in env.items() if name in ROS_VARIABLES}

@@ -1,7 +1,7 @@
-"""The wall around a student process tree: bubblewrap's command line, and whether it can be had here.
+"""The wall around a student process tree: bubblewrap's arguments, and whether it can be had here.
 
-Only command lines are made here; nothing is run but the probe that asks whether they work. The arena itself has a
-network of its own (`ros/network.py`).
+Only arguments are made here; nothing is run but the probe that asks whether they work. The arena starts the programs
+(`ros/launching.py`) in namespaces of its own (`ros/namespaces.py`).
 """
 
 from __future__ import annotations
@@ -18,24 +18,31 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, TypeAlias
 
 from grader.arena.cgroups import Cgroups, find_cgroups
+from grader.arena.host_programs import host_program
 from grader.arena.inside import HOME, SHIMS, STANDINS
 from grader.arena.limits import Limits
 from grader.arena.ros_env import RosInstallation
+from grader.arena.system_calls import system_call_filter
 from grader.errors import HostError, SandboxMissing
 from grader.model.record import Record
 
 Mode = Literal["auto", "require", "none"]
+Word: TypeAlias = "str | dict[str, Any]"
+"""An argument, or what the arena puts into its place (`ros/launching.py`)."""
 
 ETC = (
     "alternatives", "ld.so.cache", "ld.so.conf", "ld.so.conf.d", "localtime", "timezone", "nsswitch.conf",
     "os-release", "debian_version", "lsb-release", "python3", "python3.11", "mime.types", "catkin", "ros",
     "ssl/openssl.cnf",
 )  # fmt: skip
+OWN_ETC = ("passwd", "group", "hosts")
 OWN_FOLDER = Path(__file__).resolve().parent.parent
-NETWORK = Path(__file__).parent / "ros" / "network.py"
+NAMESPACES = Path(__file__).parent / "ros" / "namespaces.py"
+FIRST_ENV = {"PATH": "/usr/bin:/bin", "LANG": "C.UTF-8"}
+"""Of the first shell behind the wall, which then sets what the process is to have."""
 WALLS = ("--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try")
 NO_NESTING = "--disable-userns"
 UID_MAP = Path("/proc/self/uid_map")
@@ -46,6 +53,21 @@ COUNTS_BY_NAMESPACE = (5, 14)
 """Since this kernel RLIMIT_NPROC counts the processes of a user namespace, before it all of the user's."""
 ULIMIT_HINT = "raise what this shell allows (`ulimit -Ha` shows it), then grade again"
 INSTALL_HINT = "apt-get install bubblewrap (in a container: allow user namespaces, or run it privileged)"
+
+
+def copy_of(path: Path) -> Word:
+    """A copy of that file or folder, in memory, which tells nothing of where it comes from."""
+    return {"copy": str(path)}
+
+
+def scratch(size_bytes: int, files: int) -> Word:
+    """New memory for files."""
+    return {"scratch": [size_bytes, files]}
+
+
+def descriptor(name: str) -> Word:
+    """The number of a descriptor that is passed on."""
+    return {"descriptor": name}
 
 
 class Sandbox(Record):
@@ -67,36 +89,33 @@ class Sandbox(Record):
         who = "as root for an unprivileged user" if self.uid else "unprivileged"
         return f"bubblewrap, {who}; memory held by {self.cgroups.label}"
 
-    def command(
-        self,
-        argv: Sequence[str],
-        *,
-        ros: RosInstallation,
-        place: Path,
-        limits: Limits,
-        binds: Sequence[str],
-        net: bool,
-        info: bool,
-    ) -> list[str]:
-        """The command that runs `argv`, and all that it starts, inside of the walls. `place` is the run's own folder
-        (see `inside.prepare`), `binds` bubblewrap arguments. Only tmpfs of fixed size can be written, and what `binds`
-        give."""
-        drop = ["setpriv", f"--reuid={self.uid}", f"--regid={self.uid}", "--clear-groups"] if self.uid else []
-        drop += ["prlimit", *self.rlimits(limits), "--"]
+    def outer(self, limits: Limits) -> list[str]:
+        """The programs of this machine that come first: they take rights away and set limits."""
+        drop = [f"--reuid={self.uid}", f"--regid={self.uid}", "--clear-groups"]
+        become = [_program("setpriv"), *drop] if self.uid else []
+        return [*become, _program("prlimit"), *self.rlimits(limits), "--"]
+
+    def wall(
+        self, *, ros: RosInstallation, place: Path, limits: Limits, binds: Sequence[Word], net: bool
+    ) -> list[Word] | None:
+        """bubblewrap's arguments, None where there is none. `place` is the run's own folder (see `inside.prepare`),
+        `binds` are more arguments. Only memory of fixed size can be written: the scratches, and what `binds` give."""
         if not self.bubblewrap:
-            return [*drop, *argv]
+            return None
+        etc = [
+            word for name in OWN_ETC for word in ("--ro-bind", copy_of(place / "etc" / name), f"/etc/{name}")
+        ]
         return [
-            *drop, "bwrap", *_system(ros), "--proc", "/proc",
-            "--dev", "/dev", *_tmpfs("/dev/shm", limits.shared_bytes), "--remount-ro", "/dev",  # noqa: S108 - its own
-            *_tmpfs("/tmp", limits.tmp_bytes), *_tmpfs(HOME, limits.home_bytes),  # noqa: S108 - its own
-            "--ro-bind", str(place / "etc" / "passwd"), "/etc/passwd",
-            "--ro-bind", str(place / "etc" / "group"), "/etc/group",
-            "--ro-bind", str(place / "etc" / "hosts"), "/etc/hosts",
-            "--ro-bind", str(place / "bin"), SHIMS, "--ro-bind", str(place / "standins"), STANDINS, *binds,
+            *_system(ros), "--proc", "/proc", "--dev", "/dev",
+            "--bind", scratch(limits.shared_bytes, limits.shared_files), "/dev/shm", "--remount-ro", "/dev",  # noqa: S108 - its own
+            "--bind", scratch(limits.tmp_bytes, limits.tmp_files), "/tmp",  # noqa: S108 - its own
+            "--bind", scratch(limits.home_bytes, limits.home_files), HOME, *etc,
+            "--ro-bind", copy_of(place / "bin"), SHIMS, "--ro-bind", copy_of(place / "standins"), STANDINS, *binds,
             "--remount-ro", "/", "--uid", "1000", "--gid", "1000", "--hostname", "localhost", "--chdir", HOME,
             *WALLS, *([] if self.nesting else [NO_NESTING]), *([] if net else ["--unshare-net"]),
-            "--cap-drop", "ALL", "--new-session", "--die-with-parent",
-            *(["--info-fd", "{info_fd}"] if info else []), "--", *argv,
+            "--cap-drop", "ALL", "--new-session", "--die-with-parent", "--info-fd", descriptor("info"),
+            *(["--seccomp", descriptor("seccomp")] if system_call_filter() else []),
+            "--clearenv", *(word for pair in FIRST_ENV.items() for word in ("--setenv", *pair)),
         ]  # fmt: skip
 
     def first_words(self, limits: Limits) -> str:
@@ -114,17 +133,20 @@ class Sandbox(Record):
         yield f"--as={limits.address_space_bytes}"
         yield f"--cpu={limits.cpu_s:.0f}:{limits.cpu_s + 10:.0f}"
         yield "--core=0"
+        yield f"--memlock={limits.locked_bytes}"
+        yield "--msgqueue=0"
         if self.uid and not self._counts_apart():
             yield f"--nproc={limits.tasks}"
 
 
-def _tmpfs(path: str, size_bytes: int) -> list[str]:
-    return ["--size", str(size_bytes), "--tmpfs", path]
+def _program(name: str) -> str:
+    """Where the machine has it; `choose` has seen that it does."""
+    return host_program(name) or f"/usr/bin/{name}"
 
 
-def _system(ros: RosInstallation) -> list[str]:
+def _system(ros: RosInstallation) -> list[Word]:
     """The system's programs, and not the grader: where it lies among them, its folder is empty."""
-    argv = ["--ro-bind", "/usr", "/usr"]
+    argv: list[Word] = ["--ro-bind", "/usr", "/usr"]
     shown = [Path("/usr")]
     for name in ("bin", "sbin", "lib", "lib32", "lib64", "libx32"):
         path = Path("/") / name
@@ -138,7 +160,7 @@ def _system(ros: RosInstallation) -> list[str]:
         argv += ["--ro-bind", prefix, prefix]
         shown.append(Path(prefix).resolve())
     if any(OWN_FOLDER.is_relative_to(folder) for folder in shown):
-        argv += _tmpfs(str(OWN_FOLDER), 4096)
+        argv += ["--size", "4096", "--tmpfs", str(OWN_FOLDER)]
     return argv
 
 
@@ -213,9 +235,11 @@ def why_not() -> str:
 @lru_cache(maxsize=2)
 def _refusal(*more: str) -> str:
     """What this machine says to a sandbox with these arguments; empty where it makes one."""
-    drop = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"] if os.geteuid() == 0 else []
-    walled = ["bwrap", "--ro-bind", "/", "/", "--proc", "/proc", *WALLS, *more, "/bin/true"]
-    command = [sys.executable, "-I", str(NETWORK), *drop, *walled]
+    drop = (
+        [_program("setpriv"), "--reuid=65534", "--regid=65534", "--clear-groups"] if os.geteuid() == 0 else []
+    )
+    walled = [_program("bwrap"), "--ro-bind", "/", "/", "--proc", "/proc", *WALLS, *more, "/bin/true"]
+    command = [sys.executable, "-I", str(NAMESPACES), *drop, *walled]
     try:
         done = subprocess.run(command, capture_output=True, check=False, timeout=20)
     except subprocess.TimeoutExpired:

@@ -177,7 +177,7 @@ class ArenaSession:
         self.rosout_up = rosout is None  # then nobody need wait for it
         return {
             "master": self._master,
-            "own_network": self.place.sandbox.bubblewrap,
+            "stage": self.place.stage(),
             "cgroups": self.place.sandbox.cgroups.model_dump(),
             "port": PORT if self.place.sandbox.bubblewrap else 0,
             "limits": self.place.limits.model_dump(),

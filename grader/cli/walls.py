@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from grader.arena.cgroups import describe, find_cgroups
-from grader.arena.sandbox import NETWORK, ULIMIT_HINT, choose, refused_limits, why_not
+from grader.arena.sandbox import NAMESPACES, ULIMIT_HINT, choose, refused_limits, why_not
 from grader.cli.row import Row
 from grader.errors import HostError
 from grader.portable import user_id
@@ -33,7 +33,7 @@ def walls() -> Iterator[Row]:
     """A row for each part, then one for what `--sandbox auto` makes of them."""
     yield from map(_program, PROGRAMS)
     yield _probe("user namespaces", ["unshare", "--user", "--pid", "--fork", "true"], drop=user_id() == 0)
-    yield _probe("network", [sys.executable, "-I", str(NETWORK), "true"], drop=False)
+    yield _probe("network", [sys.executable, "-I", str(NAMESPACES), "/bin/true"], drop=False)
     held = find_cgroups().memory is not None
     yield Row(
         name="limits", state="ok" if held else "limited", detail=describe(), mend="" if held else DELEGATE

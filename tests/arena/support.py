@@ -8,11 +8,13 @@ import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+import pytest
+
 from grader.arena.inside import prepare
 from grader.arena.limits import Limits
 from grader.arena.place import Place
 from grader.arena.ros_env import require_ros
-from grader.arena.sandbox import choose
+from grader.arena.sandbox import choose, why_not
 from grader.arena.scenario import run_scenario
 from grader.arena.workspace import make_workspace, run_in_place
 from grader.evidence.reader import load_run
@@ -31,6 +33,7 @@ CMAKE = (
 )
 SCRIPT = "#!/usr/bin/env python3\n"
 RUN_S = 60.0
+needs_sandbox = pytest.mark.skipif(bool(why_not()), reason=f"no sandbox here: {why_not()}")
 
 
 def make_submission(folder: Path, files: Mapping[str, str]) -> Submission:

@@ -177,7 +177,7 @@ def test_environment_hooks_lead_no_node_elsewhere(tmp_path: Path) -> None:
     hook = "catkin_add_env_hooks(50.lab SHELLS sh DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/hooks)\n"
     files = {
         "CMakeLists.txt": CMAKE + hook,
-        "hooks/50.lab.sh": "export ROS_MASTER_URI=http://192.0.2.1:1 ROS_IP=192.0.2.1 ROS_LAB=mine\n",
+        "hooks/50.lab.sh": "export ROS_MASTER_URI=http://192.0.2.1:1 ROS_IP=192.0.2.1 ROS_ETC_DIR=/mine ROS_LAB=mine\n",
         "src/node.py": SCRIPT,
     }
     with make_place(files) as place:
@@ -186,7 +186,8 @@ def test_environment_hooks_lead_no_node_elsewhere(tmp_path: Path) -> None:
             built, outcome = asyncio.run(build(place, writer, [], []))
         env = built.spec("node", ["true"])["env"]
     assert outcome.ok
-    assert (env["ROS_LAB"], env["ROS_IP"], env.get("ROS_MASTER_URI")) == ("mine", "127.0.0.1", None)
+    assert (env["ROS_ETC_DIR"], env["ROS_IP"]) == ("/mine", "127.0.0.1")
+    assert not {"ROS_LAB", "ROS_MASTER_URI"} & env.keys()
 
 
 V1 = "30 20 0:26 / /sys/fs/cgroup/memory rw,relatime shared:9 - cgroup cgroup rw,memory\n"

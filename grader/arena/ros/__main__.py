@@ -2,7 +2,8 @@
 
 Runs under ROS's own interpreter and imports nothing but the standard library and ROS. The first line configures it:
 `master` (false for a build, which needs none), `port`, `limits`, `suffix` (of its nodes' names), `rosout` (a process
-spec, or null). When stdin ends, all ends.
+spec, or null), `stage` (the folder over which what sandboxes see is mounted, and the user who writes there; null
+without a sandbox). When stdin ends, all ends.
 """
 
 import base64
@@ -18,8 +19,9 @@ from groups import Groups
 from host import Lateness, peak_bytes
 from keys import leave_keys_behind
 from loop import Loop
-from network import enter_own_network
+from namespaces import enter_own_namespaces
 from processes import Process, kill_orphans, reap_all
+from stage import Stage
 from template import stand_by
 from wire import Wire, set_clock
 
@@ -37,6 +39,7 @@ class Arena:
         self._limits = config["limits"]
         self._cgroups = config["cgroups"]
         self._groups = []
+        self._stage = Stage(**config["stage"]) if config["stage"] else None
         self._processes = {}
         self._finishing = False
         self._clock = None
@@ -106,7 +109,7 @@ class Arena:
         try:
             groups = self._new_groups() if spec["role"] != "grader" else None
             self._processes[spec["name"]] = Process(
-                self.loop, self._wire, spec, self._limits, self._exited, groups=groups
+                self.loop, self._wire, spec, self._limits, self._exited, groups=groups, stage=self._stage
             )
         except OSError as error:
             self._wire.status("spawn-failed", name=spec["name"], detail=str(error))
@@ -252,8 +255,8 @@ def live():
         return  # the grader was ended before it could say anything
     config = json.loads(line.decode())
     leave_keys_behind()
-    if config["own_network"]:
-        enter_own_network()
+    if config["stage"]:
+        enter_own_namespaces()
     calibration = Calibration() if config["master"] else None
     arena = Arena(wire, config, calibration)
     arena.loop.run()

@@ -4,10 +4,9 @@ import contextlib
 import json
 import os
 import signal
-import socket
-import subprocess
 import time
 
+from launching import launch
 from streams import Collected, Lines
 from tree import cpu_s, descendants, resident_bytes
 
@@ -16,12 +15,13 @@ WORDS_BYTES = 200
 
 
 class Process:
-    """One process tree. `spec`: name, role, argv, env, cwd, sandboxed, collect, script, repairs.
+    """One process tree. `spec` is made by `Place.spec` (grader/arena/place.py): name, role, argv, env, outer, bwrap,
+    wall, filter, shell, collect, script, repairs.
 
     `collect` names a file for what the process writes to `{collect}`, and how many bytes of it are taken.
     """
 
-    def __init__(self, loop, wire, spec, limits, on_exit, *, groups=None):
+    def __init__(self, loop, wire, spec, limits, on_exit, *, groups=None, stage=None):
         self.name = spec["name"]
         self.role = spec["role"]
         self.alive = True
@@ -40,9 +40,10 @@ class Process:
         self._open_streams = 0
         self._status = None
         self._groups = groups
+        self._stage = stage
         self._collected = None
         self._spawn(spec)
-        self._event("start", argv=spec["argv_shown"], script=spec["script"], repairs=spec["repairs"])
+        self._event("start", argv=spec["argv"], script=spec["script"], repairs=spec["repairs"])
         loop.call_later(WATCH_S, self._watch)
 
     def interrupt(self):
@@ -98,35 +99,19 @@ class Process:
         self._peak_bytes = max(self._peak_bytes, usage.ru_maxrss * 1024)
 
     def _spawn(self, spec):
-        lifeline, theirs = socket.socketpair()
-        info_r, info_w = os.pipe() if spec["sandboxed"] else (None, None)
-        collect_r, collect_w = os.pipe() if spec["collect"] else (None, None)
-        passed = {"{lifeline}": theirs.fileno(), "{info_fd}": info_w, "{collect}": collect_w}
-        numbers = {name: str(number) for name, number in passed.items() if number is not None}
-        self._popen = subprocess.Popen(
-            [_filled_in(argument, numbers) for argument in spec["argv"]],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env=spec["env"],
-            cwd=spec["cwd"],
-            pass_fds=[number for number in passed.values() if number is not None],
-            start_new_session=True,
-        )
+        launched = launch(spec, self._stage, self._groups)
+        self._popen = launched.popen
+        self._scratches = launched.scratches
         self.pid = self._popen.pid
-        theirs.close()
-        for number in (info_w, collect_w):
-            if number is not None:
-                os.close(number)
-        if info_r is not None:
-            self._read_info(info_r)
-        self._give_leave(lifeline)
+        if launched.info is not None:
+            self._read_info(launched.info)
+        self._give_leave(launched.lifeline)
         for name, pipe in (("stdout", self._popen.stdout), ("stderr", self._popen.stderr)):
             self._open_streams += 1
             Lines(self, name, pipe)
-        if collect_r is not None:
+        if launched.collect is not None:
             self._open_streams += 1
-            self._collected = Collected(self, collect_r, **spec["collect"])
+            self._collected = Collected(self, launched.collect, **spec["collect"])
 
     def _give_leave(self, lifeline):
         """The process is in its sandbox, which ends with the arena, and only now runs what it is to run."""
@@ -240,8 +225,9 @@ class Process:
         record = {"process": self.name, "stream": stream, "line": text, "truncated": cut}
         self._wire.event("/grader/console", record)
 
-    def too_much_collected(self):
-        self._limit("what the build left is more than {} MB".format(self._limits["built_bytes"] >> 20))
+    def too_much_collected(self, limit_bytes):
+        size = "{} MB".format(limit_bytes >> 20) if limit_bytes >> 20 else "{} kB".format(limit_bytes >> 10)
+        self._limit("what the build left is more than {}".format(size))
 
     def stream_closed(self):
         self._open_streams -= 1
@@ -258,6 +244,8 @@ class Process:
         if self._collected is not None:
             self._collected.close()
         self._leave_groups()
+        for name in self._scratches:
+            self._stage.give_up(name)
         if not self._entered and self._stopped_by is None:
             why = "its sandbox was not made: {}".format(self._last_line or "it said nothing")
             self._wire.status("spawn-failed", name=self.name, detail=why)
@@ -285,12 +273,6 @@ class Process:
     def _event(self, event, **fields):
         fields.update(event=event, name=self.name, role=self.role)
         self._wire.event("/grader/process", fields)
-
-
-def _filled_in(argument, numbers):
-    for name, number in numbers.items():
-        argument = argument.replace(name, number)
-    return argument
 
 
 def kill_orphans():

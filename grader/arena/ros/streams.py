@@ -49,7 +49,7 @@ class Collected:
         self._process = process
         self._descriptor = descriptor
         self._path = file
-        self._left_bytes = bytes
+        self._limit_bytes = self._left_bytes = bytes
         self._file = open(file + ".part", "wb")  # noqa: SIM115 - stays open until the process has ended
         os.set_blocking(descriptor, False)
         process.loop.add_reader(descriptor, self._readable)
@@ -90,4 +90,4 @@ class Collected:
             os.replace(part, self._path)
         else:
             os.unlink(part)
-            self._process.too_much_collected()
+            self._process.too_much_collected(self._limit_bytes)
