@@ -21,7 +21,7 @@ from grader.arena.system_calls import FILTERS, MACHINES
 
 FILES = """
 access alarm brk chdir chmod chown close close_range copy_file_range creat dup dup2 dup3 faccessat faccessat2
-fadvise64 fallocate fchdir fchmod fchmodat fchmodat2 fchown fchownat fcntl fdatasync fgetxattr flistxattr flock
+fadvise64 fallocate fchdir fchmod fchmodat fchmodat2 fchown fchownat fdatasync fgetxattr flistxattr
 fremovexattr fsetxattr fstat fstatfs fsync ftruncate futimesat getcwd getdents getdents64 getxattr ioctl lchown
 lgetxattr link linkat listxattr llistxattr lremovexattr lseek lsetxattr lstat mkdir mkdirat mknod mknodat newfstatat
 open openat openat2 pipe pipe2 pread64 preadv preadv2 pwrite64 pwritev pwritev2 read readahead readlink readlinkat
@@ -29,7 +29,7 @@ readv removexattr rename renameat renameat2 rmdir sendfile setxattr splice stat 
 sync_file_range syncfs tee truncate umask unlink unlinkat utime utimensat utimes write writev
 """
 MEMORY = """
-get_mempolicy madvise membarrier mincore mlock mlock2 mlockall mmap mprotect mremap msync munlock munlockall munmap
+madvise membarrier mincore mlock mlock2 mlockall mmap mprotect mremap msync munlock munlockall munmap
 pkey_alloc pkey_free pkey_mprotect
 """
 PROCESSES = """
@@ -58,6 +58,11 @@ NEW_NAMESPACES = 0x7E020080
 """CLONE_NEWNS, NEWCGROUP, NEWUTS, NEWIPC, NEWUSER, NEWPID, NEWNET, NEWTIME (man 2 clone, linux/sched.h)."""
 PERSONALITIES = (0x0, 0x8, 0x20000, 0x20008, 0xFFFFFFFF, 0x0040000)
 """Linux as it is, with 32 bits' words for uname, asked for, and without random addresses (man 2 personality)."""
+FCNTL = (0, 1, 2, 3, 4, 8, 9, 10, 11, 15, 16, 17, 1025, 1030, 1031, 1032, 1033, 1034, 1035, 1036, 1037, 1038)
+"""What is asked of a descriptor itself (linux/fcntl.h): no leases, no notices of what others do to a file."""
+FCNTL_LOCKS = (5, 6, 7, 36, 37, 38)
+"""Files of the system are shared: two sandboxes could signal to each other by locks on them. So a lock is granted, and
+not taken: a program that locks a file of its own goes on."""
 NETLINK_ROUTE = 0
 KINDS = 0xF
 """The bits of a socket's type that are no flags."""
@@ -87,20 +92,13 @@ def _add_rules(made: Any, libseccomp: Any, processor: int) -> None:  # noqa: ANN
         if libseccomp.resolve_syscall(processor, name) >= 0:  # every processor has its own
             made.add_rule(allow, name)
     made.add_rule(allow, "clone", argument(0, libseccomp.MASKED_EQ, NEW_NAMESPACES, 0))
+    made.add_rule(libseccomp.ERRNO(0), "flock")
+    for command in FCNTL:
+        made.add_rule(allow, "fcntl", argument(1, libseccomp.EQ, command))
+    for command in FCNTL_LOCKS:
+        made.add_rule(libseccomp.ERRNO(0), "fcntl", argument(1, libseccomp.EQ, command))
     for wanted in PERSONALITIES:
         made.add_rule(allow, "personality", argument(0, libseccomp.EQ, wanted))
-    made.add_rule(allow, "socketpair", argument(0, libseccomp.EQ, socket.AF_UNIX))
-    for family, kinds, protocols in _sockets():
-        for kind in kinds:
-            for protocol in protocols:
-                made.add_rule(
-                    allow, "socket", argument(0, libseccomp.EQ, family),
-                    argument(1, libseccomp.MASKED_EQ, KINDS, kind), argument(2, libseccomp.EQ, protocol),
-                )  # fmt: skip
-    known = {family for family, _, _ in _sockets()}
-    for family in set(range(FAMILIES_MAX + 1)) - known:
-        made.add_rule(libseccomp.ERRNO(errno.EAFNOSUPPORT), "socket", argument(0, libseccomp.EQ, family))
-    made.add_rule(libseccomp.ERRNO(errno.EAFNOSUPPORT), "socket", argument(0, libseccomp.GT, FAMILIES_MAX))
     refused = libseccomp.ERRNO(errno.EPERM)
     for name in (
         "unshare",
@@ -115,6 +113,23 @@ def _add_rules(made: Any, libseccomp: Any, processor: int) -> None:  # noqa: ANN
         "add_key",
     ):
         made.add_rule(refused, name)
+    _add_socket_rules(made, libseccomp)
+
+
+def _add_socket_rules(made: Any, libseccomp: Any) -> None:  # noqa: ANN401 - as above
+    allow, argument = libseccomp.ALLOW, libseccomp.Arg
+    made.add_rule(allow, "socketpair", argument(0, libseccomp.EQ, socket.AF_UNIX))
+    for family, kinds, protocols in _sockets():
+        for kind in kinds:
+            for protocol in protocols:
+                made.add_rule(
+                    allow, "socket", argument(0, libseccomp.EQ, family),
+                    argument(1, libseccomp.MASKED_EQ, KINDS, kind), argument(2, libseccomp.EQ, protocol),
+                )  # fmt: skip
+    known = {family for family, _, _ in _sockets()}
+    for family in set(range(FAMILIES_MAX + 1)) - known:
+        made.add_rule(libseccomp.ERRNO(errno.EAFNOSUPPORT), "socket", argument(0, libseccomp.EQ, family))
+    made.add_rule(libseccomp.ERRNO(errno.EAFNOSUPPORT), "socket", argument(0, libseccomp.GT, FAMILIES_MAX))
 
 
 def _sockets() -> tuple[tuple[int, tuple[int, ...], tuple[int, ...]], ...]:

@@ -23,6 +23,8 @@ KEYS = {
     ("memory", 2): "memory.max",
     ("pids", 1): "pids.max",
     ("pids", 2): "pids.max",
+    ("cpuacct", 1): "cpuacct.usage",
+    ("cpuacct", 2): "cpu.stat",
 }
 
 
@@ -38,6 +40,7 @@ class Cgroups(Record):
 
     memory: Cgroup | None = None
     pids: Cgroup | None = None
+    cpuacct: Cgroup | None = None
 
     @property
     def label(self) -> str:
@@ -47,12 +50,14 @@ class Cgroups(Record):
 @lru_cache(maxsize=1)
 def find_cgroups() -> Cgroups:
     """What is there and works: a group is made, limited and removed to see it."""
-    return Cgroups(memory=_find("memory"), pids=_find("pids"))
+    return Cgroups(memory=_find("memory"), pids=_find("pids"), cpuacct=_find("cpuacct"))
 
 
 def remove_groups(cgroups: Cgroups, arena: int) -> bool:
     """Remove the groups that an arena left which was killed, by its process id. False while processes are in them."""
-    folders = [Path(found.folder) for found in (cgroups.memory, cgroups.pids) if found is not None]
+    folders = [
+        Path(found.folder) for found in (cgroups.memory, cgroups.pids, cgroups.cpuacct) if found is not None
+    ]
     groups = [group for folder in folders for group in folder.glob(f"grader-{arena}-*")]
     for group in groups:
         with suppress(OSError):
@@ -124,6 +129,8 @@ def _usable(folder: Path, key: str) -> bool:
     except OSError:
         return False
     try:
+        if key.partition(".")[0].startswith("cpu"):
+            return (trial / key).is_file()
         (trial / key).write_text("1073741824" if key.startswith("memory") else "512")
     except OSError:
         return False

@@ -13,7 +13,7 @@ LEAST_RUN_BYTES = 8 << 20
 class Limits(Record):
     """Memory, processes, tasks (threads count), CPU seconds, output, `home_bytes` (what its home may hold besides the
     workspace's own files) and the number of files in each folder are of one process tree; messages and bytes of one
-    channel, or of one run (`run_bytes`, `channels`)."""
+    channel, or of one run (`run_bytes`, `channels`); so is what the buffers of its sockets hold (`socket_bytes`)."""
 
     memory_bytes: int = 1 << 30
     processes: int = 200
@@ -28,8 +28,11 @@ class Limits(Record):
     shared_bytes: int = 64 << 20
     shared_files: int = 1_000
     locked_bytes: int = 1 << 20
+    queued_signals: int = 1024
     file_bytes: int = 64 << 20
     open_files: int = 1024
+    descriptors: int = 8192
+    socket_bytes: int = 256 << 20
     address_space_bytes: int = 8 << 30
     built_bytes: int = 96 << 20
     channel_messages: int = 20_000

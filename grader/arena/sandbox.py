@@ -135,6 +135,9 @@ class Sandbox(Record):
         yield "--core=0"
         yield f"--memlock={limits.locked_bytes}"
         yield "--msgqueue=0"
+        yield "--rtprio=0"
+        yield "--nice=0"
+        yield f"--sigpending={limits.queued_signals}"
         if self.uid and not self._counts_apart():
             yield f"--nproc={limits.tasks}"
 

@@ -58,3 +58,48 @@ def test_events_of_version_2(tmp_path: Path, events: str, kills: int) -> None:
     (folder,) = tmp_path.iterdir()
     (folder / "memory.events").write_text(events)
     assert groups.memory_kills() == kills
+
+
+def test_version_2_has_one_group_for_all(tmp_path: Path) -> None:
+    found = {name: {"version": 2, "folder": str(tmp_path)} for name in ("memory", "pids", "cpuacct")}
+    groups = Groups(found, {"memory_bytes": 64 * MB, "tasks": 7})
+    (folder,) = tmp_path.iterdir()
+    assert ((folder / "memory.max").read_text(), (folder / "pids.max").read_text()) == (str(64 * MB), "7")
+    groups.take([4711])
+    assert (folder / "cgroup.procs").read_text() == "4711"
+    (folder / "cpu.stat").write_text("usage_usec 2500000\nuser_usec 1\n")
+    assert groups.cpu_s() == 2.5
+    assert not groups.remove()
+    for path in folder.iterdir():
+        path.unlink()
+    assert groups.remove()
+
+
+NOT_WAITED_FOR = """
+import os, signal, sys, time
+if sys.argv[1] == "ignore":
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+with open(sys.argv[2] + "/cgroup.procs", "w") as file: file.write("0")
+for _ in range(3):
+    pid = os.fork()
+    if not pid:
+        until = time.process_time() + 0.2
+        while time.process_time() < until: pass
+        os._exit(0)
+    try:
+        os.waitpid(pid, 0)
+    except ChildProcessError:
+        pass
+"""
+
+
+@pytest.mark.parametrize("how", ["ignore", "wait"])
+def test_time_of_children_that_nobody_waited_for_is_counted(how: str) -> None:
+    found = find_cgroups().cpuacct
+    if found is None:
+        pytest.skip("needs a control group that counts CPU time")
+    groups = Groups({"cpuacct": found.model_dump()}, {"memory_bytes": 1, "tasks": 1})
+    ((_, folder),) = groups._made.values()
+    subprocess.run([sys.executable, "-c", NOT_WAITED_FOR, how, folder], check=True)
+    assert 0.6 <= groups.cpu_s() < 30
+    assert groups.remove()

@@ -124,6 +124,88 @@ def test_without_cgroups_a_watchdog_holds_memory(
     assert limits_met(run) == ["stopped by the grader: more than 200 MB of memory"]
 
 
+SOCKETS = """
+import os, socket, time
+def fill():
+    kept = []
+    while True:
+        near, far = socket.socketpair()
+        near.setblocking(False)
+        kept += [near, far]
+        try:
+            while True: near.send(bytes(65536))
+        except BlockingIOError:
+            pass
+for _ in range(10):
+    if os.fork() == 0:
+        try:
+            fill()
+        except OSError:
+            time.sleep(60)
+time.sleep(60)
+"""
+DESCRIPTORS = """
+import os, time
+for _ in range(12):
+    if os.fork() == 0:
+        try:
+            while True: os.dup(0)
+        except OSError:
+            time.sleep(60)
+time.sleep(60)
+"""
+FILES = """
+import os, time
+for folder in ("/tmp", "/dev/shm"):
+    with open(folder + "/block", "wb", buffering=0) as file:
+        for _ in range(60): file.write(bytes(1 << 20))
+print("written")
+time.sleep(60)
+"""
+
+
+@needs_sandbox
+@pytest.mark.parametrize("groups", [True, False])
+@pytest.mark.parametrize(
+    "attack",
+    [
+        (SOCKETS, Limits(socket_bytes=64 << 20), "more than 64 MB in sockets"),
+        (DESCRIPTORS, Limits(), "more than 8192 files, pipes and sockets open"),
+        (FILES, Limits(memory_bytes=100 << 20), "more than 100 MB of memory"),
+    ],
+)
+def test_memory_that_no_process_counts(
+    attack: tuple[str, Limits, str], groups: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code, limits, words = attack
+    if not groups:
+        monkeypatch.setattr(sandbox, "find_cgroups", Cgroups)
+    run = run_script(tmp_path, code, limit_s=20, limits=limits)
+    assert exit_of(run).stopped_by == "KILL"
+    assert limits_met(run) == [f"stopped by the grader: {words}"]
+
+
+@needs_sandbox
+def test_the_number_of_files_is_bounded(tmp_path: Path) -> None:
+    code = """
+import os
+for folder in ("/tmp", "/dev/shm", os.environ["HOME"]):
+    number = 0
+    try:
+        while number < 5000:
+            open("%s/%d" % (folder, number), "w").close()
+            number += 1
+    except OSError as error:
+        print("full", folder, number, error.errno)
+"""
+    limits = Limits(home_files=3000, tmp_files=2000, shared_files=100)
+    lines = [line.split() for line in printed(run_script(tmp_path, code, limit_s=20, limits=limits))]
+    assert [(word[1], int(word[3])) for word in lines] == [
+        (folder, errno.ENOSPC) for folder in ("/tmp", "/dev/shm", "/home/student")
+    ]
+    assert [int(word[2]) < most for word, most in zip(lines, (2000, 100, 3000), strict=True)] == [True] * 3
+
+
 @needs_sandbox
 def test_a_fork_bomb_ends_in_its_own_sandbox(tmp_path: Path) -> None:
     code = """

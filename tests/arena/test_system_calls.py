@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from grader.arena.system_calls import FILTERS, MACHINES, system_call_filter
-from scripts.system_calls import ALLOWED, NEW_NAMESPACES, compile_filter
+from scripts.system_calls import ALLOWED, FCNTL, FCNTL_LOCKS, NEW_NAMESPACES, compile_filter
 from tests.arena.support import needs_sandbox, printed, run_script
 
 libseccomp = pytest.importorskip("pyseccomp", exc_type=(ImportError, RuntimeError))
@@ -89,6 +89,7 @@ def calls() -> Iterator[tuple[str, tuple[int, ...]]]:
         for kind in (1, 2, 3, 5, 0x80801, 10):
             for protocol in (0, 1, 6, 15, 17, 132, 262):
                 yield "socket", (family, kind, protocol)
+    yield from (("fcntl", (3, command)) for command in (*range(50), *range(1020, 1045), 1 << 33))
     yield from (("socketpair", (family, 1)) for family in (1, 2, 30))
     yield from (("personality", (value,)) for value in (0, 8, 0x20000, 0x40000, 0x400000, 0xFFFFFFFF))
 
@@ -164,6 +165,19 @@ def test_sockets(machine: str) -> None:
     for arguments in refused:
         assert run_filter(program, arch, number, *arguments) & 0xFFFF0000 == ERRNO, arguments
     assert run_filter(program, arch, number, 40, 1, 0) == ERRNO | errno.EAFNOSUPPORT
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_locks_are_granted_and_not_taken(machine: str) -> None:
+    program, arch = (FILTERS / f"{machine}.bpf").read_bytes(), ARCHES[machine]
+    fcntl = number_of(machine, "fcntl")
+    assert run_filter(program, arch, number_of(machine, "flock"), 3, 2) == ERRNO
+    answers = {command: run_filter(program, arch, fcntl, 3, command) for command in range(1100)}
+    assert {command for command, answer in answers.items() if answer == ERRNO} == set(FCNTL_LOCKS)
+    assert {command for command, answer in answers.items() if answer == ALLOW} == set(FCNTL)
+    assert (
+        run_filter(program, arch, fcntl, 3, 6 | 1 << 32) == ERRNO | errno.ENOSYS
+    )  # the kernel reads 32 bits
 
 
 def test_this_machine_has_one(monkeypatch: pytest.MonkeyPatch) -> None:

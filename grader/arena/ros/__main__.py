@@ -20,7 +20,8 @@ from host import Lateness, peak_bytes
 from keys import leave_keys_behind
 from loop import Loop
 from namespaces import enter_own_namespaces
-from processes import Process, kill_orphans, reap_all
+from processes import WATCH_S, Process, kill_orphans, reap_all
+from sockets import buffer_bytes
 from stage import Stage
 from template import stand_by
 from wire import Wire, set_clock
@@ -49,6 +50,7 @@ class Arena:
         self.loop.on_child(self._reap)
         self._lateness = Lateness(wire)
         self._lateness.start()
+        self.loop.call_later(WATCH_S, self._watch_sockets)
         if config["master"]:
             self._start_master(config)
         os.set_blocking(0, False)
@@ -222,6 +224,14 @@ class Arena:
             self._recorder.finish()
         self.loop.call_later(FINISH_S, self.loop.stop)
         self._end_when_empty()
+
+    def _watch_sockets(self):
+        """What sockets hold belongs to nobody: where it is too much, the tree with the most of them is stopped."""
+        students = [process for process in self._processes.values() if process.role != "grader"]
+        if self._stage and students and buffer_bytes() > self._limits["socket_bytes"]:
+            excess = "more than {} MB in sockets".format(self._limits["socket_bytes"] >> 20)
+            max(students, key=Process.descriptors).stop_for(excess)
+        self.loop.call_later(WATCH_S, self._watch_sockets)
 
     def _exited(self, process):
         del self._processes[process.name]

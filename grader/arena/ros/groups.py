@@ -17,21 +17,23 @@ KILLS = {1: "memory.oom_control", 2: "memory.events"}
 
 
 class Groups:
-    """`cgroups` maps `memory` and `pids` to {version, folder}, or to None (grader/arena/cgroups.py finds them)."""
+    """`cgroups` maps `memory`, `pids` and `cpuacct` to {version, folder}, or to None: grader/arena/cgroups.py finds
+    them."""
 
     def __init__(self, cgroups, limits):
         self._made = {}
-        wanted = {"memory": limits["memory_bytes"], "pids": limits["tasks"]}
+        wanted = {"memory": limits["memory_bytes"], "pids": limits["tasks"], "cpuacct": None}
         for controller, amount in wanted.items():
             found = cgroups.get(controller)
             if found:
                 self._make(controller, found["version"], found["folder"], amount)
 
     def _make(self, controller, version, parent, amount):
-        folder = os.path.join(parent, "grader-{}-{}".format(os.getpid(), secrets.token_hex(6)))
+        folder = self._shared(version, parent)
         try:
-            os.mkdir(folder)
-            _write(folder, KEYS[controller, version], amount)
+            os.makedirs(folder, exist_ok=True)
+            if amount is not None:
+                _write(folder, KEYS[controller, version], amount)
         except OSError:  # then the watchdog is alone
             with contextlib.suppress(OSError):  # it was not made at all
                 os.rmdir(folder)
@@ -41,13 +43,19 @@ class Groups:
             with contextlib.suppress(OSError):  # a kernel without swap accounting
                 _write(folder, SWAP[version], amount if version == 1 else 0)
 
+    def _shared(self, version, parent):
+        """Of version 2, a process is in one group only, which has all controllers."""
+        made = [folder for known, folder in self._made.values() if known == version == 2]
+        ours = "grader-{}-{}".format(os.getpid(), secrets.token_hex(6))
+        return made[0] if made and os.path.dirname(made[0]) == parent else os.path.join(parent, ours)
+
     @property
     def holds_memory(self):
         return "memory" in self._made
 
     def take(self, pids):
         """These processes, and all that they start from now on, belong to the groups."""
-        for _, folder in self._made.values():
+        for folder in {folder for _, folder in self._made.values()}:
             for pid in pids:
                 with contextlib.suppress(OSError):  # it has ended
                     _write(folder, "cgroup.procs", pid)
@@ -65,12 +73,21 @@ class Groups:
             reached = _number(folder, PEAK) > _number(folder, KEYS["memory", 1]) - NEAR_BYTES
         return events.get("oom_kill", 0) if reached else 0
 
+    def cpu_s(self):
+        """Of all that ever ran in the tree, waited for or not; None where no group counts it."""
+        if "cpuacct" not in self._made:
+            return None
+        version, folder = self._made["cpuacct"]
+        if version == 1:
+            return _number(folder, "cpuacct.usage") / 1e9
+        return dict(_rows(folder, "cpu.stat")).get("usage_usec", 0) / 1e6
+
     def remove(self):
         """Once its processes have ended. Gives back whether nothing is left."""
-        for controller, (_, folder) in list(self._made.items()):
+        for folder in {folder for _, folder in self._made.values()}:
             with contextlib.suppress(OSError):  # a process of it is still ending
                 os.rmdir(folder)
-                del self._made[controller]
+        self._made = {name: made for name, made in self._made.items() if os.path.exists(made[1])}
         return not self._made
 
 

@@ -58,6 +58,7 @@ def launch(spec, stage, groups):
             pass_fds=list(fds.values()),
             start_new_session=True,
         )
+        _go_first(popen.pid)
         if groups is not None:
             groups.take([popen.pid])
         if gate is not None:
@@ -65,6 +66,12 @@ def launch(spec, stage, groups):
                 os.write(gate, _joined(arguments))
         ours.pop_all()
     return Launched(popen, lifeline, info, collect, scratches)
+
+
+def _go_first(pid):
+    """Where the machine has no memory left, this tree ends before the grader does."""
+    with contextlib.suppress(OSError), open("/proc/{}/oom_score_adj".format(pid), "w") as file:
+        file.write("1000")
 
 
 def _words(spec, fds):

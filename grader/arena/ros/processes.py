@@ -8,7 +8,7 @@ import time
 
 from launching import launch
 from streams import Collected, Lines
-from tree import cpu_s, descendants, resident_bytes
+from tree import cpu_s, descendants, descriptors, resident_bytes
 
 WATCH_S = 0.5
 WORDS_BYTES = 200
@@ -176,14 +176,13 @@ class Process:
         if excess is None:
             self.loop.call_later(WATCH_S, self._watch)
         else:
-            self._stopped_for(excess)
-            self.kill()
+            self.stop_for(excess)
 
     def _excess(self, tree):
         """What the tree has too much of, in words, or None."""
-        size = sum(map(resident_bytes, tree))
+        size = sum(map(resident_bytes, tree)) + self._written_bytes()
         self._peak_bytes = max(self._peak_bytes, size)
-        used_s = sum(map(cpu_s, tree))
+        used_s = self.cpu_used_s()
         if self._groups is not None and self._groups.memory_kills():
             return self._too_much_memory()
         held = self._groups is not None and self._groups.holds_memory
@@ -193,10 +192,31 @@ class Process:
             return "more than {} processes".format(self._limits["processes"])
         if used_s > self._limits["cpu_s"]:
             return "more than {:g} s of CPU time".format(self._limits["cpu_s"])
+        if self.descriptors() > self._limits["descriptors"]:
+            return "more than {} files, pipes and sockets open".format(self._limits["descriptors"])
         return None
+
+    def cpu_used_s(self):
+        """Of the tree, also of what has ended. A control group counts children that nobody waited for, too."""
+        counted_s = self._groups.cpu_s() if self._groups is not None else None
+        return max(counted_s or 0.0, sum(map(cpu_s, self.tree())))
+
+    def _written_bytes(self):
+        """Files in memory: they are nobody's resident pages."""
+        return sum(self._stage.used_bytes(name) for name in self._scratches)
+
+    def descriptors(self):
+        """Of the whole tree."""
+        return sum(map(descriptors, self.tree()))
 
     def _too_much_memory(self):
         return "more than {} MB of memory".format(self._limits["memory_bytes"] >> 20)
+
+    def stop_for(self, excess):
+        """Kill it, and say what it had too much of."""
+        if self.alive:
+            self._stopped_for(excess)
+            self.kill()
 
     def _stopped_for(self, excess):
         self._limit("stopped by the grader: {}".format(excess))
@@ -243,6 +263,8 @@ class Process:
         self.alive = False
         if self._collected is not None:
             self._collected.close()
+        if self._groups is not None:
+            self._cpu_s = max(self._cpu_s, self._groups.cpu_s() or 0.0)
         self._leave_groups()
         for name in self._scratches:
             self._stage.give_up(name)

@@ -10,11 +10,17 @@ import struct
 
 NETLINK_SOCK_DIAG = 4
 SOCK_DIAG_BY_FAMILY = 20
+UNIX_SHOW_MEMORY, UNIX_MEMORY = 0x20, 5
+INET_SHOW_MEMORY, INET_MEMORY = 1 << 6, 7
+UNIX_ANSWER_BYTES, INET_ANSWER_BYTES = 16, 72
 REQUEST, DUMP = 0x1, 0x300
 ERROR, DONE = 2, 3
 LISTEN, ALL_STATES = 10, 0xFFFFFFFF
 TABLES = ("/proc/net/tcp", "/proc/net/tcp6")
 _HEADER = struct.Struct("=IHHII")
+_UNIX = struct.Struct("=BBHIIIQ")
+_ATTRIBUTE = struct.Struct("=HH")
+_MEMORY = struct.Struct("=III")
 _ID = struct.Struct("!HH16s16s4x8s")
 _ANSWER_INODE = struct.Struct("=4x48x16xI")
 _NO_COOKIE = b"\xff" * 8
@@ -42,6 +48,50 @@ def connected(near, far):
     except OSError:
         found = _listed(near[1], far[1])
     return [inode for state, inode in found if state != LISTEN]
+
+
+def buffer_bytes():
+    """What the buffers of all sockets of this network namespace hold: no process's memory counts it."""
+    unix = _UNIX.pack(socket.AF_UNIX, 0, 0, ALL_STATES, 0, UNIX_SHOW_MEMORY, 0)
+    questions = [(unix, UNIX_ANSWER_BYTES, UNIX_MEMORY)]
+    for family in (socket.AF_INET, socket.AF_INET6):
+        for protocol in (socket.IPPROTO_TCP, socket.IPPROTO_UDP):
+            head = struct.pack("=BBBBI", family, protocol, INET_SHOW_MEMORY, 0, ALL_STATES)
+            question = head + _ID.pack(0, 0, bytes(16), bytes(16), _NO_COOKIE)
+            questions.append((question, INET_ANSWER_BYTES, INET_MEMORY))
+    return sum(_memory_bytes(*question) for question in questions)
+
+
+def _memory_bytes(question, answer_bytes, wanted):
+    """Of the sockets that the kernel answers with; 0 where it does not answer such questions."""
+    held = 0
+    with contextlib.suppress(OSError):
+        for body in _dump(question):
+            at = answer_bytes
+            while at + _ATTRIBUTE.size <= len(body):
+                length, kind = _ATTRIBUTE.unpack_from(body, at)
+                if kind == wanted and length >= _ATTRIBUTE.size + _MEMORY.size:
+                    received, _, sent = _MEMORY.unpack_from(body, at + _ATTRIBUTE.size)
+                    held += received + sent
+                at += max(_ATTRIBUTE.size, (length + 3) & ~3)
+    return held
+
+
+def _dump(question):
+    """The body of each answer to a question about all sockets."""
+    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, NETLINK_SOCK_DIAG) as sock:
+        sock.settimeout(1.0)
+        sock.send(
+            _HEADER.pack(_HEADER.size + len(question), SOCK_DIAG_BY_FAMILY, REQUEST | DUMP, 1, 0) + question
+        )
+        while True:
+            data, start = sock.recv(_ANSWER_BYTES), 0
+            while start + _HEADER.size <= len(data):
+                length, kind, *_ = _HEADER.unpack_from(data, start)
+                if kind in (DONE, ERROR):
+                    return
+                yield data[start + _HEADER.size : start + length]
+                start += (length + 3) & ~3
 
 
 def _asked(family, states, near, far, *, dump=False):

@@ -44,6 +44,14 @@ def cpu_s(pid):
         return 0.0
 
 
+def descriptors(pid):
+    """How many files, pipes and sockets it has open."""
+    try:
+        return len(os.listdir("/proc/{}/fd".format(pid)))
+    except OSError:
+        return 0
+
+
 def resident_bytes(pid):
     try:
         with open("/proc/{}/statm".format(pid)) as file:
