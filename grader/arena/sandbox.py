@@ -1,30 +1,24 @@
-"""The wall around a student process tree: bubblewrap's command line, and whether it can be had here.
+"""The wall around a student process tree: bubblewrap's command line. Whether it can be had here: `probe.py`.
 
-Only command lines are made here; nothing is run but the probe that asks whether they work. The arena itself has a
-network of its own (`ros/network.py`).
+Only command lines are made here; nothing is run. The arena itself has a network of its own (`ros/network.py`).
 """
 
 from __future__ import annotations
 
-import os
 import platform
-import random
 import re
-import shutil
 import stat
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
-from grader.arena.cgroups import Cgroups, find_cgroups
+from grader.arena.cgroups import Cgroups
 from grader.arena.inside import HOME, SHIMS, STANDINS
 from grader.arena.limits import Limits
 from grader.arena.ros_env import RosInstallation
-from grader.errors import HostError, SandboxMissing
+from grader.errors import HostError
 from grader.model.record import Record
 
 Mode = Literal["auto", "require", "none"]
@@ -38,14 +32,8 @@ OWN_FOLDER = Path(__file__).resolve().parent.parent
 NETWORK = Path(__file__).parent / "ros" / "network.py"
 WALLS = ("--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try")
 NO_NESTING = "--disable-userns"
-UID_MAP = Path("/proc/self/uid_map")
-UNUSED_UIDS = (1_900_000_000, 2_000_000_000)
-"""Left alone by distributions and by systemd (systemd.io/UIDS-GIDS)."""
-FEW_UIDS = (30_000, 60_000)
 COUNTS_BY_NAMESPACE = (5, 14)
 """Since this kernel RLIMIT_NPROC counts the processes of a user namespace, before it all of the user's."""
-ULIMIT_HINT = "raise what this shell allows (`ulimit -Ha` shows it), then grade again"
-INSTALL_HINT = "apt-get install bubblewrap (in a container: allow user namespaces, or run it privileged)"
 
 
 class Sandbox(Record):
@@ -162,63 +150,3 @@ def temporary_base(sandbox: Sandbox | None) -> Path:
     raise HostError(
         f"{first} is closed to other users, and so is /var/tmp", hint=f"chmod o+x {first}, or set TMPDIR"
     )
-
-
-def choose(mode: Mode) -> Sandbox:
-    """The sandbox to use: `require` raises SandboxMissing where there is none, `auto` goes without and says so.
-
-    Raises HostError where this machine does not let the limits of student's processes be set: every one would fail.
-    """
-    refused = refused_limits()
-    if refused:
-        raise HostError(f"the limits of students' processes cannot be set here: {refused}", hint=ULIMIT_HINT)
-    reason = "--sandbox none" if mode == "none" else why_not()
-    if reason and mode == "require":
-        raise SandboxMissing(f"no sandbox on this machine: {reason}", hint=INSTALL_HINT)
-    can_drop = os.geteuid() == 0 and shutil.which("setpriv") is not None
-    uid = _nobodys_uid() if can_drop else None
-    nesting = not reason and _refusal(NO_NESTING) != ""
-    return Sandbox(bubblewrap=not reason, uid=uid, reason=reason, nesting=nesting, cgroups=find_cgroups())
-
-
-@lru_cache(maxsize=1)
-def refused_limits() -> str:
-    """What this machine says to the limits of students' processes; empty where it sets them, or has no prlimit."""
-    if shutil.which("prlimit") is None:
-        return ""
-    limits = Sandbox(bubblewrap=False, uid=None).rlimits(Limits())
-    command = ["prlimit", *limits, "--", "/bin/true"]
-    done = subprocess.run(command, capture_output=True, check=False, timeout=20)
-    return "" if done.returncode == 0 else done.stderr.decode(errors="replace").strip()[-200:]
-
-
-def _nobodys_uid() -> int:
-    """A user that no directory of users knows, where this machine has the whole range of them (a container may not)."""
-    try:
-        mapped = max(int(line.split()[0]) + int(line.split()[2]) for line in UID_MAP.read_text().splitlines())
-    except (OSError, ValueError, IndexError):
-        mapped = 0
-    return random.SystemRandom().randrange(*(UNUSED_UIDS if mapped >= UNUSED_UIDS[1] else FEW_UIDS))
-
-
-@lru_cache(maxsize=1)
-def why_not() -> str:
-    """Empty where the wall and the arena's own network work, else the reason in one line."""
-    for program in ("bwrap", "setpriv", "prlimit"):
-        if shutil.which(program) is None:
-            return f"{program} is not installed"
-    return "" if _refusal(NO_NESTING) == "" else _refusal()
-
-
-@lru_cache(maxsize=2)
-def _refusal(*more: str) -> str:
-    """What this machine says to a sandbox with these arguments; empty where it makes one."""
-    drop = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"] if os.geteuid() == 0 else []
-    walled = ["bwrap", "--ro-bind", "/", "/", "--proc", "/proc", *WALLS, *more, "/bin/true"]
-    command = [sys.executable, "-I", str(NETWORK), *drop, *walled]
-    try:
-        done = subprocess.run(command, capture_output=True, check=False, timeout=20)
-    except subprocess.TimeoutExpired:
-        return "bubblewrap does not answer"
-    lines = done.stderr.decode(errors="replace").strip().splitlines()
-    return "" if done.returncode == 0 else (lines or [f"exit code {done.returncode}"])[-1][:200]
