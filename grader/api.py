@@ -34,7 +34,7 @@ from grader.model.result import EnvironmentInfo, GradingResult, SubmissionInfo
 from grader.results import RESULT, read_result_file
 from grader.rubric.load import LoadedRubric
 from grader.rubric.load import load_rubric as load_file
-from grader.steps import NOTHING_TOOK, outcome, run_aside
+from grader.steps import NOTHING_TOOK, outcome, run_aside, waited_for
 
 StrPath: TypeAlias = "str | os.PathLike[str]"
 Sandbox = Literal["auto", "require", "none"]
@@ -105,7 +105,8 @@ def grade(
         stop=stop,
     )
     try:
-        result = run_aside(lambda: pipeline.grade(given, loaded, folder, options, telling), stop.ask)
+        with waited_for():
+            result = run_aside(lambda: pipeline.grade(given, loaded, folder, options, telling), stop.ask)
     except Stopped:
         if telling.error is None:
             raise

@@ -34,6 +34,7 @@ from grader.steps import (
     read_facts,
     recorded_and_judged,
     recorder,
+    waited_for,
 )
 
 __all__ = ["GradeOptions", "console_log", "grade", "prepare", "record"]
@@ -44,7 +45,7 @@ def prepare(options: GradeOptions) -> None:
     from grader.arena.base import provide_base  # noqa: PLC0415 - see steps.recorded.LATER
 
     if not options.static_only:
-        with suppress(GraderError):
+        with suppress(GraderError), waited_for():
             provide_base(options.sandbox)
 
 
@@ -68,7 +69,7 @@ def grade(
     )
     if options.tidy:
         finish_killed(out)
-    with told_apart(attempt), opened(source, rubric, options, progress) as submission:
+    with told_apart(attempt), waited_for(), opened(source, rubric, options, progress) as submission:
         attempt.about = about(submission)
         kept = options.kept(attempt.about)
         if kept is not None:
@@ -104,7 +105,7 @@ def record(
 ) -> list[Path]:
     """Record the rubric's scenarios into `out/<its id>/evidence/` and judge nothing."""
     finish_killed(out)
-    with opened(source, rubric, options, progress) as submission:
+    with waited_for(), opened(source, rubric, options, progress) as submission:
         if isinstance(submission, RecordedSubmission):
             raise UsageError(
                 f"{submission.source}: there is nothing to run in it", hint="grade it, or judge it"

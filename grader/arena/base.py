@@ -23,8 +23,9 @@ from grader.arena.cache import keep, read_kept
 from grader.arena.inside import ANSWERS, INSIDE_WORKSPACE, QUESTIONS, prepare
 from grader.arena.limits import Limits
 from grader.arena.place import BASE, Place
+from grader.arena.probe import choose
 from grader.arena.ros_env import find_ros
-from grader.arena.sandbox import Mode, choose, temporary_base
+from grader.arena.sandbox import Mode, temporary_base
 from grader.arena.session import ArenaSession
 from grader.arena.workspace import Workspace
 from grader.errors import ArenaError

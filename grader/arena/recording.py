@@ -24,6 +24,7 @@ from grader.arena.inside import prepare
 from grader.arena.limits import Limits
 from grader.arena.order import in_order
 from grader.arena.place import Place
+from grader.arena.probe import choose
 from grader.arena.recorded import (
     NO_ROS,
     PACKAGE,
@@ -35,7 +36,7 @@ from grader.arena.recorded import (
     metadata,
 )
 from grader.arena.ros_env import RosInstallation, find_ros
-from grader.arena.sandbox import Mode, Sandbox, choose, temporary_base
+from grader.arena.sandbox import Mode, Sandbox, temporary_base
 from grader.arena.scenario import expected_s, run_scenario
 from grader.arena.workspace import Workspace, make_workspace
 from grader.errors import ArenaError

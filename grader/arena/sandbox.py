@@ -1,32 +1,27 @@
-"""The wall around a student process tree: bubblewrap's arguments, and whether it can be had here.
+"""The wall around a student process tree: bubblewrap's arguments. Whether it can be had here: `probe.py`.
 
-Only arguments are made here; nothing is run but the probe that asks whether they work. The arena starts the programs
-(`ros/launching.py`) in namespaces of its own (`ros/namespaces.py`).
+Only arguments are made here; nothing is run. The arena starts the programs (`ros/launching.py`) in namespaces of its
+own (`ros/namespaces.py`).
 """
 
 from __future__ import annotations
 
-import os
 import platform
-import random
 import re
-import shutil
 import stat
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
-from grader.arena.cgroups import Cgroups, find_cgroups
+from grader.arena.cgroups import Cgroups
 from grader.arena.host_programs import host_program
 from grader.arena.inside import HOME, SHIMS, STANDINS
 from grader.arena.limits import Limits
 from grader.arena.ros_env import RosInstallation
 from grader.arena.system_calls import system_call_filter
-from grader.errors import HostError, SandboxMissing
+from grader.errors import HostError
 from grader.model.record import Record
 
 Mode = Literal["auto", "require", "none"]
@@ -45,14 +40,8 @@ FIRST_ENV = {"PATH": "/usr/bin:/bin", "LANG": "C.UTF-8"}
 """Of the first shell behind the wall, which then sets what the process is to have."""
 WALLS = ("--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try")
 NO_NESTING = "--disable-userns"
-UID_MAP = Path("/proc/self/uid_map")
-UNUSED_UIDS = (1_900_000_000, 2_000_000_000)
-"""Left alone by distributions and by systemd (systemd.io/UIDS-GIDS)."""
-FEW_UIDS = (30_000, 60_000)
 COUNTS_BY_NAMESPACE = (5, 14)
 """Since this kernel RLIMIT_NPROC counts the processes of a user namespace, before it all of the user's."""
-ULIMIT_HINT = "raise what this shell allows (`ulimit -Ha` shows it), then grade again"
-INSTALL_HINT = "apt-get install bubblewrap (in a container: allow user namespaces, or run it privileged)"
 
 
 def copy_of(path: Path) -> Word:
@@ -87,12 +76,16 @@ class Sandbox(Record):
             who = ", but for an unprivileged user" if self.uid else ""
             return f"none ({self.reason}){who}; memory held by {self.cgroups.label}"
         who = "as root for an unprivileged user" if self.uid else "unprivileged"
-        return f"bubblewrap, {who}; memory held by {self.cgroups.label}"
+        calls = "" if system_call_filter() else "; system calls not filtered on this processor"
+        return f"bubblewrap, {who}; memory held by {self.cgroups.label}{calls}"
 
     def outer(self, limits: Limits) -> list[str]:
         """The programs of this machine that come first: they take rights away and set limits."""
-        drop = [f"--reuid={self.uid}", f"--regid={self.uid}", "--clear-groups"]
-        become = [_program("setpriv"), *drop] if self.uid else []
+        drop = [f"--reuid={self.uid}", f"--regid={self.uid}", "--clear-groups"] if self.uid else []
+        drop += (
+            [] if self.bubblewrap else ["--no-new-privs"]
+        )  # bubblewrap sees to that, and may be setuid itself
+        become = [_program("setpriv"), *drop] if drop and host_program("setpriv") else []
         return [*become, _program("prlimit"), *self.rlimits(limits), "--"]
 
     def wall(
@@ -187,65 +180,3 @@ def temporary_base(sandbox: Sandbox | None) -> Path:
     raise HostError(
         f"{first} is closed to other users, and so is /var/tmp", hint=f"chmod o+x {first}, or set TMPDIR"
     )
-
-
-def choose(mode: Mode) -> Sandbox:
-    """The sandbox to use: `require` raises SandboxMissing where there is none, `auto` goes without and says so.
-
-    Raises HostError where this machine does not let the limits of student's processes be set: every one would fail.
-    """
-    refused = refused_limits()
-    if refused:
-        raise HostError(f"the limits of students' processes cannot be set here: {refused}", hint=ULIMIT_HINT)
-    reason = "--sandbox none" if mode == "none" else why_not()
-    if reason and mode == "require":
-        raise SandboxMissing(f"no sandbox on this machine: {reason}", hint=INSTALL_HINT)
-    can_drop = os.geteuid() == 0 and shutil.which("setpriv") is not None
-    uid = _nobodys_uid() if can_drop else None
-    nesting = not reason and _refusal(NO_NESTING) != ""
-    return Sandbox(bubblewrap=not reason, uid=uid, reason=reason, nesting=nesting, cgroups=find_cgroups())
-
-
-@lru_cache(maxsize=1)
-def refused_limits() -> str:
-    """What this machine says to the limits of students' processes; empty where it sets them, or has no prlimit."""
-    if shutil.which("prlimit") is None:
-        return ""
-    limits = Sandbox(bubblewrap=False, uid=None).rlimits(Limits())
-    command = ["prlimit", *limits, "--", "/bin/true"]
-    done = subprocess.run(command, capture_output=True, check=False, timeout=20)
-    return "" if done.returncode == 0 else done.stderr.decode(errors="replace").strip()[-200:]
-
-
-def _nobodys_uid() -> int:
-    """A user that no directory of users knows, where this machine has the whole range of them (a container may not)."""
-    try:
-        mapped = max(int(line.split()[0]) + int(line.split()[2]) for line in UID_MAP.read_text().splitlines())
-    except (OSError, ValueError, IndexError):
-        mapped = 0
-    return random.SystemRandom().randrange(*(UNUSED_UIDS if mapped >= UNUSED_UIDS[1] else FEW_UIDS))
-
-
-@lru_cache(maxsize=1)
-def why_not() -> str:
-    """Empty where the wall and the arena's own network work, else the reason in one line."""
-    for program in ("bwrap", "setpriv", "prlimit"):
-        if shutil.which(program) is None:
-            return f"{program} is not installed"
-    return "" if _refusal(NO_NESTING) == "" else _refusal()
-
-
-@lru_cache(maxsize=2)
-def _refusal(*more: str) -> str:
-    """What this machine says to a sandbox with these arguments; empty where it makes one."""
-    drop = (
-        [_program("setpriv"), "--reuid=65534", "--regid=65534", "--clear-groups"] if os.geteuid() == 0 else []
-    )
-    walled = [_program("bwrap"), "--ro-bind", "/", "/", "--proc", "/proc", *WALLS, *more, "/bin/true"]
-    command = [sys.executable, "-I", str(NAMESPACES), *drop, *walled]
-    try:
-        done = subprocess.run(command, capture_output=True, check=False, timeout=20)
-    except subprocess.TimeoutExpired:
-        return "bubblewrap does not answer"
-    lines = done.stderr.decode(errors="replace").strip().splitlines()
-    return "" if done.returncode == 0 else (lines or [f"exit code {done.returncode}"])[-1][:200]

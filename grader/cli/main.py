@@ -63,10 +63,16 @@ def _prepare_streams() -> None:
 
 
 def _prepare_signals() -> None:
-    """A terminated grader cleans up as an interrupted one does. A shell's `&` leaves SIGINT alive too."""
+    """A terminated grader cleans up as an interrupted one does. A shell's `&` leaves SIGINT alive too.
+
+    It waits for what it starts, and hears every signal, whatever who started it ignores or holds back.
+    """
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)
         signal.signal(signal.SIGTERM, _interrupt)
+        if sys.platform != "win32":
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+            signal.pthread_sigmask(signal.SIG_SETMASK, ())
 
 
 def _interrupt(_number: int, _frame: FrameType | None) -> None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from grader.arena.cgroups import describe, find_cgroups
-from grader.arena.sandbox import NAMESPACES, ULIMIT_HINT, choose, refused_limits, why_not
+from grader.arena.host_programs import HOST_ENV, host_program
+from grader.arena.probe import ULIMIT_HINT, choose, refused_limits, why_not
+from grader.arena.sandbox import NAMESPACES
 from grader.cli.row import Row
 from grader.errors import HostError
 from grader.portable import user_id
@@ -32,7 +33,8 @@ DELEGATE = "systemd-run --user --scope -p Delegate=yes grader …, or run it as 
 def walls() -> Iterator[Row]:
     """A row for each part, then one for what `--sandbox auto` makes of them."""
     yield from map(_program, PROGRAMS)
-    yield _probe("user namespaces", ["unshare", "--user", "--pid", "--fork", "true"], drop=user_id() == 0)
+    unshare = host_program("unshare") or "unshare"
+    yield _probe("user namespaces", [unshare, "--user", "--pid", "--fork", "/bin/true"], drop=user_id() == 0)
     yield _probe("network", [sys.executable, "-I", str(NAMESPACES), "/bin/true"], drop=False)
     held = find_cgroups().memory is not None
     yield Row(
@@ -43,7 +45,7 @@ def walls() -> Iterator[Row]:
 
 
 def _program(name: str) -> Row:
-    path, package = shutil.which(name), PROGRAMS[name]
+    path, package = host_program(name), PROGRAMS[name]
     if path is None:
         return Row(name=name, state="limited", detail="not found", mend=f"apt-get install {package}")
     return Row(name=name, state="ok", detail=path)
@@ -51,9 +53,18 @@ def _program(name: str) -> Row:
 
 def _probe(name: str, command: Sequence[str], *, drop: bool) -> Row:
     """Whether namespaces of that kind can be made, by the user who needs them."""
-    nobody = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"] if drop else []
+    setpriv = host_program("setpriv") or "setpriv"
+    nobody = [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if drop else []
     try:
-        done = subprocess.run([*nobody, *command], capture_output=True, check=False, timeout=PROBE_S)
+        done = subprocess.run(
+            [*nobody, *command],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            timeout=PROBE_S,
+            env=HOST_ENV,
+            cwd="/",
+        )
         said = done.stderr.decode(errors="replace").strip().splitlines()
         reason = "" if done.returncode == 0 else (said or [f"exit code {done.returncode}"])[-1]
     except (OSError, subprocess.TimeoutExpired) as error:
@@ -80,8 +91,8 @@ def _limits_of_processes() -> Row:
 
 
 def _mode() -> Row:
-    reason = why_not()
     try:
+        reason = why_not()
         label = choose("auto").label
     except HostError as error:
         return Row(name="sandbox", state="missing", detail=error.message, mend=error.hint)

@@ -1,6 +1,7 @@
 """The steps that `grader/pipeline.py` names, each in a module of what it gives."""
 
 from grader.steps.aside import run_aside
+from grader.steps.children import waited_for
 from grader.steps.judged import Judged, figures_of, judged_again, judged_recording
 from grader.steps.opened import about, opened
 from grader.steps.options import GradeOptions
@@ -25,4 +26,5 @@ __all__ = [
     "recorded_and_judged",
     "recorder",
     "run_aside",
+    "waited_for",
 ]

@@ -13,8 +13,8 @@ import pytest
 from grader.arena.inside import prepare
 from grader.arena.limits import Limits
 from grader.arena.place import Place
+from grader.arena.probe import choose, why_not
 from grader.arena.ros_env import require_ros
-from grader.arena.sandbox import choose, why_not
 from grader.arena.scenario import run_scenario
 from grader.arena.workspace import make_workspace, run_in_place
 from grader.evidence.reader import load_run

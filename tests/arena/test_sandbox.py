@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import cgroups, sandbox
+from grader.arena import cgroups, probe, sandbox
 from grader.arena.build import build
 from grader.arena.cgroups import Cgroup, Cgroups
 from grader.arena.limits import SUBMISSION_MESSAGE_BYTES, Limits
-from grader.arena.sandbox import why_not
+from grader.arena.probe import why_not
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter
@@ -117,7 +117,7 @@ time.sleep(60)
 def test_without_cgroups_a_watchdog_holds_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
-    monkeypatch.setattr(sandbox, "find_cgroups", Cgroups)
+    monkeypatch.setattr(probe, "find_cgroups", Cgroups)
     code = "import time\nblocks = []\nwhile True:\n    blocks.append(bytearray(20 << 20))\n    time.sleep(0.05)\n"
     run = run_script(tmp_path, code, limit_s=20, limits=Limits(memory_bytes=200 << 20), sandbox=kind)
     assert exit_of(run).stopped_by == "KILL"
@@ -179,7 +179,7 @@ def test_memory_that_no_process_counts(
 ) -> None:
     code, limits, words = attack
     if not groups:
-        monkeypatch.setattr(sandbox, "find_cgroups", Cgroups)
+        monkeypatch.setattr(probe, "find_cgroups", Cgroups)
     run = run_script(tmp_path, code, limit_s=20, limits=limits)
     assert exit_of(run).stopped_by == "KILL"
     assert limits_met(run) == [f"stopped by the grader: {words}"]

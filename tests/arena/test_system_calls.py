@@ -90,6 +90,7 @@ def calls() -> Iterator[tuple[str, tuple[int, ...]]]:
             for protocol in (0, 1, 6, 15, 17, 132, 262):
                 yield "socket", (family, kind, protocol)
     yield from (("fcntl", (3, command)) for command in (*range(50), *range(1020, 1045), 1 << 33))
+    yield from (("ioctl", (0, number)) for number in (*range(0x5400, 0x5440), 0x5401 | 1 << 40, 0x80045430))
     yield from (("socketpair", (family, 1)) for family in (1, 2, 30))
     yield from (("personality", (value,)) for value in (0, 8, 0x20000, 0x40000, 0x400000, 0xFFFFFFFF))
 
@@ -178,6 +179,17 @@ def test_locks_are_granted_and_not_taken(machine: str) -> None:
     assert (
         run_filter(program, arch, fcntl, 3, 6 | 1 << 32) == ERRNO | errno.ENOSYS
     )  # the kernel reads 32 bits
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+def test_nothing_types_into_a_terminal(machine: str) -> None:
+    program, arch = (FILTERS / f"{machine}.bpf").read_bytes(), ARCHES[machine]
+    ioctl = number_of(machine, "ioctl")
+    for high in (0, 1 << 32, 0xFFFFFFFF << 32):  # the kernel reads 32 bits
+        answers = {
+            n: run_filter(program, arch, ioctl, 0, n | high) for n in (*range(0x5300, 0x5500), 0x80045430)
+        }
+        assert {n for n, answer in answers.items() if answer != ALLOW} == {0x5412, 0x541C}
 
 
 def test_this_machine_has_one(monkeypatch: pytest.MonkeyPatch) -> None:

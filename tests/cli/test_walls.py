@@ -10,7 +10,7 @@ import pytest
 from grader.arena.cgroups import Cgroup, Cgroups
 from grader.cli import walls
 from grader.cli.row import Row
-from grader.errors import HostError
+from grader.errors import HostError, SandboxMissing
 
 
 def rows() -> dict[str, Row]:
@@ -27,7 +27,7 @@ def test_every_part_has_a_row_and_what_is_missing_a_command() -> None:
 
 @pytest.mark.parametrize(("program", "package"), [("bwrap", "bubblewrap"), ("setpriv", "util-linux")])
 def test_a_program_that_is_not_installed(monkeypatch, program: str, package: str) -> None:
-    monkeypatch.setattr(walls.shutil, "which", lambda name: None if name == program else f"/usr/bin/{name}")
+    monkeypatch.setattr(walls, "host_program", lambda name: None if name == program else f"/usr/bin/{name}")
     monkeypatch.setattr(walls, "why_not", lambda: f"{program} is not installed")
     found = rows()
     assert (found[program].state, found[program].mend) == ("limited", f"apt-get install {package}")
@@ -57,6 +57,15 @@ def test_namespaces_that_are_forbidden(monkeypatch, tmp_path: Path, name: str, v
     row = walls._probe("user namespaces", ["unshare"], drop=False)
     assert (row.state, row.detail) == ("limited", "unshare: unshare failed: Operation not permitted")
     assert mend in row.mend
+
+
+def test_a_probe_that_does_not_answer_is_not_taken_for_a_machine_without(monkeypatch) -> None:
+    def no_answer() -> str:
+        raise SandboxMissing("no answer within 20 s", hint="look at each part")
+
+    monkeypatch.setattr(walls, "why_not", no_answer)
+    row = rows()["sandbox"]
+    assert (row.state, row.detail, row.mend) == ("missing", "no answer within 20 s", "look at each part")
 
 
 def test_what_holds_memory_where_no_group_can_be_made(monkeypatch) -> None:

@@ -8,7 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
 
-from grader.arena.sandbox import why_not
+from grader.arena.probe import why_not
 from grader.rubric.load import load_rubric
 from tests.hostile.form import attack_names, load_attack, rubric_path
 from tests.hostile.harness import Graded, faults, grade_in_room, why_no_room
