@@ -130,7 +130,7 @@ def test_git_in_a_students_folder_finds_nothing_of_his(tmp_path, monkeypatch) ->
         assert remote or not {"BASH_ENV", "PAGER"} & told.keys()
 
 
-def test_doctor_asks_ros_s_python_from_a_folder_that_is_nobody_s(tmp_path) -> None:
+def test_doctor_asks_the_python_of_ros_from_the_root_folder(tmp_path) -> None:
     """`python -c` looks in the current folder first."""
     python = (
         write(tmp_path, {"python3": f"#!/bin/sh\npwd > {tmp_path}/here\n"}, executable=("python3",))
