@@ -4,8 +4,9 @@
 # $GRADER_CACHE names a folder in which what pip and apt fetch is kept.
 set -euo pipefail
 root="$(cd -P "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
-home="${GRADER_HOME:?a folder for the grader}"
-cache="${GRADER_CACHE:-}"
+home="$(realpath -m -- "${GRADER_HOME:?a folder for the grader}")"
+cache="${GRADER_CACHE:+$(realpath -m -- "$GRADER_CACHE")}"
+cd -- "$root" # a job begins in the student's folder, in which Python would look for its own modules first
 stamp="$root $(git -C "$root" rev-parse HEAD 2>/dev/null || cksum <"$root/pyproject.toml")"
 
 say() { printf 'install: %s\n' "$*" >&2; }

@@ -21,6 +21,7 @@ ALLOWED = {
     "errors": set[str](),
     "shown": set[str](),
     "portable": set[str](),
+    "outside": set[str](),
     "standins": set[str](),
     "admission": {"files", "portable"},
     "files": {"errors", "portable"},
@@ -29,7 +30,7 @@ ALLOWED = {
     "faults": BASE | {"files", "intake", "report", "results", "rubric"},
     "evidence": BASE | {"files"},
     "package": BASE,
-    "intake": BASE | {"files"},
+    "intake": BASE | {"files", "outside"},
     "checks": BASE | {"evidence"},
     "instructor": BASE | {"checks", "temporary"},
     "rubric": BASE | {"checks", "evidence", "instructor"},
@@ -57,10 +58,10 @@ ALLOWED = {
     "fetching": BASE | {"files", "intake", "temporary"},
     "standing": BASE | {"intake"},
     "gradebook": BASE | {"files", "report"},
-    "similarity": BASE | {"evidence", "files", "intake", "report", "temporary"},
+    "similarity": BASE | {"evidence", "files", "intake", "outside", "report", "temporary"},
     "batch": {
         *BASE, "checks", "evidence", "faults", "fetching", "figures", "files", "gradebook", "intake",
-        "judging", "overrides", "pipeline", "report", "results", "rubric", "temporary"
+        "judging", "outside", "overrides", "pipeline", "report", "results", "rubric", "temporary"
     },
     "review": BASE | {
         "batch", "files", "gradebook", "intake", "overrides", "report", "results", "rubric", "temporary"

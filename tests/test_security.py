@@ -36,6 +36,17 @@ def test_what_holds_a_promise_and_what_tests_it_is_there(row: list[str]) -> None
         assert _is_there(name), name
 
 
+OUTSIDE = [row for row in ROWS if len(row) == 4 and row[0] != "program or file"]
+
+
+@pytest.mark.parametrize("row", OUTSIDE, ids=[row[0][:40] for row in OUTSIDE])
+def test_what_stands_outside_has_a_test_or_says_that_nothing_holds(row: list[str]) -> None:
+    tested = re.findall(r"`([^`]+)`", row[3])
+    assert tested or "**nothing**" in row[2]
+    for name in tested:
+        assert _is_there(name), name
+
+
 def _is_there(name: str) -> bool:
     if name.startswith("test_"):
         return any(

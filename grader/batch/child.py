@@ -11,13 +11,13 @@ import pickle
 import select
 import signal
 import subprocess
-import sys
 import threading
 from contextlib import suppress
 from types import FrameType
 from typing import IO, Any
 
 from grader.batch.job import Job, Outcome
+from grader.outside import anywhere, own_module
 
 HEAD_BYTES = 8
 LEAVE_S = 30.0  # to end its work in order, once it is told to
@@ -83,7 +83,8 @@ def _lives(process: subprocess.Popen[bytes] | None) -> bool:
 def _started() -> subprocess.Popen[bytes]:
     """In a session of its own: a Ctrl-C on the terminal is its parent's to hand on."""
     return subprocess.Popen(
-        [sys.executable, "-m", "grader.batch.child"],
+        own_module("grader.batch.child"),
+        env=anywhere(os.environ),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         start_new_session=True,

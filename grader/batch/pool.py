@@ -13,6 +13,7 @@ from multiprocessing import connection
 from types import FrameType
 from typing import TypeVar
 
+SAFE_PATH = "PYTHONSAFEPATH"
 LEAVE_S = 30.0  # to end its work, once the process that started it is gone
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -28,19 +29,35 @@ class _Worker:
 @contextmanager
 def workers(count: int) -> Iterator[ProcessPoolExecutor]:
     """Worker processes. When the block is left early, what runs is interrupted and cleans up first."""
-    pool = ProcessPoolExecutor(
-        max(count, 1), mp_context=multiprocessing.get_context("spawn"), initializer=_prepare
-    )
+    with _safe_path():
+        pool = ProcessPoolExecutor(
+            max(count, 1), mp_context=multiprocessing.get_context("spawn"), initializer=_prepare
+        )
+        try:
+            yield pool
+        except BaseException:
+            for child in multiprocessing.active_children():
+                if child.pid is not None:
+                    with suppress(ProcessLookupError):  # it has ended by itself
+                        os.kill(child.pid, signal.SIGINT)
+            raise
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """What `multiprocessing` starts looks for Python's own modules in the current folder first, which may be a
+    student's; not with this variable, which Python knows since 3.11."""
+    before = os.environ.get(SAFE_PATH)
+    os.environ[SAFE_PATH] = "1"
     try:
-        yield pool
-    except BaseException:
-        for child in multiprocessing.active_children():
-            if child.pid is not None:
-                with suppress(ProcessLookupError):  # it has ended by itself
-                    os.kill(child.pid, signal.SIGINT)
-        raise
+        yield
     finally:
-        pool.shutdown(cancel_futures=True)
+        if before is None:
+            del os.environ[SAFE_PATH]
+        else:
+            os.environ[SAFE_PATH] = before
 
 
 def side_by_side(

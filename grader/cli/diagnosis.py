@@ -88,7 +88,9 @@ def _modules(ros: RosInstallation) -> Iterator[Row]:
     """ROS's Python packages, as its own interpreter finds them."""
     command = [ros.python, "-c", FIND_MODULES, *ROS_MODULES]
     try:
-        done = subprocess.run(command, env=ros.env, capture_output=True, text=True, check=True, timeout=20)
+        done = subprocess.run(
+            command, env=ros.env, cwd="/", capture_output=True, text=True, check=True, timeout=20
+        )
     except (OSError, subprocess.SubprocessError) as error:
         yield Row(name="ROS's Python", state="missing", detail=f"{ros.python}: {error}", mend=INSTALL_HINT)
         return

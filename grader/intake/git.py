@@ -6,7 +6,6 @@ import os
 import re
 import select
 import shlex
-import shutil
 import signal
 import subprocess
 import sys
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import IO
 
 from grader.intake.credentials import Access, refused, scrubbed
+from grader.outside import anywhere, program
 from grader.portable import kill_group
 
 _QUIET = {
@@ -47,8 +47,11 @@ _MEMORY_BYTES = 2 << 30
 _NETWORK_KEPT = re.compile(
     r"GIT_(SSH.*|SSL_.*|PROXY_.*|HTTP_.*|CONFIG_(GLOBAL|SYSTEM|NOSYSTEM|COUNT|(KEY|VALUE)_\d+)|EXEC_PATH)"
 )
-
-
+# Of the user's variables, what git on this machine needs: to be found, to load, and on Windows to run at all.
+_LOCAL_KEPT = {
+    "PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "DYLD_FALLBACK_LIBRARY_PATH", "TMPDIR", "TEMP", "TMP", "SYSTEMROOT",
+    "SYSTEMDRIVE", "WINDIR", "COMSPEC", "PATHEXT",
+}  # fmt: skip
 _ANSWER_BYTES = 16 << 20
 _SILENCE_S = 20.0
 _SAID_BYTES = 64 << 10
@@ -194,11 +197,12 @@ class Git:
         stderr: IO[bytes] | int,
     ) -> Iterator[subprocess.Popen[bytes]]:
         options = [part for key, value in _QUIET.items() for part in ("-c", f"{key}={value}")]
-        if shutil.which("git") is None:
+        git = program("git")
+        if git is None:
             raise GitMissing("git is not installed")
         try:
             process = subprocess.Popen(
-                [*_limits(), "git", *options, *args],
+                [*_limits(), git, *options, *args],
                 cwd=cwd,
                 env=environment,
                 stdin=subprocess.DEVNULL,
@@ -215,7 +219,7 @@ class Git:
 
     def _local_environment(self) -> dict[str, str]:
         """For repositories on this machine: no settings but ours, so no filter, no helper and no network."""
-        kept = {key: value for key, value in os.environ.items() if not key.startswith(("GIT_", "XDG_CONFIG"))}
+        kept = {key: value for key, value in anywhere(os.environ).items() if key.upper() in _LOCAL_KEPT}
         return {
             **kept,
             **_ASK_NOTHING,
@@ -230,7 +234,7 @@ class Git:
         """For servers: the user's settings hold the credentials, the proxy, perhaps a mirror on this disk."""
         kept = {
             key: value
-            for key, value in os.environ.items()
+            for key, value in anywhere(os.environ).items()
             if not key.startswith("GIT_") or _NETWORK_KEPT.fullmatch(key)
         }
         environment = {**kept, **_ASK_NOTHING, "GIT_ALLOW_PROTOCOL": "https:http:ssh:git:file"}
@@ -276,13 +280,14 @@ def _place(repository: Repository | None) -> tuple[str, ...]:
 def _limits() -> tuple[str, ...]:
     """For git and all that it starts, and git ends when the grader is killed. Where there is no `prlimit`, there is no
     ROS either, nor a sandbox."""
-    if shutil.which("prlimit") is None or shutil.which("setpriv") is None:
+    setpriv, prlimit = program("setpriv"), program("prlimit")
+    if setpriv is None or prlimit is None:
         return ()
     return (
-        "setpriv",
+        setpriv,
         "--pdeathsig",
         "KILL",
-        "prlimit",
+        prlimit,
         f"--fsize={_FILE_BYTES}",
         f"--as={_MEMORY_BYTES}",
         "--core=0",
@@ -291,6 +296,6 @@ def _limits() -> tuple[str, ...]:
 
 
 def _configured_ssh(environment: dict[str, str], cwd: Path) -> str:
-    command = ["git", "config", "--get", "core.sshCommand"]
+    command = [program("git") or "git", "config", "--get", "core.sshCommand"]
     found = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False)
     return found.stdout.strip()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
@@ -18,6 +17,7 @@ from grader.errors import HostError, SubmissionError, UsageError
 from grader.intake import Limits
 from grader.intake.archive import unpack
 from grader.model.similarity import Similarity
+from grader.outside import anywhere, own_module
 from grader.similarity.request import Request
 from grader.temporary import temporary_folder
 
@@ -82,7 +82,7 @@ def _answer(request: Request, place: Path) -> Similarity:
     said = place / "said"
     with (place / "answer").open("w+b") as answer, said.open("wb") as errors:
         process = subprocess.Popen(
-            [sys.executable, "-m", "grader.similarity.job"],
+            own_module("grader.similarity.job"),
             env=_environment(),
             stdin=subprocess.PIPE,
             stdout=answer,
@@ -115,7 +115,7 @@ def _failed(code: int, said: Path) -> str:
 def _environment() -> dict[str, str]:
     """Equal texts have equal fingerprints in every run; no threads, which a process that forks must not have."""
     return {
-        **os.environ,
+        **anywhere(os.environ),
         "MPLBACKEND": "Agg",
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",

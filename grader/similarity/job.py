@@ -1,4 +1,4 @@
-"""`python -m grader.similarity.job`: compares a class in a process of its own. A request on stdin, `Similarity` on
+"""Compares a class in a process of its own. A request on stdin, `Similarity` on
 stdout."""
 
 from __future__ import annotations
