@@ -59,9 +59,34 @@ NEW_NAMESPACES = 0x7E020080
 """CLONE_NEWNS, NEWCGROUP, NEWUTS, NEWIPC, NEWUSER, NEWPID, NEWNET, NEWTIME (man 2 clone, linux/sched.h)."""
 PERSONALITIES = (0x0, 0xFFFFFFFF)
 """Linux as it is, and the question which one it is (man 2 personality)."""
-FCNTL = (0, 1, 2, 3, 4, 8, 9, 10, 11, 15, 16, 17, 1025, 1030, 1031, 1032, 1033, 1034, 1035, 1036, 1037, 1038)
+FCNTL = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    8,
+    9,
+    10,
+    11,
+    15,
+    16,
+    17,
+    36,
+    1025,
+    1030,
+    1031,
+    1032,
+    1033,
+    1034,
+    1035,
+    1036,
+    1037,
+    1038,
+)
 """What is asked of a descriptor itself (linux/fcntl.h): no leases, no notices of what others do to a file."""
-FCNTL_LOCKS = (5, 6, 7, 36, 37, 38)
+FCNTL_LOCKS = (6, 7, 37, 38)
 """Files of the system are shared: two sandboxes could signal to each other by locks on them. So a lock is granted, and
 not taken: a program that locks a file of its own goes on."""
 TERMINAL_INPUT, CONSOLE = 0x5412, 0x541C

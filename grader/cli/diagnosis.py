@@ -19,6 +19,7 @@ from grader.cli.elsewhere import elsewhere
 from grader.cli.row import Row
 from grader.cli.walls import walls
 from grader.errors import RosMissing
+from grader.outside import LISTS
 from grader.portable import cores, system, user_id
 
 PROGRAMS = {"git": "git", "cmake": "cmake", "make": "make", "c++": "g++"}
@@ -44,7 +45,17 @@ def diagnose() -> tuple[Row, ...]:
     """Every row, in the order in which things are needed. Where it is not Linux, what is there without it."""
     if system():
         return (_python(), _git(), *elsewhere(), *_resources(), _encoding())
-    return (_python(), *_programs(), *_ros(), *walls(), _user(), *_resources(), _hostname(), _encoding())
+    return (
+        _python(),
+        *_programs(),
+        *_ros(),
+        *walls(),
+        _user(),
+        _search_paths(),
+        *_resources(),
+        _hostname(),
+        _encoding(),
+    )
 
 
 def _python() -> Row:
@@ -108,6 +119,16 @@ def _standins(ros: RosInstallation) -> Row:
     missing = missing_packages(ros)
     detail = f"for {', '.join(missing)}, which this ROS lacks" if missing else "not needed for any package"
     return Row(name="stand-ins", state="ok", detail=detail)
+
+
+def _search_paths() -> Row:
+    """An entry that is no absolute path stands for the folder that one is in, which may be a student's."""
+    odd = [name for name in LISTS if not all(map(os.path.isabs, os.environ.get(name, "/").split(os.pathsep)))]
+    if not odd:
+        return Row(name="search paths", state="ok", detail="every entry is an absolute path")
+    detail = f"{', '.join(odd)}: an entry stands for the current folder, so programs load files from there"
+    fix = "write ${NAME:+$NAME:} in front of what is added, with no empty entry"
+    return Row(name="search paths", state="limited", detail=detail, mend=fix)
 
 
 def _user() -> Row:

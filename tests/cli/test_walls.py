@@ -9,6 +9,7 @@ import pytest
 
 from grader.arena.cgroups import Cgroup, Cgroups
 from grader.cli import walls
+from grader.cli.diagnosis import diagnose
 from grader.cli.row import Row
 from grader.errors import HostError, SandboxMissing
 
@@ -85,3 +86,14 @@ def test_limits_that_cannot_be_set_keep_everything_from_being_graded(monkeypatch
     found = rows()
     assert (found["ulimit"].state, found["ulimit"].detail) == ("missing", "prlimit: Operation not permitted")
     assert (found["sandbox"].state, found["sandbox"].mend) == ("missing", "raise them")
+
+
+@pytest.mark.parametrize(
+    ("value", "state"),
+    [("/usr/lib", "ok"), (":/usr/lib", "limited"), ("/a::/b", "limited"), ("lib", "limited")],
+)
+def test_an_entry_that_stands_for_the_current_folder_is_named(value, state, monkeypatch) -> None:
+    monkeypatch.setenv("LD_LIBRARY_PATH", value)
+    (row,) = (row for row in diagnose() if row.name == "search paths")
+    assert row.state == state
+    assert ("LD_LIBRARY_PATH" in row.detail) == (state != "ok")
