@@ -44,7 +44,7 @@ RESERVED = frozenset(
 @dataclass(frozen=True, kw_only=True)
 class BatchOptions:
     """`jobs` submissions side by side; `only` as `--only` has it. With `same_commit`, what is
-    graded again is the commit of the earlier result. `cluster` is said in `run.json`."""
+    graded again is the commit of the earlier result. `cluster` and `cluster_insecure` are said in `run.json`."""
 
     out: Path
     jobs: int
@@ -54,6 +54,7 @@ class BatchOptions:
     only: Sequence[str] = ()
     same_commit: bool = False
     cluster: str = ""
+    cluster_insecure: bool = False
 
 
 class Watcher(Protocol):
@@ -189,6 +190,7 @@ def _run_of(roster: Roster, rubric_source: str, rubric: LoadedRubric, options: B
         started_at=datetime.now(timezone.utc),
         jobs=options.jobs,
         cluster=options.cluster,
+        cluster_insecure=options.cluster_insecure,
         columns=roster.columns,
         faults=roster.faults,
         entries=tuple(_without_password(entry) for entry in roster.entries),

@@ -56,6 +56,7 @@ class BatchRun(Record):
     ended_at: datetime | None = None
     jobs: int = 0
     cluster: str = ""
+    cluster_insecure: bool = False
     counts: Counts = Counts()
     columns: tuple[str, ...] = ()
     faults: tuple[RosterFault, ...] = ()

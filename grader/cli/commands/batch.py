@@ -39,6 +39,7 @@ def run(
     static: bool = False,
     sandbox: Mode = "auto",
     cluster: str | None = None,
+    cluster_insecure: bool = False,
     exchange: str | None = None,
     as_json: bool = False,
 ) -> ExitCode:
@@ -53,6 +54,7 @@ def run(
         before=_time(before),
         only=only or (),
         cluster=cluster or "",
+        cluster_insecure=cluster_insecure,
     )
     for fault in named.faults:
         say_beside(f"roster: {fault}")
@@ -94,13 +96,18 @@ def _time(text: str | None) -> datetime | None:
 
 def _hands(options: BatchOptions, exchange: str | None) -> Hands:
     if not options.cluster:
-        if exchange is not None:
-            raise UsageError("--exchange is for --cluster", hint="leave it out")
+        given = {"--exchange": exchange is not None, "--cluster-insecure": options.cluster_insecure}
+        for flag in (name for name, there in given.items() if there):
+            raise UsageError(f"{flag} is for --cluster", hint="leave it out")
         return Processes(options.jobs)
     from grader.cluster import ClusterHands  # noqa: PLC0415 - an extra
 
     return ClusterHands(
-        options.cluster, options.out, exchange, say=lambda text: say_beside(f"cluster: {text}")
+        options.cluster,
+        options.out,
+        exchange,
+        insecure=options.cluster_insecure,
+        say=lambda text: say_beside(f"cluster: {text}"),
     )
 
 

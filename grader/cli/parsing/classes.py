@@ -61,7 +61,12 @@ def _batch(batch: argparse.ArgumentParser) -> None:
     batch.add_argument(
         "--cluster",
         metavar="ADDRESS",
-        help="hand the submissions to a Dask cluster: tcp://HOST:8786, or local",
+        help="hand the submissions to a Dask cluster: tls://HOST:8786, or local",
+    )
+    batch.add_argument(
+        "--cluster-insecure",
+        action="store_true",
+        help="take a cluster without certificates (tcp://): all who reach it can run programs there",
     )
     batch.add_argument(
         "--exchange",

@@ -19,6 +19,7 @@ def again(run: BatchRun, out: Path, only: str = "", *, static: bool | None = Non
     words += ["--static"] if (run.static_only if static is None else static) else []
     words += ["--before", run.before.isoformat()] if run.before else []
     words += ["--cluster", run.cluster] if run.cluster else []
+    words += ["--cluster-insecure"] if run.cluster_insecure else []
     words += ["--only", only] if only else []
     return _typed(words)
 
