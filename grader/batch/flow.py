@@ -14,13 +14,13 @@ from typing import Any, Protocol
 
 from grader import __version__
 from grader.batch.choice import check, chosen
-from grader.batch.folder import RUN, BatchFolder, write_run
+from grader.batch.folder import RUN, BatchFolder, open_batch, write_run
 from grader.batch.hands import Hands
 from grader.batch.job import Job, Outcome, Sandbox
 from grader.batch.settled import Settler, rewrite
-from grader.errors import Busy, GraderError
+from grader.errors import Busy, GraderError, UsageError
 from grader.fetching import prefetch
-from grader.files import check_writable, lock
+from grader.files import check_writable, keep_private, lock, make_folder
 from grader.gradebook import write_gradebook
 from grader.intake import safe_name, without_password
 from grader.judging.summary import passed
@@ -100,11 +100,12 @@ def run_batch(
     roster = _gradable(roster, options.out)
     check(roster.entries, options.only)
     check_writable(options.out)
-    options.out.mkdir(parents=True, exist_ok=True)
+    is_new = make_folder(options.out)
     with alone(options.out):
         finish_killed(options.out)
         overrides = read_overrides(options.out / OVERRIDES, rubric.rubric, ids_of(roster))
-        folder = BatchFolder(options.out, _run_of(roster, rubric_source, rubric, options))
+        own = _kept_private(options.out, is_new=is_new)
+        folder = BatchFolder(options.out, _run_of(roster, rubric_source, rubric, options, own_folder=own))
         folder.refuse_newer()
         write_run(options.out, folder.run)
         batch = _Batch(
@@ -124,6 +125,15 @@ def run_batch(
         finally:
             folder = write_books(folder, rubric.rubric, state, kept)
     return folder
+
+
+def _kept_private(out: Path, *, is_new: bool) -> bool:
+    """Whether a batch made this folder: then it is for its owner alone. Any other one keeps the mode that it has."""
+    with suppress(UsageError):
+        is_new = is_new or open_batch(out).run.own_folder
+    if is_new:
+        keep_private(out)
+    return is_new
 
 
 def _outcomes(batch: _Batch, hands: Hands, watcher: Watcher) -> Iterator[Outcome]:
@@ -179,7 +189,9 @@ def _settled(batch: _Batch, entry: Entry, outcome: Outcome) -> Outcome:
     return outcome.model_copy(update={"status": now.status, "points": now.points, "passed": ok})
 
 
-def _run_of(roster: Roster, rubric_source: str, rubric: LoadedRubric, options: BatchOptions) -> BatchRun:
+def _run_of(
+    roster: Roster, rubric_source: str, rubric: LoadedRubric, options: BatchOptions, *, own_folder: bool
+) -> BatchRun:
     return BatchRun(
         state="running",
         grader=__version__,
@@ -191,6 +203,7 @@ def _run_of(roster: Roster, rubric_source: str, rubric: LoadedRubric, options: B
         jobs=options.jobs,
         cluster=options.cluster,
         cluster_insecure=options.cluster_insecure,
+        own_folder=own_folder,
         columns=roster.columns,
         faults=roster.faults,
         entries=tuple(_without_password(entry) for entry in roster.entries),

@@ -119,6 +119,8 @@ KEYS: dict[str, str] = {
     "BatchRun.ended_at": "When it ended; null while it runs.",
     "BatchRun.jobs": "How many were graded side by side; 0 for as many as fit.",
     "BatchRun.cluster": "The address of the cluster's scheduler, without passwords.",
+    "BatchRun.cluster_insecure": "Whether that may be a cluster without certificates.",
+    "BatchRun.own_folder": "Whether a batch made the folder of results, and so keeps it for its owner alone.",
     "BatchRun.counts": "How many submissions came to what.",
     "BatchRun.columns": "The roster's further columns.",
     "BatchRun.faults": "Rows of the roster that cannot be graded.",

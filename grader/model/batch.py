@@ -57,6 +57,7 @@ class BatchRun(Record):
     jobs: int = 0
     cluster: str = ""
     cluster_insecure: bool = False
+    own_folder: bool = False
     counts: Counts = Counts()
     columns: tuple[str, ...] = ()
     faults: tuple[RosterFault, ...] = ()
