@@ -44,7 +44,8 @@ RESERVED = frozenset(
 @dataclass(frozen=True, kw_only=True)
 class BatchOptions:
     """`jobs` submissions side by side; `only` as `--only` has it. With `same_commit`, what is
-    graded again is the commit of the earlier result. `cluster` and `cluster_insecure` are said in `run.json`."""
+    graded again is the commit of the earlier result. What `cluster` and those below it say stands in `run.json`, so
+    that the same can be asked for again."""
 
     out: Path
     jobs: int
@@ -55,6 +56,8 @@ class BatchOptions:
     same_commit: bool = False
     cluster: str = ""
     cluster_insecure: bool = False
+    allow_local: tuple[str, ...] = ()
+    remote_only: bool = False
 
 
 class Watcher(Protocol):
@@ -204,6 +207,8 @@ def _run_of(
         cluster=options.cluster,
         cluster_insecure=options.cluster_insecure,
         own_folder=own_folder,
+        allow_local=options.allow_local,
+        remote_only=options.remote_only,
         columns=roster.columns,
         faults=roster.faults,
         entries=tuple(_without_password(entry) for entry in roster.entries),

@@ -121,6 +121,8 @@ KEYS: dict[str, str] = {
     "BatchRun.cluster": "The address of the cluster's scheduler, without passwords.",
     "BatchRun.cluster_insecure": "Whether that may be a cluster without certificates.",
     "BatchRun.own_folder": "Whether a batch made the folder of results, and so keeps it for its owner alone.",
+    "BatchRun.allow_local": "What `--allow-local` said: folders below which the roster may name paths.",
+    "BatchRun.remote_only": "Whether the roster may name no path of the machine (`--remote-only`).",
     "BatchRun.counts": "How many submissions came to what.",
     "BatchRun.columns": "The roster's further columns.",
     "BatchRun.faults": "Rows of the roster that cannot be graded.",

@@ -58,6 +58,8 @@ class BatchRun(Record):
     cluster: str = ""
     cluster_insecure: bool = False
     own_folder: bool = False
+    allow_local: tuple[str, ...] = ()
+    remote_only: bool = False
     counts: Counts = Counts()
     columns: tuple[str, ...] = ()
     faults: tuple[RosterFault, ...] = ()

@@ -15,7 +15,7 @@ from grader.cli.say import say, say_beside, say_json
 from grader.errors import ExitCode, UsageError
 from grader.model.batch import BatchRun
 from grader.portable import cores
-from grader.roster import read_roster
+from grader.roster import Local, read_roster
 from grader.roster.times import parse_time
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.shown import line
@@ -41,11 +41,14 @@ def run(
     cluster: str | None = None,
     cluster_insecure: bool = False,
     exchange: str | None = None,
+    allow_local: list[Path] | None = None,
+    remote_only: bool = False,
     as_json: bool = False,
 ) -> ExitCode:
     """Grade a class into `out/<id>/`, with a gradebook, and go on where an earlier batch stopped."""
     loaded = load_rubric(rubric)
-    named = read_roster(roster)
+    local = _local(allow_local or [], remote_only=remote_only)
+    named = read_roster(roster, local)
     options = BatchOptions(
         out=out or DEFAULT_OUT,
         jobs=jobs or _jobs(loaded, static=static),
@@ -55,6 +58,8 @@ def run(
         only=only or (),
         cluster=cluster or "",
         cluster_insecure=cluster_insecure,
+        allow_local=tuple(str(folder) for folder in local.folders),
+        remote_only=remote_only,
     )
     for fault in named.faults:
         say_beside(f"roster: {fault}")
@@ -92,6 +97,15 @@ def _time(text: str | None) -> datetime | None:
     if found is None:
         raise UsageError(f"--before {line(text, 80)} is no time", hint="such as 2026-11-20T23:59:00+01:00")
     return found
+
+
+def _local(folders: list[Path], *, remote_only: bool) -> Local:
+    if folders and remote_only:
+        raise UsageError("--remote-only refuses what --allow-local allows", hint="leave one of them out")
+    for folder in folders:
+        if not folder.is_dir():
+            raise UsageError(f"--allow-local {folder}: there is no such folder", hint="give a folder")
+    return Local(folders=tuple(folder.absolute() for folder in folders), remote_only=remote_only)
 
 
 def _hands(options: BatchOptions, exchange: str | None) -> Hands:
