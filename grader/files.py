@@ -9,14 +9,17 @@ import sys
 import tempfile
 from contextlib import suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from grader.errors import GraderError, HostError, OutputError
-from grader.portable import CLOEXEC, NOFOLLOW
+from grader.portable import BINARY, CLOEXEC, NOFOLLOW
 
 if sys.platform != "win32":
     import fcntl
 
 HAS_LOCKS = sys.platform != "win32"
+FILE, FOLDER = 0o600, 0o700
+"""Modes of what is for its owner alone: marks are."""
 
 FULL = {
     errno.ENOSPC: "the disk is full",
@@ -26,10 +29,11 @@ FULL = {
 }
 
 
-def atomic_write(path: Path, data: bytes) -> None:
+def atomic_write(path: Path, data: bytes, *, public: bool = False) -> None:
     """Write `data` beside `path`, flush it to the disk, and rename it into place.
 
-    A link stays a link, and what is no file (`/dev/null`, a pipe) is written to and stays what it is.
+    The file is for its owner alone, whatever the umask, with folders that are missing; a `public` one is as the umask
+    says. A link stays a link, and what is no file (`/dev/null`, a pipe) is written to and stays what it is.
     Raises OutputError, or HostError where the disk gives out; then `path` is as it was before, and nothing is
     left beside it.
     """
@@ -39,8 +43,8 @@ def atomic_write(path: Path, data: bytes) -> None:
         return
     beside = path.with_name(f".{path.name[:80]}.{secrets.token_hex(6)}")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with beside.open("xb") as file:
+        make_folder(path.parent, public=public)
+        with new_file(beside, public=public) as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
@@ -51,6 +55,34 @@ def atomic_write(path: Path, data: bytes) -> None:
         if isinstance(error, OSError):
             raise unwritable(path, error) from error
         raise
+
+
+def new_file(path: Path, *, public: bool = False) -> BinaryIO:
+    """Open a file that is not there yet, for its owner alone unless it is `public`. Raises OSError."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | CLOEXEC | NOFOLLOW | BINARY
+    return os.fdopen(os.open(path, flags, 0o666 if public else FILE), "wb")
+
+
+def make_folder(folder: Path, *, public: bool = False) -> bool:
+    """Make a folder, and those above it that are missing, for their owner alone unless they are `public`; whether it is
+    new. One that was there keeps its mode: who made it has decided. Raises OSError."""
+    try:
+        folder.mkdir(0o777 if public else FOLDER)
+    except FileNotFoundError:
+        make_folder(folder.parent, public=public)
+        return make_folder(folder, public=public)
+    except OSError:
+        if not folder.is_dir():
+            raise
+        return False
+    return True
+
+
+def keep_private(path: Path) -> None:
+    """Leave a file or a folder to its owner alone, where the file system knows modes; a link stays as it is."""
+    with suppress(OSError):
+        if not path.is_symlink():
+            path.chmod(FOLDER if path.is_dir() else FILE)
 
 
 def _write_into(path: Path, data: bytes) -> None:
@@ -83,11 +115,11 @@ def unwritable(path: Path, error: OSError) -> GraderError:
 
 
 def sync_tree(folder: Path) -> None:
-    """Flush everything in `folder`, and the folder itself, to the disk. Raises OSError."""
+    """Flush everything in `folder`, and the folder itself, to the disk, for its owner alone. Raises OSError."""
     for place, _, files in os.walk(folder, topdown=False):
-        for name in files:
-            sync(Path(place) / name)
-        sync(Path(place))
+        for path in (*(Path(place) / name for name in files), Path(place)):
+            keep_private(path)
+            sync(path)
 
 
 def sync(path: Path) -> None:

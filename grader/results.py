@@ -3,6 +3,8 @@
 Everything is written into `.grader-new`, flushed to the disk, and renamed to `.grader-ready`: from there on it counts.
 Then the old result goes, the new evidence and reports come, and the new result last. A grader that is killed in between
 leaves no result, or one that fits the evidence beside it; the next one finishes what it had begun.
+
+Folders that are made and files that are written are for their owner alone: they hold a student's marks.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from pydantic import ValidationError
 from typing_extensions import Self
 
 from grader.errors import Busy, EvidenceError
-from grader.files import lock, sync, sync_tree, unwritable
+from grader.files import lock, make_folder, sync, sync_tree, unwritable
 from grader.model.result import GradingResult
 from grader.model.version import RESULT as FORMAT
 from grader.model.version import UPDATE
@@ -52,7 +54,7 @@ class Results:
         try:
             with self._writable():
                 _recover(self.folder)
-                self.evidence.mkdir(parents=True)
+                make_folder(self.evidence)
         except BaseException:
             self._leave()
             raise
@@ -147,7 +149,7 @@ def _locked(folder: Path) -> int:
     """A descriptor that holds the folder, made anew where the grader that held it before has just removed it."""
     for _ in range(ATTEMPTS):
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            make_folder(folder)
             descriptor = open_folder(folder)
         except FileNotFoundError:
             continue

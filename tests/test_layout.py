@@ -66,7 +66,9 @@ ALLOWED = {
     "review": BASE | {
         "batch", "files", "gradebook", "intake", "overrides", "report", "results", "rubric", "temporary"
     },
-    "cluster": BASE | {"arena.ros_env", "batch.child", "batch.job", "intake", "results", "rubric", "temporary"},
+    "cluster": BASE | {
+        "arena.ros_env", "batch.child", "batch.job", "files", "intake", "results", "rubric", "temporary"
+    },
     "watching": {
         *BASE, "arena.asynchronous", "arena.workspace", "faults", "intake", "package", "pipeline",
         "report", "results", "rubric", "temporary"

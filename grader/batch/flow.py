@@ -14,13 +14,13 @@ from typing import Any, Protocol
 
 from grader import __version__
 from grader.batch.choice import check, chosen
-from grader.batch.folder import RUN, BatchFolder, write_run
+from grader.batch.folder import RUN, BatchFolder, open_batch, write_run
 from grader.batch.hands import Hands
 from grader.batch.job import Job, Outcome, Sandbox
 from grader.batch.settled import Settler, rewrite
-from grader.errors import Busy, GraderError
+from grader.errors import Busy, GraderError, UsageError
 from grader.fetching import prefetch
-from grader.files import check_writable, lock
+from grader.files import check_writable, keep_private, lock, make_folder
 from grader.gradebook import write_gradebook
 from grader.intake import safe_name, without_password
 from grader.judging.summary import passed
@@ -44,7 +44,8 @@ RESERVED = frozenset(
 @dataclass(frozen=True, kw_only=True)
 class BatchOptions:
     """`jobs` submissions side by side; `only` as `--only` has it. With `same_commit`, what is
-    graded again is the commit of the earlier result. `cluster` is said in `run.json`."""
+    graded again is the commit of the earlier result. What `cluster` and those below it say stands in `run.json`, so
+    that the same can be asked for again."""
 
     out: Path
     jobs: int
@@ -54,6 +55,9 @@ class BatchOptions:
     only: Sequence[str] = ()
     same_commit: bool = False
     cluster: str = ""
+    cluster_insecure: bool = False
+    allow_local: tuple[str, ...] = ()
+    remote_only: bool = False
 
 
 class Watcher(Protocol):
@@ -99,11 +103,12 @@ def run_batch(
     roster = _gradable(roster, options.out)
     check(roster.entries, options.only)
     check_writable(options.out)
-    options.out.mkdir(parents=True, exist_ok=True)
+    is_new = make_folder(options.out)
     with alone(options.out):
         finish_killed(options.out)
         overrides = read_overrides(options.out / OVERRIDES, rubric.rubric, ids_of(roster))
-        folder = BatchFolder(options.out, _run_of(roster, rubric_source, rubric, options))
+        own = _kept_private(options.out, is_new=is_new)
+        folder = BatchFolder(options.out, _run_of(roster, rubric_source, rubric, options, own_folder=own))
         folder.refuse_newer()
         write_run(options.out, folder.run)
         batch = _Batch(
@@ -123,6 +128,15 @@ def run_batch(
         finally:
             folder = write_books(folder, rubric.rubric, state, kept)
     return folder
+
+
+def _kept_private(out: Path, *, is_new: bool) -> bool:
+    """Whether a batch made this folder: then it is for its owner alone. Any other one keeps the mode that it has."""
+    with suppress(UsageError):
+        is_new = is_new or open_batch(out).run.own_folder
+    if is_new:
+        keep_private(out)
+    return is_new
 
 
 def _outcomes(batch: _Batch, hands: Hands, watcher: Watcher) -> Iterator[Outcome]:
@@ -178,7 +192,9 @@ def _settled(batch: _Batch, entry: Entry, outcome: Outcome) -> Outcome:
     return outcome.model_copy(update={"status": now.status, "points": now.points, "passed": ok})
 
 
-def _run_of(roster: Roster, rubric_source: str, rubric: LoadedRubric, options: BatchOptions) -> BatchRun:
+def _run_of(
+    roster: Roster, rubric_source: str, rubric: LoadedRubric, options: BatchOptions, *, own_folder: bool
+) -> BatchRun:
     return BatchRun(
         state="running",
         grader=__version__,
@@ -189,6 +205,10 @@ def _run_of(roster: Roster, rubric_source: str, rubric: LoadedRubric, options: B
         started_at=datetime.now(timezone.utc),
         jobs=options.jobs,
         cluster=options.cluster,
+        cluster_insecure=options.cluster_insecure,
+        own_folder=own_folder,
+        allow_local=options.allow_local,
+        remote_only=options.remote_only,
         columns=roster.columns,
         faults=roster.faults,
         entries=tuple(_without_password(entry) for entry in roster.entries),

@@ -198,6 +198,8 @@ def run_missing(
         before=folder.run.before,
         only=again,
         same_commit=True,
+        allow_local=folder.run.allow_local,
+        remote_only=folder.run.remote_only,
     )
     now = run_batch(roster, folder.run.rubric_source, rubric, options, hands=hands, watcher=watcher)
     after = tuple(_run_again(now, one) if one.missing else one for one in regraded)

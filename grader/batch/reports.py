@@ -12,7 +12,7 @@ from pathlib import Path
 from grader.batch.pool import side_by_side, workers, working
 from grader.batch.settled import figures_in
 from grader.errors import EvidenceError, GraderError, UsageError
-from grader.files import unwritable
+from grader.files import new_file, unwritable
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
 from grader.report.html import html_report
@@ -59,7 +59,8 @@ def write_one(folder: Path, rubric: LoadedRubric) -> GradingResult:
         made = _files(result, rubric, figures_in(folder, result, rubric.rubric))
         try:
             for name, data in made.items():
-                (results.new / name).write_bytes(data)
+                with new_file(results.new / name) as file:
+                    file.write(data)
             for name in made:
                 (results.new / name).replace(folder / name)
         except OSError as error:

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from grader.errors import OutputError
-from grader.files import atomic_write
+from grader.files import atomic_write, make_folder
 from grader.model.result import GradingResult
 from grader.report.code_quality import code_quality
 from grader.report.junit import junit
@@ -35,7 +35,7 @@ def clear(out: Path) -> None:
         for name in names:
             path = out / name
             shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
-        out.mkdir(parents=True, exist_ok=True)
+        make_folder(out)
     except OSError as error:
         raise OutputError(
             f"{out} cannot be written: {error.strerror}", hint="say where else it may go"

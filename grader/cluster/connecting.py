@@ -4,48 +4,26 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import os
-import re
 import signal
 import threading
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from grader.cluster import remote
+from grader.cluster.address import LOCAL, is_encrypted
 from grader.cluster.crew import has_no_grader
-from grader.errors import HostError, UsageError
+from grader.errors import HostError
 
-LOCAL = "local"
 CONNECT_S = 15.0
-THREADS_A_CORE = 4  # a grading waits most of the time
-_ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://(\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]@]+):[0-9]{1,5}/?")
 TLS = tuple(f"DASK_DISTRIBUTED__COMM__TLS__{name}" for name in ("CA_FILE", "CLIENT__CERT", "CLIENT__KEY"))
-EXTRA = 'pip install "ros-lab-grader[cluster]"'
-
-
-def check_address(text: str) -> str:
-    """What `--cluster` says: `tcp://host:8786` (or `tls://…`), or `local`.
-
-    Raises UsageError for what is neither, and where Dask is missing.
-    """
-    if text != LOCAL and not _ADDRESS.fullmatch(text):
-        raise UsageError(
-            f"--cluster {text}: not the address of a Dask scheduler",
-            hint="give tcp://host:8786 as `dask scheduler` prints it, or `local`",
-        )
-    try:
-        import distributed  # noqa: F401, PLC0415 - only to know that it is there
-    except ImportError as error:
-        raise UsageError(f"--cluster needs Dask: {error}", hint=EXTRA) from error
-    return text
 
 
 @contextmanager
 def connected(address: str) -> Iterator[Any]:
     """A `distributed.Client`. Raises HostError where no scheduler answers, or one without this grader."""
-    from distributed import Client, LocalCluster  # noqa: PLC0415 - slow to load
+    from distributed import Client  # noqa: PLC0415 - slow to load
     from distributed.versions import VersionMismatchWarning  # noqa: PLC0415 - as above
 
     warnings.filterwarnings("ignore", category=VersionMismatchWarning)  # each worker is asked what matters
@@ -56,17 +34,12 @@ def connected(address: str) -> Iterator[Any]:
             _check_scheduler(client, address)
             yield client
         return
-    with _not_interrupted():
-        cluster = LocalCluster(
-            n_workers=os.cpu_count() or 1,
-            threads_per_worker=THREADS_A_CORE,
-            processes=True,
-            dashboard_address=None,
-            memory_limit=0,
-            silence_logs=logging.CRITICAL,
-        )
-    with cluster, Client(cluster, set_as_default=False) as client:
-        yield client
+    from grader.cluster.own import own_cluster  # noqa: PLC0415 - slow to load
+
+    with ExitStack() as stack:
+        with _not_interrupted():
+            cluster = stack.enter_context(own_cluster())
+        yield stack.enter_context(Client(cluster, set_as_default=False))
 
 
 def _check_address_answers(address: str) -> None:
@@ -88,16 +61,23 @@ def _check_address_answers(address: str) -> None:
 
 
 async def _answer(address: str) -> None:
-    from distributed import Security, rpc  # noqa: PLC0415 - slow to load
+    from distributed import rpc  # noqa: PLC0415 - slow to load
 
-    async with rpc(address, connection_args=Security().get_connection_args("client")) as scheduler:
+    async with rpc(address, connection_args=_security(address).get_connection_args("client")) as scheduler:
         await scheduler.versions()
+
+
+def _security(address: str) -> Any:  # noqa: ANN401 - Dask has no types
+    """What Dask's settings say of certificates; who is reached by TLS leads us to nobody without."""
+    from distributed import Security  # noqa: PLC0415 - slow to load
+
+    return Security(require_encryption=True) if is_encrypted(address) else Security()
 
 
 @contextmanager
 def _client(make: Any, address: str) -> Iterator[Any]:  # noqa: ANN401 - Dask has no types
     try:
-        client = make(address, timeout=CONNECT_S, set_as_default=False)
+        client = make(address, timeout=CONNECT_S, set_as_default=False, security=_security(address))
     except (OSError, ValueError, ImportError, RuntimeError) as error:
         raise _nobody_answers(address) from error
     try:

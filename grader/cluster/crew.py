@@ -9,16 +9,22 @@ from typing import Any
 
 from grader.arena.ros_env import INSTALL_HINT
 from grader.cluster import remote
+from grader.cluster.address import is_encrypted
 
+OPEN = "it listens without certificates: start it with the protocol of its scheduler"
 Answer = Mapping[str, str] | BaseException | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Needs:
-    """What a worker must have: the client's `versions`, what its answer must say of the exchange, and ROS."""
+    """What a worker must have: the client's `versions`, what its answer must say of the exchange, and ROS.
+
+    `encrypted`: it must listen as the scheduler does, with certificates.
+    """
 
     versions: Mapping[str, str]
     ros: bool
+    encrypted: bool = False
 
 
 class Crew:
@@ -61,7 +67,8 @@ class Crew:
         if answer is None or isinstance(answer, OSError):
             self._forget(address)  # gone while it was asked, or asked again
             return ""
-        why = why_not(answer, self._needs)
+        is_open = self._needs.encrypted and not is_encrypted(address)
+        why = OPEN if is_open else why_not(answer, self._needs)
         if not why:
             self.fit[address] = self._threads[address]
             return ""

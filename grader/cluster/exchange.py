@@ -12,6 +12,7 @@ from typing import Any, BinaryIO, cast
 from urllib.parse import urlsplit
 
 from grader.errors import HostError, UsageError
+from grader.files import make_folder
 from grader.model.record import Record
 
 TOKEN_BYTES = 8
@@ -45,7 +46,10 @@ class Exchange:
             place, root = self._open()
             if place.exists(root):
                 place.rm(root, recursive=True)
-            place.makedirs(root, exist_ok=True)
+            if "://" in self.url:
+                place.makedirs(root, exist_ok=True)
+            elif not make_folder(Path(root)):
+                raise FileExistsError("somebody else has just made it")
 
     def remove(self) -> None:
         """The folder and everything in it."""

@@ -12,7 +12,8 @@ from pathlib import Path
 
 from grader.batch.job import Job, Outcome
 from grader.cluster import remote
-from grader.cluster.connecting import LOCAL, check_address, connected
+from grader.cluster.address import LOCAL, check_address, is_encrypted
+from grader.cluster.connecting import connected
 from grader.cluster.crew import Needs
 from grader.cluster.exchange import Exchange, checked_url
 from grader.cluster.shift import Shift
@@ -26,7 +27,9 @@ TOKEN_BYTES = 6
 
 
 class ClusterHands:
-    """The workers of the Dask cluster at `address` (`tcp://host:8786`; `local` starts one for trying it).
+    """The workers of the Dask cluster at `address` (`tls://host:8786`; `local` starts one for trying it).
+
+    With `insecure` it may be one without certificates (`tcp://host:8786`), to which all who reach it may send code.
 
     `out` is the batch's folder, which only this process writes. Results come back through `exchange`, any fsspec URL or
     path that all machines reach; by default a folder in `out`. `say` is told, in one line each, which workers are left
@@ -41,10 +44,11 @@ class ClusterHands:
         out: Path,
         exchange: str | None = None,
         *,
+        insecure: bool = False,
         say: Callable[[str], None] = lambda _: None,
         patience_s: float = PATIENCE_S,
     ) -> None:
-        self._address = check_address(address)
+        self._address = check_address(address, insecure=insecure)
         self._exchange = Exchange(_place(out, exchange))
         self._say, self._patience_s = say, patience_s
 
@@ -54,7 +58,11 @@ class ClusterHands:
         first = next(waiting, None)
         if first is None:
             return
-        needs = Needs(versions=self._versions(), ros=not first.static_only and needs_ros(first.rubric))
+        needs = Needs(
+            versions=self._versions(),
+            ros=not first.static_only and needs_ros(first.rubric),
+            encrypted=self._address == LOCAL or is_encrypted(self._address),
+        )
         with connected(self._address) as client:
             word = secrets.token_hex(TOKEN_BYTES)
             self._exchange.make()

@@ -18,7 +18,7 @@ from typing import Any
 
 from grader.batch.job import Job, Outcome
 from grader.cluster import remote
-from grader.cluster.connecting import LOCAL
+from grader.cluster.address import LOCAL, is_encrypted
 from grader.cluster.crew import Answer, Crew, Needs, ask_of
 from grader.cluster.errands import Report, failed
 from grader.cluster.exchange import Exchange
@@ -194,7 +194,8 @@ class Shift:
     def _nobody(self) -> HostError:
         left_out = "; ".join(self._crew.left_out.values())
         what = f"no worker that can grade ({left_out})" if left_out else "no worker"
-        start = f"start one with `dask worker {self._address} --nthreads 4`, {GOES_ON}"
+        files = " --tls-ca-file CA --tls-cert CERT --tls-key KEY" if is_encrypted(self._address) else ""
+        start = f"start one with `dask worker {self._address} --nthreads 4{files}`, {GOES_ON}"
         return HostError(
             f"{what} at {self._address} for {self._patience_s:g} s",
             hint=start if self._address != LOCAL else "grade without --cluster",

@@ -12,7 +12,7 @@ from grader.deliver.settings import Settings, read_settings
 from grader.deliver.upload import upload
 from grader.errors import GraderError, InternalError
 from grader.faults import fault_of
-from grader.files import atomic_write
+from grader.files import atomic_write, make_folder
 from grader.model.progress import Silence
 from grader.model.result import GradingResult
 from grader.report.terminal import open_console, print_report
@@ -48,6 +48,7 @@ class Form:
 def deliver(place: Place, form: Form) -> bool:
     """Grade what was handed in and write `results.json`; False where that says that nothing was graded."""
     try:
+        make_folder(place.results, public=True)  # as its `results.json`, but for the reports in it
         settings = read_settings(place.lab)
         try:
             result, rubric = _grade(place, settings)
@@ -65,7 +66,8 @@ def deliver(place: Place, form: Form) -> bool:
 
 
 def _write(place: Place, document: dict[str, object]) -> None:
-    atomic_write(place.results / "results.json", json_text(document).encode())
+    """As the umask has it: the platform may read it as another user than it grades as."""
+    atomic_write(place.results / "results.json", json_text(document).encode(), public=True)
 
 
 def _grade(place: Place, settings: Settings) -> tuple[GradingResult, LoadedRubric]:

@@ -49,7 +49,7 @@ class Parcel:
         """Write the files below `folder`, each whole or not at all. Raises OutputError."""
         for path, data, executable in self.entries():
             target = folder / path
-            atomic_write(target, data)
+            atomic_write(target, data, public=True)
             target.chmod(_mode(executable=executable) & 0o777)
 
 

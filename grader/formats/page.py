@@ -126,7 +126,7 @@ def main(folder: Path) -> None:
     """Write all of it."""
     for name, text in pages().items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        atomic_write(folder / name, text.encode())
+        atomic_write(folder / name, text.encode(), public=True)
 
 
 if __name__ == "__main__":

@@ -56,6 +56,10 @@ class BatchRun(Record):
     ended_at: datetime | None = None
     jobs: int = 0
     cluster: str = ""
+    cluster_insecure: bool = False
+    own_folder: bool = False
+    allow_local: tuple[str, ...] = ()
+    remote_only: bool = False
     counts: Counts = Counts()
     columns: tuple[str, ...] = ()
     faults: tuple[RosterFault, ...] = ()

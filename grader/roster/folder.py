@@ -9,18 +9,23 @@ from grader.errors import UsageError
 from grader.intake.names import archive_stem, encodable, is_archive_name, listing, printable
 from grader.model.roster import Entry, Roster
 from grader.roster.gather import Found, columns_of, gather
+from grader.roster.local import REFUSED, Local, local_fault
 from grader.roster.platforms import Named, platform_name
 
 IGNORED = {"__MACOSX", "Thumbs.db", "desktop.ini"}
 RECORDINGS = (".bag", ".mcap")
 
 
-def from_folder(folder: Path) -> Roster:
+def from_folder(folder: Path, local: Local) -> Roster:
     """An entry for each folder, repository, archive or recording in it, in order of names; one for all files that
     Moodle or Canvas has from one student.
 
-    Raises UsageError where the folder cannot be read, or is one submission.
+    Raises UsageError where the folder cannot be read, is one submission, or `local` allows only what is fetched.
     """
+    if local.remote_only:
+        raise UsageError(
+            f"{folder}: a folder of submissions {REFUSED}", hint="give a roster of addresses, or leave it out"
+        )
     paths = _inside(folder)
     if any(path.name == "package.xml" for path in paths):
         raise UsageError(
@@ -32,7 +37,7 @@ def from_folder(folder: Path) -> Roster:
         named = platform_name(path.name) if encodable(path.name) else None
         key = (named.platform, named.id) if named else ("", path.name)
         students.setdefault(key, []).append((path, named))
-    found = [_student(files) for files in students.values()]
+    found = [_allowed(_student(files), folder, local) for files in students.values()]
     return gather(folder, found, columns=columns_of(one.entry for one in found))
 
 
@@ -43,6 +48,12 @@ def _inside(folder: Path) -> list[Path]:
         )
     except OSError as error:
         raise UsageError(f"{folder}: cannot be read: {error.strerror}") from error
+
+
+def _allowed(found: Found, folder: Path, local: Local) -> Found:
+    """A link may lead out of the folder."""
+    fault = local_fault(found.entry.source, folder, local) if found.entry else ""
+    return Found(where=found.where, id=found.id, faults=(fault,)) if fault else found
 
 
 def _student(files: list[tuple[Path, Named | None]]) -> Found:

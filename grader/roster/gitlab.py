@@ -13,6 +13,8 @@ from grader.intake.names import encodable, printable
 from grader.model.roster import Entry, Roster
 from grader.roster.decode import text_of
 from grader.roster.gather import Found, columns_of, gather
+from grader.roster.local import Local
+from grader.roster.sources import source_fault, whole_source
 
 BYTES_MAX = 64 << 20
 ADDRESSES = ("http_url_to_repo", "ssh_url_to_repo")
@@ -21,20 +23,20 @@ _BLANK = " \t\r\n"
 _BLANKS = re.compile(f"[{_BLANK}]*")
 
 
-def from_gitlab(path: Path) -> Roster:
+def from_gitlab(path: Path, local: Local) -> Roster:
     """The projects of a group (`GET /groups/:id/projects`), in one list, or in one after the other as pages come.
 
     Raises UsageError where the file is no such list.
     """
     found = [
-        _found(project, f"{path.name}: project {number}")
+        _found(project, f"{path.name}: project {number}", path.parent, local)
         for number, project in enumerate(_projects(path), start=1)
     ]
     found = _told_apart(found)
     return gather(path, found, columns=columns_of(one.entry for one in found))
 
 
-def _found(project: object, where: str) -> Found:
+def _found(project: object, where: str, base: Path, local: Local) -> Found:
     if not isinstance(project, dict):
         return Found(where=where, faults=("no project",))
     texts = {key: text for key, text in project.items() if isinstance(text, str) and encodable(text)}
@@ -42,11 +44,13 @@ def _found(project: object, where: str) -> Found:
     name = texts.get("path") or texts.get("name", "")
     if source is None or not name:
         return Found(where=where, id=name, faults=("no http_url_to_repo, or no path",))
+    if fault := source_fault(source, base, local):
+        return Found(where=where, id=name, faults=(f"source: {fault}",))
     namespace = project.get("namespace")
     group = namespace.get("full_path") if isinstance(namespace, dict) else None
     entry = Entry(
         id=name,
-        source=source,
+        source=whole_source(source, base),
         name=texts.get("name", ""),
         group=group if isinstance(group, str) and encodable(group) else "",
         where=where,

@@ -6,7 +6,10 @@ import os
 import re
 from pathlib import Path
 
+from grader.errors import SubmissionError, UsageError
 from grader.intake.names import brief
+from grader.intake.source import parse_source
+from grader.roster.local import OWN_FOLDER, Local, local_fault
 
 _ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://|[^/\s@]+@[^/\s:]+:|[\w.-]{2,}:(?!//)\S")
 """An address with a scheme, git's `user@host:path`, or `host:path`, as an SSH configuration names hosts."""
@@ -16,19 +19,21 @@ _WEB = re.compile(r"(www\.|[\w-]+(\.[\w-]+)*\.(com|org|edu|net|io|de|fr|it|es|uk
 _NO_REF = re.compile(r"[\x00-\x20~^:?*\[\\\x7f]|\.\.|@\{|//|^[/-]|[/.]$")
 
 
-def source_fault(source: str, base: Path) -> str:
-    """Why nothing can be fetched from `source`, a field of a roster in the folder `base`; empty where it may be."""
-    relative = not Path(source).is_absolute() and not source.startswith("~")
+def source_fault(source: str, base: Path, local: Local = OWN_FOLDER) -> str:
+    """Why nothing can be had from `source`, a field of a roster in the folder `base`, or nothing may be by `local`;
+    empty where it may be."""
     try:
-        out = relative and not (base / source).resolve().is_relative_to(base.resolve())
         there = _is_there(source, base)
     except (OSError, ValueError, RuntimeError):
         return f"{_shown(source)} is no path that can be followed"
+    refused = local_fault(whole_source(source, base), base, local)
     if not there and (_ADDRESS.match(source) or _WINDOWS.match(source)):
-        return _address_fault(source)
-    if out:
-        return f"{_shown(source)} leads out of the roster's folder"
-    if there or not relative:
+        fault = _address_fault(source)
+        if fault or not refused:
+            return fault
+    if refused:
+        return f"{_shown(source)} {refused}"
+    if there or Path(source).is_absolute() or source.startswith("~"):
         return ""
     web = "; a web address begins with https://" if _WEB.match(source) else ""
     return f"{_shown(source)} does not exist{web}"
@@ -37,9 +42,18 @@ def source_fault(source: str, base: Path) -> str:
 def _address_fault(source: str) -> str:
     if _SLASHES.match(source):
         return f"{_shown(source)}: an address has two slashes behind its colon, as in https://"
-    if _ADDRESS.match(source):
+    if not _ADDRESS.match(source):
+        return f"{_shown(source)} is a path of Windows: write it with / as it is on this machine"
+    try:
+        parse_source(source)
+    except UsageError:  # as what git takes for the name of a program (`ext::`) or for an option of ssh
+        return f"{_shown(source)} is no address of a repository"
+    except (
+        SubmissionError,
+        OSError,
+    ):  # a path on this machine that is not there is told when it is looked for
         return ""
-    return f"{_shown(source)} is a path of Windows: write it with / as it is on this machine"
+    return ""
 
 
 def whole_source(source: str, base: Path) -> str:

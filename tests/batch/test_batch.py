@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.roster.local import OUT
 from tests.batch.a_class import (
     CORRECT,
     ROOT,
@@ -200,7 +201,7 @@ def test_ten_rows_that_are_bad_in_ten_ways(tmp_path, asking, capsys) -> None:
         "ref (roster.csv:5)": "there is no branch, tag or commit 'no-such-branch'",
         "broken (roster.csv:6)": "broken.zip is damaged",
         "none (roster.csv:7)": "no package.xml was found",
-        "outside": "roster.csv:9: source: ../../etc leads out of the roster's folder",
+        "outside": f"roster.csv:9: source: ../../etc {OUT}",
         "private (roster.csv:10)": "it does not exist, or it needs a password",
         "soon": "roster.csv:12: extension_days: soon is no number of days",
     }

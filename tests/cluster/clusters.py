@@ -12,21 +12,24 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from distributed.security import Security
+
 DASK = (sys.executable, "-m", "dask")
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 60.0
 
 
 class Cluster:
-    """A scheduler at `address`; `worker()` starts one more worker."""
+    """A scheduler at `address`; `worker()` starts one more worker. With `tls` all of them show `certificates`."""
 
-    def __init__(self, folder: Path, *, preload: str = "") -> None:
+    def __init__(self, folder: Path, *, preload: str = "", tls: bool = False) -> None:
         self._folder = folder
+        self.certificates = _certificates(folder) if tls else {}
         self._processes: list[subprocess.Popen[bytes]] = []
         address = folder / "address.json"
         self.scheduler, _ = self._start(
             "scheduler", "--host", "127.0.0.1", "--port", "0", "--dashboard-address", "127.0.0.1:0",
-            "--no-dashboard", "--scheduler-file", str(address), *_preload(preload)
+            "--no-dashboard", "--scheduler-file", str(address), *self._tls(), *_preload(preload)
         )  # fmt: skip
         until(lambda: address.exists() and address.read_text().endswith("}"))
         self.address = str(json.loads(address.read_text())["address"])
@@ -35,7 +38,8 @@ class Cluster:
         """Its process (that of its nanny, where it has one), once the scheduler knows it."""
         process, log = self._start(
             "worker", self.address, "--no-dashboard", "--nthreads", str(threads), "--memory-limit", "0",
-            "--local-directory", str(self._folder), "--nanny" if nanny else "--no-nanny", *_preload(preload)
+            "--local-directory", str(self._folder), "--nanny" if nanny else "--no-nanny",
+            *self._tls(), *_preload(preload)
         )  # fmt: skip
         until(lambda: b"Registered to" in log.read_bytes())
         return process
@@ -49,6 +53,11 @@ class Cluster:
             process.kill()
             process.wait()
 
+    def _tls(self) -> list[str]:
+        """Options of `dask scheduler` and `dask worker`, as docs/how-to/cluster.md has them."""
+        files = [f"--tls-{name}={path}" for name, path in self.certificates.items()]
+        return ["--protocol=tls", *files] if files else []
+
     def _start(self, *args: str) -> tuple[subprocess.Popen[bytes], Path]:
         log = self._folder / f"{args[0]}-{len(self._processes)}.log"
         env = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -59,9 +68,9 @@ class Cluster:
 
 
 @contextmanager
-def cluster(folder: Path, *, preload: str = "") -> Iterator[Cluster]:
+def cluster(folder: Path, *, preload: str = "", tls: bool = False) -> Iterator[Cluster]:
     """Ended with everything that belongs to it."""
-    made = Cluster(folder, preload=preload)
+    made = Cluster(folder, preload=preload, tls=tls)
     try:
         yield made
     finally:
@@ -70,6 +79,15 @@ def cluster(folder: Path, *, preload: str = "") -> Iterator[Cluster]:
 
 def _preload(name: str) -> list[str]:
     return ["--preload", f"tests.cluster.preloads.{name}"] if name else []
+
+
+def _certificates(folder: Path) -> dict[str, Path]:
+    """Files for both ends; the certificate has signed itself, so it is the authority too."""
+    made = Security.temporary()
+    files = {"ca-file": made.tls_ca_file, "cert": made.tls_client_cert, "key": made.tls_client_key}
+    for name, text in files.items():
+        (folder / name).write_text(str(text))
+    return {name: folder / name for name in files}
 
 
 def until(holds: Callable[[], object], patience_s: float = PATIENCE_S) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from grader.cluster import ClusterHands, connecting
-from grader.cluster.connecting import check_address
+from grader.cluster.address import check_address
 from grader.errors import HostError, UsageError
 from tests.cluster.jobs import jobs_for
 
@@ -27,7 +27,22 @@ from tests.cluster.jobs import jobs_for
     ],
 )
 def test_addresses(address: str) -> None:
+    assert check_address(address, insecure=True) == address
+
+
+@pytest.mark.parametrize("address", ["local", "tls://host:8786", "wss://host:8786"])
+def test_where_certificates_are_asked_for_no_flag_is_needed(address: str) -> None:
     assert check_address(address) == address
+
+
+@pytest.mark.parametrize("scheme", ["tcp", "ws", "ucx"])
+def test_a_cluster_that_asks_for_no_certificate_is_refused_without_the_flag(
+    scheme: str, tmp_path: Path
+) -> None:
+    with pytest.raises(UsageError, match="asks for no certificate") as caught:
+        ClusterHands(f"{scheme}://host:8786", tmp_path / "out")
+    assert "--cluster-insecure" in caught.value.hint
+    assert "tls://" in caught.value.hint
 
 
 @pytest.mark.parametrize(
@@ -38,19 +53,20 @@ def test_addresses(address: str) -> None:
 def test_what_is_no_address_is_refused_before_anything_is_done(address: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="not the address of a Dask scheduler") as caught:
         ClusterHands(address, tmp_path / "out")
-    assert "tcp://host:8786" in caught.value.hint
+    assert "tls://host:8786" in caught.value.hint
     assert not (tmp_path / "out").exists()
 
 
-def test_without_dask_it_says_what_to_install(monkeypatch) -> None:
-    monkeypatch.setitem(sys.modules, "distributed", None)
+@pytest.mark.parametrize("missing", ["distributed", "cryptography"])
+def test_without_dask_it_says_what_to_install(missing: str, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, missing, None)
     with pytest.raises(UsageError, match="needs Dask") as caught:
         check_address("local")
     assert "ros-lab-grader[cluster]" in caught.value.hint
 
 
 def _refusal(address: str, out: Path) -> HostError:
-    hands = ClusterHands(address, out)
+    hands = ClusterHands(address, out, insecure=True)
     with pytest.raises(HostError) as caught:
         list(hands.run(jobs_for(out, 1), begun=lambda _: None))
     assert "\n" not in caught.value.message
@@ -103,5 +119,5 @@ def test_a_tls_address_without_certificates_says_where_they_go(tmp_path: Path) -
 
 
 def test_no_jobs_need_no_cluster(tmp_path: Path) -> None:
-    hands = ClusterHands("tcp://127.0.0.1:1", tmp_path / "out")
+    hands = ClusterHands("tls://127.0.0.1:1", tmp_path / "out")
     assert list(hands.run(iter(()), begun=lambda _: None)) == []

@@ -41,6 +41,19 @@ def test_without_anything_to_run_no_ros_is_asked_for() -> None:
     assert why_not({**GOOD, "ros": ""}, Needs(versions=VERSIONS, ros=False)) == ""
 
 
+@pytest.mark.parametrize(
+    ("address", "fits"), [("tls://10.0.0.1:1", True), (A, False), ("ucx://10.0.0.1:1", False)]
+)
+def test_where_certificates_are_asked_for_a_worker_without_is_left_out(address: str, fits: bool) -> None:
+    needs = Needs(versions=VERSIONS, ros=True, encrypted=True)
+    heard: SimpleQueue[tuple[str, Answer]] = SimpleQueue()
+    crew = Crew(needs, lambda _: GOOD, lambda *said: heard.put(said))
+    crew.update({address: 4})
+    said = crew.settle(*heard.get(timeout=10))
+    assert (crew.fit == {address: 4}) is fits
+    assert ("listens without certificates" in said) is not fits
+
+
 class _Asked:
     """A crew whose workers answer what `says` holds for them."""
 

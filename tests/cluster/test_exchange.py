@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from fsspec.implementations.local import LocalFileSystem
 
 from grader.cluster.exchange import Exchange, checked_url
 from grader.errors import HostError, UsageError
@@ -75,6 +76,15 @@ def test_what_an_earlier_batch_left_is_gone(exchange: Exchange, tmp_path: Path) 
     assert _names(exchange) == []
     exchange.remove()
     assert not Path(exchange.url).exists()
+
+
+def test_a_folder_on_this_machine_is_its_owners_and_never_one_that_somebody_else_made(
+    exchange: Exchange, tmp_path: Path, monkeypatch
+) -> None:
+    assert Path(exchange.url).stat().st_mode & 0o777 == 0o700
+    monkeypatch.setattr(LocalFileSystem, "rm", lambda *_, **__: None)
+    with pytest.raises(HostError, match="somebody else has just made it"):
+        exchange.make()
 
 
 def test_who_reads_the_word_is_at_the_same_place(exchange: Exchange, tmp_path: Path) -> None:

@@ -39,7 +39,10 @@ def test_a_submission_that_ends_its_workers_is_given_up_and_the_others_are_grade
         place.worker(preload="poison", nanny=True)
     out = tmp_path / "out"
     jobs = [named_job(out, "poison"), *jobs_for(out, 4)]
-    outcomes = {outcome.id: outcome for outcome in ClusterHands(place.address, out).run(jobs, begun=_none)}
+    outcomes = {
+        outcome.id: outcome
+        for outcome in ClusterHands(place.address, out, insecure=True).run(jobs, begun=_none)
+    }
     poison = outcomes.pop("poison")
     assert (poison.status, poison.kind) == ("error", "worker-lost")
     assert "3 times" in poison.message
@@ -51,7 +54,7 @@ def test_a_submission_that_ends_its_workers_is_given_up_and_the_others_are_grade
 def test_workers_that_come_later_take_over_from_those_that_are_gone(place: Cluster, tmp_path: Path) -> None:
     first = place.worker()
     out, outcomes = tmp_path / "out", []
-    for outcome in ClusterHands(place.address, out).run(jobs_for(out, 8), begun=_none):
+    for outcome in ClusterHands(place.address, out, insecure=True).run(jobs_for(out, 8), begun=_none):
         outcomes.append(outcome)
         if len(outcomes) == 2:
             kill(first.pid)
@@ -64,7 +67,7 @@ def test_workers_that_come_later_take_over_from_those_that_are_gone(place: Clust
 def test_a_caller_that_stops_leaves_nothing_running(place: Cluster, tmp_path: Path) -> None:
     worker = place.worker(threads=2)
     out = tmp_path / "out"
-    outcomes = ClusterHands(place.address, out).run(jobs_for(out, 50), begun=_none)
+    outcomes = ClusterHands(place.address, out, insecure=True).run(jobs_for(out, 50), begun=_none)
     next(outcomes)
     assert children_of(worker.pid)
     outcomes.close()
@@ -90,14 +93,14 @@ def test_a_killed_client_leaves_its_workers_free_and_the_next_one_goes_on(
     until(lambda: not any(lives(pid) for pid in busy))
     (out / EXCHANGE).mkdir(exist_ok=True)
     (out / EXCHANGE / "s000.0123456789abcdef.tar.gz").write_bytes(b"of the one that was killed")
-    assert len(ids(ClusterHands(place.address, out).run(jobs_for(out, 4), begun=_none))) == 4
+    assert len(ids(ClusterHands(place.address, out, insecure=True).run(jobs_for(out, 4), begun=_none))) == 4
     assert not (out / EXCHANGE).exists()
 
 
 def test_without_its_scheduler_the_batch_ends_with_one_line(place: Cluster, tmp_path: Path) -> None:
     place.worker()
     out = tmp_path / "out"
-    outcomes = ClusterHands(place.address, out).run(jobs_for(out, 50), begun=_none)
+    outcomes = ClusterHands(place.address, out, insecure=True).run(jobs_for(out, 50), begun=_none)
     next(outcomes)
     kill(place.scheduler.pid)
     with pytest.raises(HostError, match=r"the connection to the scheduler at .* is lost") as caught:

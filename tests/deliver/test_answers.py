@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
 from pathlib import Path
 
 import pytest
 
 from grader.deliver import gradescope, prairielearn
-from grader.deliver.grading import Form, Place, deliver
+from grader.deliver.grading import REPORTS, Form, Place, deliver
 from grader.deliver.settings import FILE, Settings
 from grader.errors import HostError
 from grader.model.result import ErrorInfo
@@ -22,6 +24,7 @@ FORMS = {
     "gradescope": (gradescope.place, gradescope.FORM),
     "prairielearn": (prairielearn.place, prairielearn.FORM),
 }
+REFERENCE = Path(__file__).parents[2] / "reference_solutions" / "leeds-comp3631-lab1" / "lab1"
 RUBRIC = LoadedRubric.model_construct(rubric=rubric(), path=Path("lab.yaml"), digest="0" * 64)
 SOUND = (
     criterion("good", Status.PASS, 6, 6),
@@ -84,6 +87,20 @@ def test_a_grader_that_cannot_grade_says_so_and_gives_no_score(platform, setting
     assert document.get("score", 0) == 0
     assert ("score" in document) == (platform == "prairielearn")  # there, it says that nothing was gradable
     assert "NOT GRADED" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("platform", FORMS)
+def test_a_platform_can_read_what_it_is_told_and_the_reports_stay_closed(platform, tmp_path) -> None:
+    lab = Path(__file__).parents[2] / "benchmarks" / "data" / "static.yaml"
+    place, form = laid_out(tmp_path, platform, Settings(rubric=str(lab), minutes=10).to_json().decode())
+    shutil.copytree(REFERENCE, place.handed_in / "lab1")
+    before = os.umask(0o022)
+    try:
+        assert deliver(place, form)
+    finally:
+        os.umask(before)
+    places = (place.results, place.results / "results.json", place.results / REPORTS)
+    assert [path.stat().st_mode & 0o777 for path in places] == [0o755, 0o644, 0o700]
 
 
 @pytest.mark.parametrize("platform", FORMS)

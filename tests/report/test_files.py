@@ -143,13 +143,19 @@ def test_an_interrupted_write_leaves_nothing(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_new_files_follow_the_umask(tmp_path):
+def test_new_files_are_their_owners_and_public_ones_follow_the_umask(tmp_path):
+    (tmp_path / "there").touch(0o666)
     before = os.umask(0o027)
     try:
-        atomic_write(tmp_path / "x", b"")
+        for name in ("own/x", "there"):
+            atomic_write(tmp_path / name, b"")
+        atomic_write(tmp_path / "all" / "x", b"", public=True)
     finally:
         os.umask(before)
-    assert (tmp_path / "x").stat().st_mode & 0o777 == 0o640
+    modes = {
+        name: (tmp_path / name).stat().st_mode & 0o777 for name in ("own", "own/x", "there", "all", "all/x")
+    }
+    assert modes == {"own": 0o700, "own/x": 0o600, "there": 0o600, "all": 0o750, "all/x": 0o640}
 
 
 @pytest.mark.parametrize("place", ["file", "file/below", "/proc/nowhere", "/proc/1/x"])

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from grader.model.roster import Roster
-from grader.roster import read_roster
+from grader.roster import Local, read_roster
+from grader.roster.local import OWN_FOLDER
 
 
 def roster_file(folder: Path, text: str | bytes, encoding: str = "utf-8") -> Path:
@@ -14,8 +15,8 @@ def roster_file(folder: Path, text: str | bytes, encoding: str = "utf-8") -> Pat
     return path
 
 
-def read(folder: Path, text: str | bytes) -> Roster:
-    return read_roster(roster_file(folder, text))
+def read(folder: Path, text: str | bytes, local: Local = OWN_FOLDER) -> Roster:
+    return read_roster(roster_file(folder, text), local)
 
 
 def said(roster: Roster) -> list[str]:

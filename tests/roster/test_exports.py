@@ -86,7 +86,7 @@ def test_projects_of_one_name_in_several_subgroups(tmp_path: Path) -> None:
     projects = [
         {
             "path": "ros",
-            "ssh_url_to_repo": f"git@g:lab/{who}/ros.git",
+            "ssh_url_to_repo": f"git@git.example:lab/{who}/ros.git",
             "path_with_namespace": f"lab/{who}/ros",
         }
         for who in ("ada", "bob")

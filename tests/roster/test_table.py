@@ -81,10 +81,9 @@ def test_one_source_may_be_of_two(tmp_path: Path) -> None:
         "gitlab-uni:ada/lab",
         "https://host/ada@main",
         "host.example:22/x",
-        "/srv/ada.zip",
     ],
 )
-def test_addresses_and_absolute_paths_stay_as_they_are(tmp_path: Path, source: str) -> None:
+def test_addresses_stay_as_they_are(tmp_path: Path, source: str) -> None:
     assert [entry.source for entry in read(tmp_path, f"id,source\nada,{source}\n").entries] == [source]
 
 

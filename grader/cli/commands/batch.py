@@ -15,7 +15,7 @@ from grader.cli.say import say, say_beside, say_json
 from grader.errors import ExitCode, UsageError
 from grader.model.batch import BatchRun
 from grader.portable import cores
-from grader.roster import read_roster
+from grader.roster import Local, read_roster
 from grader.roster.times import parse_time
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.shown import line
@@ -39,12 +39,16 @@ def run(
     static: bool = False,
     sandbox: Mode = "auto",
     cluster: str | None = None,
+    cluster_insecure: bool = False,
     exchange: str | None = None,
+    allow_local: list[Path] | None = None,
+    remote_only: bool = False,
     as_json: bool = False,
 ) -> ExitCode:
     """Grade a class into `out/<id>/`, with a gradebook, and go on where an earlier batch stopped."""
     loaded = load_rubric(rubric)
-    named = read_roster(roster)
+    local = _local(allow_local or [], remote_only=remote_only)
+    named = read_roster(roster, local)
     options = BatchOptions(
         out=out or DEFAULT_OUT,
         jobs=jobs or _jobs(loaded, static=static),
@@ -53,6 +57,9 @@ def run(
         before=_time(before),
         only=only or (),
         cluster=cluster or "",
+        cluster_insecure=cluster_insecure,
+        allow_local=tuple(str(folder) for folder in local.folders),
+        remote_only=remote_only,
     )
     for fault in named.faults:
         say_beside(f"roster: {fault}")
@@ -92,15 +99,29 @@ def _time(text: str | None) -> datetime | None:
     return found
 
 
+def _local(folders: list[Path], *, remote_only: bool) -> Local:
+    if folders and remote_only:
+        raise UsageError("--remote-only refuses what --allow-local allows", hint="leave one of them out")
+    for folder in folders:
+        if not folder.is_dir():
+            raise UsageError(f"--allow-local {folder}: there is no such folder", hint="give a folder")
+    return Local(folders=tuple(folder.absolute() for folder in folders), remote_only=remote_only)
+
+
 def _hands(options: BatchOptions, exchange: str | None) -> Hands:
     if not options.cluster:
-        if exchange is not None:
-            raise UsageError("--exchange is for --cluster", hint="leave it out")
+        given = {"--exchange": exchange is not None, "--cluster-insecure": options.cluster_insecure}
+        for flag in (name for name, there in given.items() if there):
+            raise UsageError(f"{flag} is for --cluster", hint="leave it out")
         return Processes(options.jobs)
     from grader.cluster import ClusterHands  # noqa: PLC0415 - an extra
 
     return ClusterHands(
-        options.cluster, options.out, exchange, say=lambda text: say_beside(f"cluster: {text}")
+        options.cluster,
+        options.out,
+        exchange,
+        insecure=options.cluster_insecure,
+        say=lambda text: say_beside(f"cluster: {text}"),
     )
 
 

@@ -41,6 +41,6 @@ def run(
         return ExitCode.PASSED
     name = f"{rubric.rubric.id}-gradescope.zip"
     target = out / name if out is not None and out.is_dir() else out or Path(name)
-    atomic_write(target, data)
+    atomic_write(target, data, public=True)
     say(f"{target}: upload it under Configure Autograder, with Ubuntu 22.04 as the base image")
     return ExitCode.PASSED

@@ -33,7 +33,7 @@ def run(
     target = out or Path(f"{rubric.rubric.id}-prairielearn")
     parcel = question(rubric, settings, image)
     if target.suffix.lower() == ".zip":
-        atomic_write(target, parcel.zipped())
+        atomic_write(target, parcel.zipped(), public=True)
     else:
         _check_free(target)
         parcel.write(target)

@@ -19,6 +19,6 @@ def run(*, lab: str, out: str = "-", force: bool = False) -> ExitCode:
     if out == "-":
         say_document(lambda _: data.decode("utf-8"))
         return ExitCode.PASSED
-    atomic_write(Path(out), data)
+    atomic_write(Path(out), data, public=True)
     say(f"{out}: change it, then `grader rubric validate {out}`")
     return ExitCode.PASSED

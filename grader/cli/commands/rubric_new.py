@@ -36,7 +36,7 @@ def run(
     if out == "-":
         say_document(lambda _: text)
         return ExitCode.PASSED
-    atomic_write(Path(out), text.encode())
+    atomic_write(Path(out), text.encode(), public=True)
     say(f"{out}: look through it, then `grader rubric validate {out}`")
     say(f"and `grader rubric test {out} --solution {solution}`")
     return ExitCode.PASSED

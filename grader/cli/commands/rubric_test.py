@@ -60,7 +60,7 @@ def run(
     )
     test = _tested(plan, temporary=out is None)
     if write is not None and not test.reference.lost:
-        atomic_write(write, mutants_text(loaded.rubric.id, plan.mutants, test.mutants).encode())
+        atomic_write(write, mutants_text(loaded.rubric.id, plan.mutants, test.mutants).encode(), public=True)
     if as_json:
         say_json(test.model_dump(mode="json", by_alias=True))
     else:

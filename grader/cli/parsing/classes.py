@@ -57,11 +57,27 @@ def _batch(batch: argparse.ArgumentParser) -> None:
     batch.add_argument(
         "--before", metavar="TIME", help="the last commit before it counts (default: the rubric's deadline)"
     )
+    batch.add_argument(
+        "--allow-local",
+        metavar="DIR",
+        action="append",
+        default=[],
+        type=Path,
+        help="the roster may name paths below it, too, not only below its own folder; may be given several times",
+    )
+    batch.add_argument(
+        "--remote-only", action="store_true", help="the roster may name no path of this machine at all"
+    )
     batch.add_argument("--static", action="store_true", help="look at the files only, run nothing")
     batch.add_argument(
         "--cluster",
         metavar="ADDRESS",
-        help="hand the submissions to a Dask cluster: tcp://HOST:8786, or local",
+        help="hand the submissions to a Dask cluster: tls://HOST:8786, or local",
+    )
+    batch.add_argument(
+        "--cluster-insecure",
+        action="store_true",
+        help="take a cluster without certificates (tcp://): all who reach it can run programs there",
     )
     batch.add_argument(
         "--exchange",

@@ -36,7 +36,6 @@ def salt_in(folder: Path) -> bytes:
         return salt
     salt = secrets.token_bytes(SALT_BYTES)
     atomic_write(path, salt)
-    path.chmod(0o600)
     return salt
 
 

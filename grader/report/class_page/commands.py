@@ -18,7 +18,10 @@ def again(run: BatchRun, out: Path, only: str = "", *, static: bool | None = Non
     words += ["--rubric", run.rubric_source or run.rubric.id, "--out", str(out.absolute())]
     words += ["--static"] if (run.static_only if static is None else static) else []
     words += ["--before", run.before.isoformat()] if run.before else []
+    words += [word for folder in run.allow_local for word in ("--allow-local", folder)]
+    words += ["--remote-only"] if run.remote_only else []
     words += ["--cluster", run.cluster] if run.cluster else []
+    words += ["--cluster-insecure"] if run.cluster_insecure else []
     words += ["--only", only] if only else []
     return _typed(words)
 

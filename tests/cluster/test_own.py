@@ -1,0 +1,139 @@
+"""The cluster that `--cluster local` starts, as another user of the machine meets it."""
+
+from __future__ import annotations
+
+import os
+import socket
+import ssl
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from distributed import Client
+from distributed.security import Security
+
+from grader.cluster.address import LOCAL
+from grader.cluster.connecting import connected
+from tests.cluster.sockets import listening_ports, tree_of
+
+KEY = b"PRIVATE KEY"
+
+
+@pytest.fixture(scope="module")
+def temporary(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Where temporary files go, with a scratch folder of Dask's that another user made."""
+    folder = tmp_path_factory.mktemp("temporary")
+    (folder / "dask-scratch-space").mkdir()
+    (folder / "dask-scratch-space").chmod(0o777)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TMPDIR", str(folder))
+        patch.setattr("tempfile.tempdir", None)
+        yield folder
+
+
+@pytest.fixture(scope="module")
+def keys() -> Iterator[list[Path]]:
+    """The files from which this process, which holds scheduler and nannies, has loaded a key."""
+    loaded = []
+    load = ssl.SSLContext.load_cert_chain
+
+    def noted(self: ssl.SSLContext, certfile: str, keyfile: str | None = None, **more: Any) -> None:
+        path = Path(keyfile or certfile)
+        assert path.parent.stat().st_mode & 0o077 == 0, f"others can read {path}"
+        loaded.append(path)
+        load(self, certfile, keyfile, **more)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ssl.SSLContext, "load_cert_chain", noted)
+        yield loaded
+
+
+@pytest.fixture(scope="module")
+def before() -> list[int]:
+    return listening_ports(os.getpid())
+
+
+@pytest.fixture(scope="module")
+def client(before: list[int], temporary: Path, keys: list[Path]) -> Iterator[Any]:
+    with connected(LOCAL) as client:
+        client.wait_for_workers(os.cpu_count() or 1)
+        yield client
+
+
+@pytest.fixture(scope="module")
+def ports(before: list[int], client: Any) -> list[int]:
+    """Those on which this process and its own listen since there is a cluster."""
+    return [port for port in listening_ports(os.getpid()) if port not in before]
+
+
+def test_nothing_listens_but_scheduler_nannies_and_workers(client: Any, ports: list[int]) -> None:
+    known = client.scheduler_info(n_workers=-1)
+    addresses = [known["address"], *known["workers"], *(one["nanny"] for one in known["workers"].values())]
+    assert {address.partition("://")[0] for address in addresses} == {"tls"}
+    assert sorted(int(address.rpartition(":")[2]) for address in addresses) == ports
+    assert known["services"] == {}
+
+
+def test_every_port_refuses_who_has_no_certificate_of_the_cluster(ports: list[int]) -> None:
+    foreign = Security.temporary()
+    context = foreign.get_connection_args("client")["ssl_context"]
+    bare = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    for one in (context, bare):
+        one.check_hostname, one.verify_mode = False, ssl.CERT_NONE
+    assert len(ports) >= 3
+    for port in ports:
+        for one in (context, bare):
+            with pytest.raises(ssl.SSLError), _connected(port) as plain, one.wrap_socket(plain) as secured:
+                secured.recv(1)
+        with _connected(port) as plain:
+            plain.sendall(b"\0" * 64)
+            assert _told(plain) == b""
+
+
+@pytest.mark.parametrize("security", [None, "temporary"])
+@pytest.mark.parametrize("protocol", ["tcp", "tls"])
+def test_a_client_without_the_certificates_is_refused(
+    client: Any, protocol: str, security: str | None
+) -> None:
+    address = f"{protocol}://{client.scheduler.address.partition('://')[2]}"
+    theirs = Security.temporary() if security else None
+    with pytest.raises((OSError, TypeError, RuntimeError, ValueError)):
+        Client(address, timeout=3, set_as_default=False, security=theirs)
+
+
+def test_no_key_is_where_others_can_read_it(client: Any, temporary: Path, keys: list[Path]) -> None:
+    assert keys
+    assert not any(path.exists() for path in keys)
+    for pid in tree_of(os.getpid()):
+        for name in ("cmdline", "environ"):
+            assert KEY not in Path(f"/proc/{pid}/{name}").read_bytes()
+    left = [path for path in temporary.rglob("*") if path.is_file() and KEY in path.read_bytes()]
+    assert left == []
+
+
+def test_no_process_imports_from_a_folder_that_another_user_made(client: Any, temporary: Path) -> None:
+    paths = [*_paths(), *(path for found in client.run(_paths).values() for path in found)]
+    inside = [Path(path).relative_to(temporary) for path in paths if Path(path).is_relative_to(temporary)]
+    tops = {temporary / path.parts[0] for path in inside}
+    assert tops
+    assert not any(top.stat().st_mode & 0o077 for top in tops)
+
+
+def _paths() -> list[str]:
+    import sys  # noqa: PLC0415 - in a worker
+
+    return list(sys.path)
+
+
+def _connected(port: int) -> socket.socket:
+    return socket.create_connection(("127.0.0.1", port), timeout=10)
+
+
+def _told(connection: socket.socket) -> bytes:
+    """What comes before the connection ends, without what TLS itself says of its refusal."""
+    try:
+        said = connection.recv(64)
+    except ConnectionResetError:
+        return b""
+    return b"" if said[:1] == b"\x15" else said
