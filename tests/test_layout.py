@@ -78,7 +78,7 @@ ALLOWED = {
     "cli": {
         *BASE, "arena", "authoring", "batch", "checks", "ci", "evidence", "faults", "files", "formats", "instructor",
         "intake", "judging", "cluster", "deliver", "gradebook", "mutation", "package", "pipeline", "report",
-        "review", "roster", "rubric", "similarity", "standing", "temporary", "watching"
+        "outside", "review", "roster", "rubric", "similarity", "standing", "temporary", "watching"
     },
     "formats": BASE | {"evidence.events", "files", "mutation.model", "rubric"},
     "api": {
