@@ -40,6 +40,7 @@ def walls() -> Iterator[Row]:
     yield Row(
         name="limits", state="ok" if held else "limited", detail=describe(), mend="" if held else DELEGATE
     )
+    yield from _inherited()
     yield _limits_of_processes()
     yield _mode()
 
@@ -81,6 +82,16 @@ def _switch() -> str:
         if path.is_file() and path.read_text(errors="replace").strip() == forbidding:
             return mend
     return CONTAINER
+
+
+def _inherited() -> Iterator[Row]:
+    from grader.arena.inherited import group, limits  # noqa: PLC0415 - other systems lack what it imports
+
+    for limit in (*limits(), *group()):
+        detail = f"{limit.what}: {limit.found}; a run needs {limit.needed}"
+        yield Row(
+            name=limit.name, state="missing" if limit.command else "ok", detail=detail, mend=limit.command
+        )
 
 
 def _limits_of_processes() -> Row:

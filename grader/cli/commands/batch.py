@@ -11,6 +11,7 @@ from grader.batch.folder import BatchFolder
 from grader.batch.hands import Hands, Processes
 from grader.batch.notable import notable
 from grader.cli.class_display import open_class_display
+from grader.cli.room import make_room
 from grader.cli.say import say, say_beside, say_json
 from grader.errors import ExitCode, UsageError
 from grader.model.batch import BatchRun
@@ -18,6 +19,7 @@ from grader.portable import cores
 from grader.roster import read_roster
 from grader.roster.times import parse_time
 from grader.rubric.load import LoadedRubric, load_rubric
+from grader.rubric.needs import needs_ros
 from grader.shown import line
 
 if TYPE_CHECKING:
@@ -54,6 +56,8 @@ def run(
         only=only or (),
         cluster=cluster or "",
     )
+    if needs_ros(loaded) and not (static or cluster):
+        make_room(gradings=options.jobs)
     for fault in named.faults:
         say_beside(f"roster: {fault}")
     with open_class_display() as watcher:

@@ -11,6 +11,7 @@ from pathlib import Path
 from grader.arena.sandbox import Mode
 from grader.cli.display import open_progress
 from grader.cli.mutants import print_test
+from grader.cli.room import make_room
 from grader.cli.say import say_json
 from grader.errors import ExitCode
 from grader.files import atomic_write, check_writable
@@ -38,6 +39,7 @@ def run(
     as_json: bool = False,
 ) -> ExitCode:
     """Test, show, and write what was lost to the file `write`, where one is given."""
+    make_room(gradings=jobs)
     loaded = load_rubric(rubric)
     reference = given_reference(solution) if solution else find_reference(loaded)
     correct = load_solution(reference, loaded.rubric.package)
