@@ -9,11 +9,12 @@ from pathlib import Path
 
 from grader.arena.cgroups import describe, find_cgroups
 from grader.arena.host_programs import HOST_ENV, host_program
-from grader.arena.probe import ULIMIT_HINT, choose, refused_limits, why_not
+from grader.arena.probe import ULIMIT_HINT, choose, refused_limits
 from grader.arena.sandbox import NETWORK
 from grader.cli.row import Row
 from grader.errors import HostError
 from grader.portable import user_id
+from grader.report.unwalled import without_sandbox
 
 PROGRAMS = {"bwrap": "bubblewrap", "setpriv": "util-linux", "prlimit": "util-linux"}
 PROBE_S = 20
@@ -103,11 +104,10 @@ def _limits_of_processes() -> Row:
 
 def _mode() -> Row:
     try:
-        reason = why_not()
-        label = choose("auto").label
+        sandbox = choose("auto")
     except HostError as error:
         return Row(name="sandbox", state="missing", detail=error.message, mend=error.hint)
-    if not reason:
-        return Row(name="sandbox", state="ok", detail=f"--sandbox auto takes {label}")
-    detail = f"{label}: students' code runs without a wall around it, and --sandbox require refuses"
+    if sandbox.bubblewrap:
+        return Row(name="sandbox", state="ok", detail=f"--sandbox auto takes {sandbox.label}")
+    detail = f"{without_sandbox(sandbox.label)} --sandbox require refuses."
     return Row(name="sandbox", state="limited", detail=detail, mend="mend the rows above")

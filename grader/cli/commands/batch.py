@@ -13,6 +13,7 @@ from grader.batch.notable import notable
 from grader.cli.class_display import open_class_display
 from grader.cli.room import make_room
 from grader.cli.say import say, say_beside, say_json
+from grader.cli.unwalled import say_unwalled
 from grader.errors import ExitCode, UsageError
 from grader.model.batch import BatchRun
 from grader.portable import cores
@@ -58,6 +59,7 @@ def run(
     )
     if needs_ros(loaded) and not (static or cluster):
         make_room(gradings=options.jobs)
+        say_unwalled(sandbox, loaded)
     for fault in named.faults:
         say_beside(f"roster: {fault}")
     with open_class_display() as watcher:
