@@ -94,7 +94,7 @@ def test_temporary_files_without_room(out: Path, open_path: Path) -> None:
 
 
 def test_files_that_may_not_grow(out: Path) -> None:
-    with grading(out, prefix=("prlimit", "--fsize=5000:unlimited"), **STATIC) as limited:
+    with grading(out, prefix=("prlimit", "--fsize=5000"), **STATIC) as limited:
         assert limited.end() == 3, limited.err
     assert "ulimit -f" in limited.said[0], limited.said
     assert not list(out.rglob("*.part"))
@@ -105,12 +105,13 @@ def test_limits_that_cannot_be_set(out: Path) -> None:
     prefix = ("prlimit", "--fsize=1000000", "setpriv", "--bounding-set=-sys_resource")
     with grading(out, prefix=prefix) as refused:
         assert refused.end() == 3, refused.err
-    assert "the limits of students' processes cannot be set here" in refused.said[0]
+    assert "ulimit -f (size of a file) is 977 kB" in refused.said[0]
+    assert "prlimit --pid $$ --fsize=" in refused.said[1]
     assert result_in(out).error.kind == "host"
 
 
 def test_too_little_memory_for_the_grader(out: Path) -> None:
-    with grading(out, prefix=("prlimit", f"--as={165 << 20}:unlimited")) as short:
+    with grading(out, prefix=("prlimit", f"--as={165 << 20}")) as short:
         code = short.end()
     assert code in {0, 3, 4}, short.err
     results = list(out.rglob("result.json"))

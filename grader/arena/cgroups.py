@@ -75,14 +75,14 @@ def describe() -> str:
 
 
 def _find(controller: str) -> Cgroup | None:
-    for version, folder in _own_groups(controller):
+    for version, folder in own_groups(controller):
         _sweep(folder)
         if _usable(folder, KEYS[controller, version]):
             return Cgroup(version=version, folder=str(folder))
     return None
 
 
-def _own_groups(controller: str) -> list[tuple[Literal[1, 2], Path]]:
+def own_groups(controller: str) -> list[tuple[Literal[1, 2], Path]]:
     """The group that this process is in, as a folder, for each hierarchy that may have the controller."""
     try:
         mounts = [line.split() for line in MOUNTINFO.read_text().splitlines()]

@@ -62,9 +62,12 @@ UNKNOWN_HINT = (
 def choose(mode: Mode) -> Sandbox:
     """The sandbox to use: `require` raises SandboxMissing where there is none, `auto` goes without and says so.
 
-    Raises SandboxMissing where it cannot be known whether there is one, and HostError where this machine does not let
-    the limits of student's processes be set: every one would fail.
+    Raises SandboxMissing where it cannot be known whether there is one, and HostError where the limits that were
+    inherited are too short, or those of students' processes cannot be set: every one would fail.
     """
+    from grader.arena.inherited import make_room  # noqa: PLC0415 - elsewhere than on Linux nothing is run
+
+    make_room()
     refused = refused_limits()
     if refused:
         hint = ROOT_HINT if refused.startswith("setpriv: ") else ULIMIT_HINT

@@ -15,6 +15,10 @@ from types import FrameType
 
 from grader.cli.errors import guarded
 from grader.cli.parsing import build_parser
+from grader.cli.room import make_room
+
+RUNNING = {"batch", "check", "ci", "grade", "record", "regrade", "rubric_new", "rubric_test"}
+"""Commands that run what students wrote."""
 
 
 def run(argv: Sequence[str]) -> int:
@@ -32,8 +36,11 @@ def _dispatch(argv: Sequence[str]) -> int:
     except SystemExit as done:  # --help and --version end this way
         return int(done.code or 0)
     options.pop("debug", None)
+    name = options.pop("module")
     with _uninterrupted():
-        module = import_module(f"grader.cli.commands.{options.pop('module')}")
+        if name in RUNNING and not options.get("static"):
+            make_room(begin=True)  # before more is loaded: under short limits that would end without a word
+        module = import_module(f"grader.cli.commands.{name}")
     return int(module.run(**options))
 
 

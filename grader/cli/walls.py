@@ -9,11 +9,12 @@ from pathlib import Path
 
 from grader.arena.cgroups import describe, find_cgroups
 from grader.arena.host_programs import HOST_ENV, host_program
-from grader.arena.probe import ULIMIT_HINT, choose, refused_limits, why_not
+from grader.arena.probe import ULIMIT_HINT, choose, refused_limits
 from grader.arena.sandbox import NAMESPACES
 from grader.cli.row import Row
 from grader.errors import HostError
 from grader.portable import user_id
+from grader.report.unwalled import without_sandbox
 
 PROGRAMS = {"bwrap": "bubblewrap", "setpriv": "util-linux", "prlimit": "util-linux"}
 PROBE_S = 20
@@ -40,6 +41,7 @@ def walls() -> Iterator[Row]:
     yield Row(
         name="limits", state="ok" if held else "limited", detail=describe(), mend="" if held else DELEGATE
     )
+    yield from _inherited()
     yield _limits_of_processes()
     yield _mode()
 
@@ -83,6 +85,16 @@ def _switch() -> str:
     return CONTAINER
 
 
+def _inherited() -> Iterator[Row]:
+    from grader.arena.inherited import group, limits  # noqa: PLC0415 - other systems lack what it imports
+
+    for limit in (*limits(), *group()):
+        detail = f"{limit.what}: {limit.found}; a run needs {limit.needed}"
+        yield Row(
+            name=limit.name, state="missing" if limit.command else "ok", detail=detail, mend=limit.command
+        )
+
+
 def _limits_of_processes() -> Row:
     refused = refused_limits()
     if not refused:
@@ -92,11 +104,10 @@ def _limits_of_processes() -> Row:
 
 def _mode() -> Row:
     try:
-        reason = why_not()
-        label = choose("auto").label
+        sandbox = choose("auto")
     except HostError as error:
         return Row(name="sandbox", state="missing", detail=error.message, mend=error.hint)
-    if not reason:
-        return Row(name="sandbox", state="ok", detail=f"--sandbox auto takes {label}")
-    detail = f"{label}: students' code runs without a wall around it, and --sandbox require refuses"
+    if sandbox.bubblewrap:
+        return Row(name="sandbox", state="ok", detail=f"--sandbox auto takes {sandbox.label}")
+    detail = f"{without_sandbox(sandbox.label)} --sandbox require refuses."
     return Row(name="sandbox", state="limited", detail=detail, mend="mend the rows above")

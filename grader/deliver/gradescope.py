@@ -16,6 +16,7 @@ from grader.errors import GraderError
 from grader.model.result import GradingResult
 from grader.report.gradescope import LIMIT, LOOK, gradescope
 from grader.report.text import line
+from grader.report.unwalled import without_sandbox
 from grader.rubric.load import LoadedRubric
 
 DEFAULT_MINUTES, MOST_MINUTES = 10, 40
@@ -45,9 +46,11 @@ def graded(result: GradingResult, rubric: LoadedRubric) -> dict[str, Any]:
     """Raises GraderError where the machine kept everything from being graded."""
     document: dict[str, Any] = json.loads(gradescope(result, rubric.rubric))
     about = result.environment
+    unwalled = line(without_sandbox(about.sandbox), LIMIT)
     document["extra_data"] = {
         "grader": about.grader,
         "sandbox": about.sandbox,
+        **({"without_sandbox": unwalled} if unwalled else {}),
         "rubric": result.rubric.model_dump(),
         "submission": result.submission.digest,
     }

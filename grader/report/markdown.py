@@ -14,6 +14,7 @@ from grader.report.mermaid import mermaid
 from grader.report.settled import TITLE, automatic_words, decided, decision, late_words, look_again
 from grader.report.summary import NOT_SETTLED, verdict_words, visible_words
 from grader.report.text import line, markdown, markdown_code, number
+from grader.report.unwalled import without_sandbox
 from grader.report.view import Loss, arrange, not_graded, places, points_of
 from grader.rubric.model import Rubric
 
@@ -105,6 +106,8 @@ class _Writer:
         submission = result.submission
         graded = f"{number(result.points)} of {number(result.max_points)} points"
         yield from (f"# {'Not graded' if not_graded(result) else graded}", "")
+        unwalled = without_sandbox(result.environment.sandbox)
+        yield from (f"**{self._text(unwalled)}**", "") if unwalled else ()
         for words in late_words(result):
             yield from (self._text(words), "")
         if result.error is not None:

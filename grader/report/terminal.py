@@ -19,6 +19,7 @@ from grader.report import settled
 from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
 from grader.report.summary import visible_words
 from grader.report.text import line, number, uncommanded
+from grader.report.unwalled import without_sandbox
 from grader.report.view import Loss, arrange, not_graded, places, points_of
 from grader.rubric.model import Rubric
 
@@ -98,6 +99,8 @@ class Terminal:
     def report(self, result: GradingResult, rubric: Rubric, hidden: int, unrun: str) -> None:
         view = arrange(result, rubric)
         parts: list[RenderableType] = [self._head(result, rubric)]
+        unwalled = without_sandbox(result.environment.sandbox)
+        parts += [Text(self._show(unwalled), "yellow")] if unwalled else []
         parts += [Text(self._show(words)) for words in settled.late_words(result)]
         parts += self._section(settled.TITLE, [self._decision(o, c) for o, c in settled.decided(result)])
         parts += self._losses("Lost", view.lost)

@@ -288,12 +288,12 @@ def test_control_groups_are_found_where_this_process_is(tables: tuple[Path, Path
     mounts, groups = tables
     mounts.write_text(V1 + V2)
     groups.write_text("4:memory:/user/7\n0::/docker/abc/init\n")
-    found = cgroups._own_groups("memory")
+    found = cgroups.own_groups("memory")
     assert found == [(1, Path("/sys/fs/cgroup/memory/user/7")), (2, Path("/sys/fs/cgroup/init"))]
     groups.write_text("0::/../elsewhere\n")
-    assert cgroups._own_groups("memory") == [(2, Path("/sys/fs/cgroup"))]
+    assert cgroups.own_groups("memory") == [(2, Path("/sys/fs/cgroup"))]
     mounts.unlink()
-    assert cgroups._own_groups("memory") == []
+    assert cgroups.own_groups("memory") == []
 
 
 def test_a_control_group_counts_only_if_it_can_be_limited(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.arena.cgroups import Cgroup, Cgroups
+from grader.arena.sandbox import Sandbox
 from grader.cli import walls
 from grader.cli.diagnosis import diagnose
 from grader.cli.row import Row
@@ -20,8 +21,9 @@ def rows() -> dict[str, Row]:
 
 def test_every_part_has_a_row_and_what_is_missing_a_command() -> None:
     found = rows()
-    assert list(found) == [
-        "bwrap", "setpriv", "prlimit", "user namespaces", "network", "limits", "ulimit", "sandbox"
+    assert [name for name in found if name != "pids.max"] == [
+        "bwrap", "setpriv", "prlimit", "user namespaces", "network", "limits", "ulimit -u", "ulimit -n", "ulimit -v",
+        "ulimit -d", "ulimit -s", "ulimit -f", "ulimit -t", "ulimit", "sandbox",
     ]  # fmt: skip
     assert all(row.mend for row in found.values() if row.state != "ok")
 
@@ -29,11 +31,12 @@ def test_every_part_has_a_row_and_what_is_missing_a_command() -> None:
 @pytest.mark.parametrize(("program", "package"), [("bwrap", "bubblewrap"), ("setpriv", "util-linux")])
 def test_a_program_that_is_not_installed(monkeypatch, program: str, package: str) -> None:
     monkeypatch.setattr(walls, "host_program", lambda name: None if name == program else f"/usr/bin/{name}")
-    monkeypatch.setattr(walls, "why_not", lambda: f"{program} is not installed")
+    none = Sandbox(bubblewrap=False, uid=None, reason=f"{program} is not installed")
+    monkeypatch.setattr(walls, "choose", lambda _: none)
     found = rows()
     assert (found[program].state, found[program].mend) == ("limited", f"apt-get install {package}")
     assert found["sandbox"].state == "limited"
-    assert "without a wall around it" in found["sandbox"].detail
+    assert f"has no sandbox ({program} is not installed): students' code runs" in found["sandbox"].detail
 
 
 @pytest.mark.parametrize(
@@ -61,10 +64,10 @@ def test_namespaces_that_are_forbidden(monkeypatch, tmp_path: Path, name: str, v
 
 
 def test_a_probe_that_does_not_answer_is_not_taken_for_a_machine_without(monkeypatch) -> None:
-    def no_answer() -> str:
+    def no_answer(_mode: str) -> None:
         raise SandboxMissing("no answer within 20 s", hint="look at each part")
 
-    monkeypatch.setattr(walls, "why_not", no_answer)
+    monkeypatch.setattr(walls, "choose", no_answer)
     row = rows()["sandbox"]
     assert (row.state, row.detail, row.mend) == ("missing", "no answer within 20 s", "look at each part")
 

@@ -11,13 +11,16 @@ from grader.batch.folder import BatchFolder
 from grader.batch.hands import Hands, Processes
 from grader.batch.notable import notable
 from grader.cli.class_display import open_class_display
+from grader.cli.room import make_room
 from grader.cli.say import say, say_beside, say_json
+from grader.cli.unwalled import say_unwalled
 from grader.errors import ExitCode, UsageError
 from grader.model.batch import BatchRun
 from grader.portable import cores
 from grader.roster import Local, read_roster
 from grader.roster.times import parse_time
 from grader.rubric.load import LoadedRubric, load_rubric
+from grader.rubric.needs import needs_ros
 from grader.shown import line
 
 if TYPE_CHECKING:
@@ -61,6 +64,9 @@ def run(
         allow_local=tuple(str(folder) for folder in local.folders),
         remote_only=remote_only,
     )
+    if needs_ros(loaded) and not (static or cluster):
+        make_room(gradings=options.jobs)
+        say_unwalled(sandbox, loaded)
     for fault in named.faults:
         say_beside(f"roster: {fault}")
     with open_class_display() as watcher:

@@ -17,6 +17,7 @@ from grader.cli.handing_in import Inquiry, news, print_beside, print_standing
 from grader.cli.outcome import exit_code, settled, staged_code, worst
 from grader.cli.say import say, say_beside
 from grader.cli.show import show
+from grader.cli.unwalled import say_unwalled
 from grader.errors import ExitCode, UsageError
 from grader.files import check_writable
 from grader.intake import safe_name
@@ -70,6 +71,9 @@ def run(
         keep_hidden=False,
         files=watch or out is not None,
     )
+    running = [one.rubric for one in chosen if not static and needs_ros(one.rubric)]
+    if running:
+        say_unwalled(sandbox)
     if watch:
         _tell(chosen[0])
         source = str(Path(chosen[0].source).resolve())

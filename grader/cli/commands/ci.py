@@ -21,12 +21,14 @@ from grader.cli.errors import report
 from grader.cli.outcome import exit_code, settled
 from grader.cli.prefix import package_prefix
 from grader.cli.say import say, say_beside
+from grader.cli.unwalled import say_unwalled
 from grader.errors import ExitCode, GraderError, RubricError, UsageError
 from grader.faults import fault_of
 from grader.judging.summary import overall_status, total_points
 from grader.model.result import GradingResult
 from grader.report.hidden import hidden_ids, without_hidden
 from grader.report.terminal import open_console, print_report
+from grader.report.unwalled import without_sandbox
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 from grader.temporary import temporary_folder
@@ -52,6 +54,9 @@ def run(*, system: str) -> ExitCode:
         raise
     teller.tell(graded)
     say(f"{graded.outcome.value}: {graded.said}")
+    unwalled = without_sandbox(graded.result.environment.sandbox)
+    if unwalled:
+        say(unwalled)
     say(f"sandbox: {graded.result.environment.sandbox}")
     code = next(code for code, outcome in OF_CODE.items() if outcome is graded.outcome)
     return code if graded.fails else ExitCode.PASSED
@@ -62,6 +67,8 @@ def _graded(settings: Settings) -> Graded:
     source, rubric = chosen.source, with_mark(chosen.rubric, settings.mark)
     if chosen.words:
         say_beside(chosen.words)
+    if not settings.static:
+        say_unwalled(settings.sandbox, rubric)
     clear(settings.out)
     options = pipeline.GradeOptions(
         sandbox=settings.sandbox, submission_id=None, static_only=settings.static, keep_hidden=False

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 from grader import pipeline
 from grader.cli.display import open_progress
 from grader.cli.show import show
+from grader.cli.unwalled import say_unwalled
 from grader.errors import ExitCode
 from grader.files import check_writable
+from grader.intake.recordings import is_recording
 from grader.rubric.load import load_rubric
 
 if TYPE_CHECKING:
@@ -35,6 +37,8 @@ def run(
     options = pipeline.GradeOptions(
         sandbox=sandbox, submission_id=submission_id, static_only=False, keep_hidden=True
     )
+    if not is_recording(Path(source)):
+        say_unwalled(sandbox, loaded)
     with open_progress(early=sys.stdout.isatty() and not as_json) as progress:
         result = pipeline.grade(source, loaded, folder, options, progress)
     return show(result, loaded.rubric, folder / result.submission.id, as_json=as_json)

@@ -10,6 +10,7 @@ from grader.arena.sandbox import Mode
 from grader.cli.choice import only_package
 from grader.cli.display import open_progress
 from grader.cli.say import say
+from grader.cli.unwalled import say_unwalled
 from grader.errors import ExitCode, UsageError
 from grader.files import check_writable
 from grader.rubric.load import LoadedRubric, load_rubric
@@ -39,6 +40,7 @@ def run(
     )
     check_writable(out)
     options = pipeline.GradeOptions(sandbox=sandbox, submission_id=None, static_only=False, keep_hidden=True)
+    say_unwalled(sandbox)
     with open_progress() as progress:
         files = pipeline.record(source, loaded, out, options, progress)
     for file in files:

@@ -13,6 +13,7 @@ from grader.batch.regrade import CHANGES, Change, Regraded, regrade, run_missing
 from grader.cli.class_display import open_class_display
 from grader.cli.commands.batch import JOBS_PER_CORE, exit_code, rubric_source
 from grader.cli.say import say, say_json
+from grader.cli.unwalled import say_unwalled
 from grader.errors import ExitCode
 from grader.portable import cores
 from grader.report.text import number
@@ -42,6 +43,7 @@ def run(
     batch, regraded = regrade(batch, loaded, rubric_source(source), jobs or own)
     missing = [one for one in regraded if one.missing]
     if missing and run_missing_too:
+        say_unwalled(sandbox, loaded)
         with open_class_display() as watcher:
             hands = Processes(jobs or own * JOBS_PER_CORE)
             batch, regraded = run_missing(

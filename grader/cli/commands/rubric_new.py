@@ -11,6 +11,7 @@ from grader.authoring.new import propose_rubric
 from grader.cli.choice import only_package
 from grader.cli.display import open_progress
 from grader.cli.say import say, say_document
+from grader.cli.unwalled import say_unwalled
 from grader.errors import ExitCode, UsageError
 from grader.files import atomic_write
 from grader.rubric.model import NAME_PATTERN
@@ -31,6 +32,7 @@ def run(
     if out != "-" and Path(out).exists() and not force:
         raise UsageError(f"{out} exists", hint="choose another --out, or add --force")
     options = pipeline.GradeOptions(sandbox=sandbox)
+    say_unwalled(sandbox)
     with open_progress() as progress:
         text = propose_rubric(solution, name, chosen, options, progress)
     if out == "-":

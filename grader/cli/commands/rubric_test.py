@@ -11,7 +11,9 @@ from pathlib import Path
 from grader.arena.sandbox import Mode
 from grader.cli.display import open_progress
 from grader.cli.mutants import print_test
+from grader.cli.room import make_room
 from grader.cli.say import say_json
+from grader.cli.unwalled import say_unwalled
 from grader.errors import ExitCode
 from grader.files import atomic_write, check_writable
 from grader.mutation.find import find_reference, given_reference, load_solution, mutants_file
@@ -38,6 +40,7 @@ def run(
     as_json: bool = False,
 ) -> ExitCode:
     """Test, show, and write what was lost to the file `write`, where one is given."""
+    make_room(gradings=jobs)
     loaded = load_rubric(rubric)
     reference = given_reference(solution) if solution else find_reference(loaded)
     correct = load_solution(reference, loaded.rubric.package)
@@ -58,6 +61,7 @@ def run(
         keep_all=out is not None,
         sandbox=sandbox,
     )
+    say_unwalled(sandbox, loaded)
     test = _tested(plan, temporary=out is None)
     if write is not None and not test.reference.lost:
         atomic_write(write, mutants_text(loaded.rubric.id, plan.mutants, test.mutants).encode(), public=True)

@@ -10,6 +10,7 @@ from grader.model.batch import MISSING, ROSTER, CriterionInfo
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.roster import Entry
 from grader.model.verdict import Status
+from grader.report.unwalled import without_sandbox
 from grader.shown import line
 
 CHARS = 160
@@ -44,7 +45,8 @@ class Line:
 
     `state` is `manual` where only a person's points are missing, `missing` where it is not graded yet. `letters` has
     one of `LETTERS` for each criterion of the rubric, in its order. `earned` are the points of criteria, by place,
-    where they are not those of the status. `folder` holds its reports, if there are any. Seconds.
+    where they are not those of the status. `folder` holds its reports, if there are any. `unwalled` says that it ran
+    without a sandbox. Seconds.
     """
 
     id: str
@@ -60,6 +62,7 @@ class Line:
     decided: int
     look_again: int
     wall_s: float
+    unwalled: str
     why: str
     problem: Problem | None
 
@@ -93,6 +96,7 @@ def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInf
         decided=len(result.overrides),
         look_again=sum(override.changed for override in result.overrides),
         wall_s=result.timing.wall_s,
+        unwalled=line(without_sandbox(result.environment.sandbox), MESSAGE_CHARS),
         why=_why(result.criteria),
         problem=_problem(result),
     )

@@ -30,6 +30,7 @@ from grader.report.class_page.todo import todos
 from grader.report.html.shell import environment, policy, script, style
 from grader.report.html.words import SIGNS, count
 
+UNWALLED_MAX = 3
 SHARED_MAX, SHARED_FIRST, ALONE_MAX, WORDINGS_MAX = 100, 12, 100, 12
 """So many diagnoses are listed that several submissions share (the first ones not folded), and that one has alone; so
 many wordings of each."""
@@ -81,6 +82,7 @@ def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
         "anonymous": out is None,
         "lines": lines,
         "states": Counter(line.state for line in lines),
+        "unwalled": Counter(line.unwalled for line in lines if line.unwalled).most_common(UNWALLED_MAX),
         "todos": list(todos(run, lines, out)),
         "points": points,
         "histogram": histogram(points) if points else "",

@@ -16,6 +16,7 @@ from grader.report.html.page import Detail, Docs, Maker, Page
 from grader.report.html.shell import environment, policy, script, style
 from grader.report.summary import visible_words
 from grader.report.text import number
+from grader.report.unwalled import without_sandbox
 from grader.report.view import OPEN, ReportView, arrange, not_graded
 from grader.rubric.model import Rubric
 
@@ -50,6 +51,7 @@ class Head:
     bar_words: str
     mark_at: float | None
     pass_mark: str
+    unwalled: str
     late: tuple[str, ...]
     short: str
     left_out: str
@@ -113,6 +115,7 @@ def _head(result: GradingResult, rubric: Rubric, view: ReportView, hidden: int) 
         if mark is not None and not hidden and rubric.max_points
         else None,
         pass_mark=words.pass_mark(result, rubric, hidden),
+        unwalled=without_sandbox(result.environment.sandbox),
         late=settled.late_words(result),
         short=words.in_short(result, view),
         left_out=visible_words(result, hidden) if graded else "",
