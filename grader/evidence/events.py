@@ -45,7 +45,7 @@ class ConsoleLine(Record):
 
 
 class Connection(Record):
-    """A live topic connection as the subscribing node reports it (`getBusInfo`)."""
+    """A live topic connection: both nodes report it (`getBusInfo`), and the kernel knows of one between them."""
 
     topic: str
     publisher: str

@@ -171,7 +171,7 @@ KEYS: dict[str, str] = {
     "GraphEvent.service_types": "Types by service, as the services themselves say.",
     "Connection.topic": "The topic.",
     "Connection.publisher": "The publishing node.",
-    "Connection.subscriber": "The subscribing node, which reports it.",
+    "Connection.subscriber": "The subscribing node.",
     "ParamEvent.action": "It was set, or deleted.",
     "ParamEvent.name": "The parameter.",
     "ParamEvent.caller_id": "The node that did it.",
