@@ -182,6 +182,7 @@ KEYS: dict[str, str] = {
     "HostEvent.max_ms": "How late, at most.",
     "HostEvent.load_1min": "The load average.",
     "HostEvent.busy": "The share of the processors' time that was busy, 0 to 1; null where not known.",
+    "HostEvent.own_busy": "The part of `busy` that this run's student processes took, 0 to 1; null where not known.",
     "ActorEvent.action": "What was done.",
     "ActorEvent.actor": "Who did it.",
     "ActorEvent.topic": "The topic, parameter or service.",

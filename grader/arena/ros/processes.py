@@ -180,6 +180,12 @@ class Process:
         """Ids of all its processes, bubblewrap's own too."""
         return [self.pid, *descendants(self.pid)]
 
+    def cpu_used_s(self):
+        """Of all its processes so far, those that have ended and were waited for included."""
+        roots = [pid for pid in (self._inner_pid, None if self._status is not None else self.pid) if pid]
+        tree = {pid for root in roots for pid in (root, *descendants(root))}
+        return self._cpu_s + sum(map(cpu_s, tree))
+
     def left_behind(self):
         """Process ids of the tree that still run."""
         return self._tree() if self.alive else []
