@@ -41,8 +41,9 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
         ever says so.
 
     How it is measured
-        The subscribing node itself is asked whom it hears. A node that the rubric does not name may have
-        any name; the `_<digits>_<digits>` of an anonymous one does not matter.
+        Both nodes are asked whom they are connected to. It counts where both say so and the kernel knows of
+        a connection between their processes: what one node says of itself is not enough. A node that the
+        rubric does not name may have any name; the `_<digits>_<digits>` of an anonymous one does not matter.
 
     How to fix
         Both ends need the same topic name, with the namespace and after every `<remap>`, and the same

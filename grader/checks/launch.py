@@ -45,8 +45,9 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
         missing without anybody noticing.
 
     How it is measured
-        `roslaunch` runs the file, which is found by its name anywhere in the package, and the subscribing
-        node itself is asked whom it is connected to. Any two nodes of the package do, under any names.
+        `roslaunch` runs the file, which is found by its name anywhere in the package, and both nodes are
+        asked whom they are connected to; the kernel's table of connections has to bear it out. Any two
+        nodes of the package do, under any names.
 
     How to fix
         One `<node pkg="…" type="….py" name="…"/>` for each script, with the `.py` and the executable bit.

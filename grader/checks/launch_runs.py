@@ -65,7 +65,7 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
         another one, or in another namespace, is there and talks to nobody.
 
     How it is measured
-        `roslaunch` runs the file; names come from the master, connections from the subscribing node itself.
+        `roslaunch` runs the file; names come from the master, connections from both nodes and the kernel.
         `<arg>`, `ns` and `<group>` are worked out, and `$(anon x)` may be followed by anything. Names given to
         `init_node` do not matter. Parameters are read as they were when the node started.
 

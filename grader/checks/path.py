@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from grader.checks.registry import check
 from grader.checks.support.absence import no_message
 from grader.checks.support.geometry import followed, relative
-from grader.checks.support.lateness import lateness
+from grader.checks.support.lateness import NO_EXCUSE, Lateness, lateness
 from grader.checks.support.names import GlobalName
 from grader.checks.support.straying import Way, measured, metres, spot, stands, what_is_wrong
 from grader.checks.support.text import listed, number
@@ -125,12 +125,19 @@ def _judged(found: Track, run: Run, params: PathParams) -> Verdict:
 
 def _excused(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
     """Where the machine itself was late, a robot that only just strays may have strayed with it."""
-    late = lateness(run, run.start_ns, run.end_ns)
-    if not nearly or late is None:
+    late, whole = (lateness(run, run.start_ns, run.end_ns, own=own) for own in (False, True))
+    if not nearly or late is None or whole is None:
         return verdict
-    if not late.full and late.max_ms < LATE_MS and late.p95_ms < LATE_P95_MS:
-        return verdict
-    late_by = f"late itself, by up to {late.max_ms:.0f} ms"
-    message = f"{verdict.message}; but the grading machine was {'busy' if late.full else late_by}"
-    hint = "grade again while the machine has less to do"
-    return inconclusive(message, hint=hint, measured=verdict.measured)
+    if _kept_waiting(late):
+        late_by = f"late itself, by up to {late.max_ms:.0f} ms"
+        message = f"{verdict.message}; but the grading machine was {'busy' if late.full else late_by}"
+        hint = "grade again while the machine has less to do"
+        return inconclusive(message, hint=hint, measured=verdict.measured)
+    if _kept_waiting(whole):
+        return verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}"})
+    return verdict
+
+
+def _kept_waiting(late: Lateness) -> bool:
+    """Whether the machine was so late, or so busy, that a robot may have strayed by it."""
+    return late.full or late.max_ms >= LATE_MS or late.p95_ms >= LATE_P95_MS

@@ -10,7 +10,7 @@ from pydantic import Field
 from grader.checks.registry import check
 from grader.checks.support.ending import explain_end
 from grader.checks.support.gaps import described, rhythm
-from grader.checks.support.lateness import Lateness, lateness
+from grader.checks.support.lateness import NO_EXCUSE, Lateness, lateness
 from grader.checks.support.losses import all_lost, whole_until_ns
 from grader.checks.support.process import early_end, observed_until_ns
 from grader.checks.support.text import hertz, number, plural, seconds
@@ -102,7 +102,8 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         nominal rate, and 95 % of the gaps within half a period of the nominal one (a rubric may set other
         bounds). One single stall costs nothing. If the grading machine itself was late while a rate failed,
         or had no time to spare and a few long gaps are all that is wrong, nothing is taken: the run is
-        repeated. The mean is given with its 95 % confidence interval.
+        repeated; not so where the run's own processes kept the machine busy. The mean is given with its
+        95 % confidence interval.
 
     How to fix
         `rate = rospy.Rate(10)` once before the loop, `rate.sleep()` (with its brackets) once in each turn
@@ -141,7 +142,7 @@ def judged_rhythm(run: Run, params: RateParams, channels: Sequence[Channel]) -> 
 def _measured(found: Rhythm, run: Run, params: RateParams) -> str:
     """What came, and how late the machine was meanwhile."""
     seen = described(found, *params.bounds_ns)
-    late = lateness(run, found.times_ns[0], found.until_ns) if found.gaps_ns else None
+    late = lateness(run, found.times_ns[0], found.until_ns, own=True) if found.gaps_ns else None
     return seen if late is None else f"{seen}, {late.described}"
 
 
@@ -223,21 +224,33 @@ def _rate_hint(ratio: float, nominal: str) -> str:
 
 
 def _excused(verdict: Verdict | None, found: Rhythm, run: Run, params: RateParams) -> Verdict | None:
-    """A rate that fails while the host was late costs nobody anything, unless it is too far off for that."""
-    late = None if verdict is None else lateness(run, found.times_ns[0], found.until_ns)
-    if verdict is None or late is None:
+    """A rate that fails while the host was late costs nobody anything, unless it is too far off for that, or the run
+    itself kept the host busy."""
+    if verdict is None:
+        return None
+    late, whole = (lateness(run, found.times_ns[0], found.until_ns, own=own) for own in (False, True))
+    if late is None or whole is None:
         return verdict
-    beyond = found.mean_hz >= 2 * params.rate_hz or found.tail_ns / 2e6 > max(
-        late.max_ms, params.period_ns / 1e6
-    )
-    if not beyond and (was_late(late, params) or sleeps_explain(found, late, params)):
-        what = f"late itself (by up to {late.max_ms:.0f} ms, 95 % within {late.p95_ms:.0f} ms)"
-    elif not beyond and stalls_explain(found, late, params):
-        what = f"{(late.busy or 0) * 100:.0f} % busy, and without the few long gaps the rate would be right"
-    else:
-        return verdict
-    message = f"{verdict.message}; but the grading machine was {what}, so nothing follows from it"
-    return inconclusive(message, hint="grade again while the machine has less to do")
+    what = _excuse(found, late, params)
+    if what:
+        message = f"{verdict.message}; but the grading machine was {what}, so nothing follows from it"
+        return inconclusive(message, hint="grade again while the machine has less to do")
+    if _excuse(found, whole, params):
+        return verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}"})
+    return verdict
+
+
+def _excuse(found: Rhythm, late: Lateness, params: RateParams) -> str:
+    """What the machine was that may have made the rate wrong; "" where that is not why."""
+    if found.mean_hz >= 2 * params.rate_hz:
+        return ""
+    if found.tail_ns / 2e6 > max(late.max_ms, params.period_ns / 1e6):
+        return ""
+    if was_late(late, params) or sleeps_explain(found, late, params):
+        return f"late itself (by up to {late.max_ms:.0f} ms, 95 % within {late.p95_ms:.0f} ms)"
+    if stalls_explain(found, late, params):
+        return f"{(late.busy or 0) * 100:.0f} % busy, and without the few long gaps the rate would be right"
+    return ""
 
 
 def was_late(late: Lateness, params: RateParams) -> bool:

@@ -45,7 +45,7 @@ class ConsoleLine(Record):
 
 
 class Connection(Record):
-    """A live topic connection as the subscribing node reports it (`getBusInfo`)."""
+    """A live topic connection: both nodes report it (`getBusInfo`), and the kernel knows of one between them."""
 
     topic: str
     publisher: str
@@ -79,7 +79,8 @@ class ParamEvent(Record):
 
 class HostEvent(Record):
     """`/grader/host`: how late a timer woke that asked for 20 ms each time, since the last such event (ms), the load
-    average, and the share of the processors' time that was busy (0 to 1)."""
+    average, and the share of the processors' time (0 to 1) that was busy, and that the run's own student processes
+    took."""
 
     samples: int
     mean_ms: float
@@ -87,6 +88,7 @@ class HostEvent(Record):
     max_ms: float
     load_1min: float
     busy: float | None = None
+    own_busy: float | None = None
 
 
 class ActorEvent(Record):

@@ -86,6 +86,9 @@ FORMATS: dict[str, Format] = {
                 Addition(1, "GraphEvent.processes", "Nodes are told from the grader's by their names alone."),
                 Addition(1, "GraphEvent.service_types", "Types of services are not known."),
                 Addition(1, "HostEvent.busy", "How busy the processors were is not known."),
+                Addition(
+                    1, "HostEvent.own_busy", "How much of it the run's own processes took is not known."
+                ),
                 Addition(1, "LaunchNode.file", "It stands in the launch file itself."),
                 Addition(1, "LaunchNode.namespace", "It is in no namespace."),
                 Addition(1, "LaunchNode.machine", "Not given."),

@@ -42,13 +42,14 @@ class Arena:
         self._groups = []
         self._stage = Stage(**config["stage"]) if config["stage"] else None
         self._processes = {}
+        self._students = []
         self._finishing = False
         self._clock = None
         self._master = None
         self._input = b""
         self.loop = Loop()
         self.loop.on_child(self._reap)
-        self._lateness = Lateness(wire)
+        self._lateness = Lateness(wire, self._used_s)
         self._lateness.start()
         self.loop.call_later(WATCH_S, self._watch_sockets)
         if config["master"]:
@@ -110,9 +111,12 @@ class Arena:
         spec["env"]["ROS_MASTER_URI"] = os.environ.get("ROS_MASTER_URI", "http://127.0.0.1:11311")
         try:
             groups = self._new_groups() if spec["role"] != "grader" else None
-            self._processes[spec["name"]] = Process(
+            process = Process(
                 self.loop, self._wire, spec, self._limits, self._exited, groups=groups, stage=self._stage
             )
+            self._processes[process.name] = process
+            if process.role == "student":
+                self._students.append(process)
         except OSError as error:
             self._wire.status("spawn-failed", name=spec["name"], detail=str(error))
 
@@ -131,6 +135,10 @@ class Arena:
     def _trees(self):
         """Each process of the run with the ids of all that runs below it."""
         return [(process.name, process.tree()) for process in list(self._processes.values())]
+
+    def _used_s(self):
+        """CPU seconds of the student's processes so far."""
+        return sum(process.cpu_used_s() for process in list(self._students))
 
     def _interrupt(self, command):
         if command["name"] not in self._processes:

@@ -4,6 +4,8 @@ import os
 import threading
 import time
 
+from tree import TICKS_HZ
+
 PERIOD_S = 0.02
 REPORT_S = 0.5
 
@@ -24,8 +26,12 @@ def processor_ticks():
 
 
 class Lateness:
-    def __init__(self, wire):
+    """`used_s` gives the CPU seconds that the student's processes have used so far, ended ones included."""
+
+    def __init__(self, wire, used_s):
         self._wire = wire
+        self._used_s = used_s
+        self._own_s = 0.0
         self._stopping = False
         self._ticks = processor_ticks()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -49,18 +55,25 @@ class Lateness:
             if self._stopping or after >= report_at:
                 self._report(late_ms)
                 late_ms = []
+                # to look at many processes takes time, and is not the machine's lateness
+                after = time.monotonic()
                 report_at = after + REPORT_S
 
     def _report(self, late_ms):
         late_ms.sort()
         (busy_before, all_before), self._ticks = self._ticks, processor_ticks()
         busy, ticks = self._ticks
+        before_s, self._own_s = self._own_s, self._used_s()
+        all_ticks = max(1, ticks - all_before)
+        share = (busy - busy_before) / all_ticks
+        own = (self._own_s - before_s) * TICKS_HZ / all_ticks
         record = {
             "samples": len(late_ms),
             "mean_ms": round(sum(late_ms) / len(late_ms), 3),
             "p95_ms": round(late_ms[int(0.95 * (len(late_ms) - 1))], 3),
             "max_ms": round(late_ms[-1], 3),
             "load_1min": round(os.getloadavg()[0], 2),
-            "busy": round((busy - busy_before) / max(1, ticks - all_before), 3),
+            "busy": round(share, 3),
+            "own_busy": round(min(max(0.0, own), share), 3),
         }
         self._wire.event("/grader/host", record)

@@ -11,15 +11,14 @@ import time
 import rosmaster.master_api
 import rosmaster.registrations
 import services
-from bounded import ProtocolError, call, slave_api
+from bounded import ProtocolError, slave_api
 from graph import GraphLog
-from guard import NAME_CHARS_MAX, OWN_NODE, ROSOUT, Rules
+from guard import OWN_NODE, ROSOUT, Rules
+from links import Links
 from params import ParamLog
 from pool import Notifications, Pool
 from values import cut
 
-BUS_INFO_S, CONNECTIONS_S = 0.5, 1.5
-CONNECTIONS_MAX = 2000
 NOTIFY_S = 10.0
 OPENED_MAX, ARGUMENTS_MAX, ARGUMENT_CHARS = 100, 20, 1000
 PROBE_S = 0.5
@@ -59,6 +58,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self._pool = Pool()
         self._calling = threading.local()
         self._guard = guard
+        self._links = Links(own, owners, guard)
         self._rules = Rules(owners, self._registered, own_ports)
         self._params = ParamLog(wire, self._guard)
         self._graph = GraphLog(loop, wire, self._guard, self.graph)
@@ -116,8 +116,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         deadline = time.monotonic() + SUBSCRIBED_S
         pause = threading.Event()
         while wanted and time.monotonic() < deadline:
-            found = {c["subscriber"] for c in self._connections(caller_id, caller_api) if c["topic"] == topic}
-            if wanted <= found:
+            if wanted <= self._links.subscribers(caller_api, topic):
                 return
             pause.wait(LOOK_S)
 
@@ -208,10 +207,9 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         }
         record["service_types"] = self._types_of(service_apis)
         if connections:
-            publishing = {node for _, nodes in publishers for node in nodes if not OWN_NODE.fullmatch(node)}
-            record["connections"] = self._all_connections(
-                {n: apis[n] for n in sorted(publishing) if n in apis}
-            )
+            on_topics = {node for _, nodes in (*publishers, *subscribers) for node in nodes}
+            asked = sorted(n for n in on_topics if n in apis and not OWN_NODE.fullmatch(n))
+            record["connections"] = self._links.of({node: apis[node] for node in asked})
         return record
 
     def tell_connections(self):
@@ -247,34 +245,6 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
             return services.probe(service, api, self._own, PROBE_S)
         except ProtocolError:
             return ""
-
-    def _all_connections(self, apis):
-        """Of these nodes, asked side by side; who does not answer in time has none."""
-        deadline = time.monotonic() + CONNECTIONS_S
-        found, answered, asked = {}, threading.Semaphore(0), 0
-        for node, api in apis.items():
-
-            def ask(node=node, api=api):
-                if time.monotonic() < deadline:
-                    found[node] = list(self._connections(node, api))
-                answered.release()
-
-            asked += self._pool.submit(self._owners.known(api), ask)
-        for _ in range(asked):
-            answered.acquire(timeout=max(0.0, deadline - time.monotonic()))
-        return [c for node in apis for c in found.get(node, ())][:CONNECTIONS_MAX]
-
-    def _connections(self, node, api):
-        """The node's outgoing connections, as the node itself reports them."""
-        try:
-            entries = call(slave_api(api, BUS_INFO_S).getBusInfo, self._own)
-        except (ProtocolError, ValueError):
-            return
-        for entry in entries[:CONNECTIONS_MAX] if isinstance(entries, list) else ():
-            if isinstance(entry, list) and len(entry) >= 5 and entry[2] == "o":
-                subscriber, topic = cut(entry[1], NAME_CHARS_MAX), cut(entry[4], NAME_CHARS_MAX)
-                if not OWN_NODE.fullmatch(subscriber):
-                    yield {"topic": topic, "publisher": node, "subscriber": subscriber}
 
     def _after(self, answer):
         self._graph.changed(self._process)

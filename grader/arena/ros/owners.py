@@ -4,6 +4,7 @@ A node's is the one that listens on the port of its slave API, so nodes that `ro
 copies that fight for one name. A caller's is the one that is connected from the port that the call comes from.
 """
 
+import collections
 import os
 import threading
 import time
@@ -28,6 +29,7 @@ class Owners:
         self._looking = threading.Lock()
         self._looked_s = self._look_took_s = 0.0
         self._holders = {}
+        self._pids = {}
 
     def of(self, api):
         """The name of the process whose node has this address; None where it cannot be told."""
@@ -58,6 +60,12 @@ class Owners:
             self._look_at_all()
             return [self._holders.get("socket:[{}]".format(inode)) for inode in inodes]
 
+    def pids(self, inodes):
+        """For each of these sockets the ids of the processes that have it open: one look at all of them."""
+        with self._looking:
+            self._look_at_all()
+            return {inode: self._pids.get("socket:[{}]".format(inode), frozenset()) for inode in inodes}
+
     def _may_look(self, api):
         """An address that nobody listens on costs a few looks, not one at every change of the graph."""
         now_s = time.monotonic()
@@ -84,12 +92,12 @@ class Owners:
         if pause_s > 0:
             threading.Event().wait(pause_s)
         self._looked_s = time.monotonic()
-        self._holders = {
-            link: name
-            for name, pids in reversed(self._trees())
-            for pid in pids
-            for link in _open_sockets(pid)
-        }
+        self._holders, self._pids = {}, collections.defaultdict(set)
+        for name, pids in self._trees():
+            for pid in pids:
+                for link in _open_sockets(pid):
+                    self._holders.setdefault(link, name)
+                    self._pids[link].add(pid)
         self._look_took_s = time.monotonic() - self._looked_s
 
 

@@ -165,6 +165,14 @@ class Process:
         """Ids of all its processes, bubblewrap's own too."""
         return [self.pid, *descendants(self.pid)]
 
+    def cpu_used_s(self):
+        """Of all its processes so far, also of what has ended. A control group counts children that nobody waited for,
+        too."""
+        counted_s = self._groups.cpu_s() if self._groups is not None else None
+        roots = [pid for pid in (self._inner_pid, None if self._status is not None else self.pid) if pid]
+        tree = {pid for root in roots for pid in (root, *descendants(root))}
+        return max(counted_s or 0.0, self._cpu_s + sum(map(cpu_s, tree)))
+
     def left_behind(self):
         """Process ids of the tree that still run."""
         return self._tree() if self.alive else []
@@ -195,11 +203,6 @@ class Process:
         if self.descriptors() > self._limits["descriptors"]:
             return "more than {} files, pipes and sockets open".format(self._limits["descriptors"])
         return None
-
-    def cpu_used_s(self):
-        """Of the tree, also of what has ended. A control group counts children that nobody waited for, too."""
-        counted_s = self._groups.cpu_s() if self._groups is not None else None
-        return max(counted_s or 0.0, sum(map(cpu_s, self.tree())))
 
     def _written_bytes(self):
         """Files in memory: they are nobody's resident pages."""

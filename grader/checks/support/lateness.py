@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
+from grader.evidence.events import HostEvent
 from grader.evidence.run import Channel, Run
 
 CALIBRATION = "/grader/calibration"
@@ -16,13 +17,19 @@ PERIOD_NS = 100_000_000
 STAMP = struct.Struct("<III")
 FULL = 0.9
 """The share of the processors' time from which who has work to do may wait for a turn, though sleepers wake in time."""
+OWN_LEAST, OTHERS_MOST = 0.6, 0.25
+"""Shares of the processors' time of half a second: a run that took so much itself, and left so little to all others,
+made the machine late in it. One busy loop takes half of two processors, and is not it; nor is who shares the machine.
+"""
+NO_EXCUSE = "the grading machine was busy with this run's own processes, which excuses nothing"
 
 
 class Lateness(NamedTuple):
     """In ms: the mean, the 95th percentile and the most, the larger of what timer and calibration say.
 
     `sleep_ms` is what a sleep of 0.1 s took too long in the mean, `calibration_hz` the rate of a loop of such sleeps;
-    None where no calibration was recorded. `busy` is the share of the processors' time that was taken.
+    None where no calibration was recorded. `busy` is the share of the processors' time that was taken, `own` what of
+    it the run's own processes took.
     """
 
     mean_ms: float
@@ -31,6 +38,7 @@ class Lateness(NamedTuple):
     sleep_ms: float | None = None
     calibration_hz: float | None = None
     busy: float | None = None
+    own: float | None = None
 
     @property
     def full(self) -> bool:
@@ -39,16 +47,23 @@ class Lateness(NamedTuple):
 
     @property
     def described(self) -> str:
-        """`machine 97 % busy and late by 3 ms, calibration 9.97 Hz`."""
-        busy = "" if self.busy is None else f" {self.busy * 100:.0f} % busy and"
+        """`machine 97 % busy (by this run alone: 95 %) and late by 3 ms, calibration 9.97 Hz`."""
+        share = self.own or 0.0
+        own = f" (by this run alone: {share * 100:.0f} %)" if share >= OTHERS_MOST else ""
+        busy = "" if self.busy is None else f" {self.busy * 100:.0f} % busy{own} and"
         late = f"machine{busy} late by {self.max_ms:.0f} ms"
         return late if self.calibration_hz is None else f"{late}, calibration {self.calibration_hz:.2f} Hz"
 
 
-def lateness(run: Run, from_ns: int, to_ns: int) -> Lateness | None:
-    """Between two times of the run; None where nothing was measured (another tool's recording)."""
-    timer = _timer(run, from_ns, to_ns)
-    sleeps = [late for channel in run.channels for late in _sleeps_ms(channel, from_ns, to_ns)]
+def lateness(run: Run, from_ns: int, to_ns: int, *, own: bool = False) -> Lateness | None:
+    """Between two times of the run; None where nothing was measured (another tool's recording).
+
+    Of what excuses a run: the half seconds that its own processes filled are left out, unless `own` asks for them too.
+    """
+    windows = [w for w in _windows(run, from_ns, to_ns) if own or not w.is_own]
+    left_out = [] if own else [w for w in _windows(run, from_ns, to_ns) if w.is_own]
+    timer = _timer(windows)
+    sleeps = [late for channel in run.channels for late in _sleeps_ms(channel, from_ns, to_ns, left_out)]
     if not sleeps:
         return timer if run.host else None
     mean_ms = statistics.fmean(sleeps)
@@ -59,19 +74,42 @@ def lateness(run: Run, from_ns: int, to_ns: int) -> Lateness | None:
         sleep_ms=mean_ms,
         calibration_hz=1e3 / (PERIOD_NS / 1e6 + mean_ms),
         busy=timer.busy,
+        own=timer.own,
     )
 
 
-def _timer(run: Run, from_ns: int, to_ns: int) -> Lateness:
-    """The worst that was reported of this stretch of time."""
-    before = max((t for t, _ in run.host if t <= from_ns), default=from_ns)
-    after = min((t for t, _ in run.host if t >= to_ns), default=to_ns)
-    events = [e for t, e in run.host if before < t <= after]
+class _Window(NamedTuple):
+    """What one event tells of."""
+
+    from_ns: int
+    to_ns: int
+    event: HostEvent
+
+    @property
+    def is_own(self) -> bool:
+        """Whether the run's own processes filled the machine."""
+        busy, own = self.event.busy, self.event.own_busy
+        return (
+            busy is not None and own is not None and own >= OWN_LEAST and round(busy - own, 3) <= OTHERS_MOST
+        )
+
+
+def _windows(run: Run, from_ns: int, to_ns: int) -> list[_Window]:
+    """All that touch this stretch of time."""
+    starts = [run.start_ns, *(t for t, _ in run.host)]
+    found = [_Window(start, t, event) for start, (t, event) in zip(starts, run.host, strict=False)]
+    return [w for w in found if w.to_ns > from_ns and w.from_ns < to_ns]
+
+
+def _timer(windows: Sequence[_Window]) -> Lateness:
+    """The worst that was reported."""
+    events = [w.event for w in windows]
     return Lateness(
         max((e.mean_ms for e in events), default=0.0),
         max((e.p95_ms for e in events), default=0.0),
         max((e.max_ms for e in events), default=0.0),
         busy=_mean([e.busy for e in events if e.busy is not None]),
+        own=_mean([e.own_busy for e in events if e.own_busy is not None]),
     )
 
 
@@ -79,13 +117,15 @@ def _mean(shares: Sequence[float]) -> float | None:
     return statistics.fmean(shares) if shares else None
 
 
-def _sleeps_ms(channel: Channel, from_ns: int, to_ns: int) -> Iterator[float]:
-    """How much too long each sleep of the calibration was, by its own stamps, of those that touch the stretch."""
+def _sleeps_ms(channel: Channel, from_ns: int, to_ns: int, left_out: Sequence[_Window]) -> Iterator[float]:
+    """How much too long each sleep of the calibration was, by its own stamps, of those that touch the stretch and none
+    of the windows `left_out`."""
     if channel.topic != CALIBRATION or channel.type != CALIBRATION_TYPE or not channel.by_grader:
         return
     whole = [m for m in channel.messages if len(m.data) >= STAMP.size]
     for before, after in pairwise(whole):
-        if after.log_time_ns >= from_ns and before.log_time_ns <= to_ns:
+        own = any(w.from_ns < after.log_time_ns and w.to_ns > before.log_time_ns for w in left_out)
+        if after.log_time_ns >= from_ns and before.log_time_ns <= to_ns and not own:
             yield max(0.0, (_sent_ns(after.data) - _sent_ns(before.data) - PERIOD_NS) / 1e6)
 
 

@@ -1,0 +1,115 @@
+"""Which nodes are connected over which topics: what both ends say, held against the kernel's table of sockets.
+
+A node can say what it likes of itself (`getBusInfo`). So a connection counts only where its publisher and its
+subscriber are asked in one round and both name it, and where a process of each holds an end of a connection. What the
+kernel does not say (no /proc of another user, too many sockets) is left to the two.
+"""
+
+import collections
+import threading
+import time
+
+from bounded import ProtocolError, call, port_of, slave_api
+from guard import NAME_CHARS_MAX, OWN_NODE, shown
+from pool import Pool
+from ties import Ties
+from values import cut
+
+BUS_INFO_S, ROUND_S = 0.5, 1.5
+CONNECTIONS_MAX = 2000
+DOUBTED_ROUNDS, DOUBTS_MAX = 3, 100
+"""What is said wrongly so many rounds in a row is told: each end learns at its own time that the other is gone."""
+
+Said = collections.namedtuple("Said", "topic subscriber transport")
+Answer = collections.namedtuple("Answer", "serves hears")
+"""`serves` are all the connections of a publisher, `hears` is what a subscriber hears: (topic, publisher's name or
+port)."""
+
+
+class Links:
+    """`own` is the name under which the arena asks."""
+
+    def __init__(self, own, owners, guard):
+        self._own = own
+        self._owners = owners
+        self._guard = guard
+        self._pool = Pool()
+        self._doubts = {}
+
+    def of(self, apis):
+        """The connections between these nodes (addresses by names), all asked side by side: who does not answer in
+        time has none."""
+        answers = self._ask(apis)
+        ties = Ties(self._owners)
+        found, doubts = [], []
+        for node, answer in answers.items():
+            for said in answer.serves:
+                if node == said.subscriber or self._is_so(node, said, apis, answers, ties):
+                    found.append({"topic": said.topic, "publisher": node, "subscriber": said.subscriber})
+                elif len(doubts) < DOUBTS_MAX and self._is_made_up(node, said, apis, answers, ties):
+                    doubts.append((node, said))
+        self._doubts = {doubt: self._doubts.get(doubt, 0) + 1 for doubt in doubts}
+        for (node, said), rounds in self._doubts.items():
+            if rounds >= DOUBTED_ROUNDS:
+                self._refuse(node, said, apis)
+        return found[:CONNECTIONS_MAX]
+
+    def subscribers(self, api, topic):
+        """Whom a publisher itself names."""
+        answer = self._answer(api)
+        return {said.subscriber for said in answer.serves if said.topic == topic} if answer else set()
+
+    def _is_so(self, node, said, apis, answers, ties):
+        answer = answers.get(said.subscriber)
+        if answer is None or answer.hears.isdisjoint(((said.topic, node), (said.topic, port_of(apis[node])))):
+            return False
+        return ties.joined(apis[node], apis[said.subscriber], said.transport) is not False
+
+    def _is_made_up(self, node, said, apis, answers, ties):
+        """Rather than out of date: who does not answer says nothing, and a publisher that sends nothing does not
+        notice that its subscriber has gone."""
+        silent = said.subscriber in apis and said.subscriber not in answers
+        return not silent and not ties.half_closed(apis[node])
+
+    def _refuse(self, node, said, apis):
+        detail = "said that {} is connected to {} over {}, which is not so"
+        self._guard.refused(
+            self._owners.known(apis[node]) or node,
+            detail.format(shown(said.subscriber), shown(node), shown(said.topic)),
+        )
+
+    def _ask(self, apis):
+        """What nodes say, by their names in the order of `apis`."""
+        deadline = time.monotonic() + ROUND_S
+        found, answered, asked = {}, threading.Semaphore(0), 0
+        for node, api in apis.items():
+
+            def ask(node=node, api=api):
+                if time.monotonic() < deadline:
+                    answer = self._answer(api)
+                    if answer is not None:
+                        found[node] = answer
+                answered.release()
+
+            asked += self._pool.submit(self._owners.known(api), ask)
+        for _ in range(asked):
+            answered.acquire(timeout=max(0.0, deadline - time.monotonic()))
+        return {node: found[node] for node in apis if node in found}
+
+    def _answer(self, api):
+        """What a node says of its connections; None where it says nothing. A subscriber names publishers by their
+        addresses, in which the host may have any name."""
+        try:
+            entries = call(slave_api(api, BUS_INFO_S).getBusInfo, self._own)
+        except (ProtocolError, ValueError):
+            return None
+        serves, hears = [], set()
+        for entry in entries[:CONNECTIONS_MAX] if isinstance(entries, list) else ():
+            if not isinstance(entry, list) or len(entry) < 5:
+                continue
+            other, direction, transport, topic = (cut(value, NAME_CHARS_MAX) for value in entry[1:5])
+            if direction == "o" and not OWN_NODE.fullmatch(other):
+                serves.append(Said(topic, other, transport))
+            elif direction == "i":
+                hears.add((topic, port_of(other) or other))
+        return Answer(serves, hears)
