@@ -29,7 +29,7 @@ ALLOWED = {
     "results": BASE | {"files"},
     "faults": BASE | {"files", "intake", "report", "results", "rubric"},
     "evidence": BASE | {"files"},
-    "package": BASE,
+    "package": BASE | {"outside"},
     "intake": BASE | {"files", "outside"},
     "checks": BASE | {"evidence"},
     "instructor": BASE | {"checks", "temporary"},
@@ -64,7 +64,7 @@ ALLOWED = {
         "judging", "outside", "overrides", "pipeline", "report", "results", "rubric", "temporary"
     },
     "review": BASE | {
-        "batch", "files", "gradebook", "intake", "overrides", "report", "results", "rubric", "temporary"
+        "batch", "files", "gradebook", "intake", "outside", "overrides", "report", "results", "rubric", "temporary"
     },
     "cluster": BASE | {
         "arena.ros_env", "batch.child", "batch.job", "files", "intake", "results", "rubric", "temporary"

@@ -19,6 +19,7 @@ from grader.arena.cgroups import find_cgroups
 from grader.arena.host_programs import HOST_ENV, host_program
 from grader.arena.limits import Limits
 from grader.arena.sandbox import NAMESPACES, NO_NESTING, WALLS, Mode, Sandbox
+from grader.arena.system_calls import system_call_filter
 from grader.errors import HostError, SandboxMissing
 
 UID_MAP = Path("/proc/self/uid_map")
@@ -128,7 +129,19 @@ def _nobodys_uid() -> int:
 
 def _refusal(*more: str) -> str:
     """What this machine says to a sandbox with these arguments; empty where it makes one."""
-    walls = ["--ro-bind", "/", "/", "--proc", "/proc", *WALLS, *more, "--die-with-parent", "/bin/true"]
+    calls = ["--seccomp", "0"] if system_call_filter() else []
+    walls = [
+        "--ro-bind",
+        "/",
+        "/",
+        "--proc",
+        "/proc",
+        *WALLS,
+        *more,
+        *calls,
+        "--die-with-parent",
+        "/bin/true",
+    ]
     return _said([sys.executable, "-I", str(NAMESPACES), *_drop(), host_program("bwrap") or "bwrap", *walls])
 
 
@@ -143,7 +156,7 @@ def _said(command: list[str]) -> str:
     try:
         done = subprocess.run(
             command,
-            stdin=subprocess.DEVNULL,
+            input=system_call_filter() or b"",
             capture_output=True,
             check=False,
             timeout=PROBE_S,

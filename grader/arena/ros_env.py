@@ -85,6 +85,8 @@ def _from_setup(setup: Path) -> RosInstallation:
     done = subprocess.run(
         ["/bin/bash", "-c", script, "bash", str(setup)],
         env=base,
+        cwd="/",
+        stdin=subprocess.DEVNULL,
         capture_output=True,
         check=False,
         timeout=30,

@@ -13,6 +13,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from grader.arena.host_programs import HOST_ENV, host_program
 from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
 from grader.arena.standins import missing_packages
 from grader.cli.elsewhere import elsewhere
@@ -100,7 +101,14 @@ def _modules(ros: RosInstallation) -> Iterator[Row]:
     command = [ros.python, "-c", FIND_MODULES, *ROS_MODULES]
     try:
         done = subprocess.run(
-            command, env=ros.env, cwd="/", capture_output=True, text=True, check=True, timeout=20
+            command,
+            env=ros.env,
+            cwd="/",
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=20,
         )
     except (OSError, subprocess.SubprocessError) as error:
         yield Row(name="ROS's Python", state="missing", detail=f"{ros.python}: {error}", mend=INSTALL_HINT)
@@ -164,9 +172,18 @@ def _amount(name: str, size_bytes: int, least_bytes: int, unit: str) -> Row:
 def _hostname() -> Row:
     """ROS nodes look their own host up; getent has a time limit where the resolver has none."""
     name = socket.gethostname()
-    command = [shutil.which("getent") or "/usr/bin/getent", "hosts", name]
+    command = [host_program("getent") or "/usr/bin/getent", "hosts", name]
     try:
-        found = subprocess.run(command, capture_output=True, check=False, timeout=5).returncode == 0
+        done = subprocess.run(
+            command,
+            env=HOST_ENV,
+            cwd="/",
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            timeout=5,
+        )
+        found = done.returncode == 0
     except (OSError, subprocess.TimeoutExpired):
         found = False
     if found:

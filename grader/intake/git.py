@@ -297,5 +297,13 @@ def _limits() -> tuple[str, ...]:
 
 def _configured_ssh(environment: dict[str, str], cwd: Path) -> str:
     command = [program("git") or "git", "config", "--get", "core.sshCommand"]
-    found = subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, check=False)
+    found = subprocess.run(
+        command,
+        cwd=cwd,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     return found.stdout.strip()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -14,6 +15,7 @@ from pydantic import Field
 
 from grader.model.package import Fault, PythonSlip
 from grader.model.record import Record
+from grader.outside import anywhere
 from grader.package.python_causes import cause_of
 from grader.package.reading import printable
 
@@ -119,7 +121,14 @@ def _run(folder: Path, paths: list[str], timeout_s: float) -> tuple[SyntaxReport
     command = [sys.executable, "-I", str(SYNTAX_SCRIPT), str(folder)]
     names = json.dumps(paths).encode("ascii")
     try:
-        done = subprocess.run(command, input=names, capture_output=True, timeout=timeout_s, check=False)
+        done = subprocess.run(
+            command,
+            env=anywhere(os.environ),
+            input=names,
+            capture_output=True,
+            timeout=timeout_s,
+            check=False,
+        )
     except subprocess.TimeoutExpired as error:
         return read_syntax_report(error.stdout or b""), True
     return read_syntax_report(done.stdout), False

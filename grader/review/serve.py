@@ -18,6 +18,7 @@ from pathlib import Path
 from waitress.server import create_server
 
 from grader.errors import HostError, UsageError
+from grader.outside import anywhere, program
 from grader.review.app import create_app
 from grader.review.desk import Desk
 from grader.review.guard import BODY_BYTES, TOKEN_BYTES
@@ -113,7 +114,10 @@ def git_user() -> str:
     """What git calls the person; empty where it does not."""
     with suppress(OSError, subprocess.SubprocessError, UnicodeDecodeError):
         done = subprocess.run(
-            ["git", "config", "user.name"],  # noqa: S607 - the person's own git
+            [program("git") or "/usr/bin/git", "config", "user.name"],
+            env=anywhere(os.environ),
+            cwd="/",
+            stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
             timeout=GIT_S,

@@ -10,6 +10,7 @@ import pytest
 
 from grader.arena import probe
 from grader.arena.host_programs import HOST_ENV, host_program
+from grader.arena.system_calls import system_call_filter
 from grader.errors import ExitCode, HostError, SandboxMissing
 
 FORBIDDEN = (
@@ -146,12 +147,13 @@ def test_a_probe_that_fails_only_now_allows_no_namespaces_in_the_sandbox(monkeyp
 
 
 def test_the_probe_sees_nothing_of_whoever_grades(tmp_path, monkeypatch) -> None:
-    bwrap(tmp_path, monkeypatch, f"{{ pwd; env; cat; }} >{tmp_path}/seen; exit 0")
+    bwrap(tmp_path, monkeypatch, f"{{ pwd; env; }} >{tmp_path}/seen; cat >{tmp_path}/input")
     for name in ("PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "BASH_ENV", "LC_ALL"):
         monkeypatch.setenv(name, str(tmp_path))
     assert probe.why_not() == ""
     lines = (tmp_path / "seen").read_text().splitlines()
     assert lines[0] == "/"
+    assert (tmp_path / "input").read_bytes() == (system_call_filter() or b"")
     own = {"PWD", "OLDPWD", "SHLVL", "_", "LC_CTYPE"}
     seen = dict(line.split("=", 1) for line in lines[1:])
     assert {name: value for name, value in seen.items() if name not in own} == HOST_ENV

@@ -1,0 +1,164 @@
+"""Every place in the code that starts a program, and what of a submission may reach that program: it is listed here.
+
+A program that is started outside of the sandbox gets an environment that is written down (`env=`), is no bare name that
+a variable could lead elsewhere, and takes no terminal. What is new has to be listed, with the reason why it may be.
+"""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+GRADER = Path(__file__).resolve().parent.parent / "grader"
+INSIDE = {
+    "arena/ros/opener.py": "runs behind the wall, as the program that a student's launch file names",
+    "arena/ros/calibration.py": "a copy of the arena, which starts nothing",
+    "arena/ros/template.py": "a copy of the template, which becomes an arena",
+}
+"""What makes a process, but starts no program of the machine's."""
+
+
+class Start(NamedTuple):
+    """`env` and `cwd` are the arguments as they are written; `student`: what of a submission reaches the program."""
+
+    env: str
+    cwd: str | None
+    student: str
+
+
+STARTS = {
+    "arena/probe.py:_said": Start("HOST_ENV", "'/'", "nothing"),
+    "arena/ros/launching.py:launch": Start(
+        "HOST_ENV",
+        "stage.folder if gate is not None else NOWHERE",
+        "nothing: tests/arena/test_environment.py",
+    ),
+    "arena/ros_env.py:_from_setup": Start("base", "'/'", "nothing: ROS's own setup.bash"),
+    "arena/template.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
+    "batch/child.py:_started": Start(
+        "anywhere(os.environ)", None, "nothing: jobs come through a pipe, as JSON"
+    ),
+    "cli/diagnosis.py:_hostname": Start("HOST_ENV", "'/'", "nothing"),
+    "cli/diagnosis.py:_modules": Start("ros.env", "'/'", "nothing"),
+    "cli/walls.py:_probe": Start("HOST_ENV", "'/'", "nothing"),
+    "instructor/testing.py:_run": Start(
+        "_environment()", "folder", "nothing: the instructor's tests, beside a copy of the evidence"
+    ),
+    "intake/git.py:_configured_ssh": Start(
+        "environment", "cwd", "nothing: the settings of the user who grades"
+    ),
+    "intake/git.py:_started": Start(
+        "environment", "cwd", "its repository's data; no setting, hook or filter of it"
+    ),
+    "package/python.py:_run": Start(
+        "anywhere(os.environ)", None, "its source files, which are parsed and not run"
+    ),
+    "review/serve.py:git_user": Start("anywhere(os.environ)", "'/'", "nothing"),
+    "similarity/comparing.py:_answer": Start(
+        "_environment()", None, "its source files, which are read and not run"
+    ),
+}
+REPLACED = {"arena/ros/namespaces.py:<module>": "becomes the program of the probe: arena/probe.py"}
+MAKERS = {"Popen", "run", "call", "check_call", "check_output", "getoutput", "getstatusoutput"}
+SPAWNERS = {"system", "popen", "fork", "forkpty", "posix_spawn", "posix_spawnp", "startfile"}
+
+
+def named(call: ast.Call) -> tuple[str, str]:
+    """`subprocess`, `Popen` of `subprocess.Popen(…)`; the first is empty for a plain name."""
+    function = call.func
+    if isinstance(function, ast.Attribute):
+        return ast.unparse(function.value), function.attr
+    return "", function.id if isinstance(function, ast.Name) else ""
+
+
+def starts(path: Path) -> list[tuple[str, ast.Call]]:
+    """Each call that starts a program or makes a process, with the function that it stands in."""
+    found: list[tuple[str, ast.Call]] = []
+
+    def look(node: ast.AST, function: str) -> None:
+        for child in ast.iter_child_nodes(node):
+            inner = child.name if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef) else function
+            if isinstance(child, ast.Call) and is_start(*named(child)):
+                found.append((f"{path.relative_to(GRADER)}:{inner}", child))
+            look(child, inner)
+
+    look(ast.parse(path.read_text(encoding="utf-8")), "<module>")
+    return found
+
+
+def is_start(module: str, name: str) -> bool:
+    if module == "subprocess":
+        return name in MAKERS
+    if module == "os":
+        return name in SPAWNERS or name.startswith(("exec", "spawn"))
+    return name in {"create_subprocess_exec", "create_subprocess_shell", "Popen"}
+
+
+ALL = [
+    (where, call)
+    for path in sorted(GRADER.rglob("*.py"))
+    if "standins" not in path.parts  # nodes and libraries that run behind the wall
+    for where, call in starts(path)
+]
+CALLS = {where: call for where, call in ALL if where.partition(":")[0] not in INSIDE}
+
+
+def test_every_start_is_listed_and_every_listed_one_is_there() -> None:
+    assert CALLS.keys() == STARTS.keys() | REPLACED.keys()
+    assert {where.partition(":")[0] for where, _ in ALL} >= INSIDE.keys()
+    assert len(ALL) == len({where for where, _ in ALL})
+
+
+@pytest.mark.parametrize("where", STARTS)
+def test_what_a_program_outside_is_given(where: str) -> None:
+    call, listed = CALLS[where], STARTS[where]
+    words = {word.arg: word.value for word in call.keywords}
+    assert ast.unparse(words["env"]) == listed.env
+    assert (ast.unparse(words["cwd"]) if "cwd" in words else None) == listed.cwd
+    assert words.keys() & {"stdin", "input"}
+    assert not words.keys() & {"shell", "preexec_fn", "executable"}
+    assert "close_fds" not in words
+    if "pass_fds" in words:
+        assert where == "arena/ros/launching.py:launch"
+
+
+@pytest.mark.parametrize("where", STARTS)
+def test_no_program_is_looked_for_by_a_bare_name(where: str) -> None:
+    first = CALLS[where].args[0]
+    while isinstance(first, ast.List):
+        first = first.elts[0]
+    if isinstance(first, ast.Constant):
+        assert first.value.startswith("/")
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("import subprocess\ndef f(): subprocess.run(['x'])", True),
+        ("import os\nos.execvp('x', [])", True),
+        ("import os\nos.system('x')", True),
+        ("async def f(): await asyncio.create_subprocess_exec('x')", True),
+        ("import os\nos.environ.get('x')", False),
+        ("thread.run()", False),
+    ],
+)
+def test_what_counts_as_a_start(
+    text: str, found: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tests.test_programs.GRADER", tmp_path)
+    (tmp_path / "new.py").write_text(text)
+    assert bool(starts(tmp_path / "new.py")) is found
+
+
+def test_modules_that_start_programs_are_imported_as_modules() -> None:
+    """`from subprocess import Popen as p` would pass unseen."""
+    for path in GRADER.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module in {"subprocess", "os", "pty"}:
+                assert not {alias.name for alias in node.names} & (MAKERS | SPAWNERS), path
+            if isinstance(node, ast.Import):
+                renamed = {alias.name for alias in node.names if alias.asname}
+                assert not renamed & {"subprocess", "os"}, path
