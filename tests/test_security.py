@@ -9,6 +9,7 @@ import pytest
 
 from grader.arena.limits import SUBMISSION_MESSAGE_BYTES
 from grader.arena.limits import Limits as RunLimits
+from grader.arena.ros_env import DUMP_BYTES, NAMES_MAX, VALUE_BYTES
 from grader.intake.limits import Limits as IntakeLimits
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -73,6 +74,11 @@ def test_limits_are_as_they_are() -> None:
         f"| a process tree | {run.cpu_s:g} s |",
         f"| a process tree | {run.output_lines} lines, {run.output_bytes // mb} MB |",
         f"{run.home_bytes // mb} MB and twice the workspace, {run.tmp_bytes // mb} MB, {run.shared_bytes // mb} MB",
+        f"| a process tree | {run.home_files}, {run.tmp_files}, {run.shared_files} |",
+        f"| a process tree | {run.descriptors} |",
+        f"| {run.locked_bytes // mb} MB; {run.queued_signals} |",
+        f"| buffers of sockets | a run | {run.socket_bytes // mb} MB |",
+        f"| the build | {DUMP_BYTES >> 10} kB, {NAMES_MAX} names, {VALUE_BYTES >> 10} kB each |",
         f"| a process | {run.file_bytes // mb} MB; {run.open_files} |",
         f"| the build | {run.built_bytes // mb} MB |",
         f"| a channel | {run.channel_messages}, {run.channel_bytes // mb} MB |",
