@@ -193,7 +193,7 @@ def test_ten_rows_that_are_bad_in_ten_ways(tmp_path, asking, capsys) -> None:
         f"cem,file://{tmp_path}/repository,,",
     ]
     roster = roster_of(folder, rows, "id,source,ref,extension_days")
-    assert batch(roster, tmp_path / "out") == 3
+    assert batch(roster, tmp_path / "out", "--allow-local", str(tmp_path)) == 3
     shown = capsys.readouterr()
     told = {
         "unreachable (roster.csv:3)": "the server's name was not found",

@@ -6,14 +6,14 @@ import html
 import shlex
 
 from grader.cli.main import run
-from tests.batch.a_class import CORRECT, RUBRIC, WRONG_NAME, batch, roster_of
+from tests.batch.a_class import CORRECT, ROOT, RUBRIC, WRONG_NAME, batch, roster_of
 from tests.report.class_page.test_page import data_of
 
 
 def test_a_batch_writes_the_page_beside_the_gradebook(tmp_path, capsys) -> None:
-    rows = [f"ada,{CORRECT},Ada", f"b b,{WRONG_NAME},Bob", "zoe,/nowhere/at/all,Zoe"]
+    rows = [f"ada,{CORRECT},Ada", f"b b,{WRONG_NAME},Bob", f"zoe,{tmp_path}/nowhere/at/all,Zoe"]
     roster, out = roster_of(tmp_path, rows, "id,source,name"), tmp_path / "out"
-    batch(roster, out)
+    batch(roster, out, "--allow-local", str(ROOT))
     data = data_of(out / "index.html")
     assert [(row[0], row[1], row[4]) for row in data["rows"]] == [
         ("ada", "Ada", "graded"),
@@ -25,16 +25,15 @@ def test_a_batch_writes_the_page_beside_the_gradebook(tmp_path, capsys) -> None:
     assert all((out / link).is_file() for link in links[:2])
     assert str(out / "index.html") in capsys.readouterr().out
     page = (out / "index.html").read_text(encoding="utf-8")
-    command = shlex.join(
-        ["grader", "batch", str(roster), "--rubric", str(RUBRIC), "--out", str(out), "--only", "failed"]
-    )
+    asked = ["--rubric", str(RUBRIC), "--out", str(out), "--allow-local", str(ROOT), "--only", "failed"]
+    command = shlex.join(["grader", "batch", str(roster), *asked])
     assert html.escape(command) in page
     assert "This batch" not in page
 
 
 def test_a_regrade_writes_it_anew(tmp_path) -> None:
     out = tmp_path / "out"
-    batch(roster_of(tmp_path, [f"ada,{CORRECT}"]), out)
+    batch(roster_of(tmp_path, [f"ada,{CORRECT}"]), out, "--allow-local", str(ROOT))
     before = data_of(out / "index.html")
     (out / "index.html").write_text("old")
     assert run(["regrade", str(out), "--rubric", str(RUBRIC)]) == 0
