@@ -137,7 +137,9 @@ FORMATS: dict[str, Format] = {
             changes=FIRST,
             additions=(
                 Addition(1, "BatchRun.cluster_insecure", "Any address of a cluster was taken."),
-                Addition(1, "BatchRun.own_folder", "Nobody knows who made the folder: its mode stays as it is."),
+                Addition(
+                    1, "BatchRun.own_folder", "Nobody knows who made the folder: its mode stays as it is."
+                ),
                 Addition(1, "BatchRun.allow_local", "A roster could name any path by its whole name."),
                 Addition(1, "BatchRun.remote_only", "A roster could name paths."),
             ),

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import os
 import socket
 import ssl
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from distributed import Client
 from distributed.security import Security
 
 from grader.cluster.address import LOCAL
@@ -18,6 +20,21 @@ from grader.cluster.connecting import connected
 from tests.cluster.sockets import listening_ports, tree_of
 
 KEY = b"PRIVATE KEY"
+OUTSIDE = """
+import json, logging, sys
+from distributed import Client
+from distributed.security import Security
+
+logging.disable(logging.CRITICAL)
+address, files = json.load(sys.stdin)
+try:
+    client = Client(address, timeout=20, security=Security(**files))
+except (OSError, TypeError, RuntimeError, ValueError) as error:
+    print("refused", type(error).__name__)
+else:
+    print("let in")
+    client.close()
+"""
 
 
 @pytest.fixture(scope="module")
@@ -91,15 +108,16 @@ def test_every_port_refuses_who_has_no_certificate_of_the_cluster(ports: list[in
             assert _told(plain) == b""
 
 
-@pytest.mark.parametrize("security", [None, "temporary"])
 @pytest.mark.parametrize("protocol", ["tcp", "tls"])
-def test_a_client_without_the_certificates_is_refused(
-    client: Any, protocol: str, security: str | None
-) -> None:
-    address = f"{protocol}://{client.scheduler.address.partition('://')[2]}"
-    theirs = Security.temporary() if security else None
-    with pytest.raises((OSError, TypeError, RuntimeError, ValueError)):
-        Client(address, timeout=3, set_as_default=False, security=theirs)
+@pytest.mark.parametrize("certificates", ["none", "foreign"])
+def test_a_client_without_the_certificates_is_refused(client: Any, protocol: str, certificates: str) -> None:
+    files = _files(Security.temporary()) if certificates == "foreign" else {}
+    said = _outside(f"{protocol}://{client.scheduler.address.partition('://')[2]}", files)
+    assert said.startswith("refused")
+
+
+def test_one_that_has_them_would_be_let_in(client: Any) -> None:
+    assert _outside(client.scheduler.address, _files(client.security)) == "let in"
 
 
 def test_no_key_is_where_others_can_read_it(client: Any, temporary: Path, keys: list[Path]) -> None:
@@ -121,9 +139,20 @@ def test_no_process_imports_from_a_folder_that_another_user_made(client: Any, te
 
 
 def _paths() -> list[str]:
-    import sys  # noqa: PLC0415 - in a worker
-
     return list(sys.path)
+
+
+def _files(security: Security) -> dict[str, str]:
+    return {name: getattr(security, name) for name in ("tls_ca_file", "tls_client_cert", "tls_client_key")}
+
+
+def _outside(address: str, files: dict[str, str]) -> str:
+    """What becomes of a client in a process of its own."""
+    told = json.dumps([address, files])
+    done = subprocess.run(
+        [sys.executable, "-c", OUTSIDE], input=told, capture_output=True, text=True, check=True
+    )
+    return done.stdout.strip()
 
 
 def _connected(port: int) -> socket.socket:
