@@ -43,6 +43,9 @@ STARTS = {
     ),
     "cli/diagnosis.py:_hostname": Start("HOST_ENV", "'/'", "nothing"),
     "cli/diagnosis.py:_modules": Start("ros.env", "'/'", "nothing"),
+    "cli/scope.py:_moved": Start(
+        "_environment()", "'/'", "nothing: systemd is asked for this process's number"
+    ),
     "cli/walls.py:_probe": Start("HOST_ENV", "'/'", "nothing"),
     "instructor/testing.py:_run": Start(
         "_environment()", "folder", "nothing: the instructor's tests, beside a copy of the evidence"

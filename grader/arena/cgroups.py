@@ -13,6 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
+from grader.arena.delegated import LEAF, place_for_runs
 from grader.model.record import Record
 
 MOUNTINFO = Path("/proc/self/mountinfo")
@@ -26,6 +27,11 @@ KEYS = {
     ("cpuacct", 1): "cpuacct.usage",
     ("cpuacct", 2): "cpu.stat",
 }
+WEAKER = (
+    "no control group of this process can be written, so memory, sockets' buffers and files in memory are looked at "
+    "twice a second, and of what the kernel keeps for pipes and other descriptors only their number is bounded"
+)
+WEAKER_CPU = "CPU time of children that nobody waited for is not counted"
 
 
 class Cgroup(Record):
@@ -66,16 +72,36 @@ def remove_groups(cgroups: Cgroups, arena: int) -> bool:
 
 
 def describe() -> str:
-    """For `grader doctor`: what holds memory and tasks, and why it is no cgroup where it is none."""
+    """For `grader doctor`: what holds memory and tasks, and what is weaker where it is no cgroup."""
     found = find_cgroups()
     memory = f"memory by {found.label}"
     tasks = f"tasks by cgroup v{found.pids.version}" if found.pids else "tasks by rlimits and a watchdog"
-    why = "" if found.memory else "; no control group of this process can be written"
-    return f"{memory}, {tasks}{why}"
+    counted = "" if found.cpuacct else f"; {WEAKER_CPU}"
+    return f"{memory}, {tasks}; {_where(found.memory)}{counted}"
+
+
+def has_memory() -> bool:
+    """Whether groups of version 2 can hold memory on this machine at all."""
+    there = [Path(mount[4], "cgroup.controllers") for mount in _mounts() if _type(mount) == "cgroup2"]
+    return any("memory" in path.read_text().split() for path in there if path.is_file())
+
+
+def own_group() -> str:
+    """The name of this process's group of version 2; empty where there is none."""
+    return next((path for _, names, path in _memberships() if names == ""), "")
+
+
+def _where(memory: Cgroup | None) -> str:
+    if memory is None:
+        return WEAKER
+    if memory.version == 2 and (Path(memory.folder) / LEAF).is_dir():
+        return f"in {Path(memory.folder).name}, which was delegated to the grader"
+    return "below its own group"
 
 
 def _find(controller: str) -> Cgroup | None:
-    for version, folder in own_groups(controller):
+    for version, own in own_groups(controller):
+        folder = place_for_runs(own) if version == 2 else own
         _sweep(folder)
         if _usable(folder, KEYS[controller, version]):
             return Cgroup(version=version, folder=str(folder))
@@ -84,13 +110,9 @@ def _find(controller: str) -> Cgroup | None:
 
 def own_groups(controller: str) -> list[tuple[Literal[1, 2], Path]]:
     """The group that this process is in, as a folder, for each hierarchy that may have the controller."""
-    try:
-        mounts = [line.split() for line in MOUNTINFO.read_text().splitlines()]
-        groups = [line.split(":", 2) for line in MEMBERSHIP.read_text().splitlines()]
-    except OSError:
-        return []
+    mounts = _mounts()
     found: list[tuple[Literal[1, 2], Path]] = []
-    for _, names, path in groups:
+    for _, names, path in _memberships():
         if names == "":
             found += [(2, _below(m, path)) for m in mounts if _type(m) == "cgroup2"]
         elif controller in names.split(","):
@@ -100,6 +122,21 @@ def own_groups(controller: str) -> list[tuple[Literal[1, 2], Path]]:
                 if _type(m) == "cgroup" and controller in m[-1].split(",")
             ]
     return found
+
+
+def _mounts() -> list[list[str]]:
+    try:
+        return [line.split() for line in MOUNTINFO.read_text().splitlines()]
+    except OSError:
+        return []
+
+
+def _memberships() -> list[list[str]]:
+    """Number, controllers and path of each group of this process; no controllers are version 2."""
+    try:
+        return [line.split(":", 2) for line in MEMBERSHIP.read_text().splitlines()]
+    except OSError:
+        return []
 
 
 def _type(mount: list[str]) -> str:

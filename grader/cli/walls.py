@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from grader.arena.cgroups import describe, find_cgroups
+from grader.arena.cgroups import describe, find_cgroups, has_memory
 from grader.arena.host_programs import HOST_ENV, host_program
 from grader.arena.probe import ULIMIT_HINT, choose, refused_limits
 from grader.arena.sandbox import NAMESPACES
@@ -28,7 +28,9 @@ SWITCHES = {
     ),
 }
 CONTAINER = "in a container: start it with --privileged, or with --security-opt seccomp=unconfined apparmor=unconfined"
-DELEGATE = "systemd-run --user --scope -p Delegate=yes grader …, or run it as root"
+DELEGATE = "loginctl enable-linger, or systemd-run --user --scope -p Delegate=yes grader …, or run it as root"
+OLD_GROUPS = "run it as root, or boot with cgroup v2 (systemd.unified_cgroup_hierarchy=1)"
+ROOTS_GROUPS = "in a container: start it with --privileged; in a service: Delegate=yes in its unit"
 
 
 def walls() -> Iterator[Row]:
@@ -37,10 +39,7 @@ def walls() -> Iterator[Row]:
     unshare = host_program("unshare") or "unshare"
     yield _probe("user namespaces", [unshare, "--user", "--pid", "--fork", "/bin/true"], drop=user_id() == 0)
     yield _probe("network", [sys.executable, "-I", str(NAMESPACES), "/bin/true"], drop=False)
-    held = find_cgroups().memory is not None
-    yield Row(
-        name="limits", state="ok" if held else "limited", detail=describe(), mend="" if held else DELEGATE
-    )
+    yield _limits_of_trees()
     yield from _inherited()
     yield _limits_of_processes()
     yield _mode()
@@ -93,6 +92,15 @@ def _inherited() -> Iterator[Row]:
         yield Row(
             name=limit.name, state="missing" if limit.command else "ok", detail=detail, mend=limit.command
         )
+
+
+def _limits_of_trees() -> Row:
+    if find_cgroups().memory is not None:
+        return Row(name="limits", state="ok", detail=describe())
+    others = DELEGATE if has_memory() else OLD_GROUPS
+    return Row(
+        name="limits", state="limited", detail=describe(), mend=ROOTS_GROUPS if user_id() == 0 else others
+    )
 
 
 def _limits_of_processes() -> Row:

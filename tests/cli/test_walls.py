@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.arena import cgroups
 from grader.arena.cgroups import Cgroup, Cgroups
 from grader.arena.sandbox import Sandbox
 from grader.cli import walls
@@ -72,12 +73,28 @@ def test_a_probe_that_does_not_answer_is_not_taken_for_a_machine_without(monkeyp
     assert (row.state, row.detail, row.mend) == ("missing", "no answer within 20 s", "look at each part")
 
 
-def test_what_holds_memory_where_no_group_can_be_made(monkeypatch) -> None:
-    monkeypatch.setattr(walls, "find_cgroups", Cgroups)
-    assert (rows()["limits"].state, rows()["limits"].mend) == ("limited", walls.DELEGATE)
+@pytest.mark.parametrize(
+    ("user", "could", "mend"),
+    [(1000, True, walls.DELEGATE), (1000, False, walls.OLD_GROUPS), (0, True, walls.ROOTS_GROUPS)],
+)
+def test_what_holds_memory_where_no_group_can_be_made(monkeypatch, user: int, could: bool, mend: str) -> None:
+    for module in (walls, cgroups):
+        monkeypatch.setattr(module, "find_cgroups", Cgroups)
+    monkeypatch.setattr(walls, "user_id", lambda: user)
+    monkeypatch.setattr(walls, "has_memory", lambda: could)
+    row = walls._limits_of_trees()
+    assert (row.state, row.mend) == ("limited", mend)
+    assert "looked at twice a second" in row.detail
+    assert "children that nobody waited for is not counted" in row.detail
+
+
+def test_what_holds_memory_where_groups_can_be_made(monkeypatch) -> None:
     held = Cgroups(memory=Cgroup(version=2, folder="/sys/fs/cgroup"))
-    monkeypatch.setattr(walls, "find_cgroups", lambda: held)
-    assert rows()["limits"].state == "ok"
+    for module in (walls, cgroups):
+        monkeypatch.setattr(module, "find_cgroups", lambda: held)
+    row = walls._limits_of_trees()
+    assert (row.state, row.mend) == ("ok", "")
+    assert "memory by cgroup v2, tasks by rlimits and a watchdog; below its own group" in row.detail
 
 
 def test_limits_that_cannot_be_set_keep_everything_from_being_graded(monkeypatch) -> None:
