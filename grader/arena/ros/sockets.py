@@ -5,6 +5,7 @@ The kernel finds a socket at once; /proc lists it after a walk over a table that
 
 import contextlib
 import errno
+import itertools
 import socket
 import struct
 
@@ -19,6 +20,8 @@ _ID = struct.Struct("!HH16s16s4x8s")
 _ANSWER_INODE = struct.Struct("=4x48x16xI")
 _NO_COOKIE = b"\xff" * 8
 _ANSWER_BYTES = 1 << 16
+SOCKETS_MAX, ROWS_MAX = 1000, 1000000
+"""So many of one port are looked at, and so many rows of a table."""
 
 
 def listening(port):
@@ -54,9 +57,9 @@ def _asked(family, states, near, far, *, dump=False):
         sock.settimeout(1.0)
         sock.send(_HEADER.pack(_HEADER.size + len(question), SOCK_DIAG_BY_FAMILY, flags, 1, 0) + question)
         found, more = [], True
-        while more:
+        while more and len(found) < SOCKETS_MAX:
             more = _take(sock.recv(_ANSWER_BYTES), found) and dump
-    return found
+    return found[:SOCKETS_MAX]
 
 
 def _take(data, found):
@@ -83,7 +86,8 @@ def _listed(port, far_port):
     ending = ":{:04X}".format(port)
     for table in TABLES:
         with contextlib.suppress(OSError), open(table) as file:
-            for row in (line.split(None, 10) for line in file if ending in line):
+            lines = itertools.islice(file, ROWS_MAX)
+            for row in (line.split(None, 10) for line in lines if ending in line):
                 if row[1].endswith(ending) and far_port in (None, _port(row[2])):
                     yield int(row[3], 16), int(row[9])
 
