@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
 import pytest
 
+from grader.arena import build, built, calls, parameters, recorded
 from grader.arena.limits import SUBMISSION_MESSAGE_BYTES
 from grader.arena.limits import Limits as RunLimits
 from grader.arena.ros_env import DUMP_BYTES, NAMES_MAX, VALUE_BYTES
+from grader.checks.support import text
+from grader.evidence import container, definitions, room, services
+from grader.intake import git, gitdir
 from grader.intake.limits import Limits as IntakeLimits
+from grader.package import cmake_parse, cmake_written, launch, launch_loader, python, reading
 
+KB, MB, RUN = 1 << 10, 1 << 20, RunLimits()
 ROOT = Path(__file__).resolve().parent.parent
 TEXT = (ROOT / "SECURITY.md").read_text(encoding="utf-8")
 ROWS = [
@@ -48,6 +55,114 @@ def test_what_stands_outside_has_a_test_or_says_that_nothing_holds(row: list[str
         assert _is_there(name), name
 
 
+READINGS = [row for row in ROWS if len(row) == 5 and row[0] != "reading"]
+
+
+@pytest.mark.parametrize("row", READINGS, ids=[row[0][:40] for row in READINGS])
+def test_what_is_read_from_the_students_side_is_tested(row: list[str]) -> None:
+    read_by, tested = re.findall(r"`([^`]+)`", row[1]), re.findall(r"`([^`]+)`", row[4])
+    assert all([read_by, tested, *row])
+    for name in read_by:
+        assert (ROOT / "grader" / name).exists(), name
+    for name in tested:
+        assert _is_there(name), name
+
+
+BOUNDS = {
+    "stdout and stderr": (RUN.output_bytes // MB, RUN.output_lines, "ros/streams:LINE_BYTES_MAX"),
+    "what bubblewrap says": ("ros/processes:INFO_BYTES_MAX",),
+    "what a step hands over": (RUN.built_bytes // MB,),
+    "`built.tar`": (
+        RUN.built_bytes // MB, built.MEMBERS_MAX, built.HEADER_BYTES_MAX // KB, built.HEADERS_BYTES_MAX // MB,
+        built.HEADERS_IN_A_ROW_MAX, len(built.ELF),
+    ),
+    "CMake's trace": (recorded.READ_MAX // MB, cmake_written.LINES_MAX, cmake_written.FILES_BYTES_MAX // 1000),
+    "remarks on Python files": (
+        python.REPORT_BYTES_MAX // MB, "ros/syntax:SLIPS_LIMIT", "ros/syntax:ALL_SLIPS_LIMIT", build.STEP_S,
+    ),
+    "calls of the master": (
+        ("ros/rpc:HEAD_BYTES_MAX", KB), ("ros/rpc:BODY_BYTES_MAX", MB), "ros/strict:ELEMENTS_MAX",
+        "ros/strict:DEPTH_MAX", "ros/rpc:CONNECTIONS_MAX", "ros/rpc:CALLS_HZ", "ros/rpc:MULTICALLS_MAX",
+        "ros/rpc:REQUEST_S",
+    ),
+    "answers of nodes": (
+        ("ros/bounded:ANSWER_BYTES_MAX", MB), "ros/links:CONNECTIONS_MAX", "ros/recorder:CONNECT_S",
+        "ros/links:BUS_INFO_S", "ros/master:NOTIFY_S", "ros/pool:EACH_MAX",
+    ),
+    "connections to": (("ros/tcpros:HEADER_BYTES_MAX", KB), "ros/door:WAITING_MAX", "ros/door:HANDSHAKE_S"),
+    "headers of publishers": (
+        ("ros/tcpros:HEADER_BYTES_MAX", KB), "ros/tcpros:FIELD_CHARS_MAX", "ros/tcpros:DEFINITION_CHARS_MAX",
+        "ros/recorder:OPEN_MAX", "ros/recorder:SAME_MAX", "ros/recorder:CONNECT_S",
+    ),
+    "messages": (
+        ("ros/cutting:MESSAGE_BYTES_MAX", MB), RUN.channel_bytes // MB, RUN.channel_messages, RUN.channels,
+        RUN.run_bytes // MB,
+    ),
+    "a service's answer": (("ros/services:ANSWER_BYTES_MAX", MB), "ros/services:WORDS_CHARS_MAX", calls.ANSWER_S),
+    "names of nodes": ("ros/guard:NAME_CHARS_MAX", "ros/guard:NAMES_MAX", ("ros/guard:NAME_BYTES_MAX", KB)),
+    "parameters": (
+        ("ros/params:PROCESS_BYTES_MAX", MB), ("ros/params:RUN_BYTES_MAX", MB), "ros/params:LEVELS_MAX",
+        ("ros/params:VALUE_BYTES_MAX", KB), "ros/params:EVENTS_MAX", ("ros/params:EVENTS_BYTES_MAX", MB),
+    ),
+    "`/proc`": ("ros/tree:PROCESSES_MAX", "ros/owners:FILES_MAX"),
+    "the kernel's tables": ("ros/sockets:SOCKETS_MAX", "ros/sockets:TABLE_ROWS_MAX"),
+    "lines that were printed": ("ros/streams:LINE_BYTES_MAX",),
+    "names that are compared": (text.NAMES_MAX, text.NAME_CHARS_MAX),
+    "definitions and messages": (
+        definitions.MAX_DEFINITION_BYTES, definitions.MAX_FIELDS, definitions.MAX_DEPTH, room.HELD_BYTES_MAX // MB,
+        room.DECODED_BYTES_MAX // MB,
+    ),
+    "MCAP files": (
+        room.FOREIGN_BYTES_MAX // MB, container.MAX_RECORDS, container.MAX_CHUNK_BYTES // MB,
+        container.MAX_UNPACKED_BYTES // MB,
+    ),
+    "`package.xml`": (
+        reading.MARKUP_LIMIT_BYTES // 10**6, launch._TAGS_MAX, launch._FILES_MAX, launch_loader.INCLUDES_MAX,
+        launch_loader.DEPTH_MAX,
+    ),
+    "`CMakeLists.txt`": (cmake_parse._FILE_LIMIT_BYTES // 1000, cmake_parse._STEPS_LIMIT),
+    "files of the package": (reading.SOURCE_LIMIT_BYTES // 10**6,),
+    "files for the evidence": (recorded.ATTACHED_BYTES_MAX // KB, recorded.ATTACHED_FILES_MAX),
+    "YAML files": (
+        parameters.FILE_BYTES_MAX // KB, parameters.EVENTS_MAX, parameters.VALUES_MAX, parameters.DEPTH_MAX,
+        parameters.ALIASES_MAX,
+    ),
+    "texts of services": (calls.TEXT_BYTES_MAX // KB, services._PARTS_MAX),
+    "what git says": (git._ANSWER_BYTES // MB, git._FILE_BYTES // MB, git._MEMORY_BYTES >> 30, gitdir._MAX_FILES),
+}  # fmt: skip
+"""By how a reading begins: the numbers in its bound, each a constant of the code, of ROS's side as `file:NAME`."""
+
+
+@pytest.mark.parametrize("begin", BOUNDS)
+def test_bounds_are_as_they_are(begin: str) -> None:
+    (row,) = [row for row in READINGS if row[0].startswith(begin)]
+    said = {float(number) for number in re.findall(r"(?<![\w.])\d+(?:\.\d+)?", row[2])}
+    for bound in BOUNDS[begin]:
+        name, unit = bound if isinstance(bound, tuple) else (bound, 1)
+        number = _constant(name) / unit if isinstance(name, str) else name
+        assert number in said, f"{name}: {number}"
+
+
+def _constant(name: str) -> float:
+    """`ros/rpc:REQUEST_S` from the text of the file, which only ROS's own Python imports."""
+    file, _, wanted = name.partition(":")
+    tree = ast.parse((ROOT / "grader/arena" / f"{file}.py").read_text(encoding="utf-8"))
+    for node in tree.body:
+        if isinstance(node, ast.Assign):
+            target, value = node.targets[0], node.value
+            many = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+            for one, given in zip(target.elts, value.elts, strict=True) if many else [(target, value)]:
+                if isinstance(one, ast.Name) and one.id == wanted:
+                    return _number(given)
+    raise AssertionError(name)
+
+
+def _number(node: ast.expr) -> float:
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.LShift):
+        return int(_number(node.left)) << int(_number(node.right))
+    return float(ast.literal_eval(node))
+
+
 def _is_there(name: str) -> bool:
     if name.startswith("test_"):
         return any(
@@ -68,7 +183,7 @@ def test_limits_are_as_they_are() -> None:
     run, intake = RunLimits(), IntakeLimits()
     mb = 1 << 20
     together = f"all runs of a submission together {SUBMISSION_MESSAGE_BYTES // mb} MB"
-    for text in (
+    for line in (
         f"| memory | a process tree | {run.memory_bytes // mb} MB |",
         f"| a process tree | {run.processes}, {run.tasks} |",
         f"| a process tree | {run.cpu_s:g} s |",
@@ -90,4 +205,4 @@ def test_limits_are_as_they_are() -> None:
         f"| {intake.package_bytes // mb} MiB, {intake.package_files} files;",
         f"| {intake.entries}; {intake.folders}; {intake.links} |",
     ):
-        assert text in TEXT, text
+        assert line in TEXT, line

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shlex
+import time
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -88,9 +89,13 @@ async def build(
         keep_base(place, arena.exit_codes.get(BASE_NAME))
     if not place.sandbox.bubblewrap:
         run_in_place(place.workspace, place.sandbox)
+    trace, too_much = _trace(place)
+    for detail in filter(None, (built.built.too_much, too_much)):
+        event = ActorEvent(action="limit", actor="catkin_make", detail=detail)
+        writer.event("/grader/actor", time.time_ns(), event)
     return built, BuildOutcome(
         ok=ok,
-        trace=_trace(place),
+        trace=trace,
         root=place.package_folder,
         syntax=_kept(place, SYNTAX),
         cpu_s=arena.cpu_s,
@@ -151,17 +156,20 @@ async def _answer(place: Place, arena: ArenaSession, script: str) -> None:
         await arena.interrupt(name, int_s=1.0, term_s=1.0)
 
 
-def _trace(place: Place) -> Path | None:
-    """The trace that CMake left, as far as the package's files bear it out: the build could write into it."""
+def _trace(place: Place) -> tuple[Path | None, str]:
+    """The trace that CMake left, as far as the package's files bear it out: the build could write into it. And what of
+    it was too much to be read, in words, or ""."""
     if place.sandbox.bubblewrap:
-        data = read_member(place.archive, f"./{TRACE}", READ_MAX)
+        data = read_member(place.archive, f"./{TRACE}", READ_MAX + 1)
     else:
-        data = read_untrusted(Path(place.output) / TRACE)
+        data = read_untrusted(Path(place.output) / TRACE, READ_MAX + 1)
     if data is None:
-        return None
+        return None, ""
     workspace = place.workspace
     source = workspace.built / "src" / workspace.folder
-    return _written(place, TRACE, written_calls(data, source, place.package_folder))
+    written = written_calls(data[:READ_MAX], source, place.package_folder)
+    too_large = f"CMake's trace is more than {READ_MAX >> 20} MB" if len(data) > READ_MAX else ""
+    return _written(place, TRACE, written.trace), too_large or written.too_much
 
 
 def _kept(place: Place, name: str) -> Path | None:

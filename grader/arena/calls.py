@@ -73,7 +73,9 @@ def _text(type_: str, kind: str, place: Place) -> str | None:
     package, _, name = type_.partition("/")
     own = place.workspace.repaired / package
     for folder in (own, *(Path(p) / package for p in place.share_folders)):
-        data = read_untrusted(folder / kind / f"{name}.{kind}", TEXT_BYTES_MAX)
+        data = read_untrusted(folder / kind / f"{name}.{kind}", TEXT_BYTES_MAX + 1)
+        if data is not None and len(data) > TEXT_BYTES_MAX:
+            raise ValueError(f"{name}.{kind} is larger than {TEXT_BYTES_MAX >> 10} kB")
         if data is not None:
             return data.decode(errors="replace")
     return None

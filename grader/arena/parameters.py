@@ -21,6 +21,8 @@ DEPTH_MAX = 20
 ALIASES_MAX = 20
 WORD_LETTERS = 9
 NOT_IN_FILE = "not in the file"
+OVER = TOO_LARGE, TOO_MUCH = "too large", "too much in it"
+"""How the remark on a file ends that is more than is read."""
 _random = random.SystemRandom()
 
 
@@ -112,14 +114,14 @@ def _content(data: bytes | None) -> dict[Any, Any]:
     if data is None:
         raise _UnreadableError("no such file")
     if len(data) > FILE_BYTES_MAX:
-        raise _UnreadableError("too large")
+        raise _UnreadableError(TOO_LARGE)
     text = data.decode()
     aliases = depth = 0
     for count, event in enumerate(yaml.parse(text, _Loader)):
         aliases += isinstance(event, yaml.AliasEvent)
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if count > EVENTS_MAX or aliases > ALIASES_MAX or depth > 2 * DEPTH_MAX:
-            raise _UnreadableError("too much in it")
+            raise _UnreadableError(TOO_MUCH)
     content = yaml.load(text, _Loader)  # noqa: S506 - a SafeLoader
     if not isinstance(content, dict):
         raise _UnreadableError("no names in it")
@@ -132,7 +134,7 @@ def _check_size(values: list[Any]) -> None:
     for items, depth in waiting:
         count += len(items)
         if count > VALUES_MAX or depth > DEPTH_MAX:
-            raise _UnreadableError("too much in it")
+            raise _UnreadableError(TOO_MUCH)
         waiting += [(item, depth + 1) for item in items if isinstance(item, list)]
 
 

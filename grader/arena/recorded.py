@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 from grader import __version__
 from grader.arena.limits import Limits
-from grader.model.package import PackageFacts
+from grader.evidence.events import ActorEvent
+from grader.model.package import PackageFacts, SourceFile
 from grader.model.submission import Submission
 from grader.portable import NOFOLLOW, READ
 
@@ -81,17 +82,31 @@ def metadata(submission: Submission, recording: Recording, limits: Limits) -> di
 
 def attachments(folder: Path, facts: PackageFacts) -> Iterable[tuple[str, bytes]]:
     """The package's own text files that were judged, as far as they are of a size to be looked at."""
-    chosen = [
-        f for f in facts.files if not f.binary and f.link is None and f.path.endswith(ATTACHED_SUFFIXES)
-    ]
-    for file in chosen[:ATTACHED_FILES_MAX]:
+    for file in _texts(facts)[:ATTACHED_FILES_MAX]:
         data = read_untrusted(folder / file.path, ATTACHED_BYTES_MAX)
         if data is not None:
             yield file.path, data
 
 
+def not_attached(facts: PackageFacts) -> Iterable[ActorEvent]:
+    """What `attachments` leaves out, as limits that were met."""
+    texts = _texts(facts)
+    for file in texts[:ATTACHED_FILES_MAX]:
+        if file.size_bytes > ATTACHED_BYTES_MAX:
+            detail = f"is larger than {ATTACHED_BYTES_MAX >> 10} kB: only its beginning is in the evidence"
+            yield ActorEvent(action="limit", actor=file.path, detail=detail)
+    if len(texts) > ATTACHED_FILES_MAX:
+        detail = f"holds more than {ATTACHED_FILES_MAX} text files: only the first are in the evidence"
+        yield ActorEvent(action="limit", actor="the package", detail=detail)
+
+
+def _texts(facts: PackageFacts) -> list[SourceFile]:
+    return [f for f in facts.files if not f.binary and f.link is None and f.path.endswith(ATTACHED_SUFFIXES)]
+
+
 def read_untrusted(path: Path, limit_bytes: int = READ_MAX) -> bytes | None:
-    """A regular file that student code may have written, or None: no link is followed, no pipe waited for."""
+    """A regular file that student code may have written, or None: no link is followed, no pipe waited for. It is cut
+    at the limit: for one byte more, callers see that a file is over theirs, and say so."""
     try:
         descriptor = os.open(path, READ | NOFOLLOW)
     except OSError:

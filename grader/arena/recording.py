@@ -34,19 +34,22 @@ from grader.arena.recorded import (
     Recording,
     attachments,
     metadata,
+    not_attached,
+    read_untrusted,
 )
 from grader.arena.ros_env import RosInstallation, find_ros
 from grader.arena.sandbox import Mode, Sandbox, temporary_base
 from grader.arena.scenario import expected_s, run_scenario
 from grader.arena.workspace import Workspace, make_workspace
 from grader.errors import ArenaError
-from grader.evidence.events import ScenarioEvent
+from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
 from grader.model.rhythm import RateBounds
 from grader.model.submission import Submission
-from grader.package import python_paths, read_syntax_report, with_build_facts
+from grader.package import SyntaxReport, python_paths, read_syntax_report, with_build_facts
+from grader.package.python import REPORT_BYTES_MAX
 from grader.rubric.model import Rubric
 from grader.temporary import temporary_folder
 
@@ -160,6 +163,8 @@ class Recorder:
             writer.package(recording.facts, now_ns)
             for name, data in attachments(self._submission.package.folder, recording.facts):
                 writer.attach(name, data, now_ns, "text/plain")
+            for event in not_attached(recording.facts):
+                writer.event("/grader/actor", now_ns, event)
         recording.files.append(path)
 
     async def _build(self, place: Place, writer: EvidenceWriter, *, last: bool) -> None:
@@ -184,7 +189,7 @@ class Recorder:
             self._not_run = error.message
             return
         recording.add(outcome)
-        report = read_syntax_report(outcome.syntax.read_bytes()) if outcome.syntax else None
+        report = _syntax_report(outcome.syntax, writer)
         recording.facts = with_build_facts(
             recording.facts,
             cmake_trace=outcome.trace,
@@ -261,6 +266,17 @@ class Recorder:
 
     def _metadata(self) -> dict[str, str]:
         return metadata(self._submission, self.recording, self._limits)
+
+
+def _syntax_report(path: Path | None, writer: EvidenceWriter) -> SyntaxReport | None:
+    """What ROS's own Python said; None where that is too much, and then this Python's word stands."""
+    said = read_untrusted(path, REPORT_BYTES_MAX) if path else None
+    if said is not None and len(said) == REPORT_BYTES_MAX:
+        detail = f"gives more than {REPORT_BYTES_MAX >> 20} MB of remarks on its Python files"
+        event = ActorEvent(action="limit", actor="the package", detail=detail)
+        writer.event("/grader/actor", time.time_ns(), event)
+        return None
+    return None if said is None else read_syntax_report(said)
 
 
 @contextmanager

@@ -30,6 +30,8 @@ READY_S = 15.0
 END_S = 5.0
 GROUPS_S, LOOK_S = 2.0, 0.02
 PORT = 11311
+STOPPED = "stopped by the grader"
+"""Begins the details of limits for which a process is ended (`ros/processes.py`)."""
 
 
 class _Channel(NamedTuple):
@@ -247,7 +249,8 @@ class ArenaSession:
         elif topic == "/grader/param" and not is_grader_node(record["caller_id"]):
             self.live.active(time.monotonic())
         elif topic == "/grader/actor" and record["action"] == "limit":
-            self._killed.limited(record["actor"])
+            if record["detail"].startswith(STOPPED):
+                self._killed.limited(record["actor"])
         elif topic == "/grader/actor" and record["action"] == "open":
             self.live.opened.add(record["actor"])
             self.live.active(time.monotonic())

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any, TypeAlias
 
 from grader.admission import Leave
-from grader.arena.parameters import settings
+from grader.arena.parameters import OVER, settings
 from grader.arena.place import Place
 from grader.arena.session import ArenaSession
 from grader.errors import ArenaError
@@ -66,10 +66,12 @@ def built_programs(place: Place) -> list[str]:
 
 
 def set_params(params: tuple[Param, ...], arena: ArenaSession) -> None:
-    """Set them, each with its event in the evidence; a file that cannot be read is noted there."""
+    """Set them, each with its event in the evidence; a file that cannot be read, or is too much, is noted there."""
     found, remarks = settings(params, arena.place.package_file)
     for remark in remarks:
-        arena.note(ActorEvent(action="note", actor="grader", detail=remark))
+        over = remark.endswith(OVER)
+        actor = "the package" if over else "grader"
+        arena.note(ActorEvent(action="limit" if over else "note", actor=actor, detail=remark))
     for one in found:
         record = {
             "action": "param",

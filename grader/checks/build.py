@@ -34,7 +34,7 @@ _CMAKE_ERROR = re.compile(
 )
 _COMPILER_ERROR = re.compile(r"^(?P<file>[^:\s][^:]*):(?P<line>\d+):(?:\d+:)? (?:fatal )?error: (?P<text>.*)")
 _OTHER_ERROR = re.compile(
-    r"(?P<text>.*(?:\b[Ee]rror:|Error\(s\)|undefined reference|No rule to make|[A-Za-z]+Error:|\*\*\*).*)"
+    r"(?P<text>.*(?:\b[Ee]rror:|Error\(s\)|undefined reference|No rule to make|[A-Za-z]Error:|\*\*\*).*)"
 )
 
 
@@ -111,7 +111,8 @@ def judge_build(package: PackageFacts, build: Run) -> Verdict:
 
 def _stopped_build(build: Run, took: str) -> Verdict:
     """By a limit that it broke, which is named, or because its time was up."""
-    limit = next((e.detail for _, e in build.actors if e.action == "limit" and e.actor == CATKIN_MAKE), "")
+    limits = (e.detail for _, e in build.actors if e.action == "limit" and e.actor == CATKIN_MAKE)
+    limit = next((detail for detail in limits if detail.startswith("stopped by the grader")), "")
     return failed(
         f"catkin_make was {limit}" if limit else f"catkin_make had not finished after {took} and was stopped",
         expected=EXPECTED,

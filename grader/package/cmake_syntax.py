@@ -13,6 +13,7 @@ _NESTING_LIMIT = 50
 _WORK_LIMIT = 20_000_000
 _BLOCKS = ("if", "foreach", "while", "function", "macro", "block")
 _MIDDLE = ("else", "elseif")
+_LINK_LETTERS = 4_095
 _LINK_TEXT = re.compile(r"\s*(\.{0,2}/)?[\w./-]+/[\w./-]+\s*")
 
 # A `#[` that opens no bracket comment is a plain comment to CMake, but not to the library.
@@ -82,7 +83,7 @@ def _explained(text: str, end: int, file: str, message: str) -> Fault:
         cause = "there is a `)` too many"
     elif "unexpected end of file" in message and len(tokens) > 1 and tokens[1].kind == "LPAREN":
         cause = f"the `(` of `{_word(first)}(` is never closed by `)`"
-    elif end == 0 and _LINK_TEXT.fullmatch(text):
+    elif end == 0 and len(text) <= _LINK_LETTERS and _LINK_TEXT.fullmatch(text):
         cause = "the file holds only the path that a link should lead to, no CMake commands"
     return _fault(file, line, message, cause)
 

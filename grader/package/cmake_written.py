@@ -8,9 +8,8 @@ from __future__ import annotations
 import json
 import posixpath
 from collections import defaultdict
-from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from cmake_parser import ast as nodes
 
@@ -19,30 +18,47 @@ from grader.package.cmake_syntax import commands_of
 from grader.package.cmake_trace import split_lists
 from grader.package.reading import read_markup
 
+LINES_MAX = 20_000
+FILES_BYTES_MAX = 400_000
+"""Of all the files together that are parsed to hold the trace against them."""
 _FILE_LIMIT_BYTES = 200_000
 _BY_NAME = "cmake_language"
 _FLOW = frozenset({"if", "elseif", "while", "foreach"})
 _EXPANDED = frozenset("$@\\")
 
-_Commands = dict[tuple[int, str], list[nodes.Command]]
+_Commands = dict[tuple[int, str], list[tuple[str, ...] | None]]
+"""By line and name: the arguments, None where something in them is expanded."""
 
 
-def written_calls(trace: bytes, folder: Path, root: str) -> bytes:
+class Written(NamedTuple):
+    """The trace as far as the files bear it out, and what of it was too much to be looked at, in words, or ""."""
+
+    trace: bytes
+    too_much: str = ""
+
+
+def written_calls(trace: bytes, folder: Path, root: str) -> Written:
     """The trace without the calls that the package's files do not bear out: no command of that name at that line, or
     only with other arguments, where these are plain words.
 
     `folder` holds the package as handed in, `root` is where CMake saw it. A file that the parser cannot read through
-    bears out everything, one that was not handed in nothing.
+    bears out everything, one that was not handed in nothing, and so does one that there is no more time for.
     """
     prefix = posixpath.normpath(root) + "/"
-    commands = cache(lambda path: _commands(folder, path))
+    files = _Files(folder)
+    lines = trace.split(b"\n", LINES_MAX)
+    too_many = f"CMake's trace has more than {LINES_MAX} lines" if len(lines) > LINES_MAX else ""
     kept = []
-    for line in trace.splitlines(keepends=True):
+    for line in lines[:LINES_MAX]:
         call = _call(line)
         path = posixpath.normpath(call["file"]) if call else ""
-        if call is None or not path.startswith(prefix) or _fits(call, commands(path.removeprefix(prefix))):
+        if (
+            call is None
+            or not path.startswith(prefix)
+            or _fits(call, files.commands(path.removeprefix(prefix)))
+        ):
             kept.append(line)
-    return b"".join(kept)
+    return Written(b"\n".join(kept), too_many or files.too_much)
 
 
 def _call(line: bytes) -> dict[str, Any] | None:
@@ -57,16 +73,36 @@ def _call(line: bytes) -> dict[str, Any] | None:
     return None
 
 
-def _commands(folder: Path, path: str) -> _Commands | None:
-    """By line and name; None where the file cannot be read through."""
-    data = read_markup(folder, path)
-    if isinstance(data, Fault):
-        return {} if data.kind == "Missing" else None
-    found: _Commands = defaultdict(list)
-    read = commands_of(data) if len(data) <= _FILE_LIMIT_BYTES else None
-    for command in read or ():
-        found[command.line, command.identifier.lower()].append(command)
-    return None if read is None else found
+class _Files:
+    """The commands of the package's files, each read once."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._left_bytes = FILES_BYTES_MAX
+        self._known: dict[str, _Commands | None] = {}
+        self.too_much = ""
+
+    def commands(self, path: str) -> _Commands | None:
+        """None where the file cannot be read through."""
+        if path not in self._known:
+            self._known[path] = self._read(path)
+        return self._known[path]
+
+    def _read(self, path: str) -> _Commands | None:
+        data = read_markup(self._folder, path)
+        if isinstance(data, Fault):
+            return {} if data.kind == "Missing" else None
+        if len(data) > _FILE_LIMIT_BYTES:
+            return None
+        self._left_bytes -= len(data)
+        if self._left_bytes < 0:
+            self.too_much = f"CMake's files are more than {FILES_BYTES_MAX // 1000} kB together"
+            return {}
+        read = commands_of(data)
+        found: _Commands = defaultdict(list)
+        for command in read or ():
+            found[command.line, command.identifier.lower()].append(_words(command))
+        return None if read is None else found
 
 
 def _fits(call: dict[str, Any], found: _Commands | None) -> bool:
@@ -74,12 +110,15 @@ def _fits(call: dict[str, Any], found: _Commands | None) -> bool:
     line, name = call["line"], call["cmd"].lower()
     if found is None or (line, _BY_NAME) in found:
         return True
-    return any(_same_words(command, call["args"], name) for command in found.get((line, name), ()))
+    written = found.get((line, name), ())
+    if name in _FLOW or None in written:
+        return bool(written)
+    return split_lists([a for a in call["args"] if isinstance(a, str)]) in written
 
 
-def _same_words(command: nodes.Command, args: list[Any], name: str) -> bool:
-    """Whether the arguments are those that are written, as far as nothing in them is expanded."""
+def _words(command: nodes.Command) -> tuple[str, ...] | None:
+    """The arguments as they are written; None where something in them is expanded."""
     words = [token for token in command.args if token.kind != "COMMENT"]
-    if name in _FLOW or any(t.kind != "RAW" or _EXPANDED & set(t.value) for t in words):
-        return True
-    return split_lists([t.value for t in words]) == split_lists([a for a in args if isinstance(a, str)])
+    if any(t.kind != "RAW" or _EXPANDED & set(t.value) for t in words):
+        return None
+    return split_lists([t.value for t in words])

@@ -6,8 +6,9 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -20,6 +21,8 @@ from grader.package.python_causes import cause_of
 from grader.package.reading import printable
 
 SYNTAX_SCRIPT = Path(__file__).resolve().parents[1] / "arena" / "ros" / "syntax.py"
+REPORT_BYTES_MAX = 8 << 20
+"""More than `syntax.py` has to say of as many files as a package may have."""
 _CRASHES_LIMIT = 3
 _MESSAGE_LETTERS = 500
 
@@ -55,11 +58,12 @@ class _RawEntry(Record):
 
 
 def read_syntax_report(output: bytes | str) -> SyntaxReport:
-    """The report of `grader/arena/ros/syntax.py` from what it printed; foreign lines are passed over."""
+    """The report of `grader/arena/ros/syntax.py` from what it printed; foreign lines are passed over, and what is past
+    `REPORT_BYTES_MAX` is not read."""
     checked: list[str] = []
     faults: dict[str, Fault] = {}
     slips: list[PythonSlip] = []
-    for entry in filter(None, map(_entry, output.splitlines())):
+    for entry in filter(None, map(_entry, output[:REPORT_BYTES_MAX].splitlines())):
         file = printable(entry.file)
         checked.append(file)
         if entry.faults:
@@ -111,36 +115,38 @@ def check_syntax(folder: Path, paths: Sequence[str], *, timeout_s: float = 10.0)
             kind, message = (
                 ("NotChecked", "takes too long") if timed_out else ("PythonCrash", "crashes Python")
             )
-            report = _joined(report, _without_result(left.pop(0), kind, message))
-    for path in left:
-        report = _joined(report, _without_result(path, "NotChecked", "was not reached in time"))
-    return report
+            report = _joined(report, _without_result([left.pop(0)], kind, message))
+    return _joined(report, _without_result(left, "NotChecked", "was not reached in time"))
 
 
 def _run(folder: Path, paths: list[str], timeout_s: float) -> tuple[SyntaxReport, bool]:
     command = [sys.executable, "-I", str(SYNTAX_SCRIPT), str(folder)]
     names = json.dumps(paths).encode("ascii")
-    try:
-        done = subprocess.run(
-            command,
-            env=anywhere(os.environ),
-            input=names,
-            capture_output=True,
-            timeout=timeout_s,
-            check=False,
-        )
-    except subprocess.TimeoutExpired as error:
-        return read_syntax_report(error.stdout or b""), True
-    return read_syntax_report(done.stdout), False
+    timed_out = False
+    with tempfile.TemporaryFile() as out:
+        try:
+            subprocess.run(
+                command,
+                env=anywhere(os.environ),
+                input=names,
+                stdout=out,
+                stderr=subprocess.DEVNULL,
+                timeout=timeout_s,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            timed_out = True
+        out.seek(0)
+        return read_syntax_report(out.read(REPORT_BYTES_MAX)), timed_out
 
 
-def _without_result(path: str, kind: str, message: str) -> SyntaxReport:
-    file = printable(path)
-    cause = (
-        f"the syntax of `{file}` could not be checked: reading it {message}" if kind == "PythonCrash" else ""
-    )
-    fault = Fault(file=file, line=None, kind=kind, message=message, cause=cause)
-    return SyntaxReport(checked=(file,), faults={file: fault})
+def _without_result(paths: Iterable[str], kind: str, message: str) -> SyntaxReport:
+    faults = {}
+    for file in map(printable, paths):
+        crashed = kind == "PythonCrash"
+        cause = f"the syntax of `{file}` could not be checked: reading it {message}" if crashed else ""
+        faults[file] = Fault(file=file, line=None, kind=kind, message=message, cause=cause)
+    return SyntaxReport(checked=tuple(faults), faults=faults)
 
 
 def _joined(one: SyntaxReport, two: SyntaxReport) -> SyntaxReport:

@@ -97,7 +97,7 @@ def _words(text: str) -> list[str]:
 def _near(data: bytes) -> str:
     """Why a file that does not begin with `#!` has no usable shebang."""
     lines = data[:_LOOKED_AT_BYTES].splitlines()[:50]
-    first = lines[0].decode("utf-8", "replace").strip() if lines else ""
+    first = lines[0][:_LENGTH_LIMIT_BYTES].decode("utf-8", "replace").strip() if lines else ""
     later = next((n for n, line in enumerate(lines, 1) if line.strip().startswith(b"#!")), None)
     if not data.strip():
         return "the file is empty"

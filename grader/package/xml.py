@@ -36,9 +36,11 @@ _CAUSES = (
 )  # fmt: skip
 
 
-# A tag where it begins, after all in which a `<` begins none.
+# A tag where it begins, after all in which a `<` begins none. What has no end, as it seems in the bytes of another
+# encoding, goes on to the last byte: it is looked for once.
 _TAGS = re.compile(
-    rb"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>|<!DOCTYPE[^\[>]*(?:\[.*?\]\s*)?>|(?P<tag><)[^\s/>!?]",
+    rb"<!--.*?(?:-->|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?(?:\?>|\Z)"
+    rb"|<!DOCTYPE[^\[>]*(?:\[.*?(?:\]\s*>|\Z)|>|\Z)|(?P<tag><)[^\s/>!?]",
     re.DOTALL,
 )
 _MESSAGE_LETTERS = 300

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import json
+import os
 import socket
+import struct
+import sys
 import threading
 import time
 import xmlrpc.client
@@ -193,6 +198,14 @@ def test_who_takes_too_many_names(module) -> None:
     assert not register("talker", most + 1)
 
 
+def test_names_count_as_they_are_written_down(module) -> None:
+    """A letter outside of ASCII takes up to twelve in an event of the graph, which goes to the grader in one frame."""
+    names = module("guard").Names()
+    taken = [("registerPublisher", "/n", "\U0001f600" * 200 + str(number), TYPE) for number in range(2000)]
+    size = sum(len(json.dumps(entry)) for entry in taken if names.take("attack", entry))
+    assert size < 2 * module("guard").NAME_BYTES_MAX
+
+
 def test_events_are_told_once_and_not_for_ever(module) -> None:
     told = []
 
@@ -254,3 +267,137 @@ def test_values_of_any_kind_fit_into_the_evidence(module) -> None:
     assert values.depth([[[]], {"a": [1]}], 10) == 3
     assert values.weight(["x" * 1000] * 10, 1 << 30) > 10_000
     assert values.weight(["x" * 1000] * 1000, 5000) < 10_000
+
+
+class Printing:
+    """A process of which one stream is read; `loop` calls nobody by itself."""
+
+    def __init__(self, module, limits: dict[str, int]) -> None:
+        self.process = module("processes").Process.__new__(module("processes").Process)
+        self.told: list[dict[str, object]] = []
+        known = {"_lines": 0, "_bytes": 0, "_entered": True, "printed_too_much": False, "name": "p"}
+        self.process.__dict__.update(known, _limits=limits, _wire=self, loop=self)
+        reader, self._end = os.pipe()
+        self._file = os.fdopen(reader, "rb", buffering=0)
+        module("streams").Lines(self.process, "stdout", self._file)
+
+    def event(self, _topic: str, record: dict[str, object]) -> None:
+        self.told.append(record)
+
+    def add_reader(self, _file: object, call: object) -> None:
+        self.call = call
+
+    def prints(self, data: bytes) -> None:
+        os.write(self._end, data)
+        self.call()
+
+    def close(self) -> None:
+        os.close(self._end)
+        self._file.close()
+
+
+@pytest.mark.parametrize("data", [b"\n", b"x" * 99 + b"\n", b"\0" * 1000, b"y" * 4096 + b"\n"])
+def test_what_is_printed_past_the_limit_is_thrown_away_unread(module, data: bytes) -> None:
+    printing = Printing(module, {"output_lines": 500, "output_bytes": 1 << 20})
+    begin = time.process_time()
+    for _ in range(1000):
+        printing.prints(data * ((1 << 16) // len(data)))
+    printing.close()
+    assert time.process_time() - begin < 5
+    lines = [record for record in printing.told if "line" in record]
+    assert len(lines) <= 501
+    assert sum(len(str(record["line"])) for record in lines[:-1]) <= 1 << 20
+    limits = [record["detail"] for record in printing.told if record.get("action") == "limit"]
+    assert limits == ["printed more than 500 lines or 1 MB"]
+
+
+def test_of_thousands_of_sockets_on_one_port_some_are_looked_at(module, monkeypatch) -> None:
+    sockets = module("sockets")
+    monkeypatch.setattr(sockets, "SOCKETS_MAX", 20)
+    held = [socket.socket() for _ in range(40)]
+    for number, one in enumerate(held):
+        one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+        one.bind(("127.0.0.1", held[0].getsockname()[1] if number else 0))
+        one.listen()
+    found = sockets.listening(held[0].getsockname()[1])
+    inodes = {os.fstat(one.fileno()).st_ino for one in held}
+    for one in held:
+        one.close()
+    assert 20 <= len(found) <= 40  # of each address family
+    assert set(found) <= inodes
+
+
+def test_who_has_very_many_files_open_is_looked_at_so_far_and_named(module, monkeypatch) -> None:
+    owners = module("owners")
+    monkeypatch.setattr(owners, "FILES_MAX", 5)
+    told = []
+    known = owners.Owners(lambda: [("hoarder", [os.getpid()]), ("gone", [1 << 30])])
+    known.tell = lambda actor, detail: told.append((actor, detail))
+    known.callers([])
+    assert told == [("hoarder", "had more than 5 files open: not all of them are looked at")]
+    monkeypatch.setattr(owners, "FILES_MAX", 1 << 16)
+    known.callers([])
+    assert len(told) == 1
+
+
+def header_of(**fields: str) -> bytes:
+    parts = [f"{name}={value}".encode() for name, value in fields.items()]
+    body = b"".join(struct.pack("<I", len(part)) + part for part in parts)
+    return struct.pack("<I", len(body)) + body
+
+
+@pytest.fixture
+def tcpros(monkeypatch):
+    """ROS's own reading of headers, as far as these tests need it."""
+
+    def decode(data: bytes) -> dict[str, str]:
+        found, at = {}, 4
+        while at < len(data):
+            (size,) = struct.unpack_from("<I", data, at)
+            name, _, value = data[at + 4 : at + 4 + size].decode().partition("=")
+            found[name], at = value, at + 4 + size
+        return found
+
+    network = ModuleType("rosgraph.network")
+    network.decode_ros_handshake_header = decode  # type: ignore[attr-defined]
+    network.encode_ros_handshake_header = lambda fields: header_of(**fields)  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "rosgraph", ModuleType("rosgraph"))
+    monkeypatch.setitem(sys.modules, "rosgraph.network", network)
+    for name in ("services", "tcpros"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    yield
+    for name in ("services", "tcpros"):
+        sys.modules.pop(name, None)
+
+
+@pytest.mark.usefixtures("tcpros")
+@pytest.mark.parametrize(
+    ("answer", "why"),
+    [
+        (header_of(error="x" * 200_000), "x" * 500),
+        (struct.pack("<I", 1 << 30), "connection header of"),
+        (header_of(type="a/b") + b"\1" + struct.pack("<I", 1 << 30), "an answer of"),
+        (header_of(type="a/b") + b"\0" + struct.pack("<I", 100_000) + b"y" * 100_000, "y" * 500),
+        (header_of(type="a/b\x1b[31m"), "is no name"),
+    ],
+)
+def test_what_a_service_answers_is_bounded(module, answer: bytes, why: str) -> None:
+    services = module("services")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve() -> None:
+            for _ in range(2):
+                with contextlib.suppress(OSError):  # who has read enough hangs up
+                    far, _ = server.accept()
+                    with far:
+                        far.recv(1 << 16)
+                        far.sendall(answer)
+                        far.recv(1 << 16)
+
+        thread = threading.Thread(target=serve, daemon=True)
+        thread.start()
+        uri = f"rosrpc://127.0.0.1:{server.getsockname()[1]}"
+        with pytest.raises(services.ProtocolError) as failure:
+            services.call("/s", uri, "/me", type_="a/b", request=b"", timeout_s=5)
+    assert why in str(failure.value)
+    assert len(str(failure.value)) <= 500

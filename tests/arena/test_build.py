@@ -9,6 +9,7 @@ import pytest
 
 from grader.arena.build import BuildOutcome, build
 from grader.arena.place import Place
+from grader.arena.recorded import READ_MAX
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter
@@ -130,3 +131,13 @@ def test_links_that_the_build_leaves_are_not_followed(tmp_path: Path) -> None:
     assert outcome.trace is None
     assert "devel" in built.env["CMAKE_PREFIX_PATH"]
     assert secret.read_text() == "{}"
+
+
+def test_a_trace_that_is_too_large_is_named(tmp_path: Path) -> None:
+    """Calls in a loop: each is a line of the trace."""
+    loop = 'foreach(n RANGE 40000)\n  set(x "' + "y" * 200 + '")\nendforeach()\n'
+    with make_place({"CMakeLists.txt": CMAKE + loop, "src/node.py": SCRIPT}) as place:
+        _, outcome, evidence = _built(place, tmp_path)
+    assert outcome.ok
+    met = [(e.actor, e.detail) for _, e in evidence.actors if e.action == "limit"]
+    assert met == [("catkin_make", f"CMake's trace is more than {READ_MAX >> 20} MB")]

@@ -135,6 +135,8 @@ def test_output_is_limited(tmp_path: Path, sandbox: str) -> None:
     lines = printed(run)
     assert len(lines) == 501
     assert "left out" in lines[-1]
+    met = [(e.actor, e.detail) for _, e in run.actors if e.action == "limit"]
+    assert met == [("node", "printed more than 500 lines or 8 MB")]
 
 
 def test_a_long_line_is_cut(tmp_path: Path) -> None:

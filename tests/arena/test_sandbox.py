@@ -227,6 +227,14 @@ def test_cpu_time_is_that_of_the_whole_tree(tmp_path: Path) -> None:
     assert limits_met(run) == ["stopped by the grader: more than 1 s of CPU time"]
 
 
+def test_a_name_that_is_no_text_hides_no_cpu_time(tmp_path: Path) -> None:
+    """/proc shows a process by the name that it gave itself, in any bytes."""
+    named = "import ctypes, os\nctypes.CDLL(None).prctl(15, b'\\xff) (\\xfe', 0, 0, 0)\n"
+    code = named + "for _ in range(3): os.fork()\nwhile True: pass\n"
+    run = run_script(tmp_path, code, limit_s=20, limits=Limits(cpu_s=1.0))
+    assert limits_met(run) == ["stopped by the grader: more than 1 s of CPU time"]
+
+
 def test_runs_of_one_submission_share_what_may_be_recorded() -> None:
     for runs in (1, 4, 10):
         limits = Limits().shared_by(runs)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import time
 
 import pytest
 
-from grader.package.cmake_written import written_calls
+from grader.package.cmake_written import FILES_BYTES_MAX, LINES_MAX, written_calls
 
 ROOT = "/home/student/catkin_ws/src/lab"
 WRITTEN = (
@@ -22,7 +23,7 @@ def call(line, cmd, *args, file="CMakeLists.txt"):
 def kept(tmp_path, *entries, text=WRITTEN):
     (tmp_path / "CMakeLists.txt").write_bytes(text if isinstance(text, bytes) else text.encode())
     trace = b"".join(json.dumps(entry).encode() + b"\n" for entry in entries)
-    return [json.loads(line) for line in written_calls(trace, tmp_path, ROOT).splitlines()]
+    return [json.loads(line) for line in written_calls(trace, tmp_path, ROOT).trace.splitlines()]
 
 
 TRUE = [
@@ -56,4 +57,34 @@ def test_a_file_that_cannot_be_read_through_bears_out_everything(tmp_path, text)
 
 def test_what_is_no_call_is_left_alone(tmp_path):
     garbage = b'not json\n{"file": 1}\n[1]\n{"cut":'
-    assert written_calls(garbage, tmp_path, ROOT) == garbage
+    assert written_calls(garbage, tmp_path, ROOT) == (garbage, "")
+
+
+def test_a_trace_of_too_many_lines_is_named_and_cut(tmp_path):
+    (tmp_path / "CMakeLists.txt").write_text("project(a)\n")
+    line = json.dumps(call(1, "project", "a")).encode() + b"\n"
+    begin = time.process_time()
+    found = written_calls(line * 80_000, tmp_path, ROOT)
+    assert time.process_time() - begin < 10
+    assert found.trace.count(b"\n") == LINES_MAX - 1
+    assert found.too_much == f"CMake's trace has more than {LINES_MAX} lines"
+
+
+def test_files_that_take_too_long_to_parse_bear_out_nothing_and_are_named(tmp_path):
+    for number in range(60):
+        (tmp_path / f"c{number}.cmake").write_text("a(b)\n" * 39_000)
+    entries = [call(1, "a", "b", file=f"c{number}.cmake") for number in range(60)]
+    trace = b"".join(json.dumps(entry).encode() + b"\n" for entry in entries)
+    begin = time.process_time()
+    found = written_calls(trace, tmp_path, ROOT)
+    assert time.process_time() - begin < 15
+    assert found.trace.count(b'"a"') == FILES_BYTES_MAX // len("a(b)\n" * 39_000)
+    assert found.too_much == f"CMake's files are more than {FILES_BYTES_MAX // 1000} kB together"
+
+
+def test_a_call_of_a_hundred_thousand_words_is_compared_at_once(tmp_path):
+    (tmp_path / "CMakeLists.txt").write_text(f"a({'b ' * 90_000})\n")
+    trace = (json.dumps(call(1, "a", "c")).encode() + b"\n") * 20_000
+    begin = time.process_time()
+    assert written_calls(trace, tmp_path, ROOT).trace == b""
+    assert time.process_time() - begin < 10

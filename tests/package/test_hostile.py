@@ -15,6 +15,7 @@ from grader.package import read_package
 from grader.package.cmake_trace import read_trace
 from grader.package.launch import parse_launch, parse_launch_files
 from grader.package.manifest import parse_manifest
+from grader.package.python import REPORT_BYTES_MAX, check_syntax, read_syntax_report
 from grader.package.python_causes import cause_of
 from grader.package.shebang import read_shebang
 from tests.intake.samples import lab, write
@@ -231,6 +232,54 @@ def test_lines_that_keep_patterns_busy(line, message):
 def test_first_lines_without_an_end(data):
     with bounded(1.0):
         assert len(read_shebang(data)[1]) < 1_000
+
+
+@pytest.mark.parametrize("first", ["#" + " " * 16_000 + "x", "#" + "!" * 16_000, "# " * 8_000])
+def test_first_lines_of_very_many_files(first):
+    with bounded():
+        for _ in range(500):
+            read_shebang(f"{first}\nimport rospy\n".encode())
+
+
+@pytest.mark.parametrize("text", ["a/" * 90_000 + "!", " " * 190_000 + "a/b !", "a" * 190_000 + "/"])
+def test_a_cmake_file_that_is_nearly_a_path(text, tmp_path):
+    facts = facts_of(tmp_path, {"CMakeLists.txt": text})
+    assert "the path that a link should lead to" not in facts.cmake.fault.cause
+
+
+@pytest.mark.parametrize("part", ["<!--", "<![CDATA[", "<?", "<!DOCTYPE[", "<!DOCTYPE"])
+def test_text_of_another_encoding_that_looks_like_markup(part):
+    """In UTF-16, these bytes are letters."""
+    letters = (part + " " * (len(part) % 2)).encode().decode("utf-16-le") * 20_000
+    text = f'<?xml version="1.0" encoding="UTF-16"?><launch><!-- {letters[:200_000]} --></launch>'
+    with bounded():
+        parse_launch(b"\xff\xfe" + text.encode("utf-16-le"), "launch/a.launch")
+
+
+def test_remarks_on_python_files_without_end(tmp_path):
+    """Each file has a hundred, as far as a thousand go."""
+    line = "a." + "b" * 290 + "\n"
+    files = [f"f{number}.py" for number in range(300)]
+    for name in files:
+        (tmp_path / name).write_text(line * 100)
+    with bounded():
+        report = check_syntax(tmp_path, files, timeout_s=60)
+    assert (len(report.slips), len(report.checked), report.faults) == (1000, 300, {})
+
+
+def test_a_report_on_syntax_that_has_no_end():
+    entry = b'{"file": "a.py", "faults": [], "slips": []}\n'
+    with bounded():
+        report = read_syntax_report(entry * (2 * REPORT_BYTES_MAX // len(entry)))
+    assert len(report.checked) == REPORT_BYTES_MAX // len(entry)
+
+
+def test_files_that_python_has_no_time_for_are_named(tmp_path):
+    files = [f"f{number}.py" for number in range(5000)]
+    with bounded():
+        report = check_syntax(tmp_path, files, timeout_s=0)
+    assert {fault.kind for fault in report.faults.values()} == {"NotChecked"}
+    assert len(report.faults) == 5000
 
 
 def test_python_files_that_crash_or_never_end(tmp_path):

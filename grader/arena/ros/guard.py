@@ -5,6 +5,7 @@ takes the first one's place, `rosnode cleanup` unregisters nodes that are gone, 
 """
 
 import collections
+import json
 import re
 import threading
 
@@ -177,7 +178,7 @@ class Names:
             held = self._held[process]
             if entry in held:
                 return True
-            size = sum(map(len, entry))
+            size = sum(len(json.dumps(text)) for text in entry)  # as an event of the graph holds them
             if len(held) >= NAMES_MAX or self._bytes[process] + size > NAME_BYTES_MAX:
                 return False
             held.add(entry)

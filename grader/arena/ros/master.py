@@ -59,6 +59,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
         self._calling = threading.local()
         self._guard = guard
         self._links = Links(own, owners, guard)
+        owners.tell = guard.limit
         self._rules = Rules(owners, self._registered, own_ports)
         self._params = ParamLog(wire, self._guard)
         self._graph = GraphLog(loop, wire, self._guard, self.graph)

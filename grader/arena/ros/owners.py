@@ -5,6 +5,7 @@ copies that fight for one name. A caller's is the one that is connected from the
 """
 
 import collections
+import itertools
 import os
 import threading
 import time
@@ -15,15 +16,19 @@ from bounded import port_of
 LOOKS_MAX = 3
 AGAIN_S = 0.2
 ASKED_MAX = 5000
+FILES_MAX = 50000
+"""Open files of one process, with all that runs below it, that a look looks at."""
 REST = 2
 """So many times as long as the last look took, there is no other."""
 
 
 class Owners:
-    """`trees` gives, for each process of the run that lives, its name and the ids of all that runs below it."""
+    """`trees` gives, for each process of the run that lives, its name and the ids of all that runs below it. `tell` is
+    told, as `guard.limit` is, which process has more than is looked at."""
 
     def __init__(self, trees):
         self._trees = trees
+        self.tell = None
         self._known = {}
         self._asked = {}
         self._looking = threading.Lock()
@@ -94,23 +99,26 @@ class Owners:
         self._looked_s = time.monotonic()
         self._holders, self._pids = {}, collections.defaultdict(set)
         for name, pids in self._trees():
-            for pid in pids:
-                for link in _open_sockets(pid):
-                    self._holders.setdefault(link, name)
-                    self._pids[link].add(pid)
+            for pid, link in self._open_sockets(name, pids):
+                self._holders.setdefault(link, name)
+                self._pids[link].add(pid)
         self._look_took_s = time.monotonic() - self._looked_s
 
+    def _open_sockets(self, name, pids):
+        files = ((pid, "/proc/{}/fd/{}".format(pid, number)) for pid in pids for number in _descriptors(pid))
+        for pid, file in itertools.islice(files, FILES_MAX):
+            link = _target(file)
+            if link.startswith("socket:"):
+                yield pid, link
+        if self.tell and next(files, None) is not None:
+            self.tell(name, "had more than {} files open: not all of them are looked at".format(FILES_MAX))
 
-def _open_sockets(pid):
-    folder = "/proc/{}/fd".format(pid)
+
+def _descriptors(pid):
     try:
-        numbers = os.listdir(folder)
+        return os.listdir("/proc/{}/fd".format(pid))
     except OSError:
-        return  # it has ended, or is not ours to look into
-    for number in numbers:
-        link = _target("{}/{}".format(folder, number))
-        if link.startswith("socket:"):
-            yield link
+        return ()  # it has ended, or is not ours to look into
 
 
 def _target(link):

@@ -12,6 +12,7 @@ from tree import cpu_s, descendants, descriptors, resident_bytes
 
 WATCH_S = 0.5
 WORDS_BYTES = 200
+INFO_BYTES_MAX = 4096
 
 
 class Process:
@@ -31,6 +32,7 @@ class Process:
         self._on_exit = on_exit
         self._lines = 0
         self._bytes = 0
+        self.printed_too_much = False
         self._stopped_by = None
         self._entered = False
         self._last_line = ""
@@ -134,14 +136,14 @@ class Process:
 
         def readable():
             nonlocal text
-            chunk = os.read(info_r, 4096)
+            chunk = os.read(info_r, INFO_BYTES_MAX)
             text += chunk
-            if chunk and b"}" not in text:
+            if chunk and b"}" not in text and len(text) < INFO_BYTES_MAX:
                 return
             self.loop.remove_reader(info_r)
             os.close(info_r)
-            if text:
-                self._inner_pid = json.loads(text.decode())["child-pid"]
+            with contextlib.suppress(ValueError, KeyError, TypeError):  # it ended before it could say it
+                self._inner_pid = int(json.loads(text.decode())["child-pid"])
 
         self.loop.add_reader(info_r, readable)
 
@@ -235,14 +237,13 @@ class Process:
             self._last_line = data[:WORDS_BYTES].decode("utf-8", "replace")
         self._lines += 1
         self._bytes += len(data)
+        if self.printed_too_much:
+            return
         if self._lines > self._limits["output_lines"] or self._bytes > self._limits["output_bytes"]:
-            if (
-                self._limits["output_lines"] + 1 == self._lines
-                or self._bytes - len(data) <= self._limits["output_bytes"]
-            ):
-                self._console(stream, "… output past the limit is left out", True)
-                self._lines = self._limits["output_lines"] + 1
-                self._bytes = self._limits["output_bytes"] + 1
+            self.printed_too_much = True
+            self._console(stream, "… output past the limit is left out", True)
+            most = self._limits["output_lines"], self._limits["output_bytes"] >> 20
+            self._limit("printed more than {} lines or {} MB".format(*most))
             return
         self._console(stream, data.decode("utf-8", "replace"), cut)
 

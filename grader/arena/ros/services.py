@@ -7,6 +7,7 @@ from bounded import ProtocolError, connect, port_of
 from tcpros import HEADER_BYTES_MAX, LENGTH, check_fields, read_exactly, read_header, write_header
 
 ANSWER_BYTES_MAX = 4 << 20
+WORDS_CHARS_MAX = 500
 ANY = "*"
 
 
@@ -42,7 +43,7 @@ def call(service, uri, caller_id, *, type_, request, timeout_s):
         except OSError as error:
             raise ProtocolError(str(error)) from error
     if not ok:
-        raise ProtocolError(data.decode("utf-8", "replace")[:500] or "the service failed")
+        raise ProtocolError(data.decode("utf-8", "replace")[:WORDS_CHARS_MAX] or "the service failed")
     return data
 
 
@@ -65,6 +66,6 @@ def _header(sock):
     except OSError as error:
         raise ProtocolError(str(error)) from error
     if "error" in header:
-        raise ProtocolError(header["error"])
+        raise ProtocolError(header["error"][:WORDS_CHARS_MAX])
     check_fields(header)
     return header

@@ -30,6 +30,8 @@ _ID = struct.Struct("!HH16s16s4x8s")
 _ANSWER_PORTS, _ANSWER_INODE = struct.Struct("!4xHH"), struct.Struct("=4x48x16xI")
 _NO_COOKIE = b"\xff" * 8
 _ANSWER_BYTES = 1 << 16
+SOCKETS_MAX, TABLE_ROWS_MAX = 1000, 1000000
+"""So many of one port are looked at, and so many rows of a table."""
 
 Row = collections.namedtuple("Row", "state near far inode")
 """A socket; `near` and `far` are ports."""
@@ -58,7 +60,7 @@ def streams():
     """All TCP sockets that listen, are connected, or whose other end has closed; None where there are too many."""
     states = (LISTEN, ESTABLISHED, CLOSE_WAIT)
     try:
-        rows = _dumped(sum(1 << state for state in states), 0)
+        rows = _dumped(sum(1 << state for state in states), 0, ROWS_MAX + 1)
     except OSError:
         rows = list(itertools.islice(_listed(TABLES), ROWS_MAX + 1))
     return [row for row in rows if row.state in states] if len(rows) <= ROWS_MAX else None
@@ -70,10 +72,11 @@ def datagrams():
     return rows if len(rows) <= ROWS_MAX else None
 
 
-def _dumped(states, port):
+def _dumped(states, port, most=SOCKETS_MAX):
     """Of both families, on a port, or on all where it is 0; raise OSError as below."""
     families = (socket.AF_INET, socket.AF_INET6)
-    return [row for family in families for row in _asked(family, states, (b"", port), (b"", 0), dump=True)]
+    ends = (b"", port), (b"", 0)
+    return [row for family in families for row in _asked(family, states, *ends, dump=True, most=most)]
 
 
 def buffer_bytes():
@@ -120,7 +123,7 @@ def _dump(question):
                 start += (length + 3) & ~3
 
 
-def _asked(family, states, near, far, *, dump=False):
+def _asked(family, states, near, far, *, dump=False, most=SOCKETS_MAX):
     """The rows of what the kernel answers; raise OSError where it does not answer such questions."""
     (source, port), (destination, far_port) = near, far
     identity = _ID.pack(port, far_port, source.ljust(16, b"\0"), destination.ljust(16, b"\0"), _NO_COOKIE)
@@ -130,9 +133,9 @@ def _asked(family, states, near, far, *, dump=False):
         sock.settimeout(1.0)
         sock.send(_HEADER.pack(_HEADER.size + len(question), SOCK_DIAG_BY_FAMILY, flags, 1, 0) + question)
         found, more = [], True
-        while more and len(found) <= ROWS_MAX:
+        while more and len(found) < most:
             more = _take(sock.recv(_ANSWER_BYTES), found) and dump
-    return found
+    return found[:most]
 
 
 def _take(data, found):
@@ -159,7 +162,8 @@ def _listed(tables, port=None, far_port=None):
     ending = ":" if port is None else ":{:04X}".format(port)
     for table in tables:
         with contextlib.suppress(OSError), open(table) as file:
-            for row in (line.split(None, 10) for line in file if ending in line):
+            lines = itertools.islice(file, TABLE_ROWS_MAX)
+            for row in (line.split(None, 10) for line in lines if ending in line):
                 if row[0] != "sl" and port in (None, _port(row[1])) and far_port in (None, _port(row[2])):
                     yield Row(int(row[3], 16), _port(row[1]), _port(row[2]), int(row[9]))
 

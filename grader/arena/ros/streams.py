@@ -30,6 +30,9 @@ class Lines:
             self._pipe.close()
             self._process.stream_closed()
             return
+        if self._process.printed_too_much:  # read, so that it does not wait for room, and thrown away
+            self._rest = b""
+            return
         *lines, self._rest = (self._rest + chunk).split(b"\n")
         for line in lines:
             self._line(line)

@@ -25,7 +25,9 @@ SIZE_LIMIT_BYTES = 2000000
 MEMORY_LIMIT_BYTES = 1 << 30
 CPU_LIMIT_S = 20
 TEXT_LIMIT = 300
-SLIPS_LIMIT = 100
+MESSAGE_LIMIT = 500
+SLIPS_LIMIT, ALL_SLIPS_LIMIT = 100, 1000
+"""Of a file, and of all together."""
 PAIRS = {")": "(", "]": "[", "}": "{"}
 ENCODINGS = (SyntaxError, LookupError, UnicodeDecodeError)
 
@@ -34,8 +36,12 @@ def main(argv):
     if resource is not None:
         set_limits()
     warnings.simplefilter("ignore")
+    left = ALL_SLIPS_LIMIT
     for name in argv[2:] or json.load(sys.stdin):
-        print(json.dumps(check(argv[1], name)), flush=True)
+        report = check(argv[1], name)
+        report["slips"] = report["slips"][:left]
+        left -= len(report["slips"])
+        print(json.dumps(report), flush=True)
 
 
 def set_limits():
@@ -81,7 +87,7 @@ def fault(kind, line, column, message, *, text="", opened=None, mixed=False):
         "kind": kind,
         "line": line,
         "column": column,
-        "message": message,
+        "message": message[:MESSAGE_LIMIT],
         "text": text[:TEXT_LIMIT],
         "opened": opened,
         "mixed": mixed,

@@ -37,8 +37,8 @@ def _children_of_thread(pid, thread):
 def cpu_s(pid):
     """Of a process and of the children that it waited for."""
     try:
-        with open("/proc/{}/stat".format(pid)) as file:
-            fields = file.read().rpartition(")")[2].split()
+        with open("/proc/{}/stat".format(pid), "rb") as file:  # with a name that it gave itself, in any bytes
+            fields = file.read().rpartition(b")")[2].split()
         return sum(int(ticks) for ticks in fields[11:15]) / TICKS_HZ
     except (OSError, IndexError, ValueError):
         return 0.0

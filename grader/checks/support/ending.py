@@ -65,7 +65,7 @@ SLIPS = {
     ),
 }
 _ILLEGAL_NAME = re.compile(
-    r"register (publication|subscription|service)(?: topic)? \[([^\]]*)\] with master: .*illegal chars"
+    r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
 
 
@@ -105,7 +105,7 @@ def _limit(life: Life, run: Run) -> str:
 
 def _refused_name(life: Life, run: Run) -> Ending | None:
     """rospy shuts a node down whose topic has a name that the master does not take."""
-    found = (_ILLEGAL_NAME.search(c.line) for _, c in run.lines(life.name))
+    found = (_ILLEGAL_NAME.search(c.line) for _, c in run.lines(life.name) if "illegal chars" in c.line)
     match = next(filter(None, found), None)
     if match is None:
         return None

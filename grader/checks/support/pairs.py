@@ -10,14 +10,18 @@ from collections import Counter
 from collections.abc import Collection, Iterable
 from typing import NamedTuple
 
-from grader.checks.support.printed import Line, stream_lines
+from grader.checks.support.printed import stream_lines
 from grader.checks.support.wording import VALUE, words_pattern
 from grader.evidence.run import Run
 
 _BEFORE, _BEHIND = r"(?<![\w.])", r"(?![\w]|[.,]\d)"
+_Lines = list[tuple[str, str]]
+"""Lines with their blanks squeezed, and as they are."""
 
-
-LOOKED_AT = 400
+LOOKED_AT, LOOKED_AT_LEAST = 400, 8
+TEXT_CHARS_MAX = 200
+SEARCHED_CHARS_MAX = 100_000_000
+"""Texts are as many times fewer as what was printed is longer, and none is longer than a lab's are."""
 PUNCTUATION = ".,;:!?'\"()[]{}<>"
 
 
@@ -67,18 +71,25 @@ def printed_times(run: Run, process: str, texts: Collection[str], template: str)
 
     Of a flood of texts, some that seem to have been printed are enough to look at.
     """
-    streams = stream_lines(run, process)
-    if len(texts) > LOOKED_AT:
-        texts = _worth_a_look(texts, streams)
+    streams = [[(_squeezed(line.text), line.text) for line in lines] for lines in stream_lines(run, process)]
+    printed_chars = sum(len(line) for lines in streams for _, line in lines)
+    most = min(LOOKED_AT, max(LOOKED_AT_LEAST, SEARCHED_CHARS_MAX // (1 + printed_chars)))
+    texts = [text for text in texts if len(text) <= TEXT_CHARS_MAX]
+    if len(texts) > most:
+        texts = _worth_a_look(texts, streams, most)
     counts = {text: max((_times(lines, text, template) for lines in streams), default=0) for text in texts}
     return Counter({text: count for text, count in counts.items() if count})
 
 
-def _worth_a_look(texts: Iterable[str], streams: Iterable[Iterable[Line]]) -> list[str]:
+def _squeezed(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _worth_a_look(texts: Iterable[str], streams: Iterable[_Lines], most: int) -> list[str]:
     """Texts whose last word was printed, evenly spread."""
-    said = {word.strip(PUNCTUATION) for lines in streams for line in lines for word in line.text.split()}
+    said = {word.strip(PUNCTUATION) for lines in streams for _, line in lines for word in line.split()}
     found = [text for text in texts if text.split()[-1].strip(PUNCTUATION) in said]
-    return found[:: max(1, len(found) // LOOKED_AT)]
+    return found[:: max(1, len(found) // most)]
 
 
 def heard_of(sent: Sent, other: Sent, printed: Counter[str]) -> int:
@@ -86,14 +97,15 @@ def heard_of(sent: Sent, other: Sent, printed: Counter[str]) -> int:
     return sum(min(count, max(0, printed[text] - other.texts[text])) for text, count in sent.texts.items())
 
 
-def _times(lines: Iterable[Line], text: str, template: str) -> int:
+def _times(lines: _Lines, text: str, template: str) -> int:
     before, _, behind = template.partition(VALUE)
     words = text.split()
     whole = r"\s+".join(map(re.escape, words))
     pattern = re.compile(
         f"{words_pattern(before)}{_edge(_BEFORE, whole, before)}{whole}{_BEHIND}{words_pattern(behind)}"
     )
-    return sum(bool(pattern.search(line.text)) for line in lines if words[-1] in line.text)
+    plain = " ".join(words)
+    return sum(bool(pattern.search(line)) for squeezed, line in lines if plain in squeezed)
 
 
 def _edge(mark: str, whole: str, before: str) -> str:

@@ -15,9 +15,12 @@ from grader.evidence.run import Run
 NUMBERS_PER_LINE = 6
 LINES_PER_PROBE = 8
 LINES_SPARE = 20
+NAMES_MAX = 100
+"""Of the student's nodes, those whose names are left out of lines."""
 CLOCK_SLACK_NS = 50_000_000
 _LOG_PREFIX = re.compile(r"^\s*\[\s*(?:DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*(?:\[[^\]]*\]\s*)*:?\s?")
-_ANONYMOUS = re.compile(r"/?[A-Za-z][\w/]*_\d+_\d{9,}")
+_WORD = re.compile(r"/?[A-Za-z][\w/]*")
+_ANONYMOUS_END = re.compile(r"(?=(_\d+_\d{9,}))")
 _HEX = re.compile(r"0[xX][0-9a-fA-F]+")
 _NUMBER = re.compile(r"(?<![\d.])([-+]?)(\d+)(\.\d+)?(?!\d)", re.ASCII)
 
@@ -49,7 +52,7 @@ def printed_lines(run: Run) -> tuple[Line, ...]:
         for stream in ("stdout", "stderr")
         for line in _without_tracebacks([(t, c.line) for t, c in run.lines(process) if c.stream == stream])
     ]
-    names = sorted(run.student_nodes(), key=len, reverse=True)
+    names = sorted(run.student_nodes()[:NAMES_MAX], key=len, reverse=True)
     return tuple(
         Line(t, _bare(text, names)) for t, text in sorted([*lines, *_logged(run)], key=lambda line: line[0])
     )
@@ -57,7 +60,7 @@ def printed_lines(run: Run) -> tuple[Line, ...]:
 
 def stream_lines(run: Run, process: str) -> tuple[tuple[Line, ...], ...]:
     """What one process printed on stdout and on stderr, and what its nodes logged, each by time."""
-    nodes = run.student_nodes(process)
+    nodes = run.student_nodes(process)[:NAMES_MAX]
     console = ([(t, c.line) for t, c in run.lines(process) if c.stream == s] for s in ("stdout", "stderr"))
     streams = (*console, _logged(run, nodes))
     return tuple(tuple(Line(t, _bare(text, nodes)) for t, text in stream) for stream in streams)
@@ -86,7 +89,13 @@ def _bare(text: str, names: Iterable[str]) -> str:
     text = _LOG_PREFIX.sub("", bare(text))
     for name in names:
         text = text.replace(name, " ")
-    return _ANONYMOUS.sub(" ", text)
+    return _WORD.sub(_without_anonymous, text) if _ANONYMOUS_END.search(text) else text
+
+
+def _without_anonymous(word: re.Match[str]) -> str:
+    """A word up to the last digits that `anonymous=True` puts behind a node's name becomes a blank."""
+    end = max((found.end(1) for found in _ANONYMOUS_END.finditer(word[0])), default=0)
+    return f" {word[0][end:]}" if end else word[0]
 
 
 def numbers_in(text: str) -> frozenset[int]:

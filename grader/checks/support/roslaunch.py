@@ -25,18 +25,19 @@ _ERRORS = (
     "Resource not found",
 )
 _SUBSTITUTION = re.compile(r"\\\$\\\(([^)]*)\\\)")
-_STARTED = re.compile(r"process\[(\S+)-\d+\]: started with pid")
-_DIED = re.compile(r"\[(\S+)-\d+\] process has died \[pid \d+, exit code (-?\d+)")
-_FINISHED = re.compile(r"\[(\S+)-\d+\] process has finished cleanly")
-_REQUIRED = re.compile(r"REQUIRED process (\[\S+-\d+\]) has died")
+# Students print such lines too: between brackets is no other bracket, so that a line is looked through once.
+_STARTED = re.compile(r"process\[([^\s\[\]]+)-\d+\]: started with pid")
+_DIED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has died \[pid \d+, exit code (-?\d+)")
+_FINISHED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has finished cleanly")
+_REQUIRED = re.compile(r"REQUIRED process (\[[^\s\[\]]+-\d+\]) has died")
 
 # what roslaunch says when it starts nothing, what it means, and what to do ({0}: the pattern's group)
 _REFUSALS = (
-    (r"multiple nodes named \[([^\]]+)\]", "two nodes are named {0}", "give each <node> a name of its own"),
+    (r"multiple nodes named \[([^\[\]\n]+)\]", "two nodes are named {0}", "give each <node> a name of its own"),
     (r"cannot contain a namespace", "a node's name has a slash in it",
      'write name="…" without a slash; a namespace goes into ns="…"'),
     (r"missing required attribute: '?(\w+)", "a tag has no {0}", "add the attribute"),
-    (r"file does not exist \[([^\]]+)\]", "the file {0} that <rosparam> loads does not exist",
+    (r"file does not exist \[([^\[\]\n]+)\]", "the file {0} that <rosparam> loads does not exist",
      "write $(find <package>)/config/<file>, and push the file"),
     (r"Resource not found: (\S+)", "there is no package {0}",
      "$(find …) and pkg take the package's name, letter by letter"),
@@ -45,9 +46,9 @@ _REFUSALS = (
     (r"output must be one of", 'output is "screen" or "log", in small letters', 'write output="screen"'),
     (r"multiple files named", "the package has two launch files of that name",
      "delete one of them, also one in a folder of old files: find . -name '*.launch' lists them"),
-    (r"Unable to launch \[(\S+)-\d+\]", "the system cannot start the script of {0}",
+    (r"Unable to launch \[([^\s\[\]]+)-\d+\]", "the system cannot start the script of {0}",
      "its first line has to be #!/usr/bin/env python3, or #!/bin/bash for a shell script"),
-    (r"Unknown substitution command \[([^\]]+)\]", "$({0}) is nothing that roslaunch knows",
+    (r"Unknown substitution command \[([^\[\]\n]+)\]", "$({0}) is nothing that roslaunch knows",
      "write $(find <package>)/…"),
     (r"error loading <rosparam> tag", "<rosparam> cannot load its file",
      "rosparam load <file> shows what is wrong with the file"),
@@ -65,8 +66,23 @@ class Absence(NamedTuple):
 
 
 def name_pattern(node: LaunchNode) -> re.Pattern[str]:
-    """The names that a node can come up under: `$(anon x)` becomes `x_<host>_<pid>_<digits>`."""
-    return re.compile(_SUBSTITUTION.sub(_substituted, re.escape(node.full_name).replace(r"\ ", " ")))
+    """The names that a node can come up under: `$(anon x)` becomes `x_<host>_<pid>_<digits>`.
+
+    However many substitutions there are, a name is looked through once: each takes the least that it can, and what it
+    took stands (a group in a lookahead is not tried again).
+    """
+    before, *others = _SUBSTITUTION.split(re.escape(node.full_name).replace(r"\ ", " "))
+    literals, gaps = [before], list[str]()
+    for inside, literal in zip(others[::2], others[1::2], strict=True):
+        name, gap = _substituted(inside)
+        literals[-1] += name
+        gaps.append(gap)
+        literals.append(literal)
+    steps = [
+        f"(?=(?P<g{number}>{gap}?{literals[number]}))(?P=g{number})"
+        for number, gap in enumerate(gaps[:-1], 1)
+    ]
+    return re.compile("".join([literals[0], *steps, *gaps[-1:], *literals[1:][-1:]]))
 
 
 def is_exact(node: LaunchNode) -> bool:
@@ -85,7 +101,7 @@ def refusal(run: Run) -> Absence | None:
     text = "\n".join(line for line in _lines(run))
     for pattern, why, hint in _REFUSALS:
         if match := re.search(pattern, text):
-            words = [PurePosixPath(g).name if "/" in g.strip("/") else g for g in match.groups()]
+            words = [shown(PurePosixPath(g).name if "/" in g.strip("/") else g) for g in match.groups()]
             return Absence(f"roslaunch starts nothing: {why.format(*words)}", hint.format(*words))
     return None
 
@@ -192,9 +208,10 @@ def _is(node: LaunchNode, process: str) -> bool:
     return name_pattern(node).fullmatch(f"/{process}") is not None
 
 
-def _substituted(match: re.Match[str]) -> str:
-    words = re.sub(r"\\(.)", r"\1", match[1]).split()
-    return rf"{re.escape(words[1])}_.+" if len(words) == 2 and words[0] == "anon" else ".*"
+def _substituted(inside: str) -> tuple[str, str]:
+    """What stands for `$(inside)` in a pattern: the name that is known, and what follows it."""
+    words = re.sub(r"\\(.)", r"\1", inside).split()
+    return (f"{re.escape(words[1])}_", ".+") if len(words) == 2 and words[0] == "anon" else ("", ".*")
 
 
 def _joined(lines: Iterable[str]) -> Iterator[str]:

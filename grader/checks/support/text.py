@@ -5,10 +5,13 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable
+from itertools import islice
 
 from grader.shown import visible
 
 SIMILARITY = 0.8
+NAMES_MAX, NAME_CHARS_MAX = 1_000, 60
+"""Of names that students may give by the thousand: so many are looked at, and so much of each."""
 SHOWN_CHARS = 160
 SHOWN_BEFORE_CHARS = 10_000
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
@@ -16,22 +19,32 @@ _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
 def near_names(wanted: str, names: Iterable[str]) -> tuple[str, ...]:
     """Those of `names` that look like a slip of `wanted`: case, namespace, separator, a typing error."""
-    found = [n for n in dict.fromkeys(names) if n != wanted and _is_near(wanted, n)]
+    looked_at = islice(dict.fromkeys(names), NAMES_MAX)
+    found = [n for n in looked_at if n != wanted and _is_near(wanted, n)]
     return tuple(sorted(found, key=lambda n: -_similarity(wanted, n)))
 
 
 def _is_near(wanted: str, name: str) -> bool:
     last_wanted, last_name = (n.rstrip("/").rpartition("/")[2] for n in (wanted, name))
     same_words = sorted(_words(last_wanted)) == sorted(_words(last_name)) != []
-    return (
-        same_words
-        or _squeezed(last_wanted) == _squeezed(last_name)
-        or _similarity(wanted, name) >= SIMILARITY
+    return same_words or _squeezed(last_wanted) == _squeezed(last_name) or _is_similar(wanted, name)
+
+
+def _is_similar(first: str, second: str) -> bool:
+    """The quick ratios are never less than the ratio."""
+    matcher = _matcher(first, second)
+    return all(
+        ratio() >= SIMILARITY for ratio in (matcher.real_quick_ratio, matcher.quick_ratio, matcher.ratio)
     )
 
 
 def _similarity(first: str, second: str) -> float:
-    return difflib.SequenceMatcher(None, _squeezed(first), _squeezed(second)).ratio()
+    return _matcher(first, second).ratio()
+
+
+def _matcher(first: str, second: str) -> difflib.SequenceMatcher[str]:
+    one, other = (_squeezed(name)[:NAME_CHARS_MAX] for name in (first, second))
+    return difflib.SequenceMatcher(None, one, other)
 
 
 def _words(name: str) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 HEADING = "Traceback (most recent call last):"
@@ -46,11 +46,12 @@ def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
     found: list[Traceback] = []
     frames: list[Frame] = []
     first: int | None = None
+    bare = _followed_by_syntax_error(lines)
     for index, line in enumerate(lines):
         frame = _FRAME.match(line)
         if HEADING in line:
             first, frames = index, []
-        elif frame and (first is not None or _is_bare(lines[index + 1 :])):
+        elif frame and (first is not None or bare[index]):
             first = index if first is None else first
             frames.append(Frame(frame[1], int(frame[2])))
         elif first is not None and line and not line[0].isspace():
@@ -62,9 +63,12 @@ def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
     return tuple(found)
 
 
-def _is_bare(following: Iterable[str]) -> bool:
-    """A syntax error of the script itself comes without a heading: only indented lines, then its name."""
-    for line in following:
+def _followed_by_syntax_error(lines: Sequence[str]) -> list[bool]:
+    """For each line whether only indented ones come, then the name of a syntax error: one of the script itself has no
+    heading."""
+    found, named = [False] * len(lines), False
+    for index in range(len(lines) - 1, -1, -1):
+        found[index], line = named, lines[index]
         if line and not line[0].isspace():
-            return line.startswith(("SyntaxError", "IndentationError", "TabError"))
-    return False
+            named = line.startswith(("SyntaxError", "IndentationError", "TabError"))
+    return found
