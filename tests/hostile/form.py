@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import yaml
 from pydantic import AfterValidator, Field, model_validator
@@ -20,6 +20,31 @@ ATTACKS = HERE / "attacks"
 VICTIM = HERE / "victim"
 
 User = Literal["root", "ordinary"]
+Groups = Literal["found", "with", "without"]
+Promise = Literal[
+    "outside", "sees", "disk", "reaches", "rights", "limits", "ros", "base", "outlives", "unpacking", "reading", "built",
+    "shown", "fair", "others", "exported", "not-hidden",
+]  # fmt: skip
+PROMISES: dict[Promise, str] = {
+    "outside": "It gains no rights and makes no namespaces of its own",
+    "sees": "sees the system's programs, ROS, its own workspace, and nothing else",
+    "disk": "It writes to no disk: only to memory of a fixed size",
+    "reaches": "It reaches no network but the loopback of its own run",
+    "rights": "It gains no rights and makes no namespaces of its own",
+    "limits": "Memory, tasks, CPU seconds, output, messages and files of a run are limited",
+    "ros": "Over ROS it cannot end the master, speak for other processes' nodes",
+    "base": "What a build begins with (`~/.cache/grader`) is made where nothing of a student's is",
+    "outlives": "Nothing of it outlives the run",
+    "unpacking": "Unpacking and checking out writes below one folder only",
+    "reading": "Reading a submission's files executes nothing",
+    "built": "What the build says of itself is not believed where files say otherwise",
+    "fair": "No evidence is never a pass, and a fault of the machine or of the grader is never a lost mark",
+    "shown": "What a student can write is shown, never obeyed",
+    "others": "One submission of a class cannot stop, slow or change another one's grading",
+    "exported": "student code can neither write `results.json` nor read the rubric",
+    "not-hidden": "Side channels, and how much CPU a run takes from others beside it, are not hidden",
+}
+"""Words of SECURITY.md, each in one promise of it (the last: in what it does not promise)."""
 Mode = Annotated[str, Field(pattern=r"^[0-7]{3,4}$")]
 
 
@@ -96,11 +121,28 @@ class ExpectedError(Record):
     message: Pattern
 
 
+class Run(NamedTuple):
+    """Who grades, and whether with control groups."""
+
+    user: User
+    groups: Groups
+
+    @property
+    def label(self) -> str:
+        return self.user if self.groups == "found" else f"{self.user}-{self.groups}-groups"
+
+    @property
+    def held_by(self) -> str:
+        """What the report says that memory is held by; nothing where it depends on the machine."""
+        return {"found": "", "with": "cgroup v", "without": "a watchdog"}[self.groups]
+
+
 class Attack(Record):
     """One attack or broken submission; README.md says what each key means."""
 
     title: Annotated[str, Field(min_length=5, max_length=80)]
     tries: Annotated[str, Field(min_length=10, pattern=r"\.$")]
+    promise: Promise
     attacker: str | None = None
     builder: str | None = None
     files: dict[str, str | Bytes] = Field(default_factory=dict)
@@ -116,11 +158,16 @@ class Attack(Record):
     rubric: str = "rubric.yaml"
     expect: Statuses = Field(default_factory=dict)
     error: ExpectedError | None = None
+    refused: Pattern | None = None
     noticed: tuple[Pattern, ...] = ()
     says: tuple[Pattern, ...] | None = None
     never: tuple[Pattern, ...] = ()
     shows: tuple[Pattern, ...] = ()
     user: Literal["root", "ordinary", "both"] = "root"
+    groups: Literal["found", "with", "without", "both"] = "found"
+    through: tuple[str, ...] = ()
+    container: bool = False
+    full: bool = False
     after: Literal["none", "static", "full"] = "none"
     installed: bool = False
     wall_s: Annotated[float, Field(gt=0, le=200)] = 45
@@ -134,6 +181,17 @@ class Attack(Record):
     @property
     def users(self) -> tuple[User, ...]:
         return ("root", "ordinary") if self.user == "both" else (self.user,)
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        """Each is a grading of its own."""
+        groups: tuple[Groups, ...] = ("with", "without") if self.groups == "both" else (self.groups,)
+        return tuple(Run(user, found) for user in self.users for found in groups)
+
+    def is_for_all_only(self, run: Run) -> bool:
+        """Left out of `make test`. Of the runs of one attack the last is in it: an ordinary user without control groups
+        has the least to hold it."""
+        return self.full or (self.groups != "found" and run != self.runs[-1])
 
 
 def attack_names() -> list[str]:

@@ -22,13 +22,14 @@ from grader.arena.cgroups import find_cgroups
 from grader.errors import ExitCode
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
-from tests.hostile.form import HERE, Attack, User, load_attack, rubric_path, submission_job
+from tests.hostile.form import HERE, Attack, Run, load_attack, rubric_path, submission_job
 from tests.hostile.outputs import control_characters, secrets_in
 
 ROOT = HERE.parents[1]
 MEMORY_BYTES_MAX = 300 << 20
 DISK_BYTES_MAX = 200 << 20
 ROOM_LIMITS = {"memory": ("memory.limit_in_bytes", 6 << 30), "pids": ("pids.max", 4096)}
+MACHINE_BYTES_MAX = 1600 << 20
 SPARE_S = 90.0
 UNSHARE = (
     "unshare", "--mount", "--pid", "--fork", "--kill-child", "--net", "--ipc", "--uts", "--propagation", "private"
@@ -58,12 +59,21 @@ def why_no_room() -> str:
     return "" if done.returncode == 0 else f"no overlay here: {done.stderr.strip()[-200:]}"
 
 
+def why_no_groups() -> str:
+    """Empty where a grading in a room can make control groups, else the reason."""
+    found = find_cgroups()
+    if found.memory is None or found.memory.version != 1:
+        return "rooms have control groups of version 1 only, and there are none here"
+    return ""
+
+
 class Graded:
     """What became of an attack: the room's report, and the result's folder as it was left."""
 
-    def __init__(self, report: dict[str, Any], folder: Path) -> None:
+    def __init__(self, report: dict[str, Any], folder: Path, run: Run) -> None:
         self.report = report
         self.folder = folder
+        self.run = run
 
     @property
     def result(self) -> GradingResult | None:
@@ -76,14 +86,17 @@ class Graded:
         return path.read_text(encoding="utf-8") if path.is_file() else ""
 
 
-def grade_in_room(name: str, user: User, folder: Path, **changes: object) -> Graded:
+def grade_in_room(name: str, run: Run, folder: Path, **changes: object) -> Graded:
     """Grade the attack in a room of its own; its outputs are copied into `folder`. `changes` are to the job."""
     attack = load_attack(name)
     secret = f"CANARY{secrets.token_hex(8)}"
     rubric = rubric_path(name).read_text(encoding="utf-8")
     job = {
         "submission": submission_job(name),
-        "user": user,
+        "user": run.user,
+        "may_make_groups": run.groups,
+        "through": list(attack.through),
+        "container": attack.container,
         "secret": secret,
         "rubric": rubric,
         "after": attack.after,
@@ -99,7 +112,7 @@ def grade_in_room(name: str, user: User, folder: Path, **changes: object) -> Gra
     }
     with tempfile.TemporaryDirectory(prefix="hostile-room-") as scratch, _groups() as groups:
         report = _in_room(job | {"groups": groups}, scratch, folder)
-    return Graded(report | {"secret": secret}, folder / "results")
+    return Graded(report | {"secret": secret}, folder / "results", run)
 
 
 def _in_room(job: Mapping[str, Any], scratch: str, folder: Path) -> dict[str, Any]:
@@ -151,13 +164,26 @@ def _groups() -> Iterator[list[str]]:
 def faults(name: str, graded: Graded) -> list[str]:
     """What does not hold, a line each; empty where all is well."""
     attack, report = load_attack(name), graded.report
+    everywhere = [*machine_faults(report), *_outputs(graded)]
+    if was_refused(attack, report):
+        return everywhere
     return [
-        *machine_faults(report),
-        *_outputs(graded),
+        *everywhere,
         *_statuses(attack, graded),
+        *_walls(attack, graded),
         *_words(attack, graded),
         *_after(report.get("after")),
     ]
+
+
+def was_refused(attack: Attack, report: Mapping[str, Any]) -> bool:
+    """It said why it grades nothing here, before anything of a student's ran: no harm, and no marks lost."""
+    said = report["stderr"] + report["stdout"]
+    return (
+        attack.refused is not None
+        and report["exit_code"] == ExitCode.NOT_GRADED
+        and re.search(attack.refused, said, re.IGNORECASE) is not None
+    )
 
 
 def machine_faults(report: Mapping[str, Any]) -> Iterator[str]:
@@ -180,6 +206,8 @@ def machine_faults(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"the grader did not end within {report['wall_s']:.0f} s"
     if report["memory_bytes"] >= MEMORY_BYTES_MAX:
         yield f"the grader held {report['memory_bytes'] >> 20} MB"
+    if report["machine_bytes"] >= MACHINE_BYTES_MAX:
+        yield f"the machine had {report['machine_bytes'] >> 20} MB less"
     if report["disk_bytes"] >= DISK_BYTES_MAX:
         yield f"the disk grew by {report['disk_bytes'] >> 20} MB"
 
@@ -204,13 +232,34 @@ def _statuses(attack: Attack, graded: Graded) -> Iterator[str]:
     if result.error is not None:
         yield f"it could not be graded: {result.error}"
         return
-    if code not in _codes(result):
+    if "document" in graded.report:
+        yield from _document(graded.report["document"], result)
+    elif code not in _codes(result):
         yield f"exit code {code} for a result of status {result.status} and {result.points:g} points"
     for criterion in result.criteria:
         wanted = attack.expect.get(criterion.id, BUSY if _was_busy(criterion) else Status.PASS)
         if criterion.status not in (wanted if isinstance(wanted, tuple) else (wanted,)):
             said = f"{criterion.message} [{criterion.measured}]"
             yield f"{criterion.id}: wanted {_shown(wanted)}, got {criterion.status.value}: {said}"
+
+
+def _document(document: Any, result: GradingResult) -> Iterator[str]:  # noqa: ANN401 - whatever was left there
+    """A platform has to be told what the result says."""
+    told = document.get("score") if isinstance(document, dict) else document
+    if told != result.points:
+        yield f"results.json says {told!r} for {result.points:g} points"
+
+
+def _walls(attack: Attack, graded: Graded) -> Iterator[str]:
+    """Whoever asked for no other sandbox has one, and memory is held as the run wanted it."""
+    result = graded.result
+    said = result.environment.sandbox if result is not None and result.error is None else None
+    if said is None or "--sandbox" in attack.arguments:
+        return
+    if said.startswith("bubblewrap") == attack.container:
+        yield f"wrong sandbox: {said}"
+    if graded.run.held_by not in said:
+        yield f"memory is not held by {graded.run.held_by}: {said}"
 
 
 def _was_busy(criterion: CriterionResult) -> bool:

@@ -26,6 +26,7 @@ from tests.hostile.intake_makers import (  # noqa: F401 - looked up here by name
     sparse,
     terabyte,
 )
+from tests.hostile.library_makers import libraries  # noqa: F401 - looked up here by name
 
 
 def zeros(folder: Path, *, paths: list[str], size_mb: int) -> Path:

@@ -10,28 +10,43 @@ import pytest
 
 from grader.arena.probe import why_not
 from grader.rubric.load import load_rubric
-from tests.hostile.form import attack_names, load_attack, rubric_path
-from tests.hostile.harness import Graded, faults, grade_in_room, why_no_room
+from tests.hostile.form import PROMISES, Run, attack_names, load_attack, rubric_path
+from tests.hostile.harness import ROOT, Graded, faults, grade_in_room, why_no_groups, why_no_room
 
 SIDE_BY_SIDE = 2  # they wait most of the time
-ATTACKS_AT_LEAST = 50
+ATTACKS_AT_LEAST = 140
 NAMES = attack_names()
 SHOWN_ALWAYS = {"shown-log-lines", "shown-manifest", "shown-messages"}
 """One for each way in; what the others would show, `tests/report` and `tests/cli` hold too."""
-RUNS = [(name, user) for name in NAMES for user in load_attack(name).users]
+RUNS = [(name, run) for name in NAMES for run in load_attack(name).runs]
+SECURITY = (ROOT / "SECURITY.md").read_text(encoding="utf-8")
 
 
-def _marked(name, user):
-    finding = load_attack(name).finding
-    marks = [pytest.mark.xfail(reason=finding, strict=True)] if finding else []
-    if name.startswith("shown-") and name not in SHOWN_ALWAYS:
+def _marked(name, run):
+    attack = load_attack(name)
+    marks = [pytest.mark.xfail(reason=attack.finding, strict=True)] if attack.finding else []
+    if (name.startswith("shown-") and name not in SHOWN_ALWAYS) or attack.is_for_all_only(run):
         marks.append(pytest.mark.full)
-    return pytest.param(name, user, marks=marks, id=f"{name}-{user}")
+    return pytest.param(name, run, marks=marks, id=f"{name}-{run.label}")
 
 
 def test_there_are_enough() -> None:
     assert len(NAMES) >= ATTACKS_AT_LEAST
-    assert sum("ordinary" in load_attack(name).users for name in NAMES) >= 12
+    for user, groups, least in (("ordinary", "without", 15), ("ordinary", "with", 10), ("root", "without", 10)):
+        assert sum(run == Run(user, groups) for _, run in RUNS) >= least
+
+
+def test_each_kind_is_in_make_test() -> None:
+    often = {name.split("-")[0] for name, run in RUNS if not load_attack(name).is_for_all_only(run)}
+    assert often == {name.split("-")[0] for name in NAMES}
+
+
+@pytest.mark.parametrize("promise", PROMISES)
+def test_a_promise_is_one_of_those_in_the_document(promise) -> None:
+    """A row of a table, or a point of what is not promised."""
+    told = [line for line in SECURITY.splitlines() if line.startswith(("| ", "- ")) and PROMISES[promise] in line]
+    assert len(told) == 1
+    assert any(load_attack(name).promise == promise for name in NAMES)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -42,24 +57,29 @@ def test_declaration(name) -> None:
 
 
 @pytest.fixture(scope="module")
-def graded(request, tmp_path_factory) -> Iterator[dict[tuple[str, str], Future[Graded]]]:
+def graded(request, tmp_path_factory) -> Iterator[dict[tuple[str, Run], Future[Graded]]]:
     """The selected attacks, some side by side, while the tests wait for their own one."""
     if reason := why_no_room() or why_not():
         pytest.skip(reason)
     every = [getattr(getattr(item, "callspec", None), "params", {}) for item in request.session.items]
-    chosen = [(params["attack"], params["user"]) for params in every if "user" in params]
+    chosen = [(params["attack"], params["run"]) for params in every if "run" in params]
     longest_first = sorted(dict.fromkeys(chosen), key=lambda pair: -load_attack(pair[0]).wall_s)
     out = tmp_path_factory.mktemp("hostile")
     with ThreadPoolExecutor(SIDE_BY_SIDE) as pool:
-        yield {pair: pool.submit(grade_in_room, *pair, out / "-".join(pair)) for pair in longest_first}
+        yield {
+            (name, run): pool.submit(grade_in_room, name, run, out / f"{name}-{run.label}")
+            for name, run in longest_first
+        }
         pool.shutdown(cancel_futures=True)
 
 
 @pytest.mark.ros
 @pytest.mark.slow
-@pytest.mark.parametrize(("attack", "user"), [_marked(*run) for run in RUNS])
-def test_attack(attack, user, graded) -> None:
-    done = graded[attack, user].result()
+@pytest.mark.parametrize(("attack", "run"), [_marked(*pair) for pair in RUNS])
+def test_attack(attack, run, graded) -> None:
+    if run.groups == "with" and (reason := why_no_groups()):
+        pytest.skip(reason)
+    done = graded[attack, run].result()
     found = faults(attack, done)
-    assert not found, "\n  ".join([f"{attack}, graded by {user}:", *found])
+    assert not found, "\n  ".join([f"{attack}, graded by {run.label}:", *found])
     shutil.rmtree(done.folder.parent)

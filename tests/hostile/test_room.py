@@ -6,12 +6,14 @@ import re
 
 import pytest
 
+from tests.hostile.form import Run
 from tests.hostile.harness import faults, grade_in_room, machine_faults, why_no_room
 from tests.hostile.outputs import control_characters, secrets_in
 
 SOUND = {
     "changed": [], "scratch": [], "shared": [], "processes": [], "sockets": [], "groups": [], "settings": [],
     "asked": [], "odd": [], "packets": 0, "late": False, "wall_s": 1.0, "memory_bytes": 1, "disk_bytes": 1,
+    "machine_bytes": 1,
 }  # fmt: skip
 WITHOUT_SANDBOX = {
     "read-everything": [r"harm was done: .*marks\.csv", r"a secret is in an output: console\.log"],
@@ -36,6 +38,7 @@ def test_a_sound_report_has_no_faults() -> None:
         ("late", True),
         ("memory_bytes", 300 << 20),
         ("disk_bytes", 200 << 20),
+        ("machine_bytes", 1600 << 20),
     ],
 )
 def test_each_finding_is_a_fault(key, value) -> None:
@@ -58,7 +61,7 @@ def test_secrets_and_escape_codes_are_found(tmp_path) -> None:
 def test_without_a_sandbox_the_harm_is_seen(name, tmp_path) -> None:
     if reason := why_no_room():
         pytest.skip(reason)
-    graded = grade_in_room(name, "root", tmp_path, arguments=["--sandbox", "none"])
+    graded = grade_in_room(name, Run("root", "found"), tmp_path, arguments=["--sandbox", "none"])
     found = "\n".join(faults(name, graded))
     for pattern in WITHOUT_SANDBOX[name]:
         assert re.search(pattern, found), f"nothing like {pattern!r} in:\n{found}"

@@ -14,13 +14,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tests.hostile.room import canaries, state, submission, world
-from tests.hostile.room.watch import Watched, reap, watch
+from tests.hostile.room import canaries, container, groups, state, submission, world
+from tests.hostile.room.watch import Used, Watched, reap, watch
 
 ROOT = Path(__file__).resolve().parents[3]
 LEFT_S = 2.0
 KEPT = ("PATH", "GRADER_ROS_SETUP", "CONDA_PREFIX")
 AFTER_WALL_S = 60.0
+GRADER = (sys.executable, "-m", "grader")
 
 
 def main() -> None:
@@ -39,10 +40,9 @@ class Room:
 
     def __init__(self, job: Mapping[str, Any], place: world.World) -> None:
         self._job, self._world = job, place
-        for group in job["groups"]:
-            Path(group, "cgroup.procs").write_text("0", encoding="utf-8")
-        world.bring_up_loopback()
         ordinary = job["user"] == "ordinary"
+        groups.enter(job["groups"], job["may_make_groups"], world.ORDINARY_UID if ordinary else 0)
+        world.bring_up_loopback()
         if ordinary:
             world.add_user()
         self._uid = world.ORDINARY_UID if ordinary else 0
@@ -53,12 +53,18 @@ class Room:
         self._path = submission.make(job["submission"], canaries.HANDED_IN, self._uid)
         os.chown(canaries.RESULTS, self._uid, self._uid)
         self._name = job["submission"]["name"]
+        if job["container"]:
+            container.install(canaries.RUBRIC, ROOT)
+            container.hand_in(self._path)
         self._services = canaries.Services(job["secret"])
 
     def grade_attack(self) -> dict[str, Any]:
+        if self._job["container"]:
+            observed = self._observed([*container.COMMAND])
+            return observed | {"document": container.document(), "packets": 0}  # nodes speak over this loopback
         source = self._job["source"].replace("{path}", str(self._path))
         argv = ["grade", source, "--rubric", str(canaries.RUBRIC), "--out", str(canaries.RESULTS)]
-        return self._observed([*argv, "--id", self._name, *self._job["arguments"]])
+        return self._observed([*self._job["through"], *GRADER, *argv, "--id", self._name, *self._job["arguments"]])
 
     def grade_victim(self) -> Watched:
         """In the place of what was handed in before, by the same student."""
@@ -70,37 +76,44 @@ class Room:
         command = (
             ["grade", str(folder)] if self._job["after"] == "full" else ["check", str(folder), "--static"]
         )
-        argv = [*command, "--rubric", str(rubric), "--out", str(canaries.RESULTS)]
+        argv = [*GRADER, *command, "--rubric", str(rubric), "--out", str(canaries.RESULTS)]
         return self._watch(argv, {}, AFTER_WALL_S)
 
     def _observed(self, argv: list[str]) -> dict[str, Any]:
-        files, sockets, packets = state.files(self._world), state.sockets(), state.packets()
-        settings, groups = state.settings(), self._job["groups"]
+        files, sockets, packets = self._files(), state.sockets(), state.packets()
+        settings = state.settings()
         scratch, shared = state.folder(canaries.SCRATCH), state.folder(Path("/dev/shm"))
         watched = self._watch(argv, self._job["env"], self._job["wall_s"])
         left = self._processes_left()
         return asdict(watched) | {
             "processes": left,
             "sockets": sorted(state.sockets() - sockets),
-            "groups": sorted(state.control_groups(groups)),
+            "groups": sorted(state.control_groups(self._job["groups"])),
             "packets": state.packets() - packets,
             "asked": self._services.asked,
             "settings": [name for name, value in state.settings().items() if value != settings[name]],
             "scratch": sorted(set(state.folder(canaries.SCRATCH)) ^ set(scratch)),
             "shared": sorted(set(state.folder(Path("/dev/shm"))) ^ set(shared)),
-            "changed": state.changed(files, state.files(self._world)),
+            "changed": state.changed(files, self._files()),
             "odd": self._odd_results(),
         }
+
+    def _files(self) -> dict[str, state.Entry]:
+        return state.files(self._world, container.RESULTS if self._job["container"] else canaries.RESULTS)
 
     @property
     def results(self) -> Path:
         """The folder of the submission's id, which an attack may choose."""
+        if self._job["container"]:
+            return container.RESULTS / "grader" / container.OWN_ID
         made = {path for path in canaries.RESULTS.iterdir() if path.name != canaries.OTHER.name}
         named = canaries.RESULTS / self._name
         return min(made - {named}, default=named)
 
     def _odd_results(self) -> list[str]:
         """What is no plain file or folder, and folders that are too many."""
+        if self._job["container"]:
+            return [str(path) for path in container.RESULTS.rglob("*") if not _plain(path)]
         made = [path.name for path in canaries.RESULTS.iterdir() if path.name != canaries.OTHER.name]
         odd = [str(path) for path in canaries.RESULTS.rglob("*") if not _plain(path)]
         return odd if len(made) < 2 else [*odd, *made]
@@ -115,7 +128,8 @@ class Room:
             "GITHUB_TOKEN": f"{secret}-environment", "ROS_MARKS_PASSWORD": f"{secret}-environment-ros",
             **env,
         }  # fmt: skip
-        return watch([sys.executable, "-m", "grader", *argv], env, self._uid, wall_s, self._world.used_bytes)
+        used = Used(disk=self._world.used_bytes, memory=lambda: groups.memory_bytes(self._job["groups"]))
+        return watch(argv, env, self._uid, wall_s, used)
 
     def _processes_left(self) -> list[str]:
         """Those that are still there when the time is over in which they have to go."""

@@ -11,7 +11,8 @@ import tarfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from tests.hostile.room.canaries import OTHER, RESULTS, RUNTIME
+from tests.hostile.room.canaries import OTHER, RUNTIME
+from tests.hostile.room.container import DOCUMENT
 from tests.hostile.room.world import ORDINARY_UID, World
 
 Entry = tuple[object, ...]
@@ -30,16 +31,17 @@ LOCK_BYTES_MAX = 1024
 BASE_MEMBERS = re.compile(r"grader-known(/[a-z_]+ [a-z-]+)?|build/CMakeCache\.txt|build/CMakeFiles/[\w./]+")
 
 
-def files(world: World) -> dict[str, Entry]:
+def files(world: World, results: Path) -> dict[str, Entry]:
     """Whatever differs from the machine's own files, by path, without the new results."""
-    return dict(_walk(world))
+    return dict(_walk(world, results))
 
 
-def _walk(world: World) -> Iterator[tuple[str, Entry]]:
+def _walk(world: World, results: Path) -> Iterator[tuple[str, Entry]]:
     for top, folders, names, descriptor in os.fwalk(".", dir_fd=world.changes):
         here = top.removeprefix(".").lstrip("/")
-        if here == str(RESULTS).lstrip("/"):
+        if here == str(results).lstrip("/"):
             folders[:] = [name for name in folders if name == OTHER.name]
+            names = [name for name in names if name != DOCUMENT.name]
         for name in (*folders, *names):
             path = _join(here, name)
             found = os.stat(name, dir_fd=descriptor, follow_symlinks=False)

@@ -14,6 +14,7 @@ from tests.hostile import makers
 from tests.hostile.room import archives
 
 HERE = Path(__file__).resolve().parents[1]
+TOOLS = ("hostile.py", "kernel.py")
 SHEBANG = "#!/usr/bin/env python3\n"
 RUN_BUILDER = "execute_process(COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/tools/builder.py)\n"
 GIT = ("git", "-c", "protocol.file.allow=always", "-c", "init.defaultBranch=main")
@@ -66,7 +67,8 @@ def _write_package(package: Path, job: Mapping[str, Any]) -> None:
     for key, folder in (("attacker", "src"), ("builder", "tools")):
         if job[key] is not None:
             write(package / folder / f"{key}.py", SHEBANG + job[key])
-            shutil.copy(HERE / "tools" / "hostile.py", package / folder / "hostile.py")
+            for name in TOOLS:
+                shutil.copy(HERE / "tools" / name, package / folder / name)
     if job["builder"] is not None:
         with (package / "CMakeLists.txt").open("a") as file:
             file.write(RUN_BUILDER)

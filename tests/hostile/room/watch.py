@@ -18,22 +18,30 @@ ARENA_DEPTH = 4
 
 @dataclass(kw_only=True)
 class Watched:
-    """What a grading took. `exit_code` is negative for a signal; `late` says that its time ran out."""
+    """What a grading took. `exit_code` is negative for a signal; `late` says that its time ran out. `memory_bytes` is
+    what the grader itself held, `machine_bytes` what the whole room took of the machine's memory."""
 
     exit_code: int = 0
     wall_s: float = 0.0
     late: bool = False
     memory_bytes: int = 0
     disk_bytes: int = 0
+    machine_bytes: int = 0
     stdout: str = ""
     stderr: str = ""
 
 
-def watch(
-    argv: Sequence[str], env: dict[str, str], uid: int, wall_s: float, used_bytes: Callable[[], int]
-) -> Watched:
+@dataclass(frozen=True, kw_only=True)
+class Used:
+    """Ask for bytes that are taken: of the room's disk, and of the machine's memory."""
+
+    disk: Callable[[], int]
+    memory: Callable[[], int]
+
+
+def watch(argv: Sequence[str], env: dict[str, str], uid: int, wall_s: float, used: Used) -> Watched:
     """Run it as the user `uid` to its end, or kill it when `wall_s` have passed."""
-    seen, began, used_before = Watched(), time.monotonic(), used_bytes()
+    seen, began, disk_before, memory_before = Watched(), time.monotonic(), used.disk(), used.memory()
     outputs = [os.memfd_create(name) for name in ("stdout", "stderr")]
     process = subprocess.Popen(
         argv, env=env, stdin=subprocess.DEVNULL, stdout=outputs[0], stderr=outputs[1], cwd=env["HOME"],
@@ -41,7 +49,8 @@ def watch(
     )  # fmt: skip
     while not _ended(process):
         seen.memory_bytes = max(seen.memory_bytes, _memory_bytes(process.pid))
-        seen.disk_bytes = max(seen.disk_bytes, used_bytes() - used_before)
+        seen.disk_bytes = max(seen.disk_bytes, used.disk() - disk_before)
+        seen.machine_bytes = max(seen.machine_bytes, used.memory() - memory_before)
         if time.monotonic() - began > wall_s:
             seen.late = True
             process.kill()
