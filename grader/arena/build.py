@@ -22,6 +22,7 @@ from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.record import Record
 from grader.package.cmake_written import written_calls
+from grader.package.python import REPORT_BYTES_MAX
 
 BUILD_S = 120.0
 BUILD_EXPECTED_S = 2.0
@@ -67,7 +68,16 @@ async def build(
     async with ArenaSession(place, writer, master=False, last_run=last_run) as arena:
         arena.course(ScenarioEvent(event="begin"))
         arena.start(place.spec("catkin_make", _catkin_make(place), role="build", build=True, collect=ARCHIVE))
-        arena.start(place.spec("syntax", _syntax(place), role="grader", as_handed_in=True, collect=SYNTAX))
+        arena.start(
+            place.spec(
+                "syntax",
+                _syntax(place),
+                role="grader",
+                as_handed_in=True,
+                collect=SYNTAX,
+                collect_bytes=2 * REPORT_BYTES_MAX,
+            )
+        )
         if wants_base:  # beside the build, on another core
             arena.start(base_spec(place))
         ended = await arena.wait(lambda: "catkin_make" in arena.exit_codes, BUILD_S)
