@@ -22,6 +22,7 @@ class Options:
     loops: tuple[int, ...] | None = None
     seconds: float | None = None
     keep: str | None = None
+    against: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

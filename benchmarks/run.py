@@ -17,7 +17,7 @@ from benchmarks.figures import Found, NotMeasured, Options
 from benchmarks.machine import load, machine
 from grader.errors import GraderError
 
-NAMES = ("one", "hundred", "judging", "recorder", "accuracy", "load", "fair", "thousands")
+NAMES = ("one", "against", "hundred", "judging", "recorder", "accuracy", "load", "fair", "thousands")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -29,6 +29,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         loops=tuple(given.loops) if given.loops is not None else None,
         seconds=given.seconds,
         keep=given.keep,
+        against=given.against,
     )
     wrong = [name for name in given.only or NAMES if not _right(name, options, write=given.write)]
     if wrong:
@@ -60,6 +61,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--jobs", type=int, help="how many gradings side by side")
     parser.add_argument("--loops", type=int, nargs="+", help="busy loops beside (load: several numbers)")
     parser.add_argument("--seconds", type=float, help="how long a publisher publishes (recorder, accuracy)")
+    parser.add_argument("--against", metavar="COMMIT", help="the grader to compare with (against)")
     parser.add_argument("--keep", metavar="FOLDER", help="keep results and evidence there")
     return parser
 

@@ -130,18 +130,8 @@ def _nobodys_uid() -> int:
 def _refusal(*more: str) -> str:
     """What this machine says to a sandbox with these arguments; empty where it makes one."""
     calls = ["--seccomp", "0"] if system_call_filter() else []
-    walls = [
-        "--ro-bind",
-        "/",
-        "/",
-        "--proc",
-        "/proc",
-        *WALLS,
-        *more,
-        *calls,
-        "--die-with-parent",
-        "/bin/true",
-    ]
+    files = ["--ro-bind", "/", "/", "--proc", "/proc", "--clearenv", "--setenv", "LANG", "C.UTF-8"]
+    walls = [*files, *WALLS, *more, *calls, "--die-with-parent", "/bin/true"]
     return _said([sys.executable, "-I", str(NAMESPACES), *_drop(), host_program("bwrap") or "bwrap", *walls])
 
 
