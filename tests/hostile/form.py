@@ -22,29 +22,36 @@ VICTIM = HERE / "victim"
 User = Literal["root", "ordinary"]
 Groups = Literal["found", "with", "without"]
 Promise = Literal[
-    "outside", "sees", "disk", "reaches", "rights", "limits", "ros", "base", "outlives", "unpacking", "reading", "built",
-    "shown", "fair", "others", "exported", "not-hidden",
+    "outside", "sees", "paths", "calls", "disk", "reaches", "rights", "limits", "ros", "connections", "base", "outlives", "auto",
+    "started", "inherited", "excused", "unpacking", "reading", "built", "shown", "fair", "private", "others", "exported",
 ]  # fmt: skip
 PROMISES: dict[Promise, str] = {
-    "outside": "It gains no rights and makes no namespaces of its own",
+    "outside": "Nothing of a submission reaches a program that stands outside the sandbox",
     "sees": "sees the system's programs, ROS, its own workspace, and nothing else",
+    "paths": "It sees no path of the machine but those of the system and of ROS",
+    "calls": "It makes only the system calls that ROS's programs need",
     "disk": "It writes to no disk: only to memory of a fixed size",
     "reaches": "It reaches no network but the loopback of its own run",
     "rights": "It gains no rights and makes no namespaces of its own",
-    "limits": "Memory, tasks, CPU seconds, output, messages and files of a run are limited",
+    "limits": "tasks, CPU seconds, output, messages, files and descriptors of a run are limited",
     "ros": "Over ROS it cannot end the master, speak for other processes' nodes",
+    "connections": "What a node says of its connections counts where the other end says the same",
     "base": "What a build begins with (`~/.cache/grader`) is made where nothing of a student's is",
     "outlives": "Nothing of it outlives the run",
+    "auto": "`--sandbox auto` goes without one only where",
+    "started": "What starts the grader changes nothing",
+    "inherited": "A limit that the grader inherits",
+    "excused": "A run is not excused by a machine that its own processes made late",
     "unpacking": "Unpacking and checking out writes below one folder only",
     "reading": "Reading a submission's files executes nothing",
     "built": "What the build says of itself is not believed where files say otherwise",
-    "fair": "No evidence is never a pass, and a fault of the machine or of the grader is never a lost mark",
     "shown": "What a student can write is shown, never obeyed",
+    "fair": "No evidence is never a pass, and a fault of the machine or of the grader is never a lost mark",
+    "private": "What holds marks is for its owner alone, whatever the umask",
     "others": "One submission of a class cannot stop, slow or change another one's grading",
     "exported": "student code can neither write `results.json` nor read the rubric",
-    "not-hidden": "Side channels, and how much CPU a run takes from others beside it, are not hidden",
 }
-"""Words of SECURITY.md, each in one promise of it (the last: in what it does not promise)."""
+"""Words of SECURITY.md, each in one of its promises."""
 Mode = Annotated[str, Field(pattern=r"^[0-7]{3,4}$")]
 
 

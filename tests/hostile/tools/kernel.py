@@ -31,14 +31,7 @@ NUMBERS = {  # x86_64, aarch64 (asm/unistd_64.h, asm-generic/unistd.h)
     "uselib": (134, None), "vhangup": (153, 58),
 }  # fmt: skip
 LET_THROUGH = {"x86_64": 0, "aarch64": 1}
-REFUSALS = {
-    errno.ENOSYS,
-    errno.EPERM,
-    errno.EACCES,
-    errno.EAFNOSUPPORT,
-    errno.EPROTONOSUPPORT,
-    errno.ESOCKTNOSUPPORT,
-}
+REFUSALS = {errno.ENOSYS, errno.EPERM, errno.EACCES, errno.EAFNOSUPPORT, errno.EPROTONOSUPPORT, errno.ESOCKTNOSUPPORT}
 libc = ctypes.CDLL(None, use_errno=True)
 
 
@@ -75,7 +68,7 @@ def _in_a_child(name, action):
     _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
         told = "refused by signal" if os.WTERMSIG(status) == signal.SIGSYS else "HARM: ended by signal"
-        return f"tried: {name}: {told} {os.WTERMSIG(status)}"
+        return "tried: {}: {} {}".format(name, told, os.WTERMSIG(status))
     return words
 
 
@@ -84,8 +77,8 @@ def _tried(name, action):
         got = action()
     except OSError as error:
         if error.errno in REFUSALS:
-            return f"tried: {name}: refused: {error}"
-        return f"tried: {name}: HARM: the kernel looked at it: {error}"
+            return "tried: {}: refused: {}".format(name, error)
+        return "tried: {}: HARM: the kernel looked at it: {}".format(name, error)
     except Exception as error:
-        return f"tried: {name}: refused: {type(error).__name__}: {error}"
-    return f"tried: {name}: HARM: {got!r}"
+        return "tried: {}: refused: {}: {}".format(name, type(error).__name__, error)
+    return "tried: {}: HARM: {!r}".format(name, got)
