@@ -164,6 +164,36 @@ time.sleep(60)
 """
 
 
+SHARED_AND_LET_GO = """
+import ctypes, time
+libc = ctypes.CDLL(None, use_errno=True)
+libc.mmap.restype = ctypes.c_void_p
+piece = 16 << 20
+for _ in range(64):
+    at = libc.mmap(None, ctypes.c_size_t(piece), 3, 0x21, -1, ctypes.c_long(0))
+    ctypes.memset(ctypes.c_void_p(at), 1, ctypes.c_size_t(piece))
+    libc.madvise(ctypes.c_void_p(at), ctypes.c_size_t(piece), 4)
+time.sleep(60)
+"""
+SENT_BY_CLOSED = """
+import os, socket, time
+for _ in range(7):
+    if os.fork() == 0:
+        break
+held = []
+for _ in range(400):
+    near, far = socket.socketpair()
+    near.setblocking(False)
+    try:
+        while True: near.send(bytes(65536))
+    except BlockingIOError:
+        pass
+    near.close()
+    held.append(far)
+time.sleep(60)
+"""
+
+
 @needs_sandbox
 @pytest.mark.parametrize("groups", [True, False])
 @pytest.mark.parametrize(
@@ -172,6 +202,8 @@ time.sleep(60)
         (SOCKETS, Limits(socket_bytes=64 << 20), "more than 64 MB in sockets"),
         (DESCRIPTORS, Limits(), "more than 8192 files, pipes and sockets open"),
         (FILES, Limits(memory_bytes=100 << 20), "more than 100 MB of memory"),
+        (SHARED_AND_LET_GO, Limits(memory_bytes=200 << 20), "more than 200 MB of memory"),
+        (SENT_BY_CLOSED, Limits(), "more than 256 MB in sockets"),
     ],
 )
 def test_memory_that_no_process_counts(

@@ -8,7 +8,7 @@ import time
 
 from launching import launch
 from streams import Collected, Lines
-from tree import cpu_s, descendants, descriptors, resident_bytes
+from tree import MAPS_MAX, cpu_s, descendants, descriptors, resident_bytes, shared_memory
 
 WATCH_S = 0.5
 WORDS_BYTES = 200
@@ -198,7 +198,7 @@ class Process:
         if self._groups is not None and self._groups.memory_kills():
             return self._too_much_memory()
         held = self._groups is not None and self._groups.holds_memory
-        if not held and resident + self._written_bytes() > self._limits["memory_bytes"]:
+        if not held and self._holds_too_much(tree, resident):
             return self._too_much_memory()
         if len(tree) > self._limits["processes"]:
             return "more than {} processes".format(self._limits["processes"])
@@ -208,9 +208,11 @@ class Process:
             return "more than {} files, pipes and sockets open".format(self._limits["descriptors"])
         return None
 
-    def _written_bytes(self):
-        """Files in memory: they are nobody's resident pages."""
-        return sum(self._stage.used_bytes(name) for name in self._scratches)
+    def _holds_too_much(self, tree, resident):
+        """Where no control group counts what is nobody's resident page: files in memory, and memory that is shared."""
+        shared, maps = shared_memory(tree)
+        written = sum(self._stage.used_bytes(name) for name in self._scratches)
+        return resident + written + shared > self._limits["memory_bytes"] or maps > MAPS_MAX
 
     def descriptors(self):
         """Of the whole tree."""

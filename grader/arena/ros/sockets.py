@@ -12,7 +12,9 @@ import struct
 
 NETLINK_SOCK_DIAG = 4
 SOCK_DIAG_BY_FAMILY = 20
-UNIX_SHOW_MEMORY, UNIX_MEMORY = 0x20, 5
+UNIX_SHOW, UNIX_UNREAD, UNIX_MEMORY = 0x10 | 0x20, 4, 5
+UNIX_SENT_BYTES_MAX = 425984
+"""What one socket may send ahead, with its own wish for more (net.core.wmem_max, twice)."""
 INET_SHOW_MEMORY, INET_MEMORY = 1 << 6, 7
 UNIX_ANSWER_BYTES, INET_ANSWER_BYTES = 16, 72
 REQUEST, DUMP = 0x1, 0x300
@@ -81,7 +83,7 @@ def _dumped(states, port, most=SOCKETS_MAX):
 
 def buffer_bytes():
     """What the buffers of all sockets of this network namespace hold: no process's memory counts it."""
-    unix = _UNIX.pack(socket.AF_UNIX, 0, 0, ALL_STATES, 0, UNIX_SHOW_MEMORY, 0)
+    unix = _UNIX.pack(socket.AF_UNIX, 0, 0, ALL_STATES, 0, UNIX_SHOW, 0)
     questions = [(unix, UNIX_ANSWER_BYTES, UNIX_MEMORY)]
     for family in (socket.AF_INET, socket.AF_INET6):
         for protocol in (socket.IPPROTO_TCP, socket.IPPROTO_UDP):
@@ -99,7 +101,9 @@ def _memory_bytes(question, answer_bytes, wanted):
             at = answer_bytes
             while at + _ATTRIBUTE.size <= len(body):
                 length, kind = _ATTRIBUTE.unpack_from(body, at)
-                if kind == wanted and length >= _ATTRIBUTE.size + _MEMORY.size:
+                if kind == UNIX_UNREAD and wanted == UNIX_MEMORY and any(body[at + 4 : at + 8]):
+                    held += UNIX_SENT_BYTES_MAX  # charged to the sender, which may be gone
+                elif kind == wanted and length >= _ATTRIBUTE.size + _MEMORY.size:
                     received, _, sent = _MEMORY.unpack_from(body, at + _ATTRIBUTE.size)
                     held += received + sent
                 at += max(_ATTRIBUTE.size, (length + 3) & ~3)

@@ -1,10 +1,15 @@
 """A tree of processes as /proc shows it (man 5 proc)."""
 
+import contextlib
+import itertools
 import os
 
 TICKS_HZ = os.sysconf("SC_CLK_TCK")
 PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 PROCESSES_MAX = 5000
+MAPS_MAX = 100000
+SHARED = b" /dev/zero (deleted)\n"
+PIECE_BYTES = 64 << 20
 
 
 def descendants(pid):
@@ -50,6 +55,24 @@ def descriptors(pid):
         return len(os.listdir("/proc/{}/fd".format(pid)))
     except OSError:
         return 0
+
+
+def shared_memory(pids):
+    """(bytes, maps): memory without a name that processes share, each piece once, and how many maps were looked at.
+
+    The kernel keeps a piece for as long as any of it is mapped, though no process is shown to hold what it let go: a
+    piece counts up to the last byte that is mapped, and for no less than `PIECE_BYTES`.
+    """
+    ends, maps = {}, 0
+    for pid in pids:
+        with contextlib.suppress(OSError), open("/proc/{}/maps".format(pid), "rb") as file:
+            for line in itertools.islice(file, max(0, MAPS_MAX + 1 - maps)):
+                maps += 1
+                if line.endswith(SHARED):
+                    where, _, offset, _, inode, _ = line.split(None, 5)
+                    first, last = (int(part, 16) for part in where.split(b"-"))
+                    ends[inode] = max(ends.get(inode, PIECE_BYTES), int(offset, 16) + last - first)
+    return sum(ends.values()), maps
 
 
 def resident_bytes(pid):
