@@ -32,7 +32,7 @@ class Limits(Record):
     file_bytes: int = 64 << 20
     open_files: int = 1024
     descriptors: int = 8192
-    socket_bytes: int = 256 << 20
+    socket_bytes: int = 128 << 20
     address_space_bytes: int = 8 << 30
     built_bytes: int = 96 << 20
     channel_messages: int = 20_000

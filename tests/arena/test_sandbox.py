@@ -203,7 +203,7 @@ time.sleep(60)
         (DESCRIPTORS, Limits(), "more than 8192 files, pipes and sockets open"),
         (FILES, Limits(memory_bytes=100 << 20), "more than 100 MB of memory"),
         (SHARED_AND_LET_GO, Limits(memory_bytes=200 << 20), "more than 200 MB of memory"),
-        (SENT_BY_CLOSED, Limits(), "more than 256 MB in sockets"),
+        (SENT_BY_CLOSED, Limits(), "more than 128 MB in sockets"),
     ],
 )
 def test_memory_that_no_process_counts(

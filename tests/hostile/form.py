@@ -22,8 +22,9 @@ VICTIM = HERE / "victim"
 User = Literal["root", "ordinary"]
 Groups = Literal["found", "with", "without"]
 Promise = Literal[
-    "outside", "sees", "paths", "calls", "disk", "reaches", "rights", "limits", "ros", "connections", "base", "outlives", "auto",
-    "started", "inherited", "excused", "unpacking", "reading", "built", "shown", "fair", "private", "others", "exported",
+    "outside", "sees", "paths", "calls", "disk", "reaches", "rights", "limits", "ros", "connections", "base",
+    "outlives", "auto", "started", "inherited", "excused", "unpacking", "reading", "built", "shown", "fair", "private",
+    "others", "exported",
 ]  # fmt: skip
 PROMISES: dict[Promise, str] = {
     "outside": "Nothing of a submission reaches a program that stands outside the sandbox",

@@ -30,6 +30,8 @@ MEMORY_BYTES_MAX = 300 << 20
 DISK_BYTES_MAX = 200 << 20
 ROOM_LIMITS = {"memory": ("memory.limit_in_bytes", 6 << 30), "pids": ("pids.max", 4096)}
 MACHINE_BYTES_MAX = 1600 << 20
+WATCHED_BYTES_MAX = 3000 << 20
+"""Without control groups: a tree may grow beyond its limit until somebody looks (SECURITY.md)."""
 SPARE_S = 90.0
 UNSHARE = (
     "unshare", "--mount", "--pid", "--fork", "--kill-child", "--net", "--ipc", "--uts", "--propagation", "private"
@@ -164,13 +166,15 @@ def _groups() -> Iterator[list[str]]:
 def faults(name: str, graded: Graded) -> list[str]:
     """What does not hold, a line each; empty where all is well."""
     attack, report = load_attack(name), graded.report
-    everywhere = [*machine_faults(report), *_outputs(graded)]
+    watched = graded.run.groups == "without" or graded.run == ("ordinary", "found")
+    most = WATCHED_BYTES_MAX if watched else MACHINE_BYTES_MAX
+    everywhere = [*machine_faults(report, machine_bytes_max=most), *_outputs(graded)]
     if was_refused(attack, report):
         return everywhere
     return [
         *everywhere,
         *_statuses(attack, graded),
-        *_walls(attack, graded),
+        *wall_faults(attack, graded),
         *_words(attack, graded),
         *_after(report.get("after")),
     ]
@@ -186,7 +190,7 @@ def was_refused(attack: Attack, report: Mapping[str, Any]) -> bool:
     )
 
 
-def machine_faults(report: Mapping[str, Any]) -> Iterator[str]:
+def machine_faults(report: Mapping[str, Any], *, machine_bytes_max: int = MACHINE_BYTES_MAX) -> Iterator[str]:
     for key, words in {
         "changed": "files changed outside",
         "scratch": "left in $TMPDIR",
@@ -206,7 +210,7 @@ def machine_faults(report: Mapping[str, Any]) -> Iterator[str]:
         yield f"the grader did not end within {report['wall_s']:.0f} s"
     if report["memory_bytes"] >= MEMORY_BYTES_MAX:
         yield f"the grader held {report['memory_bytes'] >> 20} MB"
-    if report["machine_bytes"] >= MACHINE_BYTES_MAX:
+    if report["machine_bytes"] >= machine_bytes_max:
         yield f"the machine had {report['machine_bytes'] >> 20} MB less"
     if report["disk_bytes"] >= DISK_BYTES_MAX:
         yield f"the disk grew by {report['disk_bytes'] >> 20} MB"
@@ -233,7 +237,7 @@ def _statuses(attack: Attack, graded: Graded) -> Iterator[str]:
         yield f"it could not be graded: {result.error}"
         return
     if "document" in graded.report:
-        yield from _document(graded.report["document"], result)
+        yield from document_faults(graded.report["document"], result)
     elif code not in _codes(result):
         yield f"exit code {code} for a result of status {result.status} and {result.points:g} points"
     for criterion in result.criteria:
@@ -243,14 +247,14 @@ def _statuses(attack: Attack, graded: Graded) -> Iterator[str]:
             yield f"{criterion.id}: wanted {_shown(wanted)}, got {criterion.status.value}: {said}"
 
 
-def _document(document: Any, result: GradingResult) -> Iterator[str]:  # noqa: ANN401 - whatever was left there
+def document_faults(document: Any, result: GradingResult) -> Iterator[str]:
     """A platform has to be told what the result says."""
     told = document.get("score") if isinstance(document, dict) else document
     if told != result.points:
         yield f"results.json says {told!r} for {result.points:g} points"
 
 
-def _walls(attack: Attack, graded: Graded) -> Iterator[str]:
+def wall_faults(attack: Attack, graded: Graded) -> Iterator[str]:
     """Whoever asked for no other sandbox has one, and memory is held as the run wanted it."""
     result = graded.result
     said = result.environment.sandbox if result is not None and result.error is None else None

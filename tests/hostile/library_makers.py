@@ -41,8 +41,8 @@ int gconv_init(void *step) { return 1; }
 
 
 def libraries(folder: Path, *, names: list[str], looks: bool = True, into: str = "evil") -> Path:
-    """Under each name a library that leaves a file wherever it runs as root, and where it `looks`, outside of the walls;
-    whatever a program wants of the one that it stands for, it finds there."""
+    """Under each name a library that leaves a file wherever it runs as root, and where it `looks`, outside of the
+    walls; whatever a program wants of the one that it stands for, it finds there."""
     target = folder / "lab" / into
     target.mkdir(exist_ok=True)
     source = folder.with_suffix(".c")
@@ -50,7 +50,7 @@ def libraries(folder: Path, *, names: list[str], looks: bool = True, into: str =
     for name in names:
         subprocess.run(
             [
-                "gcc", "-shared", "-fPIC", "-O1", f"-DLOOKS={int(looks)}", f'-DNAME="{name}"', str(source),
+                "/usr/bin/gcc", "-shared", "-fPIC", "-O1", f"-DLOOKS={int(looks)}", f'-DNAME="{name}"', str(source),
                 f"-Wl,-soname,{name}", *_hands_on(name), "-o", str(target / name),
             ],
             check=True,

@@ -32,7 +32,11 @@ def _marked(name, run):
 
 def test_there_are_enough() -> None:
     assert len(NAMES) >= ATTACKS_AT_LEAST
-    for user, groups, least in (("ordinary", "without", 15), ("ordinary", "with", 10), ("root", "without", 10)):
+    for user, groups, least in (
+        ("ordinary", "without", 15),
+        ("ordinary", "with", 10),
+        ("root", "without", 10),
+    ):
         assert sum(run == Run(user, groups) for _, run in RUNS) >= least
 
 

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 
 import pytest
 
-from tests.hostile.form import Run
-from tests.hostile.harness import faults, grade_in_room, machine_faults, why_no_room
+from tests.hostile.form import Run, load_attack
+from tests.hostile.harness import (
+    document_faults,
+    faults,
+    grade_in_room,
+    machine_faults,
+    wall_faults,
+    was_refused,
+    why_no_room,
+)
 from tests.hostile.outputs import control_characters, secrets_in
 
 SOUND = {
@@ -53,6 +62,41 @@ def test_secrets_and_escape_codes_are_found(tmp_path) -> None:
         "stderr",
         "report.md",
     ]
+
+
+def test_a_platform_that_is_told_something_else_is_a_fault() -> None:
+    result = SimpleNamespace(points=40)
+    assert list(document_faults({"score": 40}, result)) == []
+    for told in ({"score": 100}, {}, None, [40]):
+        assert len(list(document_faults(told, result))) == 1
+
+
+@pytest.mark.parametrize(
+    ("container", "groups", "said", "count"),
+    [
+        (False, "with", "bubblewrap, unprivileged; memory held by cgroup v1", 0),
+        (False, "without", "bubblewrap, unprivileged; memory held by a watchdog", 0),
+        (True, "found", "none (it is forbidden); memory held by cgroup v1", 0),
+        (False, "found", "none (it is forbidden); memory held by cgroup v1", 1),
+        (True, "found", "bubblewrap, unprivileged; memory held by a watchdog", 1),
+        (False, "with", "bubblewrap, unprivileged; memory held by a watchdog", 1),
+        (False, "without", "bubblewrap, unprivileged; memory held by cgroup v1", 1),
+    ],
+)
+def test_another_sandbox_than_was_wanted_is_a_fault(container, groups, said, count) -> None:
+    attack = SimpleNamespace(arguments=(), container=container)
+    result = SimpleNamespace(environment=SimpleNamespace(sandbox=said), error=None)
+    graded = SimpleNamespace(result=result, run=Run("ordinary", groups))
+    assert len(list(wall_faults(attack, graded))) == count
+
+
+def test_only_the_words_that_an_attack_names_excuse_it_from_being_graded() -> None:
+    attack = load_attack("start-few-processes")
+    said = {"exit_code": 3, "stdout": "", "stderr": "the limits are too short: ulimit -u"}
+    assert was_refused(attack, said)
+    assert not was_refused(attack, said | {"exit_code": 1})
+    assert not was_refused(attack, said | {"stderr": "no such file"})
+    assert not was_refused(load_attack("bomb-memory"), said)
 
 
 @pytest.mark.ros

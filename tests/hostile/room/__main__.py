@@ -61,10 +61,15 @@ class Room:
     def grade_attack(self) -> dict[str, Any]:
         if self._job["container"]:
             observed = self._observed([*container.COMMAND])
-            return observed | {"document": container.document(), "packets": 0}  # nodes speak over this loopback
+            return observed | {
+                "document": container.document(),
+                "packets": 0,
+            }  # nodes speak over this loopback
         source = self._job["source"].replace("{path}", str(self._path))
         argv = ["grade", source, "--rubric", str(canaries.RUBRIC), "--out", str(canaries.RESULTS)]
-        return self._observed([*self._job["through"], *GRADER, *argv, "--id", self._name, *self._job["arguments"]])
+        return self._observed(
+            [*self._job["through"], *GRADER, *argv, "--id", self._name, *self._job["arguments"]]
+        )
 
     def grade_victim(self) -> Watched:
         """In the place of what was handed in before, by the same student."""

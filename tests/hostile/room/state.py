@@ -41,7 +41,7 @@ def _walk(world: World, results: Path) -> Iterator[tuple[str, Entry]]:
         here = top.removeprefix(".").lstrip("/")
         if here == str(results).lstrip("/"):
             folders[:] = [name for name in folders if name == OTHER.name]
-            names = [name for name in names if name != DOCUMENT.name]
+            names[:] = [name for name in names if name != DOCUMENT.name]
         for name in (*folders, *names):
             path = _join(here, name)
             found = os.stat(name, dir_fd=descriptor, follow_symlinks=False)

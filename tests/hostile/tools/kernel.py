@@ -6,6 +6,7 @@ kernel itself would say yes, or that they are wrong: whoever is told so (EFAULT,
 
 import ctypes
 import errno
+import functools
 import os
 import platform
 import signal
@@ -25,13 +26,21 @@ NUMBERS = {  # x86_64, aarch64 (asm/unistd_64.h, asm-generic/unistd.h)
     "open_by_handle_at": (304, 265), "open_tree": (428, 428), "perf_event_open": (298, 241), "pidfd_getfd": (438, 438),
     "pivot_root": (155, 41), "process_madvise": (440, 440), "process_vm_readv": (310, 270),
     "process_vm_writev": (311, 271), "ptrace": (101, 117), "quotactl": (179, 60), "quotactl_fd": (443, 443),
-    "reboot": (169, 142), "request_key": (249, 218), "seccomp": (317, 277), "semget": (64, 190), "setdomainname": (171, 162),
-    "sethostname": (170, 161), "setns": (308, 268), "settimeofday": (164, 170), "shmget": (29, 194), "swapoff": (168, 225),
-    "swapon": (167, 224), "syslog": (103, 116), "umount2": (166, 39), "unshare": (272, 97), "userfaultfd": (323, 282),
+    "reboot": (169, 142), "request_key": (249, 218), "seccomp": (317, 277), "semget": (64, 190),
+    "setdomainname": (171, 162), "sethostname": (170, 161), "setns": (308, 268), "settimeofday": (164, 170),
+    "shmget": (29, 194), "swapoff": (168, 225), "swapon": (167, 224), "syslog": (103, 116), "umount2": (166, 39),
+    "unshare": (272, 97), "userfaultfd": (323, 282),
     "uselib": (134, None), "vhangup": (153, 58),
 }  # fmt: skip
 LET_THROUGH = {"x86_64": 0, "aarch64": 1}
-REFUSALS = {errno.ENOSYS, errno.EPERM, errno.EACCES, errno.EAFNOSUPPORT, errno.EPROTONOSUPPORT, errno.ESOCKTNOSUPPORT}
+REFUSALS = {
+    errno.ENOSYS,
+    errno.EPERM,
+    errno.EACCES,
+    errno.EAFNOSUPPORT,
+    errno.EPROTONOSUPPORT,
+    errno.ESOCKTNOSUPPORT,
+}
 libc = ctypes.CDLL(None, use_errno=True)
 
 
@@ -50,7 +59,8 @@ def call(name, *arguments):
 def refused(*calls):
     """Each call is (name, arguments…), or (words, function)."""
     for name, *arguments in calls:
-        action = arguments[0] if arguments and callable(arguments[0]) else lambda: call(name, *arguments)
+        made = functools.partial(call, name, *arguments)
+        action = arguments[0] if arguments and callable(arguments[0]) else made
         say(_in_a_child(name, action))
 
 
@@ -68,7 +78,7 @@ def _in_a_child(name, action):
     _, status = os.waitpid(child, 0)
     if os.WIFSIGNALED(status):
         told = "refused by signal" if os.WTERMSIG(status) == signal.SIGSYS else "HARM: ended by signal"
-        return "tried: {}: {} {}".format(name, told, os.WTERMSIG(status))
+        return f"tried: {name}: {told} {os.WTERMSIG(status)}"
     return words
 
 
@@ -77,8 +87,8 @@ def _tried(name, action):
         got = action()
     except OSError as error:
         if error.errno in REFUSALS:
-            return "tried: {}: refused: {}".format(name, error)
-        return "tried: {}: HARM: the kernel looked at it: {}".format(name, error)
-    except Exception as error:
-        return "tried: {}: refused: {}: {}".format(name, type(error).__name__, error)
-    return "tried: {}: HARM: {!r}".format(name, got)
+            return f"tried: {name}: refused: {error}"
+        return f"tried: {name}: HARM: the kernel looked at it: {error}"
+    except Exception as error:  # noqa: BLE001 - an attack goes on
+        return f"tried: {name}: refused: {type(error).__name__}: {error}"
+    return f"tried: {name}: HARM: {got!r}"
