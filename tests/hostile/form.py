@@ -177,6 +177,7 @@ class Attack(Record):
     container: bool = False
     full: bool = False
     after: Literal["none", "static", "full"] = "none"
+    machine_mb: int | None = None
     installed: bool = False
     wall_s: Annotated[float, Field(gt=0, le=200)] = 45
     finding: str | None = None

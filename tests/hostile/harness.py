@@ -168,6 +168,8 @@ def faults(name: str, graded: Graded) -> list[str]:
     attack, report = load_attack(name), graded.report
     watched = graded.run.groups == "without" or graded.run == ("ordinary", "found")
     most = WATCHED_BYTES_MAX if watched else MACHINE_BYTES_MAX
+    if attack.machine_mb is not None:
+        most = attack.machine_mb << 20
     everywhere = [*machine_faults(report, machine_bytes_max=most), *_outputs(graded)]
     if was_refused(attack, report):
         return everywhere
@@ -200,7 +202,7 @@ def machine_faults(report: Mapping[str, Any], *, machine_bytes_max: int = MACHIN
         "groups": "control groups left",
         "settings": "settings of the kernel changed",
         "asked": "services of the machine were asked",
-        "odd": "no files or folders in the results",
+        "odd": "no files or folders in the results, or open to others",
     }.items():
         if report[key]:
             yield f"{words}: {report[key][:10]}"

@@ -121,6 +121,7 @@ class Room:
             return [str(path) for path in container.RESULTS.rglob("*") if not _plain(path)]
         made = [path.name for path in canaries.RESULTS.iterdir() if path.name != canaries.OTHER.name]
         odd = [str(path) for path in canaries.RESULTS.rglob("*") if not _plain(path)]
+        odd += [f"{path} is open to others" for path in (self.results,) if _is_open(path)]
         return odd if len(made) < 2 else [*odd, *made]
 
     def _watch(self, argv: list[str], env: Mapping[str, str], wall_s: float) -> Watched:
@@ -144,6 +145,11 @@ class Room:
             os.sched_yield()
             reap()
         return left
+
+
+def _is_open(path: Path) -> bool:
+    """What holds marks is for its owner alone."""
+    return path.is_dir() and path.stat().st_mode & 0o077 != 0
 
 
 def _plain(path: Path) -> bool:
