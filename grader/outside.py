@@ -13,7 +13,7 @@ from pathlib import Path
 
 LISTS = ("PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "DYLD_FALLBACK_LIBRARY_PATH", "PYTHONPATH")
 _PATH = "/usr/bin:/bin"
-_SUFFIXES = (".exe",) if sys.platform == "win32" else ("",)
+_SUFFIXES = (".exe", "") if sys.platform == "win32" else ("",)
 _MODULE = "import sys; sys.path[:] = filter(None, sys.path); from {} import main; sys.exit(main())"
 
 
