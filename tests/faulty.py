@@ -81,6 +81,18 @@ class Grading:
         with suppress(ProcessLookupError):
             os.kill(self.await_process(pattern, copy=copy), signal.SIGKILL)
 
+    def kill_around(self, pattern: str, around: str) -> None:
+        """Kill the outermost process that is like `around` and runs such a process."""
+        pid = self.await_process(pattern)
+        found = []
+        with suppress(FileNotFoundError):  # it has ended since
+            while pid > 1:
+                found += [pid] if re.match(around, command(pid)) else []
+                pid = int(Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[1])
+        assert found, f"nothing like {around} around {pattern}"
+        with suppress(ProcessLookupError):
+            os.kill(found[-1], signal.SIGKILL)
+
     def end(self) -> int:
         """Its exit code."""
         out, err = self.process.communicate(timeout=2 * WAIT_S)

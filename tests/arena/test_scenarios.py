@@ -152,7 +152,7 @@ def test_a_file_of_parameters_that_cannot_be_read(tmp_path: Path, text: str | No
         until=Until(ended=("reader",)),
     )
     seen = _run(tmp_path, files, scenario)
-    (noted,) = [e.detail for _, e in seen.actors if e.action == "note"]
+    (noted,) = [e.detail for _, e in seen.actors if e.action in {"note", "limit"}]
     assert noted.startswith(f"c.yaml: {remark}")
     (value,) = [e.value for _, e in seen.actors if e.action == "param"]
     assert value in printed(seen, "reader")[0]

@@ -25,7 +25,9 @@ from master import ARGUMENT_CHARS, ARGUMENTS_MAX, OPENED_MAX, RecordingMaster
 events = []
 class Wire:
     def event(self, topic, record): events.append((topic, record))
-master = RecordingMaster(None, Wire(), None, "/grader", guard=Guard(Wire()), owners=None)
+class Owners:
+    tell = None
+master = RecordingMaster(None, Wire(), None, "/grader", guard=Guard(Wire()), owners=Owners())
 print(ARGUMENT_CHARS, ARGUMENTS_MAX, OPENED_MAX, file=sys.stderr)
 for number in range(OPENED_MAX + 5):
     answer = master.noteOpened("/firefox", "firefox", ["x" * 9999] * 99)

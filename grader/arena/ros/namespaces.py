@@ -21,7 +21,7 @@ SIOCGIFFLAGS = 0x8913
 SIOCSIFFLAGS = 0x8914
 IFF_UP = 1
 IFREQ = struct.Struct("16sh14x")
-PROBED = "/tmp"  # noqa: S108 - in a namespace that ends with the probe
+PROBED = "/sys"  # in a namespace that ends with the probe
 
 
 def enter_own_namespaces():
