@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from grader.arena.base import NAME as BASE_NAME
 from grader.arena.base import base_spec, catkin_make, has_base, keep_base
@@ -68,16 +69,7 @@ async def build(
     async with ArenaSession(place, writer, master=False, last_run=last_run) as arena:
         arena.course(ScenarioEvent(event="begin"))
         arena.start(place.spec("catkin_make", _catkin_make(place), role="build", build=True, collect=ARCHIVE))
-        arena.start(
-            place.spec(
-                "syntax",
-                _syntax(place),
-                role="grader",
-                as_handed_in=True,
-                collect=SYNTAX,
-                collect_bytes=2 * REPORT_BYTES_MAX,
-            )
-        )
+        arena.start(_syntax_spec(place))
         if wants_base:  # beside the build, on another core
             arena.start(base_spec(place))
         ended = await arena.wait(lambda: "catkin_make" in arena.exit_codes, BUILD_S)
@@ -100,9 +92,7 @@ async def build(
     if not place.sandbox.bubblewrap:
         run_in_place(place.workspace, place.sandbox)
     trace, too_much = _trace(place)
-    for detail in filter(None, (built.built.too_much, too_much)):
-        event = ActorEvent(action="limit", actor="catkin_make", detail=detail)
-        writer.event("/grader/actor", time.time_ns(), event)
+    _note_excess(writer, built.built.too_much, too_much)
     return built, BuildOutcome(
         ok=ok,
         trace=trace,
@@ -123,6 +113,24 @@ def _catkin_make(place: Place) -> list[str]:
         *(f"--trace-source={name}" for name in ("CMakeLists.txt", *included)),
         f"--trace-redirect={place.output}/{TRACE}",
     ]  # fmt: skip
+
+
+def _note_excess(writer: EvidenceWriter, *found: str) -> None:
+    """What the build left too much of, in words, as far as there is any."""
+    for detail in filter(None, found):
+        event = ActorEvent(action="limit", actor="catkin_make", detail=detail)
+        writer.event("/grader/actor", time.time_ns(), event)
+
+
+def _syntax_spec(place: Place) -> dict[str, Any]:
+    return place.spec(
+        "syntax",
+        _syntax(place),
+        role="grader",
+        as_handed_in=True,
+        collect=SYNTAX,
+        collect_bytes=2 * REPORT_BYTES_MAX,
+    )
 
 
 def _syntax(place: Place) -> list[str]:

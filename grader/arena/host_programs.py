@@ -1,7 +1,7 @@
 """The machine's own programs that stand around students' code, and the environment that they get.
 
 Neither where they are looked for nor what they are told depends on anybody's variables: a program found by the PATH of
-whoever grades, or one that is given a student's LD_LIBRARY_PATH, may be another one than it is taken for.
+the person who grades, or started with a student's LD_LIBRARY_PATH, may not be the one it is taken for.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Whether a sandbox can be had here, and which one is used.
 
 Going without is for machines that lack a program or whose kernel forbids it. A probe that says nothing, or something
-that is not known, stops the grading: what keeps it from working now may be gone with the next run, and students' code
-would have stood without a wall meanwhile.
+that is not known, stops the grading: what keeps it from working now may be gone with the next run, and until then
+students' code would have run without a wall.
 """
 
 from __future__ import annotations
@@ -136,7 +136,7 @@ def _refusal(*more: str) -> str:
 
 
 def _drop() -> list[str]:
-    """How root becomes somebody else."""
+    """The words by which root becomes another user."""
     setpriv = host_program("setpriv") if os.geteuid() == 0 else None
     return [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if setpriv else []
 

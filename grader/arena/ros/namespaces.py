@@ -1,7 +1,7 @@
 """Namespaces of the arena's own: a network in which nothing but the loopback is up, and mounts that nobody else sees
 (man 7 namespaces).
 
-The calling process enters them itself, so there is no helper that could be left behind when somebody is killed. Run as
+The calling process enters them itself, so there is no helper that could be left behind when a process is killed. Run as
 a script it enters them, mounts what a stage would (`stage.py`), and becomes the program that its arguments name.
 """
 
