@@ -215,7 +215,9 @@ def test_memory_that_no_process_counts(
     run = run_script(tmp_path, code, limit_s=20, limits=limits)
     assert exit_of(run).stopped_by == "KILL"
     (said,) = limits_met(run)
-    counted = {"stopped by the grader: more than 1024 MB of memory"} if groups else set()  # the kernel may be first
+    counted = (
+        {"stopped by the grader: more than 1024 MB of memory"} if groups else set()
+    )  # the kernel may be first
     assert said in {f"stopped by the grader: {words}"} | counted
 
 
