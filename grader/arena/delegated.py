@@ -33,7 +33,7 @@ def place_for_runs(own: Path) -> Path:
     """Where groups of runs are to be made, for the group that this process is in; it is made ready where it may be."""
     if own.name == LEAF:
         return own.parent
-    with suppress(OSError):  # it stays as it was, and whoever tries to use it sees what it can do
+    with suppress(OSError):  # it stays as it was: `cgroups._usable` finds out what it can do
         if _lacks_memory(own) and _belongs_to_the_grader(own):
             _make_ready(own)
     return own
@@ -83,7 +83,7 @@ def _make_ready(group: Path) -> None:
     leaf = group / LEAF
     leaf.mkdir(exist_ok=True)
     try:
-        for _ in range(ROUNDS):  # what was started meanwhile is in it, too
+        for _ in range(ROUNDS):  # processes started since the last look are in it, too
             if not (pids := _processes(group)) or not _all_ours(group, pids):
                 break
             _move(pids, leaf)

@@ -14,8 +14,8 @@ from io import TextIOWrapper
 from types import FrameType
 
 from grader.cli.errors import guarded
+from grader.cli.inherited_limits import make_room
 from grader.cli.parsing import build_parser
-from grader.cli.room import make_room
 
 RUNNING = {"batch", "check", "ci", "grade", "record", "regrade", "rubric_new", "rubric_test"}
 """Commands that run what students wrote."""

@@ -1,4 +1,4 @@
-"""Which clusters `--cluster` may name: those where both ends show certificates, unless somebody says otherwise."""
+"""Which clusters `--cluster` may name: those where both ends show certificates, others only if that is asked for."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the grader starts, it waits for: in a process of somebody else's, that has to be asked for."""
+"""The grader waits for every process that it starts. A program that uses its API may have switched that off."""
 
 from __future__ import annotations
 

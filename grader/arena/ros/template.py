@@ -73,8 +73,8 @@ def _receive(sock):
 
 
 def usual_signals():
-    """Whatever is ignored or held back here is so in all that is started from here, students' nodes too: a grader that
-    somebody started so must not change what they do."""
+    """Signals that are ignored or blocked here would be so in all that is started from here, students' nodes too: how
+    the grader was started must not change what they do."""
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     for number in signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, *PYTHONS}:
         signal.signal(number, signal.SIG_DFL)

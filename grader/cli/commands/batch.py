@@ -11,7 +11,7 @@ from grader.batch.folder import BatchFolder
 from grader.batch.hands import Hands, Processes
 from grader.batch.notable import notable
 from grader.cli.class_display import open_class_display
-from grader.cli.room import make_room
+from grader.cli.inherited_limits import make_room
 from grader.cli.say import say, say_beside, say_json
 from grader.cli.unwalled import say_unwalled
 from grader.errors import ExitCode, UsageError

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from grader.arena.sandbox import Mode
 from grader.cli.display import open_progress
+from grader.cli.inherited_limits import make_room
 from grader.cli.mutants import print_test
-from grader.cli.room import make_room
 from grader.cli.say import say_json
 from grader.cli.unwalled import say_unwalled
 from grader.errors import ExitCode

@@ -1,4 +1,4 @@
-"""Whether there is room for what a command runs, asked before it begins."""
+"""Whether the limits that the grader inherited leave enough for what a command runs, asked before it begins."""
 
 from __future__ import annotations
 
