@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 from benchmarks.figures import NotMeasured
 from benchmarks.machine import Meter
 from grader.arena.limits import Limits
-from grader.arena.place import Place
+from grader.arena.process_environment import Place
 from grader.arena.session import ArenaSession
 from grader.arena.starting import process_specs
 from grader.evidence.writer import EvidenceWriter

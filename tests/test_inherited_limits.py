@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import inherited, probe
+from grader.arena import inherited, sandbox_probe
 from grader.arena.inherited import MB, NEEDS, group, limits, make_room, tasks_of
 from grader.arena.limits import Limits
 from grader.errors import ExitCode, HostError
@@ -145,16 +145,16 @@ def test_a_control_group_without_room_is_named(tmp_path: Path, monkeypatch) -> N
     (inner / "pids.current").write_text("40\n")
     (inner.parent / "pids.max").write_text("200\n")
     (inner.parent / "pids.current").write_text("60\n")
-    monkeypatch.setattr("grader.arena.cgroups.own_groups", lambda _: [(2, inner)])
+    monkeypatch.setattr("grader.arena.control_groups.own_groups", lambda _: [(2, inner)])
     found = list(group())
     assert [(one.name, one.found) for one in found] == [("pids.max", "200, with 60 in use")]
     assert found[0].command == f"echo {60 + 768} > {inner.parent}/pids.max"
     monkeypatch.setattr(inherited, "limits", lambda _: iter(()))
     with pytest.raises(HostError, match=r"pids\.max .* is 200, with 60 in use"):
-        probe.choose("none")
+        sandbox_probe.choose("none")
     make_room(begin=True)
     (inner.parent / "pids.max").write_text("100000\n")
-    probe.choose("none")
+    sandbox_probe.choose("none")
 
 
 @pytest.fixture

@@ -22,8 +22,6 @@ ALLOWED = {
     "shown": set[str](),
     "portable": set[str](),
     "outside": set[str](),
-    "standins": set[str](),
-    "admission": {"files", "portable"},
     "files": {"errors", "portable"},
     "temporary": {"errors", "files", "portable"},
     "results": BASE | {"files"},
@@ -32,57 +30,37 @@ ALLOWED = {
     "package": BASE | {"outside"},
     "intake": BASE | {"files", "outside"},
     "checks": BASE | {"evidence"},
-    "instructor": BASE | {"checks", "temporary"},
-    "rubric": BASE | {"checks", "evidence", "instructor"},
+    "rubric": BASE | {"checks", "evidence", "temporary"},
     "judging": BASE | {"checks", "evidence", "rubric"},
-    "figures": BASE | {
-        "checks", "evidence.run", "evidence.events", "judging.facts", "judging.recordings", "rubric.model"
-    },
-    "report": BASE | {"files", "judging.late", "judging.summary", "rubric.model"},
-    "ci": BASE | {"files", "report", "rubric"},
-    "arena": BASE | {"admission", "evidence", "files", "package", "rubric.model", "temporary"},
+    "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},
+    "arena": BASE | {"evidence", "files", "package", "rubric.model", "temporary"},
     "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "steps": {
-        *BASE, "arena", "evidence", "faults", "figures", "intake", "judging", "package", "recordings", "report",
-        "rubric", "temporary"
+        *BASE, "arena", "evidence", "faults", "intake", "judging", "package", "recordings", "report", "rubric",
+        "temporary"
     },
     "pipeline": {
-        *BASE, "steps", "arena", "evidence", "faults", "figures", "files", "intake", "judging", "package",
-        "recordings", "report", "results", "rubric", "temporary"
-    },
-    "authoring": {
-        *BASE, "checks", "evidence", "intake", "package", "pipeline", "rubric", "temporary"
-    },
-    "roster": BASE | {"intake"},
-    "overrides": BASE | {"files", "intake", "rubric"},
-    "fetching": BASE | {"files", "intake", "temporary"},
-    "standing": BASE | {"intake"},
-    "gradebook": BASE | {"files", "report"},
-    "similarity": BASE | {"evidence", "files", "intake", "outside", "report", "temporary"},
-    "batch": {
-        *BASE, "checks", "evidence", "faults", "fetching", "figures", "files", "gradebook", "intake",
-        "judging", "outside", "overrides", "pipeline", "report", "results", "rubric", "temporary"
-    },
-    "review": BASE | {
-        "batch", "files", "gradebook", "intake", "outside", "overrides", "report", "results", "rubric", "temporary"
-    },
-    "cluster": BASE | {
-        "arena.ros_env", "batch.child", "batch.job", "files", "intake", "results", "rubric", "temporary"
-    },
-    "watching": {
-        *BASE, "arena.asynchronous", "arena.workspace", "faults", "intake", "package", "pipeline",
+        *BASE, "steps", "arena", "evidence", "faults", "files", "intake", "judging", "package", "recordings",
         "report", "results", "rubric", "temporary"
     },
-    "mutation": BASE | {"batch", "pipeline", "rubric", "temporary"},
-    "deliver": BASE | {"faults", "files", "intake", "pipeline", "report", "results", "rubric"},
-    "cli": {
-        *BASE, "arena", "authoring", "batch", "checks", "ci", "evidence", "faults", "files", "formats", "instructor",
-        "intake", "judging", "cluster", "deliver", "gradebook", "mutation", "package", "pipeline", "report",
-        "outside", "review", "roster", "rubric", "similarity", "standing", "temporary", "watching"
-    },
-    "formats": BASE | {"evidence.events", "files", "mutation.model", "rubric"},
     "api": {
         *BASE, "arena.asynchronous", "evidence", "faults", "files", "judging", "pipeline", "results", "rubric", "steps"
+    },
+    "authoring": {
+        *BASE, "checks", "classes.batch", "evidence", "intake", "package", "pipeline", "rubric", "temporary"
+    },
+    "classes": {
+        *BASE, "arena.ros_env", "checks", "evidence", "faults", "files", "intake", "judging", "outside", "pipeline",
+        "report", "results", "rubric", "temporary"
+    },
+    "student": {
+        *BASE, "arena.asynchronous", "arena.workspace", "faults", "intake", "package", "pipeline", "report",
+        "results", "rubric", "temporary"
+    },
+    "integrations": BASE | {"faults", "files", "intake", "pipeline", "report", "results", "rubric"},
+    "cli": {
+        *BASE, "arena", "authoring", "checks", "classes", "evidence", "faults", "files", "integrations", "intake",
+        "judging", "outside", "package", "pipeline", "report", "rubric", "student", "temporary"
     },
     "__main__": {"cli"},
 }  # fmt: skip
@@ -119,7 +97,7 @@ def test_imports_go_one_way() -> None:
 def test_checks_and_records_do_no_io() -> None:
     wrong = [
         f"{path.relative_to(GRADER)}: {name}"
-        for folder in ("checks", "figures", "model")
+        for folder in ("checks", "report/figures", "model")
         for path in _sources(GRADER / folder)
         for name in [*_imports(path), *_calls(path)]
         if name.split(".")[0] in IO_MODULES or name in IO_CALLS

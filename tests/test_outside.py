@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from grader.arena.ros_env import RosInstallation
-from grader.batch.job import Outcome
-from grader.batch.pool import SAFE_PATH, workers
+from grader.classes.batch.job import Outcome
+from grader.classes.batch.pool import SAFE_PATH, workers
 from grader.cli.diagnosis import _modules
 from grader.intake.git import Git
 from grader.outside import anywhere, own_module, program
@@ -48,7 +48,7 @@ def marker(tmp_path, monkeypatch) -> Path:
     return marker
 
 
-@pytest.mark.parametrize("module", ["grader.batch.child", "grader.similarity.job"])
+@pytest.mark.parametrize("module", ["grader.classes.batch.child", "grader.classes.similarity.job"])
 def test_a_process_of_the_grader_imports_nothing_from_the_folder_that_it_is_started_in(
     module, marker
 ) -> None:

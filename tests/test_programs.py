@@ -30,7 +30,7 @@ class Start(NamedTuple):
 
 
 STARTS = {
-    "arena/probe.py:_said": Start("HOST_ENV", "'/'", "nothing"),
+    "arena/sandbox_probe.py:_said": Start("HOST_ENV", "'/'", "nothing"),
     "arena/ros/launching.py:launch": Start(
         "HOST_ENV",
         "stage.folder if gate is not None else NOWHERE",
@@ -38,7 +38,7 @@ STARTS = {
     ),
     "arena/ros_env.py:_from_setup": Start("base", "'/'", "nothing: ROS's own setup.bash"),
     "arena/template.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
-    "batch/child.py:_started": Start(
+    "classes/batch/child.py:_started": Start(
         "anywhere(os.environ)", None, "nothing: jobs come through a pipe, as JSON"
     ),
     "cli/diagnosis.py:_hostname": Start("HOST_ENV", "'/'", "nothing"),
@@ -46,8 +46,8 @@ STARTS = {
     "cli/scope.py:_moved": Start(
         "_environment()", "'/'", "nothing: systemd is asked for this process's number"
     ),
-    "cli/walls.py:_probe": Start("HOST_ENV", "'/'", "nothing"),
-    "instructor/testing.py:_run": Start(
+    "cli/sandbox_report.py:_probe": Start("HOST_ENV", "'/'", "nothing"),
+    "rubric/own_checks/testing.py:_run": Start(
         "_environment()", "folder", "nothing: the instructor's tests, beside a copy of the evidence"
     ),
     "intake/git.py:_configured_ssh": Start(
@@ -59,12 +59,12 @@ STARTS = {
     "package/python.py:_run": Start(
         "anywhere(os.environ)", None, "its source files, which are parsed and not run"
     ),
-    "review/serve.py:git_user": Start("anywhere(os.environ)", "'/'", "nothing"),
-    "similarity/comparing.py:_answer": Start(
+    "classes/review/serve.py:git_user": Start("anywhere(os.environ)", "'/'", "nothing"),
+    "classes/similarity/comparing.py:_answer": Start(
         "_environment()", None, "its source files, which are read and not run"
     ),
 }
-REPLACED = {"arena/ros/namespaces.py:<module>": "becomes the program of the probe: arena/probe.py"}
+REPLACED = {"arena/ros/namespaces.py:<module>": "becomes the program of the probe: arena/sandbox_probe.py"}
 MAKERS = {"Popen", "run", "call", "check_call", "check_output", "getoutput", "getstatusoutput"}
 SPAWNERS = {"system", "popen", "fork", "forkpty", "posix_spawn", "posix_spawnp", "startfile"}
 

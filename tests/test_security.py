@@ -13,7 +13,7 @@ from grader.arena.limits import SUBMISSION_MESSAGE_BYTES
 from grader.arena.limits import Limits as RunLimits
 from grader.arena.ros_env import DUMP_BYTES, NAMES_MAX, VALUE_BYTES
 from grader.checks.support import text
-from grader.evidence import container, definitions, room, services
+from grader.evidence import container, definitions, memory_budget, services
 from grader.intake import git, gitdir
 from grader.intake.limits import Limits as IntakeLimits
 from grader.package import cmake_parse, cmake_written, launch, launch_loader, python, reading
@@ -81,21 +81,23 @@ BOUNDS = {
         python.REPORT_BYTES_MAX // MB, "ros/syntax:SLIPS_LIMIT", "ros/syntax:ALL_SLIPS_LIMIT", build.STEP_S,
     ),
     "calls of the master": (
-        ("ros/rpc:HEAD_BYTES_MAX", KB), ("ros/rpc:BODY_BYTES_MAX", MB), "ros/strict:ELEMENTS_MAX",
-        "ros/strict:DEPTH_MAX", "ros/rpc:CONNECTIONS_MAX", "ros/rpc:CALLS_HZ", "ros/rpc:MULTICALLS_MAX",
+        ("ros/rpc:HEAD_BYTES_MAX", KB), ("ros/rpc:BODY_BYTES_MAX", MB), "ros/xmlrpc_parser:ELEMENTS_MAX",
+        "ros/xmlrpc_parser:DEPTH_MAX", "ros/rpc:CONNECTIONS_MAX", "ros/rpc:CALLS_HZ", "ros/rpc:MULTICALLS_MAX",
         "ros/rpc:REQUEST_S",
     ),
     "answers of nodes": (
         ("ros/bounded:ANSWER_BYTES_MAX", MB), "ros/links:CONNECTIONS_MAX", "ros/recorder:CONNECT_S",
         "ros/links:BUS_INFO_S", "ros/master:NOTIFY_S", "ros/pool:EACH_MAX",
     ),
-    "connections to": (("ros/tcpros:HEADER_BYTES_MAX", KB), "ros/door:WAITING_MAX", "ros/door:HANDSHAKE_S"),
+    "connections to": (
+        ("ros/tcpros:HEADER_BYTES_MAX", KB), "ros/tcpros_server:WAITING_MAX", "ros/tcpros_server:HANDSHAKE_S",
+    ),
     "headers of publishers": (
         ("ros/tcpros:HEADER_BYTES_MAX", KB), "ros/tcpros:FIELD_CHARS_MAX", "ros/tcpros:DEFINITION_CHARS_MAX",
         "ros/recorder:OPEN_MAX", "ros/recorder:SAME_MAX", "ros/recorder:CONNECT_S",
     ),
     "messages": (
-        ("ros/cutting:MESSAGE_BYTES_MAX", MB), RUN.channel_bytes // MB, RUN.channel_messages, RUN.channels,
+        ("ros/framing:MESSAGE_BYTES_MAX", MB), RUN.channel_bytes // MB, RUN.channel_messages, RUN.channels,
         RUN.run_bytes // MB,
     ),
     "a service's answer": (("ros/services:ANSWER_BYTES_MAX", MB), "ros/services:WORDS_CHARS_MAX", calls.ANSWER_S),
@@ -109,11 +111,11 @@ BOUNDS = {
     "lines that were printed": ("ros/streams:LINE_BYTES_MAX",),
     "names that are compared": (text.NAMES_MAX, text.NAME_CHARS_MAX),
     "definitions and messages": (
-        definitions.MAX_DEFINITION_BYTES, definitions.MAX_FIELDS, definitions.MAX_DEPTH, room.HELD_BYTES_MAX // MB,
-        room.DECODED_BYTES_MAX // MB,
+        definitions.MAX_DEFINITION_BYTES, definitions.MAX_FIELDS, definitions.MAX_DEPTH,
+        memory_budget.HELD_BYTES_MAX // MB, memory_budget.DECODED_BYTES_MAX // MB,
     ),
     "MCAP files": (
-        room.FOREIGN_BYTES_MAX // MB, container.MAX_RECORDS, container.MAX_CHUNK_BYTES // MB,
+        memory_budget.FOREIGN_BYTES_MAX // MB, container.MAX_RECORDS, container.MAX_CHUNK_BYTES // MB,
         container.MAX_UNPACKED_BYTES // MB,
     ),
     "`package.xml`": (

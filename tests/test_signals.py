@@ -18,7 +18,7 @@ import pytest
 
 from grader import grade
 from grader.arena import template
-from grader.arena.probe import why_not
+from grader.arena.sandbox_probe import why_not
 from grader.errors import HostError
 from grader.steps import waited_for
 from tests.arena.support import printed, run_script

@@ -22,10 +22,10 @@ from grader.arena.built import read_member
 from grader.arena.cache import keep, read_kept
 from grader.arena.inside import ANSWERS, INSIDE_WORKSPACE, QUESTIONS, prepare
 from grader.arena.limits import Limits
-from grader.arena.place import BASE, Place
-from grader.arena.probe import choose
+from grader.arena.process_environment import BASE, Place
 from grader.arena.ros_env import find_ros
 from grader.arena.sandbox import Mode, temporary_base
+from grader.arena.sandbox_probe import choose
 from grader.arena.session import ArenaSession
 from grader.arena.workspace import Workspace
 from grader.errors import ArenaError

@@ -14,7 +14,7 @@ from typing import Any
 from grader.arena.base import NAME as BASE_NAME
 from grader.arena.base import base_spec, catkin_make, has_base, keep_base
 from grader.arena.built import read_member
-from grader.arena.place import ARCHIVE, Place
+from grader.arena.process_environment import ARCHIVE, Place
 from grader.arena.recorded import READ_MAX, read_untrusted
 from grader.arena.ros_env import DUMP_BYTES, excess_of, keep_ros_variables, parse_env
 from grader.arena.session import ArenaSession

@@ -6,7 +6,7 @@ import base64
 from collections.abc import Callable
 from pathlib import Path
 
-from grader.arena.place import Place
+from grader.arena.process_environment import Place
 from grader.arena.recorded import read_untrusted
 from grader.arena.session import ArenaSession
 from grader.evidence.events import ActorEvent

@@ -148,7 +148,7 @@ def _running(hard: int) -> int:
 
 
 def _rooms() -> Iterator[tuple[int, int, Path]]:
-    from grader.arena.cgroups import own_groups  # noqa: PLC0415 - it loads more than the standard library
+    from grader.arena.control_groups import own_groups  # noqa: PLC0415 - it loads more than the standard library
 
     for _, own in own_groups("pids"):
         for folder in (own, *own.parents):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from grader.arena.ros_env import RosInstallation
-from grader.arena.standins import copy_standins
+from grader.arena.standin_packages import copy_standins
 
 HOME = "/home/student"
 INSIDE_WORKSPACE = f"{HOME}/catkin_ws"
@@ -17,7 +17,7 @@ BUILT = "/run/grader/built.tar"
 BASE_WORKSPACE = "/run/grader/base.tar"
 LARGE = "/run/grader/large"
 SHIMS = "/run/grader/bin"
-STANDINS = "/run/grader/standins"
+STANDINS = "/run/grader/arena/standins"
 SYNTAX = Path(__file__).parent / "ros" / "syntax.py"
 TERMINAL = Path(__file__).parent / "ros" / "terminal.sh"
 TERMINALS = (

@@ -17,14 +17,13 @@ from pathlib import Path
 
 from typing_extensions import Self
 
-from grader.admission import Admission, shared_folder
+from grader.arena.admission import Admission, shared_folder
 from grader.arena.asynchronous import Stop, run_until_signal, side_by_side
 from grader.arena.build import BUILD_EXPECTED_S, build
 from grader.arena.inside import prepare
 from grader.arena.limits import Limits
 from grader.arena.order import in_order
-from grader.arena.place import Place
-from grader.arena.probe import choose
+from grader.arena.process_environment import Place
 from grader.arena.recorded import (
     NO_ROS,
     PACKAGE,
@@ -39,14 +38,15 @@ from grader.arena.recorded import (
 )
 from grader.arena.ros_env import RosInstallation, find_ros
 from grader.arena.sandbox import Mode, Sandbox, temporary_base
+from grader.arena.sandbox_probe import choose
 from grader.arena.scenario import expected_s, run_scenario
 from grader.arena.workspace import Workspace, make_workspace
 from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
+from grader.model.message_rate import RateBounds
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
-from grader.model.rhythm import RateBounds
 from grader.model.submission import Submission
 from grader.package import SyntaxReport, python_paths, read_syntax_report, with_build_facts
 from grader.package.python import REPORT_BYTES_MAX

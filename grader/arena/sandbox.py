@@ -15,7 +15,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
-from grader.arena.cgroups import Cgroups
+from grader.arena.control_groups import Cgroups
 from grader.arena.host_programs import host_program
 from grader.arena.inside import HOME, SHIMS, STANDINS
 from grader.arena.limits import Limits

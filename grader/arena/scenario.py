@@ -7,18 +7,18 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from grader.admission import Admission
+from grader.arena.admission import Admission
 from grader.arena.calls import call_services
-from grader.arena.live import next_look_s, settled, waiting_for
-from grader.arena.place import Place
 from grader.arena.probes import advertisement, make_shots, publication
+from grader.arena.process_environment import Place
+from grader.arena.run_state import next_look_s, settled, waiting_for
 from grader.arena.session import ArenaSession
 from grader.arena.starting import Spec, given_back, process_specs, set_params, stop
 from grader.errors import ArenaError
 from grader.evidence.events import ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
+from grader.model.message_rate import RateBounds
 from grader.model.record import Record
-from grader.model.rhythm import RateBounds
 from grader.rubric.model import Scenario, Start
 
 CLOCK_STEP_S = 0.05

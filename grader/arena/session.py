@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 
 from typing_extensions import Self
 
-from grader.arena.cgroups import remove_groups
 from grader.arena.child import ArenaProcess
+from grader.arena.control_groups import remove_groups
 from grader.arena.frames import Frame, FrameReader
 from grader.arena.killed import Killed
-from grader.arena.live import Live
-from grader.arena.place import Place
+from grader.arena.process_environment import Place
+from grader.arena.run_state import Live
 from grader.errors import ArenaError
 from grader.evidence.events import TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
 from grader.evidence.run import is_grader_node

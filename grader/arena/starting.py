@@ -9,9 +9,9 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from typing import Any, TypeAlias
 
-from grader.admission import Leave
+from grader.arena.admission import Leave
 from grader.arena.parameters import OVER, settings
-from grader.arena.place import Place
+from grader.arena.process_environment import Place
 from grader.arena.session import ArenaSession
 from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent

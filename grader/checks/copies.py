@@ -8,7 +8,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.ending import ended_after, explain_end
+from grader.checks.support.exit_cause import ended_after, explain_end
 from grader.checks.support.nodes import are_noted, nodes_of
 from grader.checks.support.pairs import LOOKED_AT, Sent, both_from_ns, heard_of, printed_times, sent_by
 from grader.checks.support.process import Life, life, lives

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
+from grader.checks.support.counter_wrap import WrapParams, judge_wraps
 from grader.checks.support.counting import (
     Count,
     Step,
@@ -18,11 +19,10 @@ from grader.checks.support.counting import (
     longest,
     wrong_steps,
 )
-from grader.checks.support.ending import explain_end
+from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.losses import losses
 from grader.checks.support.process import early_end
 from grader.checks.support.text import listed, number, plural, seconds
-from grader.checks.support.wrapping import WrapParams, judge_wraps
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record

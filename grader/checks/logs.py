@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.ending import explain_end
+from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.nodes import nodes_of
 from grader.checks.support.process import early_end, life, lives
 from grader.checks.support.rosout import CALLS, Level, Logged, console_log, logged_by

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.ending import (
+from grader.checks.support.exit_cause import (
     ended_after,
     explain_end,
     explain_traceback,

@@ -13,7 +13,7 @@ from grader.checks.support.absence import no_message
 from grader.checks.support.geometry import followed, relative
 from grader.checks.support.lateness import NO_EXCUSE, Lateness, lateness
 from grader.checks.support.names import GlobalName
-from grader.checks.support.straying import Way, measured, metres, spot, stands, what_is_wrong
+from grader.checks.support.path_deviation import Way, measured, metres, spot, stands, what_is_wrong
 from grader.checks.support.text import listed, number
 from grader.checks.support.tracks import Track, run_seconds, track
 from grader.evidence.run import Run

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from grader.checks.build import judge_build
 from grader.checks.registry import NoParams, check
-from grader.checks.support.ending import explain_end
+from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.process import Life, lives
 from grader.checks.support.text import bare, listed, shown
 from grader.evidence.run import Run

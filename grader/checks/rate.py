@@ -8,16 +8,16 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.ending import explain_end
+from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.gaps import described, rhythm
 from grader.checks.support.lateness import NO_EXCUSE, Lateness, lateness
 from grader.checks.support.losses import all_lost, whole_until_ns
 from grader.checks.support.process import early_end, observed_until_ns
 from grader.checks.support.text import hertz, number, plural, seconds
 from grader.evidence.run import Channel, Run
+from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.rhythm import ROUNDING, RateBounds, Rhythm
 from grader.model.verdict import (
     Citation,
     EvidenceCitation,

@@ -20,7 +20,7 @@ from grader.checks.support.calls import (
     other_type,
 )
 from grader.checks.support.comparing import differences
-from grader.checks.support.ending import explain_end
+from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.names import GlobalName, TypeName
 from grader.checks.support.text import listed, plural
 from grader.evidence.run import Run

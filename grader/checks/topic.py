@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from grader.checks.registry import check
-from grader.checks.support.ending import explain_end
+from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.losses import all_lost
 from grader.checks.support.process import early_end
 from grader.checks.support.text import listed, near_names, plural

@@ -15,10 +15,10 @@ from pathlib import Path
 
 from grader.arena.host_programs import HOST_ENV, host_program
 from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
-from grader.arena.standins import missing_packages
-from grader.cli.elsewhere import elsewhere
+from grader.arena.standin_packages import missing_packages
+from grader.cli.platform_support import elsewhere
 from grader.cli.row import Row
-from grader.cli.walls import walls
+from grader.cli.sandbox_report import walls
 from grader.errors import RosMissing
 from grader.outside import LISTS
 from grader.portable import cores, system, user_id

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from rich.console import Console
 from rich.text import Text
 
-from grader.cli.say import say
+from grader.cli.output import say
 from grader.model.result import EarlyVerdict
 from grader.report.terminal import STYLES, mark
 from grader.report.text import line, visible

@@ -11,11 +11,11 @@ from rich.console import Console, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from grader.cli.say import say_beside
-from grader.model.standing import Point, Standing
+from grader.cli.output import say_beside
+from grader.model.git_status import Point, Standing
 from grader.report.terminal import emit
 from grader.report.text import line
-from grader.standing import ask, standing, surroundings
+from grader.student.git_status import ask, standing, surroundings
 
 TITLE = "What is marked is what is pushed. It differs from what was checked:"
 REMARKS = "Handing in"

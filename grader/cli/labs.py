@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from grader.cli.finding import Found, shown
+from grader.cli.find_packages import Found, shown
 from grader.errors import UsageError
 from grader.intake.find import Candidate
 from grader.intake.manifest import MANIFEST

@@ -17,8 +17,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from grader.arena.cgroups import find_cgroups, has_memory, own_group
-from grader.arena.delegated import SYSTEMD
+from grader.arena.control_groups import SYSTEMD, find_cgroups, has_memory, own_group
 from grader.arena.host_programs import HOST_ENV, host_program
 from grader.portable import system
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from grader.cli.errors import report
 from grader.cli.outcome import exit_code, settled
-from grader.cli.say import say, say_document
+from grader.cli.output import say, say_document
 from grader.errors import ExitCode, GraderError
 from grader.model.result import GradingResult
 from grader.report.result_json import result_text

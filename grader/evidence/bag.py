@@ -18,7 +18,7 @@ from rosbags.rosbag1.reader import ChunkInfo, Header, RecordType, read_bytes, re
 from grader.errors import EvidenceError
 from grader.evidence.channels import merged
 from grader.evidence.container import MAX_CHUNK_BYTES, MAX_UNPACKED_BYTES
-from grader.evidence.room import LESS, NoRoom, Room
+from grader.evidence.memory_budget import LESS, NoRoom, Room
 from grader.evidence.run import Channel, Message, Run
 
 BZ2 = b"BZh"

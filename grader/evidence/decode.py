@@ -28,7 +28,7 @@ from grader.evidence.definitions import (
     canonical,
     parse,
 )
-from grader.evidence.room import DECODED_BYTES_MAX
+from grader.evidence.memory_budget import DECODED_BYTES_MAX
 
 Value: TypeAlias = Any
 """What a message holds: numbers, text, bytes, lists and dicts of these."""

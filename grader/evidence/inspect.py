@@ -6,8 +6,8 @@ from collections import defaultdict, deque
 from pathlib import Path
 from typing import Literal
 
+from grader.evidence.memory_budget import NoRoom, Room
 from grader.evidence.reader import load_run
-from grader.evidence.room import NoRoom, Room
 from grader.evidence.run import Channel, Run, is_grader_node
 from grader.evidence.stats import RateStats, rate_stats
 from grader.model.record import Record

@@ -12,7 +12,7 @@ from grader.errors import EvidenceError
 from grader.evidence.channels import merged
 from grader.evidence.container import ContainerError, records
 from grader.evidence.events import METADATA_NAME, PACKAGE_TOPIC, TOPICS
-from grader.evidence.room import Room
+from grader.evidence.memory_budget import Room
 from grader.evidence.run import Channel, Message, Run
 from grader.model.version import EVIDENCE, UPDATE
 

@@ -17,7 +17,7 @@ from zstandard import ZstdError
 from grader.errors import EvidenceError
 from grader.evidence.container import MAX_FILE_BYTES, ContainerError
 from grader.evidence.loading import Loading
-from grader.evidence.room import LESS, NoRoom, Room
+from grader.evidence.memory_budget import LESS, NoRoom, Room
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 

@@ -19,7 +19,7 @@ from grader.evidence.events import (
     RecorderEvent,
     ScenarioEvent,
 )
-from grader.evidence.room import NoRoom, Room
+from grader.evidence.memory_budget import NoRoom, Room
 
 if TYPE_CHECKING:
     from grader.evidence.decode import Decoder

@@ -6,9 +6,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.model.handed_in import AppliedOverride, HandedIn, Lateness
+from grader.model.git_status import Standing
 from grader.model.record import Record
-from grader.model.standing import Standing
+from grader.model.submission_time import AppliedOverride, HandedIn, Lateness
 from grader.model.verdict import EvidenceCitation, FileCitation, Status
 
 

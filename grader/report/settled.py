@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from grader.model.handed_in import AppliedOverride, Automatic, HandedIn
 from grader.model.result import CriterionResult, GradingResult
+from grader.model.submission_time import AppliedOverride, Automatic, HandedIn
 from grader.report.text import number
 
 TITLE = "Decided by a person"

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.checks import Check
-from grader.instructor.files import FileFault, read_beside
-from grader.instructor.known import known_checks
-from grader.instructor.own import OwnChecks, run_checks_file
+from grader.rubric.own_checks.files import FileFault, read_beside
+from grader.rubric.own_checks.known import known_checks
+from grader.rubric.own_checks.own import OwnChecks, run_checks_file
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps
 
 PYTEST = "pytest"

@@ -9,8 +9,6 @@ from pathlib import Path
 
 from grader.checks import Check
 from grader.errors import RubricError, UsageError
-from grader.instructor.known import known_checks
-from grader.instructor.own import run_checks_file
 from grader.model.record import Record
 from grader.model.version import RUBRIC, UPDATE, Versioned
 from grader.rubric.cross import cross_faults
@@ -18,6 +16,8 @@ from grader.rubric.faults import model_faults
 from grader.rubric.find import locate, rubric_ids, rubrics_folder
 from grader.rubric.instructor import Beside, read_instructor
 from grader.rubric.model import Rubric
+from grader.rubric.own_checks.known import known_checks
+from grader.rubric.own_checks.own import run_checks_file
 from grader.rubric.source import Source, read_source, text_at
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 
 from grader.checks.rate import RateParams
-from grader.model.rhythm import RateBounds
+from grader.model.message_rate import RateBounds
 from grader.rubric.model import Rubric
 
 RATE = "rate"

@@ -46,7 +46,7 @@ def judged_recording(
 def figures_of(rubric: LoadedRubric, runs: dict[str, Run], result: GradingResult) -> Figures | None:
     """What the reports show beside the verdicts. A result without pictures is better than none."""
     with suppress(Exception):
-        from grader import figures  # noqa: PLC0415 - see recorded.LATER
+        from grader.report import figures  # noqa: PLC0415 - see recorded.LATER
 
         return figures.figures_of(rubric.rubric, runs, result.criteria)
     return None

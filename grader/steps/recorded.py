@@ -25,7 +25,7 @@ from grader.steps.options import GradeOptions
 if TYPE_CHECKING:
     from grader.arena.recorded import Recording
     from grader.arena.recording import Recorder
-    from grader.arena.unrun import Unrun
+    from grader.arena.static_recorder import Unrun
 
 ROS_TYPES = "rosbags.typesys.stores.ros1_noetic"
 LATER = ("grader.evidence.decode", "grader.evidence.reader")
@@ -51,7 +51,7 @@ def recorder(
 ) -> Recorder | Unrun:
     """What records the rubric's scenarios into the folder `evidence`; use it as a context."""
     from grader.arena.recorded import STATIC_ONLY  # noqa: PLC0415 - see LATER
-    from grader.arena.unrun import Unrun, why_unrun  # noqa: PLC0415
+    from grader.arena.static_recorder import Unrun, why_unrun  # noqa: PLC0415
 
     reason = STATIC_ONLY if options.static_only or not needs_ros(rubric) else why_unrun()
     if reason:

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.admission import Admission, lateness, memory, shared_folder
-from grader.admission import admission as module
-from grader.admission.locks import FileLock
+from grader.arena import admission, memory
+from grader.arena import admission as module
+from grader.arena.admission import Admission, FileLock, shared_folder
 
 PATIENCE_S = 20.0
 
@@ -111,14 +111,14 @@ def test_a_late_machine_starts_fewer_but_always_one(tmp_path: Path) -> None:
 def test_lateness_is_forgotten_and_survives_a_damaged_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "lateness"
-    assert lateness.latest_ms(path) == 0
-    lateness.note(path, 7.5)
-    assert lateness.latest_ms(path) == 7.5
-    monkeypatch.setattr(lateness, "FRESH_S", 0.0)
-    assert lateness.latest_ms(path) == 0
+    path = tmp_path / "admission"
+    assert admission.latest_ms(path) == 0
+    admission.note(path, 7.5)
+    assert admission.latest_ms(path) == 7.5
+    monkeypatch.setattr(admission, "FRESH_S", 0.0)
+    assert admission.latest_ms(path) == 0
     path.write_bytes(os.urandom(5000))
-    assert lateness.latest_ms(path) == 0
+    assert admission.latest_ms(path) == 0
 
 
 def test_alone_waits_for_the_others_and_the_others_wait_for_it(tmp_path: Path) -> None:
@@ -171,7 +171,7 @@ def test_without_memory_one_run_goes_on_and_the_others_wait(
 HOLDER = """
 import sys, time
 from pathlib import Path
-from grader.admission.locks import FileLock
+from grader.arena.admission import FileLock
 lock = FileLock(Path(sys.argv[1]))
 assert lock.take()
 print('held', flush=True)

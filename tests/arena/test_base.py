@@ -15,7 +15,7 @@ from grader.arena import base, build
 from grader.arena.base import base_spec, has_base, provide_base
 from grader.arena.cache import FILES_MAX, keep, read_kept
 from grader.arena.inside import ANSWERS, QUESTIONS
-from grader.arena.place import Place
+from grader.arena.process_environment import Place
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.arena.build import BuildOutcome, build
-from grader.arena.place import Place
+from grader.arena.process_environment import Place
 from grader.arena.recorded import READ_MAX
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run

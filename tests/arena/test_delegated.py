@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import cgroups, delegated
-from grader.arena.delegated import LEAF, place_for_runs
+from grader.arena import control_groups
+from grader.arena.control_groups import LEAF, place_for_runs
 from tests.arena.fake_groups import FakeGroups
 
 OWN = os.getpid()
@@ -24,7 +24,7 @@ V2 = "31 20 0:27 / {} rw,nosuid - cgroup2 cgroup rw,nsdelegate\n"
 @pytest.fixture
 def fake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FakeGroups:
     """A machine that systemd has booted, whose marks nobody can read."""
-    monkeypatch.setattr(delegated, "SYSTEMD", tmp_path)
+    monkeypatch.setattr(control_groups, "SYSTEMD", tmp_path)
     monkeypatch.setattr(os, "geteuid", lambda: 0)
     return FakeGroups(tmp_path / "groups", monkeypatch)
 
@@ -36,14 +36,14 @@ def child() -> Iterator[int]:
         process.kill()
 
 
-def found_in(folder: Path, fake: FakeGroups, monkeypatch: pytest.MonkeyPatch) -> cgroups.Cgroups:
+def found_in(folder: Path, fake: FakeGroups, monkeypatch: pytest.MonkeyPatch) -> control_groups.Cgroups:
     """What is found by a process that is in that group."""
     tables = fake.root.parent
     (tables / "mountinfo").write_text(V2.format(fake.root))
     (tables / "cgroup").write_text(f"0::/{folder.relative_to(fake.root)}\n")
-    monkeypatch.setattr(cgroups, "MOUNTINFO", tables / "mountinfo")
-    monkeypatch.setattr(cgroups, "MEMBERSHIP", tables / "cgroup")
-    return cgroups.find_cgroups.__wrapped__()
+    monkeypatch.setattr(control_groups, "MOUNTINFO", tables / "mountinfo")
+    monkeypatch.setattr(control_groups, "MEMBERSHIP", tables / "cgroup")
+    return control_groups.find_cgroups.__wrapped__()
 
 
 @pytest.mark.parametrize("name", ["grader-17-ab.scope", "run-r0a1b.scope", "run-p12-i34.scope"])
@@ -70,8 +70,8 @@ def test_a_process_that_a_grader_starts_finds_the_same_place(fake: FakeGroups, m
 def test_the_report_of_doctor_says_that_it_was_delegated(fake: FakeGroups, monkeypatch) -> None:
     scope = fake.group("grader-17-ab.scope", OWN)
     found = found_in(scope, fake, monkeypatch)
-    monkeypatch.setattr(cgroups, "find_cgroups", lambda: found)
-    assert "in grader-17-ab.scope, which was delegated to the grader" in cgroups.describe()
+    monkeypatch.setattr(control_groups, "find_cgroups", lambda: found)
+    assert "in grader-17-ab.scope, which was delegated to the grader" in control_groups.describe()
 
 
 @pytest.mark.parametrize(
@@ -113,22 +113,22 @@ def test_what_root_gave_to_an_ordinary_user_is_theirs(
     fake: FakeGroups, monkeypatch, name: str, *, given: bool
 ) -> None:
     unit = fake.group(name, OWN)
-    assert not delegated._belongs_to_the_grader(unit)
+    assert not control_groups._belongs_to_the_grader(unit)
     monkeypatch.setattr(os, "geteuid", lambda: OTHERS)
     monkeypatch.setattr(Path, "stat", lambda _path, **_more: os.stat_result([0, 0, 0, 0, OTHERS, *[0] * 5]))
-    assert delegated._belongs_to_the_grader(unit) == given
+    assert control_groups._belongs_to_the_grader(unit) == given
 
 
 def test_where_controllers_cannot_be_switched_on_all_is_put_back(fake: FakeGroups, monkeypatch) -> None:
     scope = fake.group("grader-17-ab.scope", OWN)
-    move = delegated._move
+    move = control_groups._move
 
     def meanwhile(pids: list[int], group: Path) -> None:
         move(pids, group)
         if group.name == LEAF:
             (scope / "cgroup.procs").write_text("1")  # somebody comes in
 
-    monkeypatch.setattr(delegated, "_move", meanwhile)
+    monkeypatch.setattr(control_groups, "_move", meanwhile)
     assert found_in(scope, fake, monkeypatch).memory is None
     assert sorted(fake.pids(scope)) == [1, OWN]
     assert not (scope / LEAF).exists()

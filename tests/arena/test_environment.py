@@ -15,7 +15,7 @@ import pytest
 
 from grader.arena.build import build
 from grader.arena.host_programs import HOST_PATH
-from grader.arena.place import Place
+from grader.arena.process_environment import Place
 from grader.arena.ros_env import (
     DUMP_BYTES,
     NAMES_MAX,

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.cgroups import find_cgroups
+from grader.arena.control_groups import find_cgroups
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "grader" / "arena" / "ros"))
 from groups import Groups

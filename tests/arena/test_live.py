@@ -6,8 +6,8 @@ from itertools import accumulate
 
 import pytest
 
-from grader.arena.live import Live, next_look_s, settled, waiting_for
-from grader.model.rhythm import RateBounds
+from grader.arena.run_state import Live, next_look_s, settled, waiting_for
+from grader.model.message_rate import RateBounds
 from grader.rubric.model import Until
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.probe import why_not
+from grader.arena.sandbox_probe import why_not
 
 pytestmark = pytest.mark.ros
 ROOT = Path(__file__).resolve().parents[2]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import probe
+from grader.arena import sandbox_probe
 from grader.arena.host_programs import HOST_ENV, host_program
 from grader.arena.system_calls import system_call_filter
 from grader.errors import ExitCode, HostError, SandboxMissing
@@ -56,9 +56,9 @@ UNKNOWN = (
 
 @pytest.fixture(autouse=True)
 def _asked_anew():
-    probe._walls.cache_clear()
+    sandbox_probe._walls.cache_clear()
     yield
-    probe._walls.cache_clear()
+    sandbox_probe._walls.cache_clear()
 
 
 def bwrap(folder: Path, monkeypatch, script: str) -> None:
@@ -66,59 +66,61 @@ def bwrap(folder: Path, monkeypatch, script: str) -> None:
     path = folder / "bwrap"
     path.write_text(f"#!/bin/sh\n{script}\n")
     path.chmod(path.stat().st_mode | stat.S_IXUSR | stat.S_IXGRP | stat.S_IXOTH)
-    found = {**{name: host_program(name) for name in probe.PROGRAMS}, "bwrap": str(path)}
-    monkeypatch.setattr(probe, "host_program", found.get)
-    monkeypatch.setattr(probe, "NAMESPACES", Path(__file__).parent / "no_network.py")
-    monkeypatch.setattr(probe, "_drop", list)
+    found = {**{name: host_program(name) for name in sandbox_probe.PROGRAMS}, "bwrap": str(path)}
+    monkeypatch.setattr(sandbox_probe, "host_program", found.get)
+    monkeypatch.setattr(sandbox_probe, "NAMESPACES", Path(__file__).parent / "no_network.py")
+    monkeypatch.setattr(sandbox_probe, "_drop", list)
 
 
 @pytest.mark.parametrize("said", FORBIDDEN)
 def test_where_the_kernel_forbids_it_grading_goes_without(monkeypatch, said: str) -> None:
-    monkeypatch.setattr(probe, "_refusal", lambda *_: said)
-    assert probe.why_not() == said
-    assert (probe.choose("auto").bubblewrap, probe.choose("auto").reason) == (False, said)
+    monkeypatch.setattr(sandbox_probe, "_refusal", lambda *_: said)
+    assert sandbox_probe.why_not() == said
+    assert (sandbox_probe.choose("auto").bubblewrap, sandbox_probe.choose("auto").reason) == (False, said)
     with pytest.raises(SandboxMissing):
-        probe.choose("require")
+        sandbox_probe.choose("require")
 
 
 @pytest.mark.parametrize("said", UNKNOWN)
 @pytest.mark.parametrize("mode", ["auto", "require"])
 def test_an_answer_that_is_not_known_stops_the_grading(monkeypatch, said: str, mode) -> None:
-    monkeypatch.setattr(probe, "_refusal", lambda *_: said)
+    monkeypatch.setattr(sandbox_probe, "_refusal", lambda *_: said)
     with pytest.raises(SandboxMissing) as caught:
-        probe.choose(mode)
+        sandbox_probe.choose(mode)
     assert caught.value.exit_code == ExitCode.NOT_GRADED
     assert said in caught.value.message
     assert "--sandbox none" in caught.value.hint
-    assert not probe.choose("none").bubblewrap
+    assert not sandbox_probe.choose("none").bubblewrap
 
 
 def test_a_bubblewrap_that_does_not_answer_stops_the_grading(tmp_path, monkeypatch) -> None:
     bwrap(tmp_path, monkeypatch, "exec sleep 60")
-    monkeypatch.setattr(probe, "PROBE_S", 0.5)
+    monkeypatch.setattr(sandbox_probe, "PROBE_S", 0.5)
     with pytest.raises(SandboxMissing, match=r"no answer within 0\.5 s"):
-        probe.choose("auto")
+        sandbox_probe.choose("auto")
 
 
 def test_what_did_not_answer_is_asked_again(monkeypatch) -> None:
-    monkeypatch.setattr(probe, "_refusal", lambda *_: "no answer within 20 s")
+    monkeypatch.setattr(sandbox_probe, "_refusal", lambda *_: "no answer within 20 s")
     with pytest.raises(SandboxMissing):
-        probe.why_not()
-    monkeypatch.setattr(probe, "_refusal", lambda *_: "")
-    assert probe.why_not() == ""
+        sandbox_probe.why_not()
+    monkeypatch.setattr(sandbox_probe, "_refusal", lambda *_: "")
+    assert sandbox_probe.why_not() == ""
 
 
-@pytest.mark.parametrize("name", probe.PROGRAMS)
+@pytest.mark.parametrize("name", sandbox_probe.PROGRAMS)
 def test_where_a_program_is_not_installed_grading_goes_without(monkeypatch, name: str) -> None:
-    monkeypatch.setattr(probe, "host_program", lambda asked: None if asked == name else f"/usr/bin/{asked}")
-    assert probe.why_not() == f"{name} is not installed"
+    monkeypatch.setattr(
+        sandbox_probe, "host_program", lambda asked: None if asked == name else f"/usr/bin/{asked}"
+    )
+    assert sandbox_probe.why_not() == f"{name} is not installed"
 
 
 def test_a_program_that_cannot_be_started_stops_the_grading(tmp_path, monkeypatch) -> None:
     bwrap(tmp_path, monkeypatch, "exit 0")
-    monkeypatch.setattr(probe.sys, "executable", str(tmp_path / "no-python"))
+    monkeypatch.setattr(sandbox_probe.sys, "executable", str(tmp_path / "no-python"))
     with pytest.raises(SandboxMissing, match="No such file"):
-        probe.choose("auto")
+        sandbox_probe.choose("auto")
 
 
 @pytest.mark.parametrize(
@@ -134,23 +136,23 @@ def test_a_program_that_cannot_be_started_stops_the_grading(tmp_path, monkeypatc
 def test_namespaces_in_the_sandbox_are_allowed_only_where_they_cannot_be_forbidden(
     monkeypatch, first: str, nesting: bool
 ) -> None:
-    monkeypatch.setattr(probe, "_refusal", lambda *more: first if more else "")
-    assert probe.choose("auto").bubblewrap
-    assert probe.choose("auto").nesting is nesting
+    monkeypatch.setattr(sandbox_probe, "_refusal", lambda *more: first if more else "")
+    assert sandbox_probe.choose("auto").bubblewrap
+    assert sandbox_probe.choose("auto").nesting is nesting
 
 
 def test_a_probe_that_fails_only_now_allows_no_namespaces_in_the_sandbox(monkeypatch) -> None:
     busy = "bwrap: Creating new namespace failed: Resource temporarily unavailable"
-    monkeypatch.setattr(probe, "_refusal", lambda *more: busy if more else "")
+    monkeypatch.setattr(sandbox_probe, "_refusal", lambda *more: busy if more else "")
     with pytest.raises(SandboxMissing, match="Resource temporarily unavailable"):
-        probe.choose("auto")
+        sandbox_probe.choose("auto")
 
 
 def test_the_probe_sees_nothing_of_whoever_grades(tmp_path, monkeypatch) -> None:
     bwrap(tmp_path, monkeypatch, f"{{ pwd; env; }} >{tmp_path}/seen; cat >{tmp_path}/input")
     for name in ("PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "BASH_ENV", "LC_ALL"):
         monkeypatch.setenv(name, str(tmp_path))
-    assert probe.why_not() == ""
+    assert sandbox_probe.why_not() == ""
     lines = (tmp_path / "seen").read_text().splitlines()
     assert lines[0] == "/"
     assert (tmp_path / "input").read_bytes() == (system_call_filter() or b"")
@@ -160,22 +162,24 @@ def test_the_probe_sees_nothing_of_whoever_grades(tmp_path, monkeypatch) -> None
 
 
 def test_root_who_may_not_become_a_student_is_told_so(monkeypatch) -> None:
-    monkeypatch.setattr(probe, "refused_limits", lambda: "setpriv: setresuid failed: Operation not permitted")
+    monkeypatch.setattr(
+        sandbox_probe, "refused_limits", lambda: "setpriv: setresuid failed: Operation not permitted"
+    )
     with pytest.raises(HostError) as caught:
-        probe.choose("auto")
+        sandbox_probe.choose("auto")
     assert "CAP_SETUID" in caught.value.hint
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="root gives up what it may do")
 def test_limits_are_asked_for_as_the_user_who_gets_them(monkeypatch) -> None:
     """Root may raise a limit that its student's user may not."""
-    command = probe._drop()
+    command = sandbox_probe._drop()
     assert Path(command[0]).name == "setpriv"
     asked: list[list[str]] = []
-    monkeypatch.setattr(probe, "_said", lambda argv: asked.append(argv) or "")
-    probe.refused_limits.cache_clear()
+    monkeypatch.setattr(sandbox_probe, "_said", lambda argv: asked.append(argv) or "")
+    sandbox_probe.refused_limits.cache_clear()
     try:
-        assert probe.refused_limits() == ""
+        assert sandbox_probe.refused_limits() == ""
     finally:
-        probe.refused_limits.cache_clear()
+        sandbox_probe.refused_limits.cache_clear()
     assert asked[0][: len(command)] == command

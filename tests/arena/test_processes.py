@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.arena.limits import Limits
-from grader.arena.probe import why_not
+from grader.arena.sandbox_probe import why_not
 from tests.arena.support import exit_of, printed, run_script
 
 pytestmark = pytest.mark.ros

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import cgroups, probe, sandbox
+from grader.arena import control_groups, sandbox, sandbox_probe
 from grader.arena.build import build
-from grader.arena.cgroups import Cgroup, Cgroups
+from grader.arena.control_groups import Cgroup, Cgroups
 from grader.arena.limits import SUBMISSION_MESSAGE_BYTES, Limits
-from grader.arena.probe import why_not
+from grader.arena.sandbox_probe import why_not
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter
@@ -117,7 +117,7 @@ time.sleep(60)
 def test_without_cgroups_a_watchdog_holds_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
-    monkeypatch.setattr(probe, "find_cgroups", Cgroups)
+    monkeypatch.setattr(sandbox_probe, "find_cgroups", Cgroups)
     code = "import time\nblocks = []\nwhile True:\n    blocks.append(bytearray(20 << 20))\n    time.sleep(0.05)\n"
     run = run_script(tmp_path, code, limit_s=20, limits=Limits(memory_bytes=200 << 20), sandbox=kind)
     assert exit_of(run).stopped_by == "KILL"
@@ -211,7 +211,7 @@ def test_memory_that_no_process_counts(
 ) -> None:
     code, limits, words = attack
     if not groups:
-        monkeypatch.setattr(probe, "find_cgroups", Cgroups)
+        monkeypatch.setattr(sandbox_probe, "find_cgroups", Cgroups)
     run = run_script(tmp_path, code, limit_s=20, limits=limits)
     assert exit_of(run).stopped_by == "KILL"
     (said,) = limits_met(run)
@@ -323,8 +323,8 @@ V2 = "31 20 0:27 /docker/abc /sys/fs/cgroup rw,nosuid - cgroup2 cgroup rw,nsdele
 @pytest.fixture
 def tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, Path]:
     mounts, groups = tmp_path / "mountinfo", tmp_path / "cgroup"
-    monkeypatch.setattr(cgroups, "MOUNTINFO", mounts)
-    monkeypatch.setattr(cgroups, "MEMBERSHIP", groups)
+    monkeypatch.setattr(control_groups, "MOUNTINFO", mounts)
+    monkeypatch.setattr(control_groups, "MEMBERSHIP", groups)
     return mounts, groups
 
 
@@ -332,15 +332,15 @@ def test_control_groups_are_found_where_this_process_is(tables: tuple[Path, Path
     mounts, groups = tables
     mounts.write_text(V1 + V2)
     groups.write_text("4:memory:/user/7\n0::/docker/abc/init\n")
-    found = cgroups.own_groups("memory")
+    found = control_groups.own_groups("memory")
     assert found == [(1, Path("/sys/fs/cgroup/memory/user/7")), (2, Path("/sys/fs/cgroup/init"))]
     groups.write_text("0::/../elsewhere\n")
-    assert cgroups.own_groups("memory") == [(2, Path("/sys/fs/cgroup"))]
+    assert control_groups.own_groups("memory") == [(2, Path("/sys/fs/cgroup"))]
     mounts.unlink()
-    assert cgroups.own_groups("memory") == []
+    assert control_groups.own_groups("memory") == []
 
 
 def test_a_control_group_counts_only_if_it_can_be_limited(tmp_path: Path) -> None:
-    assert not cgroups._usable(tmp_path / "none", "memory.max")
-    assert cgroups.Cgroups().label == "a watchdog"
+    assert not control_groups._usable(tmp_path / "none", "memory.max")
+    assert control_groups.Cgroups().label == "a watchdog"
     assert Cgroups(memory=Cgroup(version=2, folder="/x")).label == "cgroup v2"

@@ -7,8 +7,8 @@ import io
 import pytest
 from rich.console import Console
 
-from grader.batch.course import LATELY, Course
-from grader.batch.job import Outcome
+from grader.classes.batch.job import Outcome
+from grader.classes.batch.progress import LATELY, Course
 from grader.cli.class_display import LiveClass, PlainClass, summary
 
 

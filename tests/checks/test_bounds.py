@@ -10,7 +10,7 @@ import pytest
 
 from grader.arena.limits import Limits
 from grader.checks.build import _first_error
-from grader.checks.support.ending import _refused_name
+from grader.checks.support.exit_cause import _refused_name
 from grader.checks.support.pairs import printed_times
 from grader.checks.support.printed import printed_lines
 from grader.checks.support.process import lives

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.evidence.timeline import build_runs
-from grader.model.rhythm import Rhythm
+from grader.model.message_rate import Rhythm
 from grader.model.verdict import Status
 from tests.checks.examples import judge_runs
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from grader.ci.files import clear, keep
 from grader.errors import OutputError
+from grader.integrations.ci.files import clear, keep
 from grader.rubric.load import load_rubric
 
 

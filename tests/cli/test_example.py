@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from grader.authoring.mutation.find import references_folder
+from grader.authoring.mutation.tree import read_tree
 from grader.cli.main import run
-from grader.mutation.find import references_folder
-from grader.mutation.tree import read_tree
 from grader.rubric.find import rubric_ids, rubrics_folder
 
 LAB = "leeds-comp3631-lab1"

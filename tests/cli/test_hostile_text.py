@@ -14,17 +14,17 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 import grader
+from grader.authoring.mutation.model import LostCriterion, MutantResult, ReferenceResult, RubricTest
 from grader.cli.commands import inspect as inspect_command
 from grader.cli.display import LiveSteps, PlainSteps
 from grader.cli.errors import guarded, report
 from grader.cli.mutants import print_test
-from grader.cli.say import say, say_json
+from grader.cli.output import say, say_json
 from grader.errors import RubricError, SubmissionError
 from grader.evidence.events import ActorEvent
 from grader.evidence.inspect import inspect_run
 from grader.evidence.run import Channel, Message, Run
 from grader.model.result import RubricInfo
-from grader.mutation.model import LostCriterion, MutantResult, ReferenceResult, RubricTest
 from tests.report.nasty import STEERING, TEXTS
 from tests.report.test_shown import TO_A_CI
 

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import pytest
 
-from grader.arena import cgroups, delegated, host_programs
-from grader.arena.delegated import LEAF
+from grader.arena import control_groups, host_programs
+from grader.arena.control_groups import LEAF
 from grader.cli import main, scope
 from tests.arena.fake_groups import FakeGroups
 
@@ -39,12 +39,12 @@ class Machine:
         self.groups = FakeGroups(folder / "groups", monkeypatch)
         for name in ("bin", "runtime", "linger", "systemd"):
             (folder / name).mkdir()
-        monkeypatch.setattr(delegated, "SYSTEMD", folder / "systemd")
+        monkeypatch.setattr(control_groups, "SYSTEMD", folder / "systemd")
         monkeypatch.setattr(scope, "SYSTEMD", folder / "systemd")
         monkeypatch.setattr(scope, "LINGER", folder / "linger")
         monkeypatch.setattr(scope, "RUNTIME", folder / "runtime")
-        monkeypatch.setattr(cgroups, "MOUNTINFO", folder / "mountinfo")
-        monkeypatch.setattr(cgroups, "MEMBERSHIP", folder / "cgroup")
+        monkeypatch.setattr(control_groups, "MOUNTINFO", folder / "mountinfo")
+        monkeypatch.setattr(control_groups, "MEMBERSHIP", folder / "cgroup")
         monkeypatch.setattr(pwd, "getpwuid", self._account)
         monkeypatch.setattr(host_programs, "HOST_PATH", str(folder / "bin"))
         (folder / "mountinfo").write_text(
@@ -77,17 +77,17 @@ class Machine:
 
 @pytest.fixture
 def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    cgroups.find_cgroups.cache_clear()
+    control_groups.find_cgroups.cache_clear()
     host_programs.host_program.cache_clear()
     yield Machine(tmp_path, monkeypatch)
-    cgroups.find_cgroups.cache_clear()
+    control_groups.find_cgroups.cache_clear()
     host_programs.host_program.cache_clear()
 
 
 def test_memory_is_held_by_a_scope_of_its_own_afterwards(machine: Machine) -> None:
-    assert cgroups.find_cgroups().memory is None
+    assert control_groups.find_cgroups().memory is None
     scope.enter_scope()
-    found = cgroups.find_cgroups().memory
+    found = control_groups.find_cgroups().memory
     assert found is not None
     own = Path(found.folder)
     assert own.name.startswith(f"grader-{os.getpid()}-")
@@ -158,8 +158,8 @@ def test_where_systemd_gives_none_all_stays_as_it_was(machine: Machine, monkeypa
     monkeypatch.setattr(scope, "ANSWER_S", 0.2)
     (machine.folder / "bin" / "busctl").write_text(script)
     scope.enter_scope()
-    assert cgroups.find_cgroups().memory is None
-    assert cgroups.own_group() == f"/{LOGIN}"
+    assert control_groups.find_cgroups().memory is None
+    assert control_groups.own_group() == f"/{LOGIN}"
 
 
 @pytest.mark.parametrize("missing", ["systemd", "bin/busctl", "memory"])

@@ -39,14 +39,14 @@ def _begins(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("GRADER_PATH", SOLUTION)
     monkeypatch.setenv("GRADER_LAB", LAB)
     (tmp_path / "roster.csv").write_text(f"id,source\nada,{SOLUTION}\n")
-    monkeypatch.setattr("grader.cli.unwalled.why_unrun", lambda: "")
+    monkeypatch.setattr("grader.cli.sandbox_report.why_unrun", lambda: "")
 
 
 @pytest.mark.usefixtures("_begins")
 @pytest.mark.parametrize("command", COMMANDS)
 def test_it_is_said_before_anything_is_run(command: str, monkeypatch, capsys) -> None:
     none = Sandbox(bubblewrap=False, uid=None, reason="bwrap is not installed")
-    monkeypatch.setattr("grader.arena.probe.choose", lambda _: none)
+    monkeypatch.setattr("grader.arena.sandbox_probe.choose", lambda _: none)
     assert run(COMMANDS[command][0]) == 3
     said = capsys.readouterr().err
     assert said.count(SAID) == 1, said
@@ -57,7 +57,7 @@ def test_it_is_said_before_anything_is_run(command: str, monkeypatch, capsys) ->
 @pytest.mark.parametrize("command", COMMANDS)
 def test_nothing_is_said_of_a_sandbox_that_is_there(command: str, monkeypatch, capsys) -> None:
     there = Sandbox(bubblewrap=True, uid=None)
-    monkeypatch.setattr("grader.arena.probe.choose", lambda _: there)
+    monkeypatch.setattr("grader.arena.sandbox_probe.choose", lambda _: there)
     assert run(COMMANDS[command][0]) == 3
     assert "students' code" not in capsys.readouterr().err
 

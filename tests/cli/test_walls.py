@@ -7,17 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import cgroups
-from grader.arena.cgroups import Cgroup, Cgroups
+from grader.arena import control_groups
+from grader.arena.control_groups import Cgroup, Cgroups
 from grader.arena.sandbox import Sandbox
-from grader.cli import walls
+from grader.cli import sandbox_report
 from grader.cli.diagnosis import diagnose
 from grader.cli.row import Row
 from grader.errors import HostError, SandboxMissing
 
 
 def rows() -> dict[str, Row]:
-    return {row.name: row for row in walls.walls()}
+    return {row.name: row for row in sandbox_report.walls()}
 
 
 def test_every_part_has_a_row_and_what_is_missing_a_command() -> None:
@@ -31,9 +31,11 @@ def test_every_part_has_a_row_and_what_is_missing_a_command() -> None:
 
 @pytest.mark.parametrize(("program", "package"), [("bwrap", "bubblewrap"), ("setpriv", "util-linux")])
 def test_a_program_that_is_not_installed(monkeypatch, program: str, package: str) -> None:
-    monkeypatch.setattr(walls, "host_program", lambda name: None if name == program else f"/usr/bin/{name}")
+    monkeypatch.setattr(
+        sandbox_report, "host_program", lambda name: None if name == program else f"/usr/bin/{name}"
+    )
     none = Sandbox(bubblewrap=False, uid=None, reason=f"{program} is not installed")
-    monkeypatch.setattr(walls, "choose", lambda _: none)
+    monkeypatch.setattr(sandbox_report, "choose", lambda _: none)
     found = rows()
     assert (found[program].state, found[program].mend) == ("limited", f"apt-get install {package}")
     assert found["sandbox"].state == "limited"
@@ -57,9 +59,9 @@ def test_namespaces_that_are_forbidden(monkeypatch, tmp_path: Path, name: str, v
     (tmp_path / name).parent.mkdir()
     (tmp_path / name).write_text(f"{value}\n")
     refused = subprocess.CompletedProcess([], 1, b"", b"unshare: unshare failed: Operation not permitted\n")
-    monkeypatch.setattr(walls, "SETTINGS", tmp_path)
-    monkeypatch.setattr(walls.subprocess, "run", lambda *_args, **_more: refused)
-    row = walls._probe("user namespaces", ["unshare"], drop=False)
+    monkeypatch.setattr(sandbox_report, "SETTINGS", tmp_path)
+    monkeypatch.setattr(sandbox_report.subprocess, "run", lambda *_args, **_more: refused)
+    row = sandbox_report._probe("user namespaces", ["unshare"], drop=False)
     assert (row.state, row.detail) == ("limited", "unshare: unshare failed: Operation not permitted")
     assert mend in row.mend
 
@@ -68,21 +70,25 @@ def test_a_probe_that_does_not_answer_is_not_taken_for_a_machine_without(monkeyp
     def no_answer(_mode: str) -> None:
         raise SandboxMissing("no answer within 20 s", hint="look at each part")
 
-    monkeypatch.setattr(walls, "choose", no_answer)
+    monkeypatch.setattr(sandbox_report, "choose", no_answer)
     row = rows()["sandbox"]
     assert (row.state, row.detail, row.mend) == ("missing", "no answer within 20 s", "look at each part")
 
 
 @pytest.mark.parametrize(
     ("user", "could", "mend"),
-    [(1000, True, walls.DELEGATE), (1000, False, walls.OLD_GROUPS), (0, True, walls.ROOTS_GROUPS)],
+    [
+        (1000, True, sandbox_report.DELEGATE),
+        (1000, False, sandbox_report.OLD_GROUPS),
+        (0, True, sandbox_report.ROOTS_GROUPS),
+    ],
 )
 def test_what_holds_memory_where_no_group_can_be_made(monkeypatch, user: int, could: bool, mend: str) -> None:
-    for module in (walls, cgroups):
+    for module in (sandbox_report, control_groups):
         monkeypatch.setattr(module, "find_cgroups", Cgroups)
-    monkeypatch.setattr(walls, "user_id", lambda: user)
-    monkeypatch.setattr(walls, "has_memory", lambda: could)
-    row = walls._limits_of_trees()
+    monkeypatch.setattr(sandbox_report, "user_id", lambda: user)
+    monkeypatch.setattr(sandbox_report, "has_memory", lambda: could)
+    row = sandbox_report._limits_of_trees()
     assert (row.state, row.mend) == ("limited", mend)
     assert "looked at twice a second" in row.detail
     assert "children that nobody waited for is not counted" in row.detail
@@ -90,9 +96,9 @@ def test_what_holds_memory_where_no_group_can_be_made(monkeypatch, user: int, co
 
 def test_what_holds_memory_where_groups_can_be_made(monkeypatch) -> None:
     held = Cgroups(memory=Cgroup(version=2, folder="/sys/fs/cgroup"))
-    for module in (walls, cgroups):
+    for module in (sandbox_report, control_groups):
         monkeypatch.setattr(module, "find_cgroups", lambda: held)
-    row = walls._limits_of_trees()
+    row = sandbox_report._limits_of_trees()
     assert (row.state, row.mend) == ("ok", "")
     assert "memory by cgroup v2, tasks by rlimits and a watchdog; below its own group" in row.detail
 
@@ -101,8 +107,8 @@ def test_limits_that_cannot_be_set_keep_everything_from_being_graded(monkeypatch
     def refuses(_mode: str) -> None:
         raise HostError("the limits cannot be set", hint="raise them")
 
-    monkeypatch.setattr(walls, "refused_limits", lambda: "prlimit: Operation not permitted")
-    monkeypatch.setattr(walls, "choose", refuses)
+    monkeypatch.setattr(sandbox_report, "refused_limits", lambda: "prlimit: Operation not permitted")
+    monkeypatch.setattr(sandbox_report, "choose", refuses)
     found = rows()
     assert (found["ulimit"].state, found["ulimit"].detail) == ("missing", "prlimit: Operation not permitted")
     assert (found["sandbox"].state, found["sandbox"].mend) == ("missing", "raise them")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from grader.cluster import ClusterHands
+from grader.classes.cluster import ClusterHands
 from tests.cluster.jobs import jobs_for
 
 

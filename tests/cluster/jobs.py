@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from grader.batch.job import Job, Outcome
+from grader.classes.batch.job import Job, Outcome
 from grader.model.roster import Entry
 from grader.results import RESULT
 from grader.rubric.load import load_rubric

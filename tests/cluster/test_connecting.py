@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.cluster import ClusterHands, connecting
-from grader.cluster.address import check_address
+from grader.classes.cluster import ClusterHands, connecting
+from grader.classes.cluster.address import check_address
 from grader.errors import HostError, UsageError
 from tests.cluster.jobs import jobs_for
 

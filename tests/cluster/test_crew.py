@@ -6,7 +6,7 @@ from queue import SimpleQueue
 
 import pytest
 
-from grader.cluster.crew import Answer, Crew, Needs, why_not
+from grader.classes.cluster.crew import Answer, Crew, Needs, why_not
 
 VERSIONS = {"grader": "1.0", "code": "1f2e", "python": "3.11", "pydantic": "2.7.0"}
 GOOD = {**VERSIONS, "host": "node1", "ros": "noetic", "kept_out": ""}

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from fsspec.implementations.local import LocalFileSystem
 
-from grader.cluster.exchange import Exchange, checked_url
+from grader.classes.cluster.exchange import Exchange, checked_url
 from grader.errors import HostError, UsageError
 
 WORD = "0123abcd"

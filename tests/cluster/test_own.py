@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 from distributed.security import Security
 
-from grader.cluster.address import LOCAL
-from grader.cluster.connecting import connected
+from grader.classes.cluster.address import LOCAL
+from grader.classes.cluster.connecting import connected
 from tests.cluster.sockets import listening_ports, tree_of
 
 KEY = b"PRIVATE KEY"

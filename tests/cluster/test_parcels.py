@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.cluster import parcels
-from grader.cluster.exchange import Parcel
-from grader.cluster.parcels import pack, unpack
+from grader.classes.cluster import parcels
+from grader.classes.cluster.exchange import Parcel
+from grader.classes.cluster.parcels import pack, unpack
 from grader.errors import HostError
 
 

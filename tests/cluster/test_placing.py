@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from grader.batch.job import Job, Outcome
-from grader.cluster import placing
-from grader.cluster.errands import Report
-from grader.cluster.exchange import Exchange, Parcel
-from grader.cluster.parcels import pack
-from grader.cluster.placing import ParcelLost, place
+from grader.classes.batch.job import Job, Outcome
+from grader.classes.cluster import placing
+from grader.classes.cluster.errands import Report
+from grader.classes.cluster.exchange import Exchange, Parcel
+from grader.classes.cluster.parcels import pack
+from grader.classes.cluster.placing import ParcelLost, place
 from grader.errors import Busy
 from grader.results import Results
 from tests.cluster.jobs import jobs_for

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.cluster import remote
-from grader.cluster.errands import Errand
-from grader.cluster.exchange import Exchange
+from grader.classes.cluster import remote
+from grader.classes.cluster.errands import Errand
+from grader.classes.cluster.exchange import Exchange
 from tests.cluster.clusters import children_of, until
 from tests.cluster.jobs import named_job
 

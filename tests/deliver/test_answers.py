@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from grader.deliver import gradescope, prairielearn
-from grader.deliver.grading import REPORTS, Form, Place, deliver
-from grader.deliver.settings import FILE, Settings
 from grader.errors import HostError
+from grader.integrations.deliver import gradescope, prairielearn
+from grader.integrations.deliver.grading import REPORTS, Form, Place, deliver
+from grader.integrations.deliver.settings import FILE, Settings
 from grader.model.result import ErrorInfo
 from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from grader.cli.main import run
-from grader.deliver.wheel import wheel
+from grader.integrations.deliver.wheel import wheel
 from tests.instructor.samples import GREETING, OWN, TESTS, write_rubric
 
 LAB = "york-ele00118m-lab7"
@@ -82,7 +82,7 @@ def test_the_wheel_lists_what_is_in_it_and_holds_what_grading_needs() -> None:
     needed = {
         f"grader/_data/rubrics/{LAB}.yaml",
         "grader/_data/setup.sh",
-        "grader/standins/turtlesim/package.xml",
+        "grader/arena/standins/turtlesim/package.xml",
     }
     assert needed <= set(names)
     assert not [path for path in names if "__pycache__" in path]
@@ -96,7 +96,9 @@ def test_the_wheel_is_installed_by_pip_and_exports_the_same_again(tmp_path) -> N
     target = tmp_path / "site"
     pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-compile", "--target", str(target)]
     subprocess.run([*pip, str(tmp_path / name)], check=True)
-    ask = "import sys; from grader.deliver.wheel import wheel; sys.stdout.buffer.write(wheel()[1])"
+    ask = (
+        "import sys; from grader.integrations.deliver.wheel import wheel; sys.stdout.buffer.write(wheel()[1])"
+    )
     again = subprocess.run(
         [sys.executable, "-c", ask],
         env={"PYTHONPATH": str(target)},

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.deliver.upload import upload
 from grader.errors import SubmissionError
 from grader.intake import open_submission
+from grader.integrations.deliver.upload import upload
 from grader.model.submission import Submission
 
 MANIFEST = "<package format='2'><name>lab1</name></package>"

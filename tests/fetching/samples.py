@@ -9,7 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from unittest.mock import patch
 
-from grader.fetching import Obtained, Patience, Rule, obtain
+from grader.classes.fetching import Obtained, Patience, Rule, obtain
 from grader.intake import open_submission
 from grader.model.roster import Entry
 from grader.model.submission import Submission

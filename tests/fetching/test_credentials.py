@@ -7,8 +7,8 @@ import subprocess
 
 import pytest
 
+from grader.classes.fetching import Rule
 from grader.errors import SubmissionError, UsageError
-from grader.fetching import Rule
 from grader.intake import without_password
 from grader.intake.credentials import Access, accesses, split_address
 from grader.intake.source import parse_source

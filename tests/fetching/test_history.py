@@ -6,9 +6,9 @@ from datetime import datetime, timedelta, timezone
 
 import pytest
 
+from grader.classes.fetching import NothingInTime, Rule
+from grader.classes.fetching.history import later, read_commit, shown
 from grader.errors import SubmissionError
-from grader.fetching import NothingInTime, Rule
-from grader.fetching.history import later, read_commit, shown
 from tests.fetching.samples import DEADLINE, HOST, commit_at
 from tests.intake.samples import commit, git, repository, write
 

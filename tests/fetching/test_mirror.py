@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 from grader.arena import cache as arena_cache
-from grader.fetching import Rule, prefetch
-from grader.fetching.cache import cache_folder, locked, tidy
+from grader.classes.fetching import Rule, prefetch
+from grader.classes.fetching.cache import cache_folder, locked, tidy
 from tests.fetching.samples import AT_ONCE, DEADLINE, HOST, commit_at, entry
 from tests.intake.samples import git, write
 
@@ -171,7 +171,7 @@ def test_two_processes_fetch_once(server, monkeypatch):
     server.new()
     log = fetches(server, monkeypatch)
     code = (
-        "import sys; from pathlib import Path; from grader.fetching import Rule, obtain; "
+        "import sys; from pathlib import Path; from grader.classes.fetching import Rule, obtain; "
         "from grader.model.roster import Entry; print('ready', flush=True); sys.stdin.readline(); "
         f"print(obtain(Entry(id='a', source='{HOST}/student'), Rule(), workdir=Path(sys.argv[1]), "
         "fetched_since=float(sys.argv[2])).source.ref)"

@@ -7,8 +7,8 @@ import shutil
 
 import pytest
 
+from grader.classes.fetching import Rule
 from grader.errors import SubmissionError, UsageError
-from grader.fetching import Rule
 from grader.intake import open_submission
 from grader.intake.identity import identify
 from tests.fetching.samples import DEADLINE, HOST, commit_at, entry

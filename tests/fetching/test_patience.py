@@ -6,9 +6,9 @@ import time
 
 import pytest
 
+from grader.classes.fetching import Patience, prefetch
+from grader.classes.fetching.retry import GivenUp, patiently
 from grader.errors import SubmissionError, Unreachable
-from grader.fetching import Patience, prefetch
-from grader.fetching.patience import GivenUp, patiently
 from grader.intake.explain import explained, may_pass
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.source import parse_source

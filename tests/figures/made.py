@@ -6,10 +6,10 @@ from typing import Any, TypeVar
 
 from grader.evidence.run import Run
 from grader.evidence.timeline import build_runs
-from grader.figures import figures_of
 from grader.judging import judge
 from grader.model.figure import Figures
 from grader.model.result import CriterionResult
+from grader.report.figures import figures_of
 from tests.judging.rubrics import rubric
 
 Kind = TypeVar("Kind")

@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 from grader.evidence.run import Run
-from grader.figures import DRAWN, figures_of
 from grader.judging import judge
 from grader.model.figure import CounterFigure, Figure, HeardFigure, PathFigure, RateFigure
 from grader.model.result import CriterionResult
 from grader.model.verdict import EvidenceCitation, Status
+from grader.report.figures import DRAWN, figures_of
 from tests.checks.examples import TIMELINES, Example, examples, runs_of
 from tests.figures.made import criterion
 from tests.judging.rubrics import SCENARIO, rubric

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from grader.evidence.events import ActorEvent, ConsoleLine, ProcessEvent
 from grader.evidence.run import Message, Run
-from grader.figures import DRAWN, figures_of
 from grader.judging import judge
 from grader.model.figure import POINTS_MAX, CounterFigure, Figures, HeardFigure, PathFigure, RateFigure
+from grader.report.figures import DRAWN, figures_of
 from tests.checks.examples import runs_of
 from tests.figures.made import criterion, drawn, only
 from tests.judging.rubrics import rubric

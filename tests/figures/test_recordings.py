@@ -9,9 +9,9 @@ import pytest
 
 from grader.evidence.reader import load_evidence
 from grader.evidence.run import Run
-from grader.figures import figures_of
 from grader.judging import judge
 from grader.model.figure import CodeFigure, CounterFigure, Figures, HeardFigure, RateFigure
+from grader.report.figures import figures_of
 from grader.rubric.load import load_rubric
 from tests.figures.made import only
 

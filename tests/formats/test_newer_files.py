@@ -11,13 +11,13 @@ import pytest
 from mcap.writer import Writer
 
 from grader import EvidenceError, RubricError, judge, load_result, load_rubric
+from grader.authoring.mutation.load import load_mutants
 from grader.cli.main import run
 from grader.evidence.events import TOPICS, ConsoleLine
 from grader.evidence.reader import load_run
 from grader.evidence.writer import EvidenceWriter
 from grader.model import version
 from grader.model.result import FileCitation
-from grader.mutation.load import load_mutants
 from grader.report.result_json import result_text
 from tests.formats.old import FOLDER, ROOT
 

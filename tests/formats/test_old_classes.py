@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.batch.folder import open_batch
+from grader.classes.batch.folder import open_batch
+from grader.classes.review.session import open_desk
 from grader.cli.main import run
-from grader.review.desk import open_desk
 from tests.formats.old import classes
 
 IDS = [folder.parent.name for folder in classes()]

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from grader import judge, load_result, load_rubric
-from grader.batch.reports import write_one
+from grader.classes.batch.reports import write_one
 from grader.evidence.reader import load_evidence, package_facts
 from grader.report.result_json import result_text
 from tests.formats.old import FOLDER, ROOT, Old, classes, submissions, times

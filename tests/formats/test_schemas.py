@@ -19,12 +19,12 @@ from mcap.reader import make_reader
 from grader.cli.main import run
 from grader.evidence.events import METADATA_NAME, PACKAGE_TOPIC, TOPICS
 from grader.evidence.reader import load_run
-from grader.formats import FORMATS, Addition, schema_of
-from grader.formats.keys import KEYS
-from grader.formats.page import pages
-from grader.formats.schemas import ROOTS, records_in
-from grader.formats.words import METADATA
 from grader.model import version
+from grader.report.formats import FORMATS, Addition, schema_of
+from grader.report.formats.keys import KEYS
+from grader.report.formats.page import pages
+from grader.report.formats.schemas import ROOTS, records_in
+from grader.report.formats.words import METADATA
 from grader.results import RESULT
 from tests.formats.guard import copy_of, faults
 from tests.formats.old import FOLDER, ROOT, classes
@@ -94,7 +94,7 @@ def test_every_key_has_its_words(name: str) -> None:
         for key, found in schema.get("properties", {}).items()
         if "description" not in found
     ]
-    assert silent == [], "grader/formats/keys.py says what each key means"
+    assert silent == [], "grader/report/formats/keys.py says what each key means"
 
 
 EVENTS = {record.__name__ for record in TOPICS.values()} | {"Connection"}

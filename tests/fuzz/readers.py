@@ -19,6 +19,10 @@ from grader.arena.built import read_archive, read_member
 from grader.arena.parameters import settings
 from grader.arena.sandbox import Sandbox
 from grader.arena.session import ArenaSession
+from grader.authoring.mutation.load import load_mutants
+from grader.classes.gradebook import write_gradebook
+from grader.classes.gradebook.sheet import read_sheet
+from grader.classes.roster import read_roster
 from grader.errors import EvidenceError, GraderError, OutputError, RubricError, SubmissionError, UsageError
 from grader.evidence.decode import Decoder
 from grader.evidence.export import export_bag
@@ -28,22 +32,18 @@ from grader.evidence.run import Run
 from grader.evidence.services import ServiceType
 from grader.evidence.timeline import build_runs
 from grader.evidence.writer import EvidenceStream
-from grader.gradebook import write_gradebook
-from grader.gradebook.sheet import read_sheet
 from grader.intake import Limits, open_submission, safe_name
 from grader.intake.manifest import manifest_name
 from grader.intake.refs import choose_ref, parse_refs
 from grader.intake.source import parse_source
 from grader.model.package import CMakeFacts
 from grader.model.record import Record
-from grader.mutation.load import load_mutants
 from grader.package.cmake import read_cmake, refine_cmake
 from grader.package.files import _text_facts
 from grader.package.launch import parse_launch, parse_launch_files
 from grader.package.manifest import parse_manifest, read_manifest
 from grader.package.python import read_syntax_report
 from grader.package.python_causes import cause_of
-from grader.roster import read_roster
 from grader.rubric.load import load_rubric
 from grader.rubric.model import Param, Rubric
 from grader.rubric.source import read_source

@@ -13,8 +13,8 @@ import bounded  # noqa: E402 - found by the path above
 import budget  # noqa: E402
 import connection  # noqa: E402
 import services  # noqa: E402
-import strict  # noqa: E402
 import tcpros  # noqa: E402
+import xmlrpc_parser  # noqa: E402
 from loop import serve  # noqa: E402
 
 CPU_S = 10.0
@@ -65,7 +65,7 @@ def header(data):
 
 
 def xmlrpc_answer(data):
-    json.dumps(plain(strict.read(data)[0])).encode()
+    json.dumps(plain(xmlrpc_parser.read(data)[0])).encode()
 
 
 def plain(value):
@@ -123,7 +123,7 @@ class _Recorder:
 NOTHING = ()
 TARGETS = {
     "header": (header, (bounded.ProtocolError,)),
-    "xmlrpc": (xmlrpc_answer, (strict.Malformed, xmlrpc.client.Fault)),
+    "xmlrpc": (xmlrpc_answer, (xmlrpc_parser.Malformed, xmlrpc.client.Fault)),
     "service-answer": (service_answer, (bounded.ProtocolError,)),
     "topic-stream": (topic_stream, NOTHING),
 }

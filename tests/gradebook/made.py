@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from grader.gradebook import Book, Row
-from grader.model.handed_in import AppliedOverride, Automatic, Lateness
+from grader.classes.gradebook import Book, Row
 from grader.model.result import (
     CriterionResult,
     EnvironmentInfo,
@@ -14,6 +13,7 @@ from grader.model.result import (
     TimingInfo,
 )
 from grader.model.roster import Entry
+from grader.model.submission_time import AppliedOverride, Automatic, Lateness
 from grader.model.verdict import Status
 
 BOOK = Book(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.gradebook import Row, write_gradebook
+from grader.classes.gradebook import Row, write_gradebook
 from tests.gradebook.made import BOOK, row
 
 DOWNLOAD = (

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from grader.classes.gradebook import Book, Row, write_gradebook
 from grader.errors import UsageError
-from grader.gradebook import Book, Row, write_gradebook
 from tests.gradebook.made import BOOK, late, row
 
 EXPORT = (

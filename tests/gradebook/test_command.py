@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from grader.batch.folder import write_run
+from grader.classes.batch.folder import write_run
+from grader.classes.gradebook import FORMS, Row
+from grader.classes.gradebook.table import header
 from grader.cli.main import run
 from grader.cli.parsing import build_parser
-from grader.gradebook import FORMS, Row
-from grader.gradebook.table import header
 from grader.model.batch import BatchRun
 from grader.model.roster import RosterFault
 from grader.report.result_json import result_bytes

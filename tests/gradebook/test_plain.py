@@ -13,9 +13,9 @@ from pathlib import Path
 import openpyxl
 import pytest
 
+from grader.classes.gradebook import Book, Row, write_gradebook
+from grader.classes.gradebook.plain import json_line
 from grader.errors import OutputError, UsageError
-from grader.gradebook import Book, Row, write_gradebook
-from grader.gradebook.plain import json_line
 from grader.model.result import GradingResult
 from tests.gradebook.made import BOOK, late, overridden, row
 

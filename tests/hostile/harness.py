@@ -18,7 +18,7 @@ from functools import cache
 from pathlib import Path
 from typing import IO, Any
 
-from grader.arena.cgroups import find_cgroups
+from grader.arena.control_groups import find_cgroups
 from grader.errors import ExitCode
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status

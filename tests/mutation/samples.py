@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from grader.mutation.find import find_reference, load_solution
-from grader.mutation.solution import Solution
-from grader.mutation.tree import Entry, Tree
+from grader.authoring.mutation.find import find_reference, load_solution
+from grader.authoring.mutation.solution import Solution
+from grader.authoring.mutation.tree import Entry, Tree
 from grader.rubric.load import load_rubric
 
 ROOT = Path(__file__).resolve().parent.parent.parent

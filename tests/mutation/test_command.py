@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.batch.workers import Graded
+from grader.authoring.mutation import session
+from grader.classes.batch.workers import Graded
 from grader.cli.main import run
-from grader.mutation import session
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import ROOT
 from tests.report.hostile import criterion, result

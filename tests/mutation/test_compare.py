@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
+from grader.authoring.mutation.compare import compare, lost_criteria
 from grader.model.result import CriterionResult
-from grader.mutation.compare import compare, lost_criteria
 from tests.report.hostile import criterion
 
 

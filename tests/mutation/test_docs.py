@@ -1,15 +1,15 @@
 from __future__ import annotations
 
-from grader.mutation.docs import EXAMPLE, operators_page
-from grader.mutation.load import load_mutants
-from grader.mutation.operators import OPERATORS
+from grader.authoring.mutation.docs import EXAMPLE, operators_page
+from grader.authoring.mutation.load import load_mutants
+from grader.authoring.mutation.operators import OPERATORS
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import LABS, ROOT
 from tests.rubric.samples import spoiled
 
 
 def test_the_page_is_up_to_date():
-    """`python -m grader.mutation.docs > docs/reference/mutation-operators.md` brings it up to date."""
+    """`python -m grader.authoring.mutation.docs > docs/reference/mutation-operators.md` brings it up to date."""
     page = ROOT / "docs" / "reference" / "mutation-operators.md"
     assert page.read_text(encoding="utf-8") == operators_page()
 

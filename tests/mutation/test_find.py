@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from grader.authoring.mutation import find
+from grader.authoring.mutation.find import find_reference, given_reference, load_solution, mutants_file
+from grader.authoring.mutation.tree import read_tree
 from grader.errors import UsageError
-from grader.mutation import find
-from grader.mutation.find import find_reference, given_reference, load_solution, mutants_file
-from grader.mutation.tree import read_tree
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import LABS, ROOT
 from tests.rubric.samples import spoiled

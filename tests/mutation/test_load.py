@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from grader.authoring.mutation.load import load_mutants, parameters_of
+from grader.authoring.mutation.operators import OPERATORS
 from grader.errors import RubricError
-from grader.mutation.load import load_mutants, parameters_of
-from grader.mutation.operators import OPERATORS
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import LABS, ROOT
 from tests.rubric.samples import spoiled

@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from grader.mutation.find import Reference, load_solution
-from grader.mutation.operators import OPERATORS
-from grader.mutation.registry import Operator, operator
-from grader.mutation.solution import Site, Solution
-from grader.mutation.tree import Tree, unified_diff
+from grader.authoring.mutation.find import Reference, load_solution
+from grader.authoring.mutation.operators import OPERATORS
+from grader.authoring.mutation.registry import Operator, operator
+from grader.authoring.mutation.solution import Site, Solution
+from grader.authoring.mutation.tree import Tree, unified_diff
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import LABS, ROOT, other_solution, reference_solution, tree_of
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from grader.batch.workers import Graded, Job
+from grader.authoring.mutation import session
+from grader.authoring.mutation.plan import Planned, plan_all
+from grader.authoring.mutation.session import Plan, run_test
+from grader.authoring.mutation.solution import Solution
+from grader.classes.batch.workers import Graded, Job
 from grader.errors import HostError
 from grader.model.progress import Silence
-from grader.mutation import session
-from grader.mutation.plan import Planned, plan_all
-from grader.mutation.session import Plan, run_test
-from grader.mutation.solution import Solution
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import tree_of
 from tests.report.hostile import criterion, result

@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import pytest
 
+from grader.authoring.mutation import tree as tree_module
+from grader.authoring.mutation.spans import Edit, applied
+from grader.authoring.mutation.tree import Entry, read_tree, unified_diff, write_tree
 from grader.errors import UsageError
-from grader.mutation import tree as tree_module
-from grader.mutation.spans import Edit, applied
-from grader.mutation.tree import Entry, read_tree, unified_diff, write_tree
 
 
 def test_what_is_written_is_read_back(tmp_path):

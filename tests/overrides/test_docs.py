@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from grader.overrides import FILE, read_overrides
+from grader.classes.overrides import FILE, read_overrides
 from grader.rubric.load import load_rubric
 from grader.rubric.model import Late
 from tests.overrides.samples import IDS, rubric

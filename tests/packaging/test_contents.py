@@ -76,7 +76,7 @@ def test_the_wheel_holds_every_file_of_ours_and_no_other(wheel: ZipFile):
     "name",
     [
         "grader/py.typed",
-        "grader/standins/turtlesim/turtlesim_node",
+        "grader/arena/standins/turtlesim/turtlesim_node",
         "grader/arena/ros/syntax.py",
         "grader/report/html/templates/report.html",
         "grader/report/html/style.css",

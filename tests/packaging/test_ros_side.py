@@ -10,7 +10,7 @@ import pytest
 from tests.packaging.making import BIN, ROOT
 from tests.packaging.test_pythons import find
 
-SIDES = ("grader/arena/ros", "grader/standins")
+SIDES = ("grader/arena/ros", "grader/arena/standins")
 NEWER = {
     "syntax": "match 1:\n    case 1:\n        pass\n",
     "library": "import zoneinfo\n",
@@ -42,7 +42,7 @@ def test_both_sides_are_found():
     assert {path.relative_to(ROOT).as_posix() for path in scripts()} > {
         "grader/arena/ros/syntax.py",
         "grader/arena/ros/__main__.py",
-        "grader/standins/turtlesim/turtlesim_node",
+        "grader/arena/standins/turtlesim/turtlesim_node",
     }
 
 

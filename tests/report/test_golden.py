@@ -11,8 +11,8 @@ from tempfile import TemporaryDirectory
 import pytest
 from rich.console import Console
 
-from grader.gradebook import Book, Row, write_gradebook
-from grader.gradebook.model import Form
+from grader.classes.gradebook import Book, Row, write_gradebook
+from grader.classes.gradebook.model import Form
 from grader.model.result import GradingResult
 from grader.model.roster import Entry
 from grader.report.annotations import github_annotations

@@ -12,10 +12,9 @@ from pathlib import Path
 import yaml
 
 from grader import __version__
-from grader.batch.flow import described, write_books
-from grader.batch.folder import BatchFolder, write_run
+from grader.classes.batch.flow import described, write_books
+from grader.classes.batch.folder import BatchFolder, write_run
 from grader.evidence.reader import load_evidence
-from grader.figures import figures_of
 from grader.intake import safe_name
 from grader.judging import judge
 from grader.judging.summary import overall_status, total_points
@@ -31,6 +30,7 @@ from grader.model.result import (
 )
 from grader.model.roster import Entry, RosterFault
 from grader.model.verdict import Status
+from grader.report.figures import figures_of
 from grader.report.files import write_reports
 from grader.rubric.load import LoadedRubric, load_rubric
 

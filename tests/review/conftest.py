@@ -11,9 +11,9 @@ import pytest
 from flask import Flask
 from flask.testing import FlaskClient
 
-from grader.review.app import create_app
-from grader.review.desk import Desk, open_desk
-from grader.review.follower import Pace
+from grader.classes.review.app import create_app
+from grader.classes.review.follower import Pace
+from grader.classes.review.session import Desk, open_desk
 from tests.review.a_class import a_class
 
 PORT = 8123

@@ -8,10 +8,10 @@ from datetime import datetime
 
 import pytest
 
-from grader.batch.flow import alone
-from grader.model.handed_in import Override
-from grader.review.desk import open_desk
-from grader.review.follower import Pace
+from grader.classes.batch.flow import alone
+from grader.classes.review.follower import Pace
+from grader.classes.review.session import open_desk
+from grader.model.submission_time import Override
 from tests.review.a_class import overrides_of, points_of, result_of
 from tests.review.conftest import QUICK
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from threading import Event
 
+from grader.classes.review.follower import Follower, Pace
 from grader.errors import Busy
-from grader.review.follower import Follower, Pace
 
 WAIT_S = 60
 

@@ -7,13 +7,13 @@ import re
 
 import pytest
 
-from grader.model.handed_in import Override
+from grader.classes.overrides import write_override
+from grader.classes.review.app import create_app
+from grader.classes.review.form import author_of
+from grader.classes.review.navigation import place_of
+from grader.classes.review.session import open_desk
 from grader.model.roster import RosterFault
-from grader.overrides import write_override
-from grader.review.app import create_app
-from grader.review.desk import open_desk
-from grader.review.form import author_of
-from grader.review.places import place_of
+from grader.model.submission_time import Override
 from tests.review.a_class import INCONCLUSIVE, Who, a_class, overrides_of, result_of
 from tests.review.conftest import PORT, QUICK, TOKEN, Page
 

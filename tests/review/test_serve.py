@@ -16,8 +16,8 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 
+from grader.classes.review import serve
 from grader.cli.main import run
-from grader.review import serve
 from tests.review.a_class import overrides_of, points_of
 from tests.review.running import WAIT_S, Server, Tab
 
@@ -146,7 +146,9 @@ def test_ports_that_are_none(out, port, capsys) -> None:
 
 def test_without_the_extra_it_says_what_to_install(out, monkeypatch, capsys) -> None:
     found = importlib.util.find_spec
-    monkeypatch.setattr("grader.review.find_spec", lambda name: None if name == "flask" else found(name))
+    monkeypatch.setattr(
+        "grader.classes.review.find_spec", lambda name: None if name == "flask" else found(name)
+    )
     assert run(["review", str(out)]) == 2
     errors = capsys.readouterr().err
     assert "pip install 'ros-lab-grader[review]'" in errors

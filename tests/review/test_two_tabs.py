@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 
-from grader.model.handed_in import Override
-from grader.overrides import write_override
-from grader.review.app import create_app
-from grader.review.desk import open_desk
+from grader.classes.overrides import write_override
+from grader.classes.review.app import create_app
+from grader.classes.review.session import open_desk
+from grader.model.submission_time import Override
 from tests.review.a_class import overrides_of
 from tests.review.conftest import PORT, QUICK, TOKEN, Page
 

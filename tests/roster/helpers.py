@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from grader.classes.roster import Local, read_roster
+from grader.classes.roster.local import OWN_FOLDER
 from grader.model.roster import Roster
-from grader.roster import Local, read_roster
-from grader.roster.local import OWN_FOLDER
 
 
 def roster_file(folder: Path, text: str | bytes, encoding: str = "utf-8") -> Path:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from grader.classes.roster import read_roster
 from grader.errors import UsageError
-from grader.roster import read_roster
 from tests.roster.helpers import ids, read, said
 
 GRADES = (

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from grader.classes.roster.local import OUT
 from grader.model.roster import RosterFault
-from grader.roster.local import OUT
 from tests.roster.helpers import ids, read, said
 
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from grader.classes.roster import Local, read_roster, sources
+from grader.classes.roster import local as local_module
+from grader.classes.roster.local import OUT, REFUSED
 from grader.errors import UsageError
 from grader.intake.source import parse_source
-from grader.roster import Local, read_roster, sources
-from grader.roster import local as local_module
-from grader.roster.local import OUT, REFUSED
 from tests.roster.helpers import ids, read, said
 
 REMOTE_ONLY = Local(remote_only=True)

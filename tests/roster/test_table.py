@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from grader.classes.roster import Entry, read_roster
 from grader.errors import UsageError
-from grader.roster import Entry, read_roster
 from tests.roster.helpers import ids, read, roster_file, said
 
 

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from grader.classes.similarity import comparing
 from grader.cli.main import run as grader
 from grader.model.batch import BatchRun
 from grader.model.result import RubricInfo
 from grader.model.roster import Entry
 from grader.model.similarity import Similarity
-from grader.similarity import comparing
 from tests.similarity.classes import class_of, renamed, solution
 
 COPY = renamed(solution("timed")).encode()

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from grader.classes.similarity.job import run
+from grader.classes.similarity.request import Request
 from grader.model.similarity import Similarity
-from grader.similarity.job import run
-from grader.similarity.request import Request
 from tests.similarity.classes import (
     DISGUISES,
     class_of,

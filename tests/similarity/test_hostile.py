@@ -10,10 +10,10 @@ import time
 
 import pytest
 
-from grader.similarity import compare, job, reading
-from grader.similarity.reading import read_all, texts_of
-from grader.similarity.request import Request
-from grader.similarity.sources import Source, Sources
+from grader.classes.similarity import compare, job, reading
+from grader.classes.similarity.reading import read_all, texts_of
+from grader.classes.similarity.request import Request
+from grader.classes.similarity.sources import Source, Sources
 from tests.similarity.classes import class_of, hand_in, solution
 
 GOOD = solution("timed").encode()

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.similarity import compare
-from grader.similarity.job import run
-from grader.similarity.request import Request
+from grader.classes.similarity import compare
+from grader.classes.similarity.job import run
+from grader.classes.similarity.request import Request
 from tests.similarity.classes import class_of, renamed, solution
 
 ROOT = Path(__file__).parent.parent.parent

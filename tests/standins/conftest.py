@@ -8,7 +8,7 @@ from types import ModuleType
 
 import pytest
 
-from grader.arena.standins import SOURCES
+from grader.arena.standin_packages import SOURCES
 
 PURE = ("background", "canvas", "pace", "turtle", "world")
 

@@ -9,7 +9,13 @@ from pathlib import Path
 import pytest
 
 from grader.arena.ros_env import RosInstallation, require_ros
-from grader.arena.standins import SOURCES, copy_standins, known_packages, missing_packages, with_standins
+from grader.arena.standin_packages import (
+    SOURCES,
+    copy_standins,
+    known_packages,
+    missing_packages,
+    with_standins,
+)
 from grader.cli.diagnosis import _standins
 from grader.rubric.model import Scenario, Start, Until
 from tests.arena.support import make_place, printed, run

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.model.standing import Standing
-from grader.standing import ask, standing, surroundings
+from grader.model.git_status import Standing
+from grader.student.git_status import ask, standing, surroundings
 
 MANIFEST = """<package format="2"><name>{name}</name><version>0.0.1</version><description>d</description>
 <maintainer email="a@b.org">A</maintainer><license>MIT</license><buildtool_depend>catkin</buildtool_depend>

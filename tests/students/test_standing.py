@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.standing import ask, standing, surroundings
+from grader.student.git_status import ask, standing, surroundings
 from tests.students.conftest import SCRIPT, Clone, git, write_package
 
 

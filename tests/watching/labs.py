@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from grader.rubric.load import LoadedRubric, load_rubric
-from grader.watching.concern import concerned
-from grader.watching.picture import Picture, take_picture
+from grader.student.watching.affected import concerned
+from grader.student.watching.snapshot import Picture, take_picture
 
 ROOT = Path(__file__).resolve().parents[2]
 LABS = (

@@ -11,9 +11,9 @@ from grader.errors import ExitCode
 from grader.model.result import CriterionResult, ErrorInfo, GradingResult
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
-from grader.watching.kept import Kept
-from grader.watching.loop import WAIT_S, Outcome, Watched, watch
-from grader.watching.picture import take_picture
+from grader.student.watching.kept import Kept
+from grader.student.watching.loop import WAIT_S, Outcome, Watched, watch
+from grader.student.watching.snapshot import take_picture
 from tests.report.hostile import criterion, result
 
 Step = Callable[[], object]

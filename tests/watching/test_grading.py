@@ -14,7 +14,7 @@ from grader.arena.asynchronous import Stop, Stopped, run_until_signal
 from grader.cli.parsing import build_parser
 from grader.errors import Busy, ExitCode, HostError, OutputError, SandboxMissing, SubmissionError
 from grader.model.progress import Silence
-from grader.watching.grading import Grading
+from grader.student.watching.grading import Grading
 from tests.report.hostile import result
 from tests.watching.labs import rubric
 

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from grader.arena.asynchronous import Stop
-from grader.watching.ignored import ignored
-from grader.watching.picture import differing, folders_in, take_picture
-from grader.watching.saves import WatchedFolders
+from grader.student.watching.ignored import ignored
+from grader.student.watching.saves import WatchedFolders
+from grader.student.watching.snapshot import differing, folders_in, take_picture
 from tests.watching.labs import copy_of, write
 
 LEEDS = "leeds-comp3631-lab1"

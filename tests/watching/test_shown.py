@@ -11,9 +11,9 @@ from rich.console import Console
 from grader.errors import ExitCode
 from grader.model.result import ErrorInfo, GradingResult
 from grader.model.verdict import Status
-from grader.watching.loop import Outcome
-from grader.watching.shown import DASH, JsonShown, ScreenShown
-from grader.watching.turns import turns
+from grader.student.watching.loop import Outcome
+from grader.student.watching.shown import DASH, JsonShown, ScreenShown
+from grader.student.watching.turns import turns
 from tests.report.hostile import ESCAPES, MARKDOWN, RICH, XML, criterion, result, rubric
 
 NOON = datetime(2026, 3, 2, 12, 3, 4, tzinfo=timezone.utc)

@@ -9,9 +9,9 @@ import struct
 import threading
 import time
 
-from door import HOST, Door
 from guard import shown
 from tcpros import LENGTH, write_header
+from tcpros_server import HOST, Door
 from wire import now_ns
 
 SUBSCRIBERS_MAX = 64

@@ -6,7 +6,7 @@ import time
 import xmlrpc.client
 from urllib.parse import urlparse
 
-import strict
+import xmlrpc_parser
 
 LOOPBACK = "127.0.0.1"
 ANSWER_BYTES_MAX = 1 << 20
@@ -106,11 +106,11 @@ class _Transport(xmlrpc.client.Transport):
     def parse_response(self, response):
         try:
             if response.getheader("Content-Encoding", "identity") != "identity":
-                raise strict.Malformed("an encoded answer")
+                raise xmlrpc_parser.Malformed("an encoded answer")
             data = response.read(ANSWER_BYTES_MAX + 1)
             if len(data) > ANSWER_BYTES_MAX:
-                raise strict.Malformed("an answer of more than {} bytes".format(ANSWER_BYTES_MAX))
-            return strict.read(data)[0]
+                raise xmlrpc_parser.Malformed("an answer of more than {} bytes".format(ANSWER_BYTES_MAX))
+            return xmlrpc_parser.read(data)[0]
         finally:
             self.close()
 

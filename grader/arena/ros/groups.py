@@ -17,8 +17,10 @@ KILLS = {1: "memory.oom_control", 2: "memory.events"}
 
 
 class Groups:
-    """`cgroups` maps `memory`, `pids` and `cpuacct` to {version, folder}, or to None: grader/arena/cgroups.py finds
-    them."""
+    """`cgroups` maps `memory`, `pids` and `cpuacct` to {version, folder}, or to None.
+
+    grader/arena/control_groups.py finds them.
+    """
 
     def __init__(self, cgroups, limits):
         self._made = {}

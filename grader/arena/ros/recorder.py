@@ -19,7 +19,7 @@ from arrival import note_arrivals
 from bounded import ProtocolError, call, connect, slave_api
 from budget import Budget
 from connection import Connection
-from cutting import MESSAGE_BYTES_MAX
+from framing import MESSAGE_BYTES_MAX
 from guard import shown
 from pool import Pool
 from tcpros import HEADER_BYTES_MAX, LENGTH, check_fields, read_header, write_header

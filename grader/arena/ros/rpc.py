@@ -9,7 +9,7 @@ import sys
 import threading
 import xmlrpc.client
 
-import strict
+import xmlrpc_parser
 from bounded import BoundedSocket
 from callers import SOMEBODY, Caller, Pace
 from guard import shown
@@ -228,8 +228,8 @@ class _Handler(http.server.BaseHTTPRequestHandler):
     def _result(self, body):
         """The value of a call, or a Fault."""
         try:
-            args, method = strict.read(body)
-        except (strict.Malformed, xmlrpc.client.Fault) as error:
+            args, method = xmlrpc_parser.read(body)
+        except (xmlrpc_parser.Malformed, xmlrpc.client.Fault) as error:
             raise Refused(REFUSED_CODE, "what is no call: {}".format(shown(error))) from error
         if method != MULTICALL:
             return self._called(method, args)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.checks.support.ending import explain_end
+from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.losses import all_lost
 from grader.checks.support.process import Life, early_end, life, lives
 from grader.checks.support.text import listed, near_names

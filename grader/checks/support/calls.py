@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from grader.checks.support.absence import life_of, no_node
-from grader.checks.support.ending import explain_end, explain_traceback
+from grader.checks.support.exit_cause import explain_end, explain_traceback
 from grader.checks.support.names import plain_type
 from grader.checks.support.text import listed, near_names, shown
 from grader.checks.support.traceback import HEADING, Traceback, tracebacks

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from grader.checks.support.text import hertz, plural
 from grader.evidence.run import Channel
-from grader.model.rhythm import Rhythm
+from grader.model.message_rate import Rhythm
 
 
 def described(found: Rhythm, low_ns: float, high_ns: float) -> str:

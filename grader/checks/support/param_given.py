@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
-from grader.checks.support.ending import Ending, explain_end, explain_traceback, process_tracebacks
+from grader.checks.support.exit_cause import Ending, explain_end, explain_traceback, process_tracebacks
 from grader.checks.support.param_tree import absolute, own, tree
 from grader.checks.support.printed import Line
 from grader.checks.support.process import early_end, lives

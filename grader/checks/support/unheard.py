@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from grader.checks.support.ending import explain_end, explain_traceback, process_tracebacks
+from grader.checks.support.exit_cause import explain_end, explain_traceback, process_tracebacks
 from grader.checks.support.printed import Line, Probe, numbers_in
 from grader.checks.support.process import early_end, lives
 from grader.checks.support.text import listed, near_names, number, plural, shown

@@ -6,19 +6,19 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grader.batch.flow import GRADEBOOK, INDEX, RESULTS, BatchOptions, run_batch
-from grader.batch.folder import BatchFolder
-from grader.batch.hands import Hands, Processes
-from grader.batch.notable import notable
+from grader.classes.batch.executor import Hands, Processes
+from grader.classes.batch.flow import GRADEBOOK, INDEX, RESULTS, BatchOptions, run_batch
+from grader.classes.batch.folder import BatchFolder
+from grader.classes.batch.needs_attention import notable
+from grader.classes.roster import Local, read_roster
+from grader.classes.roster.times import parse_time
 from grader.cli.class_display import open_class_display
 from grader.cli.inherited_limits import make_room
-from grader.cli.say import say, say_beside, say_json
-from grader.cli.unwalled import say_unwalled
+from grader.cli.output import say, say_beside, say_json
+from grader.cli.sandbox_report import say_unwalled
 from grader.errors import ExitCode, UsageError
 from grader.model.batch import BatchRun
 from grader.portable import cores
-from grader.roster import Local, read_roster
-from grader.roster.times import parse_time
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.needs import needs_ros
 from grader.shown import line
@@ -120,7 +120,7 @@ def _hands(options: BatchOptions, exchange: str | None) -> Hands:
         for flag in (name for name, there in given.items() if there):
             raise UsageError(f"{flag} is for --cluster", hint="leave it out")
         return Processes(options.jobs)
-    from grader.cluster import ClusterHands  # noqa: PLC0415 - an extra
+    from grader.classes.cluster import ClusterHands  # noqa: PLC0415 - an extra
 
     return ClusterHands(
         options.cluster,

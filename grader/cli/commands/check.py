@@ -10,30 +10,30 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader import pipeline
-from grader.cli.choice import Chosen, choose_all, only
 from grader.cli.display import open_progress
-from grader.cli.elsewhere import nothing_runs, the_rest
 from grader.cli.handing_in import Inquiry, news, print_beside, print_standing
 from grader.cli.outcome import exit_code, settled, staged_code, worst
-from grader.cli.say import say, say_beside
+from grader.cli.output import say, say_beside
+from grader.cli.platform_support import nothing_runs, the_rest
+from grader.cli.sandbox_report import say_unwalled
+from grader.cli.select_rubric import Chosen, choose_all, only
 from grader.cli.show import show
-from grader.cli.unwalled import say_unwalled
 from grader.errors import ExitCode, UsageError
 from grader.files import check_writable
 from grader.intake import safe_name
+from grader.model.git_status import Standing
 from grader.model.progress import Silence
 from grader.model.result import GradingResult
-from grader.model.standing import Standing
 from grader.report.hidden import hidden_ids, without_hidden
 from grader.report.terminal import open_console
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_ros
-from grader.standing import write_staged
+from grader.student.git_status import write_staged
 from grader.temporary import temporary_folder
 
 if TYPE_CHECKING:
     from grader.arena.sandbox import Mode
-    from grader.watching.loop import Shown
+    from grader.student.watching.loop import Shown
 
 
 def run(
@@ -147,11 +147,11 @@ def _package(chosen: Chosen) -> Path:
 def _watch(
     source: str, rubric: LoadedRubric, options: pipeline.GradeOptions, *, out: Path | None, as_json: bool
 ) -> ExitCode:
-    from grader.watching.grading import Grading  # noqa: PLC0415 - nobody else needs what this loads
-    from grader.watching.kept import Kept  # noqa: PLC0415
-    from grader.watching.loop import Watched, watch  # noqa: PLC0415
-    from grader.watching.picture import take_picture  # noqa: PLC0415
-    from grader.watching.saves import WatchedFolders  # noqa: PLC0415
+    from grader.student.watching.grading import Grading  # noqa: PLC0415 - nobody else needs what this loads
+    from grader.student.watching.kept import Kept  # noqa: PLC0415
+    from grader.student.watching.loop import Watched, watch  # noqa: PLC0415
+    from grader.student.watching.saves import WatchedFolders  # noqa: PLC0415
+    from grader.student.watching.snapshot import take_picture  # noqa: PLC0415
 
     static = options.static_only
 
@@ -183,7 +183,7 @@ def _watch(
 
 
 def _shown(folder: Path, rubric: LoadedRubric, *, static: bool, as_json: bool) -> Shown:
-    from grader.watching.shown import JsonShown, ScreenShown  # noqa: PLC0415 - as above
+    from grader.student.watching.shown import JsonShown, ScreenShown  # noqa: PLC0415 - as above
 
     if as_json:
         return JsonShown(sys.stdout)

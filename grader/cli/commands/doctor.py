@@ -9,8 +9,8 @@ from rich.table import Table
 from rich.text import Text
 
 from grader.cli.diagnosis import diagnose
+from grader.cli.output import say_json
 from grader.cli.row import Row
-from grader.cli.say import say_json
 from grader.errors import ExitCode
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from grader.cli.say import say
+from grader.authoring.mutation.find import find_reference, load_solution, mutants_file
+from grader.authoring.mutation.load import load_mutants
+from grader.authoring.mutation.operators import OPERATORS
+from grader.authoring.mutation.plan import Planned, plan_all, plan_declared
+from grader.authoring.mutation.solution import Solution
+from grader.authoring.mutation.tree import Tree, write_tree
+from grader.cli.output import say
 from grader.errors import ExitCode, UsageError
 from grader.files import check_writable
-from grader.mutation.find import find_reference, load_solution, mutants_file
-from grader.mutation.load import load_mutants
-from grader.mutation.operators import OPERATORS
-from grader.mutation.plan import Planned, plan_all, plan_declared
-from grader.mutation.solution import Solution
-from grader.mutation.tree import Tree, write_tree
 from grader.rubric.faults import did_you_mean
 from grader.rubric.load import LoadedRubric, load_rubric
 

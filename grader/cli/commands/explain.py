@@ -11,13 +11,13 @@ from rich.text import Text
 
 from grader.checks import HEADINGS, Check
 from grader.errors import ExitCode, UsageError
-from grader.instructor.known import known_checks
 from grader.report.terminal import emit, open_console
 from grader.report.text import number, visible
 from grader.rubric.faults import did_you_mean
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import LoadedRubric, all_rubrics, load_rubric
 from grader.rubric.model import Criterion
+from grader.rubric.own_checks.known import known_checks
 
 
 def run(*, name: str, rubric: str | None = None) -> ExitCode:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from grader.cli.say import say
+from grader.cli.output import say
 from grader.errors import EvidenceError, ExitCode, UsageError
 from grader.evidence.export import export_bag
 from grader.evidence.reader import load_evidence

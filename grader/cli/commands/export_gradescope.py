@@ -6,11 +6,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grader.cli.say import say
-from grader.deliver.gradescope import autograder
-from grader.deliver.settings import Settings
+from grader.cli.output import say
 from grader.errors import ExitCode
 from grader.files import atomic_write
+from grader.integrations.deliver.gradescope import autograder
+from grader.integrations.deliver.settings import Settings
 from grader.rubric.load import load_rubric
 
 if TYPE_CHECKING:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grader.cli.say import say
-from grader.deliver.prairielearn import IMAGE, question
-from grader.deliver.settings import FILE, Settings
+from grader.cli.output import say
 from grader.errors import ExitCode, UsageError
 from grader.files import atomic_write
+from grader.integrations.deliver.prairielearn import IMAGE, question
+from grader.integrations.deliver.settings import FILE, Settings
 from grader.rubric.load import load_rubric
 
 if TYPE_CHECKING:

@@ -7,10 +7,10 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from grader.batch.folder import open_batch
-from grader.cli.say import say, say_beside
+from grader.classes.batch.folder import open_batch
+from grader.classes.gradebook import Form, write_gradebook
+from grader.cli.output import say, say_beside
 from grader.errors import ExitCode, UsageError
-from grader.gradebook import Form, write_gradebook
 
 NAMES: dict[Form, str] = {
     "csv": "gradebook.csv",

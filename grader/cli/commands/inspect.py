@@ -10,7 +10,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from grader.cli.say import say_json
+from grader.cli.output import say_json
 from grader.errors import ExitCode
 from grader.evidence.inspect import ChannelSummary, Inspection, ProcessSummary, inspect_file
 from grader.report.terminal import emit, open_console

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from grader.batch.judging import Judged, judge_all, submissions_in
+from grader.classes.batch.judging import Judged, judge_all, submissions_in
 from grader.cli.errors import report
 from grader.cli.outcome import exit_code
-from grader.cli.say import say_document
+from grader.cli.output import say_document
 from grader.errors import EvidenceError, ExitCode
 from grader.evidence.reader import load_evidence
 from grader.files import atomic_write

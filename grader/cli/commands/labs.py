@@ -7,7 +7,7 @@ import sys
 from rich.table import Table
 from rich.text import Text
 
-from grader.cli.say import say_json
+from grader.cli.output import say_json
 from grader.errors import ExitCode
 from grader.report.terminal import emit, open_console
 from grader.report.text import number, visible

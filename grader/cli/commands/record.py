@@ -7,10 +7,10 @@ from pathlib import Path
 
 from grader import pipeline
 from grader.arena.sandbox import Mode
-from grader.cli.choice import only_package
 from grader.cli.display import open_progress
-from grader.cli.say import say
-from grader.cli.unwalled import say_unwalled
+from grader.cli.output import say
+from grader.cli.sandbox_report import say_unwalled
+from grader.cli.select_rubric import only_package
 from grader.errors import ExitCode, UsageError
 from grader.files import check_writable
 from grader.rubric.load import LoadedRubric, load_rubric

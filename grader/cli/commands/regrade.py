@@ -6,14 +6,14 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grader.batch.flow import GRADEBOOK
-from grader.batch.folder import BatchFolder, open_batch
-from grader.batch.hands import Processes
-from grader.batch.regrade import CHANGES, Change, Regraded, regrade, run_missing
+from grader.classes.batch.executor import Processes
+from grader.classes.batch.flow import GRADEBOOK
+from grader.classes.batch.folder import BatchFolder, open_batch
+from grader.classes.batch.regrade import CHANGES, Change, Regraded, regrade, run_missing
 from grader.cli.class_display import open_class_display
 from grader.cli.commands.batch import JOBS_PER_CORE, exit_code, rubric_source
-from grader.cli.say import say, say_json
-from grader.cli.unwalled import say_unwalled
+from grader.cli.output import say, say_json
+from grader.cli.sandbox_report import say_unwalled
 from grader.errors import ExitCode
 from grader.portable import cores
 from grader.report.text import number

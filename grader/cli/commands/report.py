@@ -7,14 +7,14 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from grader.batch.flow import INDEX
-from grader.batch.folder import RUN, BatchFolder, open_batch
-from grader.batch.reports import Written, has_result, result_in, write_all, write_one
-from grader.batch.settled import figures_in
+from grader.classes.batch.flow import INDEX
+from grader.classes.batch.folder import RUN, BatchFolder, open_batch
+from grader.classes.batch.reports import Written, has_result, result_in, write_all, write_one
+from grader.classes.batch.settled import figures_in
 from grader.cli.errors import report
 from grader.cli.outcome import exit_code
+from grader.cli.output import say, say_beside
 from grader.cli.prefix import package_prefix
-from grader.cli.say import say, say_beside
 from grader.errors import EvidenceError, ExitCode, UsageError
 from grader.files import atomic_write
 from grader.model.figure import Figures

@@ -6,17 +6,17 @@ import sys
 from contextlib import ExitStack
 from pathlib import Path
 
-from grader.cli.say import say
+from grader.classes.review import require_library
+from grader.cli.output import say
 from grader.errors import ExitCode, UsageError
-from grader.review import require_library
 
 
 def run(*, folder: Path, port: int = 0, no_browser: bool = False, author: str | None = None) -> ExitCode:
     """Serve the page until Ctrl-C; `author` stands beside decisions (default: what git calls the person)."""
     require_library()
-    from grader.review.desk import open_desk  # noqa: PLC0415 - an extra: not there everywhere
-    from grader.review.form import Wrong, author_of  # noqa: PLC0415
-    from grader.review.serve import browser, git_user, serve  # noqa: PLC0415
+    from grader.classes.review.form import Wrong, author_of  # noqa: PLC0415
+    from grader.classes.review.serve import browser, git_user, serve  # noqa: PLC0415
+    from grader.classes.review.session import open_desk  # noqa: PLC0415 - an extra: not there everywhere
 
     try:
         name = author_of(git_user() if author is None else author)

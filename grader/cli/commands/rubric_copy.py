@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from grader.cli.say import say, say_document
+from grader.cli.output import say, say_document
 from grader.errors import ExitCode, UsageError
 from grader.files import atomic_write
 from grader.rubric.load import load_rubric

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.cli.say import say_json
+from grader.cli.output import say_json
 from grader.errors import ExitCode
 from grader.rubric.load import load_rubric
 from grader.rubric.schema import rubric_schema

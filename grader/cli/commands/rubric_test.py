@@ -9,20 +9,20 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from grader.arena.sandbox import Mode
+from grader.authoring.mutation.find import find_reference, given_reference, load_solution, mutants_file
+from grader.authoring.mutation.load import load_mutants
+from grader.authoring.mutation.model import RubricTest
+from grader.authoring.mutation.plan import Planned, chosen, plan_all, plan_declared, refuse_unfit
+from grader.authoring.mutation.session import Plan, run_test
+from grader.authoring.mutation.solution import Solution
+from grader.authoring.mutation.write import mutants_text
 from grader.cli.display import open_progress
 from grader.cli.inherited_limits import make_room
 from grader.cli.mutants import print_test
-from grader.cli.say import say_json
-from grader.cli.unwalled import say_unwalled
+from grader.cli.output import say_json
+from grader.cli.sandbox_report import say_unwalled
 from grader.errors import ExitCode
 from grader.files import atomic_write, check_writable
-from grader.mutation.find import find_reference, given_reference, load_solution, mutants_file
-from grader.mutation.load import load_mutants
-from grader.mutation.model import RubricTest
-from grader.mutation.plan import Planned, chosen, plan_all, plan_declared, refuse_unfit
-from grader.mutation.session import Plan, run_test
-from grader.mutation.solution import Solution
-from grader.mutation.write import mutants_text
 from grader.rubric.load import LoadedRubric, load_rubric
 
 SIDE_BY_SIDE = 4  # they wait most of the time; fits two cores

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.cli.say import say
+from grader.cli.output import say
 from grader.errors import ExitCode, RubricError
 from grader.report.text import number
 from grader.rubric.load import load_rubric

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from grader.cli.say import say, say_json
+from grader.cli.output import say, say_json
 from grader.errors import ExitCode
-from grader.formats import FORMATS, schema_of
+from grader.report.formats import FORMATS, schema_of
 
 
 def run(*, name: str | None = None) -> ExitCode:

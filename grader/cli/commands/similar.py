@@ -11,17 +11,17 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from grader.batch.folder import RUN, open_batch
-from grader.cli.say import say_json
+from grader.classes.batch.folder import RUN, open_batch
+from grader.classes.similarity import compare, write_similarity
+from grader.classes.similarity.comparing import require_library
+from grader.classes.similarity.files import percent, stretches
+from grader.classes.similarity.sources import PLACE
+from grader.cli.output import say_json
 from grader.errors import ExitCode, UsageError
 from grader.model.similarity import NotCompared, Pair, Similarity
 from grader.portable import cores
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
-from grader.similarity import compare, write_similarity
-from grader.similarity.comparing import require_library
-from grader.similarity.files import percent, stretches
-from grader.similarity.sources import PLACE
 
 NAME_CHARS = 22
 PATH_CHARS = 40

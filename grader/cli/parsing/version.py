@@ -19,7 +19,7 @@ class VersionAction(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, *_rest: object) -> NoReturn:
         """Raise SystemExit with code 0."""
-        from grader.cli.say import say  # noqa: PLC0415 - `--help` does without
+        from grader.cli.output import say  # noqa: PLC0415 - `--help` does without
 
         say(f"grader {__version__}")
         say(f"Python {platform.python_version()} ({sys.executable})")

@@ -3,7 +3,7 @@
 import os
 import signal
 
-from grader.cluster import remote
+from grader.classes.cluster import remote
 
 _done = remote._done
 

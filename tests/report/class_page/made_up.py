@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from datetime import datetime, timedelta, timezone
 
 from grader.model.batch import BatchRun, Counts, CriterionInfo, State
-from grader.model.handed_in import AppliedOverride, Automatic, Lateness
 from grader.model.result import (
     CriterionResult,
     EnvironmentInfo,
@@ -18,6 +17,7 @@ from grader.model.result import (
     TimingInfo,
 )
 from grader.model.roster import Entry, RosterFault
+from grader.model.submission_time import AppliedOverride, Automatic, Lateness
 from grader.model.verdict import Status
 
 RUBRIC = RubricInfo(id="leeds-comp3631-lab1", version="1.2", digest="0" * 64)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import grader.figures
+import grader.report.figures
 from grader import pipeline
-from grader.batch import settled
-from grader.batch.settled import rewrite
+from grader.classes.batch import settled
+from grader.classes.batch.settled import rewrite
 from grader.model.figure import Figures
 from grader.report.files import write_reports
 from grader.results import Results
@@ -27,7 +27,7 @@ def kept(folder) -> None:
 
 
 def test_a_failure_to_draw_is_no_failure_to_grade(monkeypatch):
-    monkeypatch.setattr(grader.figures, "figures_of", broken)
+    monkeypatch.setattr(grader.report.figures, "figures_of", broken)
     assert pipeline.figures_of(load_rubric("leeds-comp3631-lab1"), {}, result()) is None
 
 

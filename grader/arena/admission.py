@@ -1,0 +1,198 @@
+"""The folder in which the graders of one user find each other."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import stat
+import struct
+import tempfile
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+from typing import TypeVar
+
+from typing_extensions import Self
+
+from grader.arena.memory import available_bytes
+from grader.files import lock
+
+NAME = "ros-lab-grader"
+
+
+def shared_folder() -> Path | None:
+    """The user's own folder for locks, made where it is missing; None where there is none that is ours alone."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    places = [Path(runtime) / NAME] if runtime.startswith("/") else []
+    places.append(Path(tempfile.gettempdir()) / f"{NAME}-{os.geteuid()}")
+    return next((place for place in places if _is_ours(place)), None)
+
+
+def _is_ours(folder: Path) -> bool:
+    with suppress(OSError):  # then the next place, or none
+        folder.mkdir(mode=0o700, exist_ok=True)
+        about = folder.lstat()
+        closed = not about.st_mode & (stat.S_IRWXG | stat.S_IRWXO)
+        return stat.S_ISDIR(about.st_mode) and about.st_uid == os.geteuid() and closed
+    return False
+
+
+# Locked files: shared by many or held by one, and free again when their holder ends (flock(2)).
+
+
+class FileLock:
+    """An open file that can be locked. Each object is a holder of its own, within one process too.
+
+    Raises OSError where the file cannot be opened or its file system knows no locks.
+    """
+
+    def __init__(self, path: Path) -> None:
+        flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
+        self._descriptor = os.open(path, flags, 0o600)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def take(self, *, shared: bool = False) -> bool:
+        """Lock it, or change how it is locked; False, and not locked, where somebody else's lock is in the way."""
+        return lock(self._descriptor, shared=shared)
+
+    def close(self) -> None:
+        """Give it free; a second time without effect."""
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+
+# How late this machine was a moment ago, as the arenas of all graders measure it: a small file that they share.
+
+ENTRY = struct.Struct("<qd")
+ENTRIES = 64
+FRESH_S = 1.0
+
+
+def note(path: Path, late_ms: float) -> None:
+    """Write down what was just measured. Raises OSError."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+    try:
+        place = os.getpid() % ENTRIES * ENTRY.size
+        os.pwrite(descriptor, ENTRY.pack(time.monotonic_ns(), late_ms), place)
+    finally:
+        os.close(descriptor)
+
+
+def latest_ms(path: Path) -> float:
+    """The worst that any grader measured within the last second; 0 where nobody did."""
+    try:
+        data = path.read_bytes()[: ENTRY.size * ENTRIES]
+    except FileNotFoundError:
+        return 0.0
+    now_ns = time.monotonic_ns()
+    whole = len(data) - len(data) % ENTRY.size
+    found = [late for at, late in ENTRY.iter_unpack(data[:whole]) if 0 <= now_ns - at < FRESH_S * 1e9]
+    return max((late for late in found if late == late and late >= 0), default=0.0)  # noqa: PLR0124 - not a number
+
+
+# Who may start now, and who may run alone.
+
+T = TypeVar("T")
+
+LOOK_S = 0.02
+LATE_MS = 10.0
+"""For each such step that the machine is late, one start fewer at a time; one is always let in."""
+RUN_BYTES = 400 << 20
+"""A run is let in while so much memory is available, or when there is no other."""
+START_PATIENCE_S, ALONE_PATIENCE_S, ROOM_PATIENCE_S = 300.0, 900.0, 120.0
+"""After so long one goes on in any case: whoever holds what is waited for is not at work any more."""
+
+
+class Leave:
+    """Leave to start processes, given back by `release`, or with the block that asked for it."""
+
+    def __init__(self, lock: FileLock | bool) -> None:
+        self._lock = lock
+
+    def release(self) -> None:
+        """They have started: somebody else may. A second time without effect."""
+        if isinstance(self._lock, FileLock):
+            self._lock.close()
+
+
+class Admission:
+    """For one event loop. Starts of this object are let in in the order in which they ask.
+
+    `folder` holds the locks (`shared_folder()`); without one nobody waits for anybody.
+    """
+
+    def __init__(self, folder: Path | None, *, starts: int | None = None) -> None:
+        self._folder = folder
+        self._starts = starts or len(os.sched_getaffinity(0))
+        self._next = asyncio.Lock()
+
+    @asynccontextmanager
+    async def run(self, *, alone: bool = False) -> AsyncIterator[None]:
+        """Wait until this run may begin: side by side with others while there is memory, or `alone`.
+
+        Whoever waits to be alone is waited for by all that come later.
+        """
+        if self._folder is None:
+            yield
+            return
+        with FileLock(self._folder / "runs") as runs:
+            with FileLock(self._folder / "turn") as turn:
+                await _until(lambda: turn.take(shared=not alone), ALONE_PATIENCE_S)
+                await _until(lambda: runs.take(shared=not alone), ALONE_PATIENCE_S)
+            if not alone:
+                await _until(lambda: _has_room(runs), ROOM_PATIENCE_S)
+            yield
+
+    @asynccontextmanager
+    async def start(self) -> AsyncIterator[Leave]:
+        """Wait until processes may be started: one start a core at a time, fewer while the machine is late."""
+        async with self._next:
+            lock = await _until(self._free, START_PATIENCE_S)
+        leave = Leave(lock)
+        try:
+            yield leave
+        finally:
+            leave.release()
+
+    def note_lateness(self, late_ms: float) -> None:
+        """What an arena has just measured on this machine."""
+        if self._folder is not None:
+            with suppress(OSError):  # a full disk: then admission knows less
+                note(self._folder / "lateness", late_ms)
+
+    def _free(self) -> FileLock | bool:
+        """A place to start, locked; False where all that are allowed now are taken."""
+        if self._folder is None:
+            return True
+        for number in range(self._allowed(self._folder)):
+            lock = FileLock(self._folder / f"start-{number}")
+            if lock.take():
+                return lock
+            lock.close()
+        return False
+
+    def _allowed(self, folder: Path) -> int:
+        late_ms = latest_ms(folder / "lateness")
+        return max(1, self._starts - int(min(late_ms, LATE_MS * self._starts) / LATE_MS))
+
+
+def _has_room(runs: FileLock) -> bool:
+    """Whether a run that shares this lock finds memory, or nobody else shares it. It is held if so."""
+    if not runs.take(shared=True):
+        return False
+    return available_bytes() > RUN_BYTES or (runs.take() and runs.take(shared=True))
+
+
+async def _until(look: Callable[[], T], patience_s: float) -> T:
+    """What `look` finds, as soon as it finds something, or after so long."""
+    until_s = time.monotonic() + patience_s
+    while not (found := look()) and time.monotonic() < until_s:  # noqa: ASYNC110 - others' locks tell no event loop
+        await asyncio.sleep(LOOK_S)
+    return found

@@ -1,0 +1,276 @@
+"""Where this machine lets the grader make control groups: they hold the memory and the tasks of a whole process tree.
+
+Sources: the kernel's documentation, admin-guide/cgroup-v2 and admin-guide/cgroup-v1/memory.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import secrets
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal
+
+from grader.model.record import Record
+
+MOUNTINFO = Path("/proc/self/mountinfo")
+MEMBERSHIP = Path("/proc/self/cgroup")
+ABANDONED_S = 600.0
+KEYS = {
+    ("memory", 1): "memory.limit_in_bytes",
+    ("memory", 2): "memory.max",
+    ("pids", 1): "pids.max",
+    ("pids", 2): "pids.max",
+    ("cpuacct", 1): "cpuacct.usage",
+    ("cpuacct", 2): "cpu.stat",
+}
+WEAKER = (
+    "no control group of this process can be written, so memory, sockets' buffers and files in memory are looked at "
+    "twice a second, and of what the kernel keeps for pipes and other descriptors only their number is bounded"
+)
+WEAKER_CPU = "CPU time of children that nobody waited for is not counted"
+
+
+class Cgroup(Record):
+    """One controller: new groups are made below `folder`."""
+
+    version: Literal[1, 2]
+    folder: str
+
+
+class Cgroups(Record):
+    """The controllers that can be used, None for one that cannot."""
+
+    memory: Cgroup | None = None
+    pids: Cgroup | None = None
+    cpuacct: Cgroup | None = None
+
+    @property
+    def label(self) -> str:
+        return f"cgroup v{self.memory.version}" if self.memory else "a watchdog"
+
+
+@lru_cache(maxsize=1)
+def find_cgroups() -> Cgroups:
+    """What is there and works: a group is made, limited and removed to see it."""
+    return Cgroups(memory=_find("memory"), pids=_find("pids"), cpuacct=_find("cpuacct"))
+
+
+def remove_groups(cgroups: Cgroups, arena: int) -> bool:
+    """Remove the groups that an arena left which was killed, by its process id. False while processes are in them."""
+    folders = [
+        Path(found.folder) for found in (cgroups.memory, cgroups.pids, cgroups.cpuacct) if found is not None
+    ]
+    groups = [group for folder in folders for group in folder.glob(f"grader-{arena}-*")]
+    for group in groups:
+        with suppress(OSError):
+            group.rmdir()
+    return not any(group.exists() for group in groups)
+
+
+def describe() -> str:
+    """For `grader doctor`: what holds memory and tasks, and what is weaker where it is no cgroup."""
+    found = find_cgroups()
+    memory = f"memory by {found.label}"
+    tasks = f"tasks by cgroup v{found.pids.version}" if found.pids else "tasks by rlimits and a watchdog"
+    counted = "" if found.cpuacct else f"; {WEAKER_CPU}"
+    return f"{memory}, {tasks}; {_where(found.memory)}{counted}"
+
+
+def has_memory() -> bool:
+    """Whether groups of version 2 can hold memory on this machine at all."""
+    there = [Path(mount[4], "cgroup.controllers") for mount in _mounts() if _type(mount) == "cgroup2"]
+    return any("memory" in path.read_text().split() for path in there if path.is_file())
+
+
+def own_group() -> str:
+    """The name of this process's group of version 2; empty where there is none."""
+    return next((path for _, names, path in _memberships() if names == ""), "")
+
+
+def _where(memory: Cgroup | None) -> str:
+    if memory is None:
+        return WEAKER
+    if memory.version == 2 and (Path(memory.folder) / LEAF).is_dir():
+        return f"in {Path(memory.folder).name}, which was delegated to the grader"
+    return "below its own group"
+
+
+def _find(controller: str) -> Cgroup | None:
+    for version, own in own_groups(controller):
+        folder = place_for_runs(own) if version == 2 else own
+        _sweep(folder)
+        if _usable(folder, KEYS[controller, version]):
+            return Cgroup(version=version, folder=str(folder))
+    return None
+
+
+def own_groups(controller: str) -> list[tuple[Literal[1, 2], Path]]:
+    """The group that this process is in, as a folder, for each hierarchy that may have the controller."""
+    mounts = _mounts()
+    found: list[tuple[Literal[1, 2], Path]] = []
+    for _, names, path in _memberships():
+        if names == "":
+            found += [(2, _below(m, path)) for m in mounts if _type(m) == "cgroup2"]
+        elif controller in names.split(","):
+            found += [
+                (1, _below(m, path))
+                for m in mounts
+                if _type(m) == "cgroup" and controller in m[-1].split(",")
+            ]
+    return found
+
+
+def _mounts() -> list[list[str]]:
+    try:
+        return [line.split() for line in MOUNTINFO.read_text().splitlines()]
+    except OSError:
+        return []
+
+
+def _memberships() -> list[list[str]]:
+    """Number, controllers and path of each group of this process; no controllers are version 2."""
+    try:
+        return [line.split(":", 2) for line in MEMBERSHIP.read_text().splitlines()]
+    except OSError:
+        return []
+
+
+def _type(mount: list[str]) -> str:
+    """The file system of a line of mountinfo (man 5 proc_pid_mountinfo): the first field after the dash."""
+    return mount[mount.index("-") + 1] if "-" in mount else ""
+
+
+def _below(mount: list[str], path: str) -> Path:
+    """Where the group `path` is below a mount point, whose own root may be a group already."""
+    root, point = mount[3], Path(mount[4])
+    inside = os.path.relpath(path, root) if path.startswith(root) else "."
+    return point / inside
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what a killed arena left: its groups are empty, and too old to be just made."""
+    for group in folder.glob("grader-*"):
+        with suppress(OSError):  # somebody's processes are in it, or it is gone
+            if time.time() - group.stat().st_mtime > ABANDONED_S:
+                group.rmdir()
+
+
+def _usable(folder: Path, key: str) -> bool:
+    trial = folder / f"grader-trial-{secrets.token_hex(4)}"
+    try:
+        trial.mkdir()
+    except OSError:
+        return False
+    try:
+        if key.partition(".")[0].startswith("cpu"):
+            return (trial / key).is_file()
+        (trial / key).write_text("1073741824" if key.startswith("memory") else "512")
+    except OSError:
+        return False
+    finally:
+        with suppress(OSError):  # an empty group of ours: it hurts nobody if it stays
+            trial.rmdir()
+    return True
+
+
+# A control group of version 2 that belongs to the grader is made ready: groups of runs can be made in it.
+#
+# The kernel lets a group have either processes, or controllers for the groups below it. So the grader's own processes
+# move into a group of their own, and those of the runs are made beside it.
+#
+# Sources: the kernel's documentation, admin-guide/cgroup-v2 ("No Internal Process Constraint");
+# systemd.io/CGROUP_DELEGATION.
+
+LEAF = "grader-main"
+PROCESSES = "cgroup.procs"
+SWITCHED_ON = "cgroup.subtree_control"
+CONTROLLERS = ("memory", "pids")
+MARKS = ("user.delegate", "trusted.delegate")
+"""How systemd marks what it leaves alone. The second can be read by root only, and older versions have no other."""
+SCOPES = re.compile(r"(grader|run)-[\w-]+\.scope")
+"""Those that the grader asks for (`cli/scope.py`), and those of `systemd-run --scope`."""
+USERS_OWN = "/user@"
+"""Below it all groups are the user's, also those that the user's systemd manages."""
+SYSTEMD = Path("/run/systemd/system")
+ROUNDS = 5
+
+
+def place_for_runs(own: Path) -> Path:
+    """Where groups of runs are to be made, for the group that this process is in; it is made ready where it may be."""
+    if own.name == LEAF:
+        return own.parent
+    with suppress(OSError):  # it stays as it was: `cgroups._usable` finds out what it can do
+        if _lacks_memory(own) and _belongs_to_the_grader(own):
+            _make_ready(own)
+    return own
+
+
+def _lacks_memory(group: Path) -> bool:
+    """Groups below it cannot be limited, and could be."""
+    could, can = ((group / name).read_text().split() for name in ("cgroup.controllers", SWITCHED_ON))
+    return "memory" in could and "memory" not in can
+
+
+def _belongs_to_the_grader(group: Path) -> bool:
+    """Nobody else manages it, and nobody else's processes are in it."""
+    free = not SYSTEMD.exists() or SCOPES.fullmatch(group.name) is not None
+    return (free or _handed_over(group)) and _all_ours(group, _processes(group))
+
+
+def _handed_over(group: Path) -> bool:
+    """All of it is for what runs in it: systemd says so, root gave it to this user, or it is a container's."""
+    for mark in MARKS:
+        with suppress(OSError):
+            if os.getxattr(group, mark) == b"1":
+                return True
+    given = group.stat().st_uid == os.geteuid() != 0 and USERS_OWN not in str(group)
+    containers = (
+        os.path.ismount(group) and (group / "cgroup.type").exists()
+    )  # the machine's own root has none
+    return given or containers
+
+
+def _all_ours(group: Path, pids: list[int]) -> bool:
+    """This process and what it started; in a group that was handed over, what started it, too."""
+    own = os.getpid()
+    ours = {own, *(_ancestors(own) if _handed_over(group) else ())}
+    return all(pid in ours or own in _ancestors(pid) for pid in pids)
+
+
+def _ancestors(pid: int) -> Iterator[int]:
+    """Those that this process can see: the number of one outside of its namespace is 0."""
+    with suppress(OSError, IndexError):
+        while pid := int(Path(f"/proc/{pid}/stat").read_text(errors="replace").rpartition(")")[2].split()[1]):
+            yield pid
+
+
+def _make_ready(group: Path) -> None:
+    """Raises OSError where that is not possible; then all is as before."""
+    leaf = group / LEAF
+    leaf.mkdir(exist_ok=True)
+    try:
+        for _ in range(ROUNDS):  # processes started since the last look are in it, too
+            if not (pids := _processes(group)) or not _all_ours(group, pids):
+                break
+            _move(pids, leaf)
+        there = (group / "cgroup.controllers").read_text().split()
+        (group / SWITCHED_ON).write_text(" ".join(f"+{name}" for name in CONTROLLERS if name in there))
+    except OSError:
+        _move(_processes(leaf), group)
+        leaf.rmdir()
+        raise
+
+
+def _processes(group: Path) -> list[int]:
+    return [int(pid) for pid in (group / PROCESSES).read_text().split()]
+
+
+def _move(pids: list[int], group: Path) -> None:
+    for pid in pids:
+        with suppress(ProcessLookupError):  # it has ended
+            (group / PROCESSES).write_text(str(pid))

@@ -1,0 +1,285 @@
+"""The folders and the environment that one submission's processes see, and the process specs made from them."""
+
+from __future__ import annotations
+
+import base64
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from grader.arena.built import Built, read_archive, read_folder
+from grader.arena.host_programs import host_program
+from grader.arena.inside import (
+    BASE_WORKSPACE,
+    BUILT,
+    HOME,
+    INSIDE_WORKSPACE,
+    LARGE,
+    OUTPUT,
+    SHIMS,
+    SOURCES,
+    STANDINS,
+)
+from grader.arena.limits import Limits
+from grader.arena.ros_env import SYSTEM_PATH, RosInstallation
+from grader.arena.sandbox import Sandbox, Word, copy_of, scratch
+from grader.arena.standin_packages import SOURCES as STANDIN_SOURCES
+from grader.arena.standin_packages import with_standins
+from grader.arena.system_calls import system_call_filter
+from grader.arena.workspace import Workspace
+
+LOOPBACK = "127.0.0.1"
+"""As an address: not every machine knows the name localhost."""
+LIBSTDBUF = Path("/usr/libexec/coreutils/libstdbuf.so")
+HEAD = (
+    "echo >&{lifeline} && read -r _ <&{lifeline} && exec {lifeline}>&-"
+    ' && mapfile -d "" -t words <&{words} && exec {words}<&- || exit 125; '
+)
+"""The first thing that runs says that it is there and waits for leave: an arena that has died gives none. Then it reads
+its variables and arguments (`ros/launching.py`)."""
+TAKE = 'export -- "${words[@]:1:words[0]}"; set -- "${words[@]:1+words[0]}"; unset words; '
+"""From here on what is the package's holds: until then, every program runs as it does anywhere."""
+RUN = 'cd "$HOME" && exec "$@"'
+COPY = (
+    f"mkdir {INSIDE_WORKSPACE} && cp -R --preserve=mode,links {SOURCES} {INSIDE_WORKSPACE}/"
+    f" && {{ [ ! -e {BUILT} ] || tar -xpf {BUILT} -C {INSIDE_WORKSPACE} devel 2>/dev/null || true; }} || exit 125; "
+)
+"""Each process tree has a workspace of its own: the sources, and what the build made of them."""
+BUILD_COPY = (
+    f"mkdir {INSIDE_WORKSPACE} && cp -R --preserve=mode,links {SOURCES} {INSIDE_WORKSPACE}/"
+    f" && {{ [ ! -e {BASE_WORKSPACE} ] || tar -xmf {BASE_WORKSPACE} -C {INSIDE_WORKSPACE} build"
+    f" || rm -rf {INSIDE_WORKSPACE}/build; }} || exit 125; "
+)
+BUILD_RUN = (
+    'cd "$HOME" && { "$@" {collect}>&-; code=$?; }; '
+    f"tar -cf - -C {INSIDE_WORKSPACE} --ignore-failed-read devel -C {OUTPUT} . >&{{collect}} 2>/dev/null; exit $code"
+)
+"""What the build made is handed over through a pipe, whatever came of it. The base workspace is as old as the build."""
+ARCHIVE = "built.tar"
+BASE = "base.tar"
+STAGE = "stage"
+"""The folder over which the arena mounts what sandboxes see (`ros/stage.py`)."""
+OUTPUT_FILES = 1_000
+OWN_VARIABLES = (
+    "ROS_MASTER_URI",
+    "ROS_IP",
+    "ROS_HOSTNAME",
+    "ROS_HOME",
+    "ROS_LOG_DIR",
+    "ROSCONSOLE_CONFIG_FILE",
+)
+"""The arena's to set: what a package's environment hooks say of them would lead its nodes elsewhere."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """`folder` is this submission's own, `env` what the built workspace's `setup.bash` adds."""
+
+    folder: Path
+    ros: RosInstallation
+    sandbox: Sandbox
+    limits: Limits
+    workspace: Workspace
+    package: str
+    env: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def archive(self) -> Path:
+        """What the build handed over, where it ran in a sandbox."""
+        return self.workspace.kept / ARCHIVE
+
+    @property
+    def base(self) -> Path:
+        """The base workspace for this place's build (`base.py`), where there is one."""
+        return self.workspace.kept / BASE
+
+    @cached_property
+    def built(self) -> Built:
+        """What `rosrun` finds of the build. Asked only once the build is over."""
+        if self.sandbox.bubblewrap:
+            return read_archive(self.archive, self.package)
+        return read_folder(self.workspace.built / "devel", self.package)
+
+    @property
+    def inside_workspace(self) -> str:
+        """Where processes find the workspace."""
+        return INSIDE_WORKSPACE if self.sandbox.bubblewrap else str(self.workspace.built)
+
+    @property
+    def output(self) -> str:
+        """Where the build may leave files for the grader."""
+        return OUTPUT if self.sandbox.bubblewrap else str(self.folder / "home")
+
+    @property
+    def package_folder(self) -> str:
+        return f"{self.inside_workspace}/src/{self.workspace.folder}"
+
+    @property
+    def shims(self) -> str:
+        """Where processes find `python` and the grader's helpers."""
+        return SHIMS if self.sandbox.bubblewrap else str(self.folder / "bin")
+
+    @property
+    def standins(self) -> str:
+        """Where processes find the packages that stand in for missing ones."""
+        return STANDINS if self.sandbox.bubblewrap else str(self.folder / "standins")
+
+    def from_source(self) -> Place:
+        """Without a build: ROS still finds the package's sources."""
+        path = f"{self.inside_workspace}/src:{self.ros.env.get('ROS_PACKAGE_PATH', '')}"
+        return replace(self, env={"ROS_PACKAGE_PATH": path.rstrip(":")})
+
+    def find_program(self, script: str) -> tuple[str, str] | None:
+        """What `rosrun` would start for a script: (its path for a process, its path in the package), or None.
+
+        A program that the build installed wins, as with `rosrun`; then the script's own place, then any other.
+        """
+        name = Path(script).name
+        found = self.script_path(script)
+        if name in self.built.programs:
+            return f"{self.devel_programs}/{name}", found or script
+        if found is None:
+            return None
+        return f"{self.package_folder}/{found}", found
+
+    @property
+    def devel_programs(self) -> str:
+        """Where the build puts the package's programs, as processes see it."""
+        return f"{self.inside_workspace}/devel/lib/{self.package}"
+
+    @property
+    def share_folders(self) -> tuple[Path, ...]:
+        """Folders that hold installed packages side by side, the stand-ins' last."""
+        known = [Path(p) / "share" for p in self.ros.prefixes]
+        known += [Path(p) for p in self.ros.env.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p]
+        return (*known, self.folder / "standins" / "share", STANDIN_SOURCES)
+
+    def package_file(self, file: str) -> Path | None:
+        """Where a file of the package is on disk, found as `script_path` finds it."""
+        found = self.script_path(file)
+        return None if found is None else self.workspace.repaired / self.workspace.folder / found
+
+    def script_path(self, script: str) -> str | None:
+        """Where a script is in the package: at its place, else the shallowest file of that name."""
+        package = self.workspace.repaired / self.workspace.folder
+        if (package / script).is_file():
+            return script
+        others = sorted(package.rglob(Path(script).name), key=lambda p: (len(p.parts), str(p)))
+        return next((p.relative_to(package).as_posix() for p in others if p.is_file()), None)
+
+    def arena_env(self) -> dict[str, str]:
+        """The managed roscore's environment: ROS and nothing of the shell's."""
+        return {"LANG": "C.UTF-8", "ROS_IP": LOOPBACK, **self.ros.env, "PATH": _path(self.ros, "")}
+
+    def spec(
+        self,
+        name: str,
+        argv: Sequence[str],
+        *,
+        role: str = "student",
+        copy: bool = True,
+        as_handed_in: bool = False,
+        collect: str | None = None,
+        collect_bytes: int | None = None,
+        build: bool = False,
+        **more: Any,  # noqa: ANN401 - fields of the spec
+    ) -> dict[str, Any]:
+        """What the arena needs to start a process. With `copy` it gets a workspace of its own: the sources with the
+        repairs, or `as_handed_in`, and what the build made. `build` is the build itself. What the process writes to
+        `{collect}`, `collect_bytes` at most, becomes the file of that name in `workspace.kept`."""
+        boxed = self.sandbox.bubblewrap
+        limits = self._limits(copy=copy)
+        kept = None if collect is None else str(self.workspace.kept / collect)
+        filtered = system_call_filter() if boxed else None
+        return {
+            "name": name,
+            "role": role,
+            "argv": list(argv),
+            "env": self._process_env(),
+            "outer": self.sandbox.outer(limits),
+            "bwrap": host_program("bwrap"),
+            "wall": self.sandbox.wall(
+                ros=self.ros,
+                place=self.folder,
+                limits=limits,
+                binds=self._binds(copy=copy, as_handed_in=as_handed_in or build, output=build),
+                net=role != "grader" or not as_handed_in,
+            ),
+            "filter": base64.b64encode(filtered).decode() if filtered else None,
+            "shell": ["/bin/bash", "-c", self._words(copy=copy and boxed, build=build), "bash"],
+            "collect": {"file": kept, "bytes": collect_bytes or self.limits.built_bytes}
+            if kept and boxed
+            else None,
+            "script": None,
+            "repairs": [],
+            **more,
+        }
+
+    def _words(self, *, copy: bool, build: bool) -> str:
+        """The script of the first shell. Nothing of the submission is in it."""
+        before, run = (BUILD_COPY, BUILD_RUN) if build else (COPY, RUN)
+        first = self.sandbox.first_words(self.limits) + HEAD
+        return first + (before + TAKE + run if copy else TAKE + RUN)
+
+    def _limits(self, *, copy: bool) -> Limits:
+        """A workspace of the size that was handed in has room beside what else may be written."""
+        room = self.limits.home_bytes + (2 * self.workspace.copied_bytes if copy else 0)
+        return self.limits.model_copy(update={"home_bytes": room})
+
+    def _binds(self, *, copy: bool, as_handed_in: bool, output: bool) -> list[Word]:
+        if not copy:
+            return []
+        workspace = self.workspace
+        sources = workspace.built / "src" if as_handed_in else workspace.repaired
+        binds: list[Word] = [
+            "--ro-bind",
+            copy_of(workspace.large),
+            LARGE,
+            "--ro-bind",
+            copy_of(sources),
+            SOURCES,
+        ]
+        if output:
+            base: list[Word] = (
+                ["--ro-bind", copy_of(self.base), BASE_WORKSPACE] if self.base.is_file() else []
+            )
+            return [*binds, *base, "--bind", scratch(self.limits.tmp_bytes, OUTPUT_FILES), OUTPUT]
+        return [*binds, "--ro-bind", copy_of(self.archive), BUILT] if self.archive.is_file() else binds
+
+    def stage(self) -> dict[str, Any] | None:
+        """Where the arena makes its stage, and the user who writes there; None without a sandbox."""
+        if not self.sandbox.bubblewrap:
+            return None
+        folder = self.folder / STAGE
+        folder.mkdir(mode=0o711, exist_ok=True)
+        folder.chmod(0o711)
+        return {"folder": str(folder), "owner": self.sandbox.uid or os.geteuid()}
+
+    def _process_env(self) -> dict[str, str]:
+        home = HOME if self.sandbox.bubblewrap else str(self.folder / "home")
+        base = {
+            "HOME": home,
+            "LANG": "C.UTF-8",
+            "LOGNAME": "student",
+            "PYTHONUNBUFFERED": "1",
+            "ROSCONSOLE_STDOUT_LINE_BUFFERED": "1",
+            "ROS_IP": LOOPBACK,
+            "ROS_HOME": f"{home}/.ros",
+            "SHELL": "/bin/bash",
+            "TERM": "dumb",
+            "USER": "student",
+        }
+        if LIBSTDBUF.exists():
+            base |= {"LD_PRELOAD": str(LIBSTDBUF), "_STDBUF_O": "L", "_STDBUF_E": "L"}
+        added = {name: value for name, value in self.env.items() if name not in OWN_VARIABLES}
+        merged = with_standins({**base, **self.ros.env, **added}, self.folder / "standins", self.standins)
+        return {**merged, "PATH": _path(self.ros, merged.get("PATH", ""), self.shims)}
+
+
+def _path(ros: RosInstallation, path: str, *first: str) -> str:
+    """What the package adds comes last: a program of its own never takes the place of the system's or of ROS's."""
+    entries = [*first, *ros.env["PATH"].split(os.pathsep), *SYSTEM_PATH.split(":"), *path.split(os.pathsep)]
+    return os.pathsep.join(dict.fromkeys(e for e in entries if e))

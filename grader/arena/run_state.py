@@ -1,0 +1,278 @@
+"""What has been seen of a run so far, and whether that is enough: pure, fed by the arena's frames."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from grader.model.message_rate import RateBounds
+from grader.rubric.model import Until
+
+Outcome = tuple[str, str]
+ARRIVALS_MAX = 2000
+HEARD_S = 2.0
+CONNECTED_S = 1.0
+"""So long after the last probe and the last line, a value that is not printed will not be."""
+
+
+@dataclass
+class TopicSeen:
+    """Student's messages on one topic; times are monotonic seconds of arrival at the grader."""
+
+    count: int = 0
+    first_s: float = 0.0
+    last_s: float = 0.0
+
+
+@dataclass
+class Live:
+    """The state that conditions look at. `running` and `ended` are the student's processes, `helpers` the grader's own
+    programs that run beside them, `registered` the processes of which a node has registered."""
+
+    started_s: float = 0.0
+    topics: dict[str, TopicSeen] = field(default_factory=lambda: defaultdict(TopicSeen))
+    running: set[str] = field(default_factory=set)
+    ended: set[str] = field(default_factory=set)
+    helpers: set[str] = field(default_factory=set)
+    nodes: set[str] = field(default_factory=set)
+    helper_nodes: set[str] = field(default_factory=set)
+    registered: set[str] = field(default_factory=set)
+    first_node_s: float = 0.0
+    services: set[str] = field(default_factory=set)
+    opened: set[str] = field(default_factory=set)
+    activity_s: float = 0.0
+    news_s: float = 0.0
+    subscribed: set[str] = field(default_factory=set)
+    connected_s: dict[str, float] = field(default_factory=dict)
+    unheard: dict[str, re.Pattern[str]] = field(default_factory=dict)
+    last_sent_s: float = 0.0
+    graph_changed_s: float = 0.0
+    graph_picture: object = None
+    graphs: int = 0
+    last_line_s: float = 0.0
+    rates: dict[str, list[RateBounds]] = field(default_factory=lambda: defaultdict(list))
+    arrivals_ns: dict[str, list[int]] = field(default_factory=dict)
+
+    def rate(self, rates: Iterable[RateBounds]) -> None:
+        """These rates are to be seen: when their messages arrive is kept."""
+        for bounds in rates:
+            self.rates[bounds.topic].append(bounds)
+            self.arrivals_ns[bounds.topic] = []
+
+    def arrived(self, topic: str, count: int, time_ns: int) -> None:
+        """Messages of a student's, together. Of a flood, only the first ones and the latest are kept."""
+        times_ns = self.arrivals_ns.get(topic)
+        if times_ns is not None:
+            room = ARRIVALS_MAX - len(times_ns)
+            times_ns += [time_ns] * min(count, room)
+            times_ns[-1] = time_ns
+
+    def message(self, topic: str, count: int, now_s: float, *, active: bool = True) -> None:
+        """Messages came, of the student's (`active`) or of a program that runs beside."""
+        seen = self.topics[topic]
+        seen.first_s = seen.first_s or now_s
+        seen.last_s = now_s
+        seen.count += count
+        if active:
+            self.activity_s = now_s
+
+    def active(self, now_s: float) -> None:
+        """Something of the student's happened, besides messages."""
+        self.activity_s = self.news_s = now_s
+
+    def graph(
+        self, nodes: Iterable[str], processes: Mapping[str, str], now_s: float, *, picture: object = None
+    ) -> None:
+        """The master's nodes of the student's, and the processes that nodes belong to.
+
+        `picture` is all that counts as a change, the nodes alone where it is None.
+        """
+        nodes = frozenset(nodes)
+        picture = nodes if picture is None else picture
+        if picture != self.graph_picture:
+            self.graph_changed_s, self.graph_picture = now_s, picture
+        self.registered |= set(processes.values())
+        self.helper_nodes |= {n for n in nodes if processes.get(n) in self.helpers}
+        own = {n for n in nodes if n not in self.helper_nodes}
+        if own - self.nodes:
+            self.first_node_s = self.first_node_s or now_s
+            self.active(now_s)
+        self.nodes |= own
+
+    def connections(self, topics: Iterable[str], now_s: float) -> None:
+        """The topics over which nodes are connected now; since when is kept."""
+        self.connected_s = {topic: self.connected_s.get(topic, now_s) for topic in topics}
+
+    def sent(self, value: str, now_s: float) -> None:
+        """A probe went out: its value is to be printed, as a word of its own."""
+        self.last_sent_s = now_s
+        self.unheard[value] = re.compile(rf"(?<![\w.-]){re.escape(value)}(?![\w.])")
+
+    def printed(self, line: str, now_s: float) -> None:
+        self.last_line_s = now_s
+        self.active(now_s)
+        self.unheard = {value: word for value, word in self.unheard.items() if not word.search(line)}
+
+
+def settled(live: Live, until: Until, now_s: float) -> Outcome | None:
+    """(outcome, detail) once the run has seen enough or has to give up, else None.
+
+    `silent`: what was waited for stopped coming, or never came though the nodes were up.
+    """
+    enough = (
+        _window(live, until, now_s),
+        _messages(live, until),
+        _connected(live, until, now_s),
+        _heard(live, until, now_s),
+        _nodes(live, until, now_s),
+        _quiet(live, until, now_s),
+    )
+    if live.ended and not live.running:
+        return "complete" if until.ended and all(enough) else "ended", ""
+    if _waits(until):
+        if all(enough):
+            return "complete", ""
+    elif now_s - live.started_s > until.limit_s:
+        return "complete", f"watched for {until.limit_s:g} s"
+    silent = _silent(live, until, now_s)
+    if silent:
+        return "silent", silent
+    if now_s - live.started_s > until.limit_s:
+        return "timeout", f"not complete after {until.limit_s:g} s"
+    return None
+
+
+def _waits(until: Until) -> bool:
+    """Whether anything ends the run before its limit."""
+    lasting = (until.window_s, until.alive_s, until.quiet_s)
+    seen = (until.messages, until.connected, until.heard, until.nodes, until.opened, until.ended)
+    return any(seconds is not None for seconds in lasting) or any(seen)
+
+
+def waiting_for(live: Live, until: Until) -> str:
+    """In a few words, what the run still waits for."""
+    missing = [t for t in (*until.topics, *until.messages) if not live.topics[t].count]
+    if missing:
+        return f"waiting for the first message on {missing[0]}"
+    for topic, wanted in until.messages.items():
+        if live.topics[topic].count < wanted:
+            return f"{live.topics[topic].count} of {wanted} messages on {topic}"
+    if not set(until.connected) <= set(live.connected_s):
+        return f"waiting for a connection over {', '.join(until.connected)}"
+    if len(live.nodes) < until.nodes:
+        return f"{len(live.nodes)} of {until.nodes} nodes are up"
+    return "observing"
+
+
+def next_look_s(live: Live, until: Until, now_s: float) -> float:
+    """How long nothing can change by time alone."""
+    looks = [live.started_s + until.limit_s, live.started_s + until.first_message_s]
+    for seen in live.topics.values():
+        looks += [
+            seen.first_s + (until.window_s or 0),
+            seen.last_s + until.silent_s,
+            seen.first_s + until.silent_s,
+        ]
+    looks += [live.graph_changed_s + max(until.silent_s, until.first_message_s)]
+    looks += [max(live.last_line_s, live.last_sent_s) + HEARD_S]
+    looks += [live.activity_s + (until.quiet_s or 0), live.news_s + until.silent_s]
+    looks += [live.first_node_s + (until.alive_s or 0)]
+    ahead = [look - now_s for look in looks if look > now_s]
+    return min([*ahead, 1.0]) + 0.001
+
+
+def _seen(live: Live, topics: Iterable[str]) -> list[TopicSeen]:
+    return [live.topics[t] for t in topics if live.topics[t].count]
+
+
+def _talking(live: Live) -> list[TopicSeen]:
+    """Topics with messages; what is logged says nothing of what else may come."""
+    return [seen for topic, seen in live.topics.items() if seen.count and topic != "/rosout"]
+
+
+def _window(live: Live, until: Until, now_s: float) -> bool:
+    if until.window_s is None:
+        return True
+    topics = until.topics or tuple(live.topics)
+    seen = _seen(live, topics)
+    if not seen:
+        return _talks_elsewhere(live, until, now_s)
+    if _rates_are_clear(live, until.topics):
+        return True
+    if len(seen) == len(topics):
+        return now_s >= max(s.first_s for s in seen) + until.window_s
+    return now_s >= max(s.first_s for s in seen) + max(until.window_s, until.silent_s)
+
+
+def _talks_elsewhere(live: Live, until: Until, now_s: float) -> bool:
+    """The nodes have talked for so long on topics that nobody waits for: no more will come of them."""
+    first_s = min((seen.first_s for seen in _talking(live)), default=now_s)
+    return now_s > first_s + max(until.window_s or 0, until.silent_s)
+
+
+def _rates_are_clear(live: Live, topics: tuple[str, ...]) -> bool:
+    """Whether each topic is there to show a rate, and its rate is known well enough."""
+    return bool(topics) and all(
+        topic in live.rates
+        and all(bounds.settled_by(live.arrivals_ns[topic]) for bounds in live.rates[topic])
+        for topic in topics
+    )
+
+
+def _messages(live: Live, until: Until) -> bool:
+    return all(live.topics[topic].count >= count for topic, count in until.messages.items())
+
+
+def _connected(live: Live, until: Until, now_s: float) -> bool:
+    """For so long that a node which dies as soon as it is up has done so."""
+    since = [live.connected_s.get(topic, now_s) for topic in until.connected]
+    return all(now_s >= one_s + CONNECTED_S for one_s in since)
+
+
+def _nodes(live: Live, until: Until, now_s: float) -> bool:
+    """Everything that is there or not there: nodes, programs asked to open something, processes that ended."""
+    alive = until.alive_s is None or (bool(live.nodes) and now_s >= live.first_node_s + until.alive_s)
+    up = len(live.nodes) >= until.nodes and set(until.opened) <= live.opened
+    return alive and up and set(until.ended) <= live.ended
+
+
+def _quiet(live: Live, until: Until, now_s: float) -> bool:
+    return until.quiet_s is None or (live.activity_s > 0 and now_s >= live.activity_s + until.quiet_s)
+
+
+def _heard(live: Live, until: Until, now_s: float) -> bool:
+    if not until.heard or not live.unheard:
+        return True
+    return now_s > max(live.last_line_s, live.last_sent_s) + HEARD_S
+
+
+def _silent(live: Live, until: Until, now_s: float) -> str:
+    waited = (*until.topics, *until.messages)
+    seen = _talking(live)
+    if waited and not seen:
+        return (
+            f"no message within {until.first_message_s:g} s"
+            if now_s > live.started_s + until.first_message_s
+            else ""
+        )
+    for topic, count in until.messages.items():
+        last_s = live.topics[topic].last_s or min(s.first_s for s in seen)
+        if live.topics[topic].count < count and now_s > last_s + until.silent_s:
+            return f"no message on {topic} for {until.silent_s:g} s"
+    patience_s = max(until.silent_s, until.first_message_s)
+    if until.connected and live.graph_changed_s and now_s > live.graph_changed_s + patience_s:
+        return f"the graph has not changed for {patience_s:g} s"
+    return _standstill(live, until, now_s)
+
+
+def _standstill(live: Live, until: Until, now_s: float) -> str:
+    """Nothing happens any more, though more nodes, programs or ends were waited for."""
+    growing_up = live.nodes and now_s < live.first_node_s + (until.alive_s or 0)
+    if growing_up or _nodes(live, until, now_s):
+        return ""
+    patience_s = until.silent_s if live.nodes else max(until.silent_s, until.first_message_s)
+    if now_s > max(live.news_s, live.started_s) + patience_s:
+        return f"nothing happened for {patience_s:g} s"
+    return ""

@@ -1,0 +1,69 @@
+"""Operators: named functions, each making one kind of mistake wherever it fits a correct package."""
+
+from __future__ import annotations
+
+import inspect
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+from grader.authoring.mutation.solution import Site, Solution
+from grader.model.record import Record
+
+FITS = "Fits "
+
+
+class NoParams(Record):
+    """For an operator that has nothing to set."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Operator:
+    """`mistake` is what the student does wrong, `fits` what of the package the operator works on."""
+
+    name: str
+    function: Callable[[Solution, Record], Iterator[Site]]
+    params: type[Record]
+    mistake: str
+    fits: str
+
+    @property
+    def family(self) -> str:
+        return self.function.__module__.rpartition(".")[2]
+
+    def sites(self, solution: Solution, params: Record | None = None) -> tuple[Site, ...]:
+        """Every place where it fits, each under another `at`; empty where it fits nowhere."""
+        found = [s for s in self.function(solution, params or self.params()) if s.tree != solution.tree]
+        alike = Counter(frozenset(site.at.items()) for site in found)
+        return tuple(
+            replace(site, at={**site.at, "line": site.line})
+            if alike[frozenset(site.at.items())] > 1 and site.line is not None
+            else site
+            for site in found
+        )
+
+
+OPERATORS: dict[str, Operator] = {}
+
+
+def operator(
+    name: str, *, params: type[Record] = NoParams
+) -> Callable[[Callable[..., Iterator[Site]]], Callable[..., Iterator[Site]]]:
+    """Put a function into `OPERATORS`. Its docstring's first line is the mistake, a line `Fits …` where it fits.
+
+    Raises ValueError for a name that is taken and for a docstring that lacks one of the two.
+    """
+
+    def register(function: Callable[..., Iterator[Site]]) -> Callable[..., Iterator[Site]]:
+        mistake, *rest = (inspect.getdoc(function) or "").splitlines() or [""]
+        fits = next((line.removeprefix(FITS) for line in rest if line.startswith(FITS)), "")
+        if name in OPERATORS or not mistake or not fits:
+            raise ValueError(
+                f"operator {name}: {'twice' if name in OPERATORS else 'its docstring says too little'}"
+            )
+        OPERATORS[name] = Operator(
+            name=name, function=function, params=params, mistake=mistake.rstrip("."), fits=fits.rstrip(".")
+        )
+        return function
+
+    return register

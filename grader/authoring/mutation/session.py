@@ -1,0 +1,206 @@
+"""A rubric's whole test: the reference solution, then its mutants, then what is to be said of them."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader.authoring.mutation.compare import DOUBTFUL, Comparison, compare, lost_criteria
+from grader.authoring.mutation.model import MutantResult, ReferenceResult, RubricTest
+from grader.authoring.mutation.operators import OPERATORS
+from grader.authoring.mutation.plan import Planned
+from grader.authoring.mutation.solution import Solution
+from grader.authoring.mutation.tree import Tree, unified_diff, write_tree
+from grader.classes.batch.workers import Graded, Job, Sandbox, grade_all
+from grader.errors import HostError
+from grader.model.progress import Progress
+from grader.model.result import GradingResult, RubricInfo
+from grader.model.verdict import Status
+from grader.rubric.load import LoadedRubric
+from grader.temporary import temporary_folder
+
+REFERENCE = "reference"
+SOURCE = "source"
+DIFF = "mutant.diff"
+COSTING = {Status.FAIL.value, Status.PARTIAL.value}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What is to be tried. `given` is how the solution is called. `partial` is set where the user chose some of the
+    mutants; with `keep_all`, what killed mutants left in `out` is kept too."""
+
+    rubric: LoadedRubric
+    solution: Solution
+    given: str
+    mutants: Sequence[Planned]
+    unfit: Sequence[str] = ()
+    partial: bool = False
+    jobs: int
+    out: Path
+    keep_all: bool
+    sandbox: Sandbox = "auto"
+
+
+def run_test(plan: Plan, progress: Progress) -> RubricTest:
+    """Grade everything. Raises HostError where not even the reference solution can be judged here."""
+    begun_s = time.monotonic()
+    result = _reference(plan, progress)
+    reference = _reference_result(plan, result, progress)
+    mutants: list[MutantResult] = []
+    if not reference.lost:
+        mutants = _mutants(plan, _not_reached(result), progress, time.monotonic() - begun_s)
+    known = None if plan.partial or reference.lost else _uncosted(plan, mutants)
+    killed = bool(mutants) and all(mutant.state == "killed" for mutant in mutants)
+    rubric = plan.rubric
+    return RubricTest(
+        rubric=RubricInfo(id=rubric.rubric.id, version=rubric.rubric.version, digest=rubric.digest),
+        solution=plan.given,
+        reference=reference,
+        mutants=tuple(mutants),
+        uncosted=known,
+        unfit=tuple(plan.unfit),
+        wall_s=round(time.monotonic() - begun_s, 3),
+        passed=killed and not reference.lost and not known,
+    )
+
+
+# ---- the reference solution
+
+
+def _reference(plan: Plan, progress: Progress) -> GradingResult:
+    (graded,) = _graded(
+        plan, {REFERENCE: plan.solution.tree}, 1, lambda _: progress.step(REFERENCE, "running")
+    )
+    if graded.result is None:
+        raise HostError(f"the reference solution could not be graded: {graded.error}")
+    doubtful = [c for c in graded.result.criteria if c.status in DOUBTFUL]
+    if doubtful:
+        raise HostError(
+            f"the reference solution could not be judged: {doubtful[0].id}: {doubtful[0].message}",
+            hint=doubtful[0].hint or "`grader doctor` shows what this machine lacks",
+        )
+    return graded.result
+
+
+def _reference_result(plan: Plan, result: GradingResult, progress: Progress) -> ReferenceResult:
+    """Every criterion that is worth points has to be reached."""
+    lost = lost_criteria([c for c in result.criteria if c.max_points > 0])
+    said = "lost: " + ", ".join(c.id for c in lost) if lost else "everything reached"
+    progress.step(REFERENCE, "failed" if lost else "done", said)
+    return ReferenceResult(
+        points=result.points,
+        max_points=result.max_points,
+        lost=lost,
+        evidence=_kept(plan, REFERENCE, plan.solution.tree, wanted=bool(lost)),
+    )
+
+
+def _not_reached(result: GradingResult) -> frozenset[str]:
+    """Advice that the correct package gets too, and what a person judges: no mutant is measured by it."""
+    return frozenset(c.id for c in result.criteria if c.status is not Status.PASS)
+
+
+# ---- the mutants
+
+
+def _mutants(
+    plan: Plan, ignored: frozenset[str], progress: Progress, expected_s: float
+) -> list[MutantResult]:
+    """Side by side; what is inconclusive then is graded once more, alone."""
+    results: dict[str, MutantResult] = {}
+
+    def run(mutants: Iterable[Planned], jobs: int) -> None:
+        named = {mutant.name: mutant for mutant in mutants}
+        begun_s: dict[str, float] = {}
+
+        def begun(name: str) -> None:
+            begun_s[name] = time.monotonic()
+            progress.step(named[name].label, "running", expected_s=expected_s)
+
+        with closing(_graded(plan, {n: m.tree for n, m in named.items()}, jobs, begun)) as gradings:
+            for graded in gradings:
+                took_s = time.monotonic() - begun_s[graded.name]
+                result = _mutant_result(plan, named[graded.name], graded, ignored, took_s)
+                results[graded.name] = result
+                progress.step(result.label, "done" if result.state == "killed" else "failed", _said(result))
+
+    run(sorted(plan.mutants, key=_waits_least), plan.jobs)
+    for mutant in plan.mutants:
+        if results[mutant.name].state == "inconclusive":
+            run([mutant], 1)
+    return [results[mutant.name] for mutant in plan.mutants]
+
+
+def _waits_least(mutant: Planned) -> bool:
+    """A launch file that does not bring up what a run waits for is watched to its limit: such mutants go first."""
+    return not any("launch" in name for name in mutant.operators)
+
+
+def _said(result: MutantResult) -> str:
+    lost = ", ".join(criterion.id for criterion in result.lost) or "nothing"
+    return f"{result.state}, lost: {result.error or lost}"
+
+
+def _mutant_result(
+    plan: Plan, mutant: Planned, graded: Graded, ignored: frozenset[str], took_s: float
+) -> MutantResult:
+    criteria = graded.result.criteria if graded.result else ()
+    compared = compare(mutant.costs, criteria, ignored) if graded.result else Comparison(state="error")
+    return MutantResult(
+        name=mutant.name,
+        label=mutant.label,
+        operator=mutant.step.operator,
+        mistake="; ".join(OPERATORS[name].mistake for name in mutant.operators),
+        state=compared.state,
+        expected=mutant.costs,
+        lost=lost_criteria(criteria, ignored),
+        missing=compared.missing,
+        surplus=compared.surplus,
+        differing=compared.differing,
+        diff=unified_diff(plan.solution.tree, mutant.tree),
+        evidence=_kept(plan, mutant.name, mutant.tree, wanted=compared.state != "killed"),
+        error=graded.error,
+        wall_s=round(took_s, 3),
+    )
+
+
+def _uncosted(plan: Plan, results: Sequence[MutantResult]) -> tuple[str, ...]:
+    """Criteria that are worth points, and that no mutant fails."""
+    failed = {c.id for result in results for c in result.lost if c.status in COSTING}
+    criteria = plan.rubric.rubric.criteria
+    return tuple(c.id for c in criteria if c.points > 0 and c.check != "manual" and c.id not in failed)
+
+
+# ---- gradings
+
+
+def _graded(
+    plan: Plan, trees: Mapping[str, Tree], jobs: int, begun: Callable[[str], None]
+) -> Generator[Graded, None, None]:
+    """Each tree's grading in `out/<name>/`. The trees are written where no repository of the user's is around them,
+    for a repository would know their modes better than the disk."""
+    with temporary_folder("mutants") as folder:
+        work = []
+        for name, tree in trees.items():
+            source = folder / name
+            write_tree(tree, source)
+            work.append(
+                Job(name=name, source=source, rubric=plan.rubric.path, out=plan.out, sandbox=plan.sandbox)
+            )
+        yield from grade_all(work, jobs, begun)
+
+
+def _kept(plan: Plan, name: str, tree: Tree, *, wanted: bool) -> str | None:
+    """The grading's folder with the graded files in `source/`, where it is to be kept."""
+    folder = plan.out / name
+    if not (plan.keep_all or wanted):
+        shutil.rmtree(folder, ignore_errors=True)
+        return None
+    write_tree(tree, folder / SOURCE)
+    (folder / DIFF).write_text(unified_diff(plan.solution.tree, tree), encoding="utf-8")
+    return str(folder)

@@ -1,0 +1,133 @@
+"""A correct package as operators see it: its files in memory, parsed where somebody asks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import PurePosixPath
+
+import cmake_parser
+from cmake_parser.ast import Command
+from cmake_parser.error import CMakeParseError
+
+from grader.authoring.mutation.python import Script
+from grader.authoring.mutation.spans import Edit, applied
+from grader.authoring.mutation.tree import Entry, Tree
+from grader.authoring.mutation.xml import Document
+
+MANIFEST = "package.xml"
+CMAKE = "CMakeLists.txt"
+BUILT = frozenset({"build", "devel", "install"})
+PYTHON_SHEBANG = re.compile(rb"#!\s*\S*(?:python|env +python)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Site:
+    """One place where an operator fits. `at` tells it from the others; `tree` is the mutant made there."""
+
+    at: Mapping[str, str | int]
+    tree: Tree
+    line: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solution:
+    """`folder` is the package's folder within the tree, empty or ending in a slash. All paths of files that are
+    given and taken are relative to it."""
+
+    tree: Tree
+    folder: str
+    name: str
+
+    # ---- what is there
+
+    @cached_property
+    def files(self) -> tuple[str, ...]:
+        """The package's own files; what a build left is none."""
+        inside = [name.removeprefix(self.folder) for name in self.tree if name.startswith(self.folder)]
+        return tuple(sorted(name for name in inside if PurePosixPath(name).parts[0] not in BUILT))
+
+    def entry(self, path: str) -> Entry:
+        return self.tree[self.folder + path]
+
+    def text(self, path: str) -> str:
+        return self.entry(path).data.decode(errors="surrogateescape")
+
+    @cached_property
+    def programs(self) -> tuple[str, ...]:
+        """The files that begin with a shebang."""
+        return tuple(name for name in self.files if self.entry(name).data.startswith(b"#!"))
+
+    @cached_property
+    def scripts(self) -> tuple[Script, ...]:
+        """The Python files that compile."""
+        return tuple(script for name in self.files if self._is_python(name) if (script := self._script(name)))
+
+    def _is_python(self, name: str) -> bool:
+        return name.endswith(".py") or bool(PYTHON_SHEBANG.match(self.entry(name).data))
+
+    def _script(self, name: str) -> Script | None:
+        try:
+            script = Script(name, self.text(name))
+        except (SyntaxError, ValueError, RecursionError):
+            return None
+        return script if script.module.body else None
+
+    @cached_property
+    def manifest(self) -> Document | None:
+        return self._document(MANIFEST) if MANIFEST in self.files else None
+
+    @cached_property
+    def launch_files(self) -> tuple[Document, ...]:
+        names = [name for name in self.files if name.endswith(".launch")]
+        return tuple(document for name in names if (document := self._document(name)) is not None)
+
+    def _document(self, name: str) -> Document | None:
+        try:
+            return Document(name, self.entry(name).data)
+        except ValueError:
+            return None
+
+    @cached_property
+    def cmake(self) -> tuple[Command, ...]:
+        """The commands of the package's CMakeLists.txt."""
+        if CMAKE not in self.files:
+            return ()
+        try:
+            found = list(cmake_parser.parse_raw(self.text(CMAKE), skip_comments=True))
+        except CMakeParseError:
+            return ()
+        return tuple(command for command in found if isinstance(command, Command))
+
+    def cmake_calls(self, *names: str) -> Iterator[Command]:
+        return (command for command in self.cmake if command.identifier.lower() in names)
+
+    # ---- what is made of it
+
+    def with_entry(self, path: str, entry: Entry) -> Tree:
+        return {**self.tree, self.folder + path: entry}
+
+    def with_data(self, path: str, data: bytes) -> Tree:
+        return self.with_entry(path, replace(self.entry(path), data=data))
+
+    def moved(self, old: str, new: str) -> Tree:
+        rest = {name: entry for name, entry in self.tree.items() if name != self.folder + old}
+        return {**rest, self.folder + new: self.entry(old)}
+
+    def without(self, path: str) -> Tree:
+        return {name: entry for name, entry in self.tree.items() if name != self.folder + path}
+
+    def edited(self, path: str, edits: Sequence[Edit]) -> Tree:
+        """The tree with edits in one text file."""
+        text = applied(self.text(path), edits)
+        return self.with_data(path, text.encode(errors="surrogateescape"))
+
+    def edited_xml(self, document: Document, edits: Sequence[Edit]) -> Tree:
+        """The same for XML, whose places count bytes; what the edits insert is written as UTF-8."""
+        wide = [Edit(e.start, e.end, e.text.encode().decode("latin-1")) for e in edits]
+        return self.with_data(document.path, applied(document.text, wide).encode("latin-1"))
+
+    def then(self, tree: Tree) -> Solution:
+        return replace(self, tree=tree)

@@ -1,0 +1,1 @@
+"""Many submissions at once: from a roster to a gradebook, on one machine or a cluster; compared, reviewed."""

@@ -1,0 +1,142 @@
+"""A batch's folder: `run.json`, and a folder of results for each submission."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader import __version__
+from grader.classes.gradebook import Book, Row
+from grader.errors import UsageError
+from grader.files import atomic_write
+from grader.intake import safe_name
+from grader.model.batch import MISSING, ROSTER, BatchRun
+from grader.model.result import (
+    CriterionResult,
+    EnvironmentInfo,
+    ErrorInfo,
+    GradingResult,
+    SubmissionInfo,
+    TimingInfo,
+)
+from grader.model.roster import Entry
+from grader.model.verdict import Status
+from grader.model.version import RUN as RUN_FORMAT
+from grader.model.version import UPDATE
+from grader.results import EVIDENCE
+from grader.results import read_result as read_result  # noqa: PLC0414 - for whoever has a batch's folder
+from grader.shown import json_text
+
+RUN = "run.json"
+BYTES_MAX = 64 << 20
+
+
+@dataclass(frozen=True)
+class BatchFolder:
+    """What a batch left in `path`, and is still writing where `run.state` is `running`."""
+
+    path: Path
+    run: BatchRun
+
+    def folder_of(self, entry: Entry) -> Path:
+        return self.path / safe_name(entry.id)
+
+    def earlier(self, entry: Entry) -> GradingResult | None:
+        """The entry's result; None where there is none that can be read. Raises EvidenceError for a newer grader's."""
+        return read_result(self.folder_of(entry))
+
+    def refuse_newer(self) -> None:
+        """Raise EvidenceError where a newer grader wrote one of the results: before anything is written beside it."""
+        for entry in self.run.entries:
+            self.earlier(entry)
+
+    def has_evidence(self, entry: Entry) -> bool:
+        return (self.folder_of(entry) / EVIDENCE).is_dir()
+
+    def book(self) -> Book:
+        """What the gradebook is of."""
+        run = self.run
+        return Book(
+            title=run.title,
+            rubric_id=run.rubric.id,
+            max_points=run.max_points,
+            criteria=tuple((c.id, c.title, c.max_points) for c in run.criteria),
+            columns=run.columns,
+        )
+
+    def rows(self) -> Iterator[Row]:
+        """Every submission in the roster's order, read one by one; those that the roster itself keeps from being graded
+        come last. What has no result has one of status `error` here, that says so."""
+        known = set()
+        for entry in self.run.entries:
+            known.add(safe_name(entry.id).casefold())
+            result = self.earlier(entry)
+            yield Row(entry=entry, result=result or self._without(entry, MISSING, "not graded yet"))
+        for fault in self.run.faults:
+            if fault.id is not None and safe_name(fault.id).casefold() not in known:
+                known.add(safe_name(fault.id).casefold())
+                entry = Entry(id=fault.id, source="", where=fault.where)
+                yield Row(entry=entry, result=self._without(entry, ROSTER, str(fault)))
+
+    def _without(self, entry: Entry, kind: str, message: str) -> GradingResult:
+        hint = (
+            "correct the roster"
+            if kind == ROSTER
+            else "run `grader batch` again: it goes on where it stopped"
+        )
+        return GradingResult(
+            submission=SubmissionInfo(
+                id=safe_name(entry.id), source=entry.source, commit=None, digest="", package=""
+            ),
+            rubric=self.run.rubric,
+            status="error",
+            points=0.0,
+            max_points=self.run.max_points,
+            criteria=tuple(
+                CriterionResult(
+                    id=c.id,
+                    title=c.title,
+                    check="",
+                    scenario=None,
+                    status=Status.ERROR,
+                    points=0.0,
+                    max_points=c.max_points,
+                    message="not judged",
+                    expected="",
+                    measured="",
+                    hint="",
+                    reproduce="",
+                    citations=(),
+                )
+                for c in self.run.criteria
+            ),
+            environment=EnvironmentInfo(grader=__version__, ros="", python="", sandbox=""),
+            timing=TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0),
+            error=ErrorInfo(kind=kind, message=message, hint=hint),
+        )
+
+
+def write_run(folder: Path, run: BatchRun) -> None:
+    """Raises OutputError."""
+    atomic_write(folder / RUN, json_text(run.model_dump(mode="json", by_alias=True)).encode())
+
+
+def open_batch(folder: Path) -> BatchFolder:
+    """The batch in `folder`. Raises UsageError where there is none."""
+    path = folder / RUN
+    try:
+        data = path.read_bytes() if path.stat().st_size <= BYTES_MAX else b""
+        return BatchFolder(folder, BatchRun.read_json(data))
+    except FileNotFoundError as error:
+        raise UsageError(
+            f"{folder}: no batch has been here: there is no {RUN}", hint="give the --out of `grader batch`"
+        ) from error
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        if newer := RUN_FORMAT.newer_in(data):
+            raise UsageError(f"{path}: {newer}", hint=UPDATE) from error
+        raise UsageError(
+            f"{path}: not what this grader writes", hint="run `grader batch` once more into the same folder"
+        ) from error

@@ -1,0 +1,219 @@
+"""A class judged again from its evidence by a rubric that may be another one: nothing is run.
+
+evidence, rubric → criteria → settled → reports and gradebook, and a table of what changed
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from grader import __version__
+from grader.classes.batch.executor import Hands
+from grader.classes.batch.flow import BatchOptions, Watcher, alone, described, ids_of, run_batch, write_books
+from grader.classes.batch.folder import BatchFolder, write_run
+from grader.classes.batch.job import Sandbox
+from grader.classes.batch.judging import Judged, judge_all
+from grader.classes.batch.settled import Settler, rewrite
+from grader.classes.overrides import FILE as OVERRIDES
+from grader.classes.overrides import read_overrides
+from grader.errors import GraderError
+from grader.files import atomic_write
+from grader.judging.summary import overall_status, total_points
+from grader.model.result import CriterionResult, GradingResult
+from grader.model.roster import Entry, Roster
+from grader.report.text import csv_text
+from grader.results import EVIDENCE
+from grader.rubric.load import LoadedRubric
+
+CHANGES = "changes.csv"
+COLUMNS = ("id", "criterion", "status before", "status", "points before", "points", "max_points", "why")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """One criterion that came to something else. One that is new has no `before`, one that is gone no `after`."""
+
+    criterion: str
+    before: CriterionResult | None
+    after: CriterionResult | None
+
+    @property
+    def why(self) -> str:
+        """What the check says now."""
+        if self.after is None:
+            return "the rubric has it no more"
+        return self.after.message or self.after.measured or self.after.title
+
+
+@dataclass(frozen=True, kw_only=True)
+class Regraded:
+    """One submission: its result before and after, and the scenarios of which there is no recording that fits.
+
+    `error` says in one line why it could not be judged: its result stays as it was.
+    """
+
+    entry: Entry
+    before: GradingResult | None
+    after: GradingResult | None
+    missing: tuple[str, ...] = ()
+    error: str = ""
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """What changed, in the new rubric's order."""
+        if self.before is None or self.after is None:
+            return ()
+        old = {c.id: c for c in self.before.criteria}
+        new = {c.id: c for c in self.after.criteria}
+        names = [*new, *(name for name in old if name not in new)]
+        found = (Change(criterion=n, before=old.get(n), after=new.get(n)) for n in names)
+        return tuple(change for change in found if _differs(change))
+
+
+def _differs(change: Change) -> bool:
+    before, after = change.before, change.after
+    if before is None or after is None:
+        return True
+    return (before.status, before.points, before.max_points) != (after.status, after.points, after.max_points)
+
+
+def regrade(
+    folder: BatchFolder, rubric: LoadedRubric, rubric_source: str, jobs: int
+) -> tuple[BatchFolder, tuple[Regraded, ...]]:
+    """Judge every submission of the batch again; gives the folder as it is now and what became of each, in order.
+
+    Writes each `result.json` with its reports, `run.json`, `results.jsonl`, `gradebook.csv` and `changes.csv`.
+    Raises UsageError for faulty overrides, EvidenceError where a newer grader has written there, Busy where a batch
+    works in the folder, OutputError.
+    """
+    with alone(folder.path):
+        folder.refuse_newer()
+        entries = folder.run.entries
+        overrides = read_overrides(folder.path / OVERRIDES, rubric.rubric, ids_of(folder.run))
+        settler = Settler(rubric.rubric, overrides)
+        by_folder = {folder.folder_of(entry): entry for entry in entries if folder.has_evidence(entry)}
+        found = {
+            judged.folder: _regraded(folder, rubric, settler, by_folder[judged.folder.parent], judged)
+            for judged in judge_all([path / EVIDENCE for path in by_folder], rubric, jobs, fitting=True)
+        }
+        regraded = tuple(
+            found.get(folder.folder_of(entry) / EVIDENCE) or _without_evidence(folder, rubric, settler, entry)
+            for entry in entries
+        )
+        run = folder.run.model_copy(update=described(rubric, rubric_source) | {"grader": __version__})
+        now = BatchFolder(folder.path, run)
+        write_run(now.path, now.run)
+        write_changes(folder.path / CHANGES, regraded)
+        return write_books(now, rubric.rubric, run.state, run.counts.kept, ended_at=run.ended_at), regraded
+
+
+def _regraded(
+    folder: BatchFolder, rubric: LoadedRubric, settler: Settler, entry: Entry, judged: Judged
+) -> Regraded:
+    before = folder.earlier(entry)
+    if before is None or judged.criteria is None:
+        return Regraded(entry=entry, before=before, after=None, error=judged.error or "it has no result")
+    automatic = before.model_copy(
+        update={
+            "rubric": described(rubric, "")["rubric"],
+            "criteria": judged.criteria,
+            "status": overall_status(judged.criteria),
+            "points": total_points(rubric.rubric, judged.criteria),
+            "max_points": rubric.rubric.max_points,
+            "environment": before.environment.model_copy(update={"grader": __version__}),
+            "overrides": (),
+            "handed_in": None,
+            "late": None,
+            "error": None,
+        }
+    )
+    handed_in = before.handed_in and before.handed_in.model_copy(
+        update={"deadline": None}
+    )  # the rubric's of today
+    after = settler.settled(automatic, entry.id, handed_in, before)
+    try:
+        if after != before:
+            rewrite(folder.folder_of(entry), after, rubric.rubric, rubric.docs)
+    except GraderError as error:
+        return Regraded(entry=entry, before=before, after=None, error=error.message)
+    return Regraded(entry=entry, before=before, after=after, missing=judged.missing)
+
+
+def _without_evidence(folder: BatchFolder, rubric: LoadedRubric, settler: Settler, entry: Entry) -> Regraded:
+    """What could not be graded has what people gave for it."""
+    before = folder.earlier(entry)
+    error = before.error.message if before is not None and before.error else "nothing was recorded"
+    if before is not None and (settler.of(entry.id) or before.overrides):
+        rewrite(folder.folder_of(entry), settler.again(before, entry.id, None), rubric.rubric, rubric.docs)
+    return Regraded(entry=entry, before=before, after=None, error=error)
+
+
+def write_changes(path: Path, regraded: Sequence[Regraded]) -> None:
+    """Each criterion that changed, a row each. Raises OutputError."""
+    atomic_write(path, csv_text([COLUMNS, *_rows(regraded)]).encode("utf-8"))
+
+
+def _rows(regraded: Sequence[Regraded]) -> Iterator[tuple[str | float, ...]]:
+    for one in regraded:
+        for change in one.changes:
+            before, after = change.before, change.after
+            yield (
+                one.entry.id,
+                change.criterion,
+                before.status.value if before else "",
+                after.status.value if after else "",
+                before.points if before else "",
+                after.points if after else "",
+                after.max_points if after else "",
+                change.why,
+            )
+
+
+def run_missing(
+    folder: BatchFolder,
+    rubric: LoadedRubric,
+    regraded: Sequence[Regraded],
+    *,
+    hands: Hands,
+    watcher: Watcher,
+    sandbox: Sandbox,
+) -> tuple[BatchFolder, tuple[Regraded, ...]]:
+    """Grade anew, of the same commits, what has scenarios that were not recorded; gives what `regrade` gives.
+
+    Credentials come from the environment or from git: the batch's folder holds none.
+    """
+    again = [one.entry.id for one in regraded if one.missing]
+    roster = Roster(
+        file=folder.run.roster,
+        entries=folder.run.entries,
+        columns=folder.run.columns,
+        faults=folder.run.faults,
+    )
+    options = BatchOptions(
+        out=folder.path,
+        jobs=folder.run.jobs,
+        sandbox=sandbox,
+        before=folder.run.before,
+        only=again,
+        same_commit=True,
+        allow_local=folder.run.allow_local,
+        remote_only=folder.run.remote_only,
+    )
+    now = run_batch(roster, folder.run.rubric_source, rubric, options, hands=hands, watcher=watcher)
+    after = tuple(_run_again(now, one) if one.missing else one for one in regraded)
+    write_changes(folder.path / CHANGES, after)
+    return now, after
+
+
+def _run_again(folder: BatchFolder, one: Regraded) -> Regraded:
+    result = folder.earlier(one.entry)
+    failed = result is None or result.status == "error"
+    return Regraded(
+        entry=one.entry,
+        before=one.before,
+        after=result,
+        missing=one.missing if failed else (),
+        error="it could not be run again" if failed else "",
+    )

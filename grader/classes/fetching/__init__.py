@@ -1,0 +1,10 @@
+"""How a batch gets one roster entry's source, and which commit of it counts."""
+
+from __future__ import annotations
+
+from grader.classes.fetching.ahead import Prefetch, prefetch
+from grader.classes.fetching.history import NothingInTime, Rule
+from grader.classes.fetching.obtain import Obtained, obtain
+from grader.classes.fetching.retry import Patience
+
+__all__ = ["NothingInTime", "Obtained", "Patience", "Prefetch", "Rule", "obtain", "prefetch"]

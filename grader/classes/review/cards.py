@@ -1,0 +1,141 @@
+"""What the page of one submission shows of each criterion, and which come first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from grader.classes.gradebook import Row
+from grader.classes.review.edit_conflicts import mark
+from grader.model.result import CriterionResult
+from grader.model.submission_time import AppliedOverride, Override
+from grader.model.verdict import Status
+from grader.report.html.words import SIGNS
+from grader.report.text import number
+from grader.rubric.model import Rubric
+
+MANUAL = "manual"
+OPEN = {Status.MANUAL, Status.INCONCLUSIVE, Status.ERROR}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Draft:
+    """What a form was sent with and what became of it. In a `conflict` somebody else decided meanwhile; `error` says
+    what is wrong with what was sent, `saved` when it was written."""
+
+    points: str = ""
+    comment: str = ""
+    conflict: bool = False
+    error: str = ""
+    saved: str = ""
+    typed: bool = True
+
+
+@dataclass(frozen=True, kw_only=True)
+class Card:
+    """One criterion with its form. `override` is what stands in `overrides.yaml`, `applied` what the result has."""
+
+    criterion: CriterionResult
+    manual: bool
+    hidden: bool
+    override: Override | None
+    applied: AppliedOverride | None
+    draft: Draft | None
+
+    @property
+    def sign(self) -> str:
+        return SIGNS[self.criterion.status]
+
+    @property
+    def seen(self) -> str:
+        """What its form says that it was made from."""
+        return mark(self.override)
+
+    @property
+    def points(self) -> str:
+        """For the form's field."""
+        if self.draft and self.draft.typed:
+            return self.draft.points
+        return plain(self.override.points) if self.override else ""
+
+    @property
+    def comment(self) -> str:
+        """For the form's field."""
+        if self.draft and self.draft.typed:
+            return self.draft.comment
+        return self.override.comment if self.override else ""
+
+    @property
+    def said(self) -> str:
+        """What the check says, where a person decided."""
+        if self.applied is None or self.manual:
+            return ""
+        return verdict(
+            self.applied.automatic.status, self.applied.automatic.points, self.criterion.max_points
+        )
+
+    @property
+    def was(self) -> str:
+        """What the check said when the person decided, where it says something else now."""
+        if self.applied is None or not self.applied.changed:
+            return ""
+        return verdict(self.applied.was.status, self.applied.was.points, self.criterion.max_points)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cards:
+    """What waits for a person, what a person decided, and the rest: what lost points first, else as in the rubric."""
+
+    waiting: Sequence[Card]
+    decided: Sequence[Card]
+    rest: Sequence[Card]
+
+
+def cards(row: Row, rubric: Rubric, decided: Mapping[str, Override], drafts: Mapping[str, Draft]) -> Cards:
+    """The cards of a submission."""
+    found = [card(row, rubric, name, decided, drafts) for name in (c.id for c in row.result.criteria)]
+    whole = row.result.error is None
+    mine = [c for c in found if c.override is not None]
+    waiting = [c for c in found if c.override is None and _waits(c, whole=whole)]
+    others = [c for c in found if c not in mine and c not in waiting]
+    return Cards(waiting=waiting, decided=mine, rest=sorted(others, key=_nothing_lost))
+
+
+def card(
+    row: Row,
+    rubric: Rubric,
+    criterion: str,
+    decided: Mapping[str, Override],
+    drafts: Mapping[str, Draft],
+) -> Card:
+    """One of them; the result has a criterion of that id."""
+    result = row.result
+    asked = next((c for c in rubric.criteria if c.id == criterion), None)
+    return Card(
+        criterion=next(c for c in result.criteria if c.id == criterion),
+        manual=asked is not None and asked.check == MANUAL,
+        hidden=asked is not None and asked.visibility == "hidden",
+        override=decided.get(criterion),
+        applied=next((o for o in result.overrides if o.criterion == criterion), None),
+        draft=drafts.get(criterion),
+    )
+
+
+def _waits(card: Card, *, whole: bool) -> bool:
+    """Of what could not be graded at all, only what people decide anyway waits for one."""
+    status = card.criterion.status
+    return card.criterion.max_points > 0 and ((status in OPEN and whole) or (card.manual and status in OPEN))
+
+
+def _nothing_lost(card: Card) -> bool:
+    return card.criterion.points >= card.criterion.max_points
+
+
+def verdict(status: Status, points: float, most: float) -> str:
+    """`fail, 0 of 10`."""
+    return f"{status.value}, {number(points)} of {number(most)}"
+
+
+def plain(value: float) -> str:
+    """As a field of a form has it: no digit is lost."""
+    return f"{value:.10f}".rstrip("0").rstrip(".")

@@ -1,0 +1,127 @@
+"""The server of a review: loopback only, until Ctrl-C."""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import socket
+import subprocess
+import sys
+import threading
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from html import escape
+from pathlib import Path
+
+from waitress.server import create_server
+
+from grader.classes.review.app import create_app
+from grader.classes.review.guard import BODY_BYTES, TOKEN_BYTES
+from grader.classes.review.session import Desk
+from grader.errors import HostError, UsageError
+from grader.outside import anywhere, program
+from grader.temporary import temporary_folder
+
+HOST = "127.0.0.1"
+THREADS = 6
+GIT_S = 5
+
+
+def serve(desk: Desk, *, port: int, author: str, opened: Callable[[str], None]) -> bool:
+    """Serve `desk` until interrupted; `opened` is given the address with its token. Port 0 is any that is free.
+
+    Gives whether all that follows a decision is written. Raises UsageError where the port cannot be had.
+    """
+    with _bound(port) as listening:
+        token = secrets.token_urlsafe(TOKEN_BYTES)
+        number = listening.getsockname()[1]
+        server = create_server(
+            create_app(desk, port=number, token=token, author=author),
+            sockets=[listening],
+            threads=THREADS,
+            ident=None,
+            max_request_body_size=2 * BODY_BYTES,
+            max_request_header_size=2 * BODY_BYTES,
+            clear_untrusted_proxy_headers=True,
+        )
+        desk.start()
+        try:
+            opened(f"http://{HOST}:{number}/?token={token}")
+            server.run()
+        except KeyboardInterrupt:
+            pass
+        finally:
+            server.close()
+            done = desk.close()
+    return done
+
+
+@contextmanager
+def _bound(port: int) -> Iterator[socket.socket]:
+    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    try:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listening.bind((HOST, port))
+        except OSError as error:
+            why = "is in use" if error.errno == errno.EADDRINUSE else f"cannot be had: {error.strerror}"
+            raise UsageError(f"port {port} {why}", hint="choose another --port, or none") from error
+        yield listening
+    finally:
+        listening.close()
+
+
+@contextmanager
+def browser(address: str, *, wanted: bool) -> Iterator[bool]:
+    """Open the address in the person's browser, where there is one; whether it was tried.
+
+    The browser is given a file of this user's alone: all users of a machine may read the arguments of a program.
+    """
+    with ExitStack() as stack:
+        tried = wanted and _has_screen()
+        if tried:
+            try:
+                page = stack.enter_context(temporary_folder("run")) / "review.html"
+            except HostError:
+                tried = False
+            else:
+                _write_page(page, address)
+                threading.Thread(target=_open, args=(page,), daemon=True).start()
+        yield tried
+
+
+def _write_page(page: Path, address: str) -> None:
+    page.touch(mode=0o600)
+    target = escape(address, quote=True)
+    page.write_text(
+        f'<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0; url={target}">'
+    )
+
+
+def _open(page: Path) -> None:
+    with suppress(webbrowser.Error, OSError):
+        webbrowser.open(page.as_uri())
+
+
+def _has_screen() -> bool:
+    screens = ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")
+    return sys.platform == "darwin" or any(os.environ.get(name) for name in screens)
+
+
+def git_user() -> str:
+    """What git calls the person; empty where it does not."""
+    with suppress(OSError, subprocess.SubprocessError, UnicodeDecodeError):
+        done = subprocess.run(
+            [program("git") or "/usr/bin/git", "config", "user.name"],
+            env=anywhere(os.environ),
+            cwd="/",
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=GIT_S,
+            check=False,
+        )
+        return done.stdout.strip()
+    return ""

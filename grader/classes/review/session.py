@@ -1,0 +1,225 @@
+"""Where decisions are made: each is written into `overrides.yaml` at once, and results and gradebook follow."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+from grader.classes.batch.flow import GRADEBOOK, alone, ids_of, write_books
+from grader.classes.batch.folder import BatchFolder, open_batch, write_run
+from grader.classes.batch.settled import Settler, rewrite
+from grader.classes.overrides import FILE, Overrides, read_overrides, write_override
+from grader.classes.review.edit_conflicts import Conflict, alike, mark, plain, reviewing
+from grader.classes.review.follower import Follower, Pace
+from grader.classes.review.submissions import Item, Stamp, Submissions, stamp_of
+from grader.errors import Busy, GraderError, UsageError
+from grader.model.batch import State
+from grader.model.result import GradingResult
+from grader.model.submission_time import Override
+from grader.results import RESULT, read_result
+from grader.rubric.load import LoadedRubric, load_rubric
+
+PATIENCE_S = 0.3
+OTHER_RUBRIC = "the class has been graded by another rubric since: end this review and start it again"
+
+OLDER_RESULT = (
+    "the submission was judged by another rubric: it counts when `grader regrade` has judged it anew"
+)
+
+
+def open_desk(path: Path, pace: Pace | None = None) -> Desk:
+    """The desk of the class in `path`. Raises UsageError where there is none, and where its rubric has changed,
+    EvidenceError where a newer grader wrote results in it."""
+    batch = open_batch(path)
+    batch.refuse_newer()
+    run = batch.run
+    rubric = load_rubric(run.rubric_source)
+    if rubric.digest != run.rubric.digest:
+        raise UsageError(
+            f"{run.rubric_source}: the rubric has changed since the class was graded",
+            hint=f"grader regrade {path} judges it by the rubric of today; then review it",
+        )
+    return Desk(path, rubric, pace or Pace())
+
+
+class Desk:
+    """Safe to use from several threads, and beside other desks and batches of the same class."""
+
+    def __init__(self, path: Path, rubric: LoadedRubric, pace: Pace) -> None:
+        self.path, self.rubric = path, rubric
+        self._docs = rubric.docs
+        self.submissions = Submissions(path)
+        self.follower = Follower(self._follow, pace)
+        self._saving, self._writing, self._guard = threading.Lock(), threading.Lock(), threading.Lock()
+        self._overrides: tuple[tuple[Stamp, tuple[str, ...]], Overrides] | None = None
+        self._pending: set[str] = set()
+        self._caught_up = False
+        self._books_behind = False
+
+    def start(self) -> None:
+        """Begin to follow; what was decided while nobody reviewed is looked at first."""
+        self.follower.start()
+        self.follower.changed()
+
+    def close(self) -> bool:
+        """Write what is left; whether all is written."""
+        return self.follower.close()
+
+    def overrides(self) -> Overrides:
+        """What `overrides.yaml` says now. Raises RubricError where it has faults."""
+        ids = tuple(ids_of(self.submissions.batch().run))
+        stamp = (stamp_of(self.path / FILE), ids)
+        with self._guard:
+            found = self._overrides
+        if found is None or found[0] != stamp:
+            found = (stamp, read_overrides(self.path / FILE, self.rubric.rubric, ids))
+            with self._guard:
+                self._overrides = found
+        return found[1]
+
+    def save(self, item: Item, criterion: str, override: Override | None, seen: str) -> str:
+        """Put a decision in place of the one that was `seen` (its `mark`), or take that out (None).
+
+        Gives in a line why the submission's files do not say so yet; empty where they do.
+
+        Raises Conflict where another one stands there by now, and what `write_override` raises; then nothing changed.
+        """
+        name = item.entry.id
+        with self._saving, reviewing(self.path):
+            now = self.overrides().get(name, {}).get(criterion)
+            if not alike(now, override):
+                if mark(now) != seen:
+                    raise Conflict(now)
+                write_override(self.path / FILE, name, criterion, override)
+        with self._guard:
+            self._pending.add(item.key)
+            self._books_behind = True
+        waits = self._settled_soon(item)
+        self.follower.changed()
+        return waits
+
+    def result(self, item: Item, overrides: Overrides) -> GradingResult | None:
+        """A submission's result as it counts with these overrides; None where it has none."""
+        result = read_result(self.path / item.key) if item.gradable else None
+        if (
+            result is None
+            or result.rubric.digest != self.rubric.digest
+            or not self._behind(item, result, overrides)
+        ):
+            return result
+        return Settler(self.rubric.rubric, overrides).again(result, item.entry.id, None)
+
+    def waits(self, item: Item) -> str:
+        """Why the files of a submission do not say yet what was decided; empty where they do."""
+        with self._guard:
+            pending = item.key in self._pending
+        return self.follower.trouble or "its report follows in a moment" if pending else ""
+
+    def batch_runs(self) -> bool:
+        """Whether a batch works in the folder just now."""
+        if self.submissions.batch().run.state != "running" or self._writing.locked():
+            return False
+        try:
+            with alone(self.path):
+                return False
+        except Busy:
+            return True
+
+    def _settled_soon(self, item: Item) -> str:
+        """Settle one submission now, or say why that comes later."""
+        if not item.gradable:
+            return "it counts as soon as the submission has a result"
+        if not self._writing.acquire(timeout=PATIENCE_S):
+            return "the report follows in a moment"
+        try:
+            with alone(self.path):
+                return self._settle({item.key})
+        except Busy:
+            return "a batch works in this folder just now: the report follows when it has ended"
+        except GraderError as error:
+            return error.message
+        finally:
+            self._writing.release()
+
+    def _settle(self, keys: set[str]) -> str:
+        """Let the files of these submissions say what was decided, or say why the last one's cannot. The caller holds
+        the class's lock."""
+        with self._guard:
+            self._pending -= keys  # first: who decides from here on puts it back
+        why = ""
+        try:
+            overrides = self.overrides()
+            for item in filter(None, map(self.submissions.item, sorted(keys))):
+                why = self._settle_one(item, overrides)
+        except BaseException:
+            with self._guard:
+                self._pending |= keys
+            raise
+        return why
+
+    def _settle_one(self, item: Item, overrides: Overrides) -> str:
+        batch = self.submissions.batch()
+        if batch.run.rubric.digest != self.rubric.digest:
+            raise UsageError(OTHER_RUBRIC)
+        result = batch.earlier(item.entry) if item.gradable else None
+        if result is None:
+            return ""
+        if result.rubric.digest != self.rubric.digest:
+            return OLDER_RESULT
+        now = Settler(self.rubric.rubric, overrides).again(result, item.entry.id, None)
+        if now != result:
+            rewrite(batch.folder_of(item.entry), now, self.rubric.rubric, self._docs)
+        return ""
+
+    def _follow(self) -> None:
+        """Settle what is not settled yet, and write the class's files."""
+        if not self._caught_up:
+            self._catch_up()
+        if not self._books_behind:
+            return
+        with self._writing, alone(self.path):
+            with self._guard:
+                keys = set(self._pending)
+                self._books_behind = False
+            try:
+                self._settle(keys)
+                self._write_books(self.submissions.batch())
+            except BaseException:
+                self._books_behind = True
+                raise
+
+    def _write_books(self, batch: BatchFolder) -> None:
+        run = batch.run
+        state: State = "interrupted" if run.state == "running" else run.state
+        written = write_books(batch, self.rubric.rubric, state, run.counts.kept, ended_at=run.ended_at)
+        write_run(self.path, written.run.model_copy(update={"ended_at": run.ended_at}))
+
+    def _catch_up(self) -> None:
+        """Find what was decided, or settled, while nobody reviewed or just before a review was killed."""
+        batch = self.submissions.batch()
+        behind = set(self._all_behind(self.overrides()))
+        written = stamp_of(self.path / GRADEBOOK)
+        newest = max(
+            ((stamp_of(self.path / item.key / RESULT) or (0,))[0] for item in self.submissions.items()),
+            default=0,
+        )
+        with self._guard:
+            self._pending |= behind
+            late = batch.run.state != "running" and (written is None or newest > written[0])
+            self._books_behind |= bool(behind) or late
+        self._caught_up = True
+
+    def _all_behind(self, overrides: Overrides) -> Iterator[str]:
+        for item in self.submissions.items():
+            result = read_result(self.path / item.key) if item.gradable else None
+            same = result is not None and result.rubric.digest == self.rubric.digest
+            if result is not None and same and self._behind(item, result, overrides):
+                yield item.key
+
+    @staticmethod
+    def _behind(item: Item, result: GradingResult, overrides: Overrides) -> bool:
+        """Whether a result says something else than `overrides.yaml`."""
+        known = {criterion.id for criterion in result.criteria}
+        given = {k: v for k, v in overrides.get(item.entry.id, {}).items() if k in known}
+        return given != {o.criterion: plain(o) for o in result.overrides}

@@ -1,0 +1,122 @@
+"""A folder with a submission in each of its entries; bulk downloads of Moodle and Canvas are known by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from grader.classes.roster.gather import Found, columns_of, gather
+from grader.classes.roster.local import REFUSED, Local, local_fault
+from grader.classes.roster.platforms import Named, platform_name
+from grader.errors import UsageError
+from grader.intake.names import archive_stem, encodable, is_archive_name, listing, printable
+from grader.model.roster import Entry, Roster
+
+IGNORED = {"__MACOSX", "Thumbs.db", "desktop.ini"}
+RECORDINGS = (".bag", ".mcap")
+
+
+def from_folder(folder: Path, local: Local) -> Roster:
+    """An entry for each folder, repository, archive or recording in it, in order of names; one for all files that
+    Moodle or Canvas has from one student.
+
+    Raises UsageError where the folder cannot be read, is one submission, or `local` allows only what is fetched.
+    """
+    if local.remote_only:
+        raise UsageError(
+            f"{folder}: a folder of submissions {REFUSED}", hint="give a roster of addresses, or leave it out"
+        )
+    paths = _inside(folder)
+    if any(path.name == "package.xml" for path in paths):
+        raise UsageError(
+            f"{folder}: this is one package, no folder of submissions",
+            hint="grader grade takes one submission",
+        )
+    students: dict[tuple[str, ...], list[tuple[Path, Named | None]]] = {}
+    for path in paths:
+        named = platform_name(path.name) if encodable(path.name) else None
+        key = (named.platform, named.id) if named else ("", path.name)
+        students.setdefault(key, []).append((path, named))
+    found = [_allowed(_student(files), folder, local) for files in students.values()]
+    return gather(folder, found, columns=columns_of(one.entry for one in found))
+
+
+def _inside(folder: Path) -> list[Path]:
+    try:
+        return sorted(
+            path for path in folder.iterdir() if not path.name.startswith(".") and path.name not in IGNORED
+        )
+    except OSError as error:
+        raise UsageError(f"{folder}: cannot be read: {error.strerror}") from error
+
+
+def _allowed(found: Found, folder: Path, local: Local) -> Found:
+    """A link may lead out of the folder."""
+    fault = local_fault(found.entry.source, folder, local) if found.entry else ""
+    return Found(where=found.where, id=found.id, faults=(fault,)) if fault else found
+
+
+def _student(files: list[tuple[Path, Named | None]]) -> Found:
+    path, named = files[0]
+    if named is not None:
+        return _named([(path, named) for path, named in files if named])
+    where = printable(path.name)
+    if not encodable(path.name):
+        return Found(where=where, faults=("its name is no UTF-8 text: rename it",))
+    if not _can_be_graded(path):
+        return Found(where=where, faults=("neither a folder nor an archive",))
+    name = path.name if path.is_dir() else archive_stem(path.name)
+    return Found(where=where, id=name, entry=Entry(id=name, source=str(path.absolute()), where=where))
+
+
+def _named(files: list[tuple[Path, Named]]) -> Found:
+    """What a platform has from one student: the one folder, or the one archive among the files."""
+    taken = [one for one in files if _can_be_graded(one[0]) and not one[1].is_text]
+    path, named = (taken or files)[0]
+    where, name = printable(path.name), f"{named.name}-{named.id}"
+    if not taken:
+        fault = "only text or a link was handed in" if named.is_text else "neither a folder nor an archive"
+        return Found(where=where, id=name, faults=(fault,))
+    if len(taken) > 1:
+        more = listing([other.name for other, _ in taken[1:]])
+        fault = f"not the only one of this student, there is {more}: leave one there"
+        return Found(where=where, id=name, faults=(fault,))
+    others = [one.name for one, _ in files if one != path]
+    return Found(where=where, id=name, entry=_entry(path, named, name, others))
+
+
+def _entry(path: Path, named: Named, name: str, others: list[str]) -> Entry:
+    source = _single_archive(path) or path
+    file = named.file or (source.name if source != path else "")
+    extra: Mapping[str, str] = {
+        "platform": named.platform,
+        "file": printable(file),
+        "late": "yes" if named.late else "",
+        "other files": ", ".join(printable(other) for other in others),
+        _id_column(named): named.id,
+    }
+    return Entry(
+        id=name,
+        source=str(source.absolute()),
+        name=f"{named.name} {named.id}" if named.is_blind else named.name,
+        where=printable(path.name),
+        extra={key: text for key, text in extra.items() if text},
+    )
+
+
+def _id_column(named: Named) -> str:
+    return "Canvas anonymous id" if named.platform == "Canvas" and named.is_blind else f"{named.platform} id"
+
+
+def _can_be_graded(path: Path) -> bool:
+    return path.is_dir() or is_archive_name(path.name) or path.suffix.lower() in RECORDINGS
+
+
+def _single_archive(path: Path) -> Path | None:
+    """The archive that is all that a student's folder holds."""
+    try:
+        inside = _inside(path) if path.is_dir() else []
+    except UsageError:
+        return None
+    alone = len(inside) == 1 and inside[0].is_file() and is_archive_name(inside[0].name)
+    return inside[0] if alone and encodable(inside[0].name) else None

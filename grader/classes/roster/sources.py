@@ -1,0 +1,80 @@
+"""The sources that a roster names: addresses as they are, paths from the roster's folder."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+from grader.classes.roster.local import OWN_FOLDER, Local, local_fault
+from grader.errors import SubmissionError, UsageError
+from grader.intake.names import brief
+from grader.intake.source import parse_source
+
+_ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*://|[^/\s@]+@[^/\s:]+:|[\w.-]{2,}:(?!//)\S")
+"""An address with a scheme, git's `user@host:path`, or `host:path`, as an SSH configuration names hosts."""
+_WINDOWS = re.compile(r"[A-Za-z]:[\\/]|.*\\", re.DOTALL)
+_SLASHES = re.compile(r"(https?|ssh|git|file):(?!//)", re.IGNORECASE)
+_WEB = re.compile(r"(www\.|[\w-]+(\.[\w-]+)*\.(com|org|edu|net|io|de|fr|it|es|uk)/)\S")
+_NO_REF = re.compile(r"[\x00-\x20~^:?*\[\\\x7f]|\.\.|@\{|//|^[/-]|[/.]$")
+
+
+def source_fault(source: str, base: Path, local: Local = OWN_FOLDER) -> str:
+    """Why nothing can be had from `source`, a field of a roster in the folder `base`, or nothing may be by `local`;
+    empty where it may be."""
+    try:
+        there = _is_there(source, base)
+    except (OSError, ValueError, RuntimeError):
+        return f"{_shown(source)} is no path that can be followed"
+    refused = local_fault(whole_source(source, base), base, local)
+    if not there and (_ADDRESS.match(source) or _WINDOWS.match(source)):
+        fault = _address_fault(source)
+        if fault or not refused:
+            return fault
+    if refused:
+        return f"{_shown(source)} {refused}"
+    if there or Path(source).is_absolute() or source.startswith("~"):
+        return ""
+    web = "; a web address begins with https://" if _WEB.match(source) else ""
+    return f"{_shown(source)} does not exist{web}"
+
+
+def _address_fault(source: str) -> str:
+    if _SLASHES.match(source):
+        return f"{_shown(source)}: an address has two slashes behind its colon, as in https://"
+    if not _ADDRESS.match(source):
+        return f"{_shown(source)} is a path of Windows: write it with / as it is on this machine"
+    try:
+        parse_source(source)
+    except UsageError:  # as what git takes for the name of a program (`ext::`) or for an option of ssh
+        return f"{_shown(source)} is no address of a repository"
+    except (
+        SubmissionError,
+        OSError,
+    ):  # a path on this machine that is not there is told when it is looked for
+        return ""
+    return ""
+
+
+def whole_source(source: str, base: Path) -> str:
+    """The same for whoever stands in another folder: a path becomes absolute."""
+    if _ADDRESS.match(source) and not _is_there(source, base):
+        return source
+    return str(base.absolute() / os.path.expanduser(source))  # noqa: PTH111 - Path.expanduser raises without a home
+
+
+def ref_fault(ref: str) -> str:
+    """Why `ref` names no branch, tag or commit; empty where it may."""
+    return f"{brief(ref)} cannot be the name of a branch, tag or commit" if _NO_REF.search(ref) else ""
+
+
+def _shown(source: str) -> str:
+    """Without what may be a password: all that stands before an `@`."""
+    return brief(source.rpartition("@")[2] if re.search(r":.*@", source, re.DOTALL) else source)
+
+
+def _is_there(source: str, base: Path) -> bool:
+    """Whether a path is, with or without the `@ref` behind it."""
+    ends = [len(source), *(at.start() for at in re.finditer("@", source))]
+    home = [os.path.expanduser(source[:end]) for end in ends[:20] if end]  # noqa: PTH111 - as above
+    return any(os.path.lexists(base / path) for path in home)

@@ -1,0 +1,134 @@
+"""CSV as spreadsheets and learning platforms write it: rows with their lines, whatever the delimiter."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from grader.classes.roster.decode import text_of
+from grader.errors import UsageError
+from grader.intake.names import is_archive_name
+
+BYTES_MAX = 32 << 20
+FIELD_LETTERS_MAX = 10_000
+UNREADABLE_MAX = 50
+DELIMITERS = (",", ";", "\t")
+_SEPARATOR = re.compile(r"\"?sep=(.)\"?[\r\n]*", re.IGNORECASE)
+
+
+class Row(NamedTuple):
+    """The fields of one row by their column's name, the line in which it begins, counted from 1, and what is wrong.
+
+    In a row that is `shifted`, no field but the first can be told to be in its column.
+    """
+
+    line: int
+    fields: Mapping[str, str]
+    faults: tuple[str, ...] = ()
+    shifted: bool = False
+
+
+class Table(NamedTuple):
+    """Column names as they are written, the line that names them, and the rows that are not empty, in their order."""
+
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+    line: int = 1
+
+
+def read_table(path: Path) -> Table:
+    """Raises UsageError where the file is no table of text at all; what is wrong with a row is said by the row."""
+    lines = list(io.StringIO(_text(path), newline=""))
+    found = _rows(lines, *_delimiter(lines))
+    header = next(found, None)
+    if header is None:
+        raise UsageError(f"{path}: the file is empty", hint="its first line names the columns: id,source")
+    line, fields, faults = header
+    if faults:
+        raise UsageError(f"{path}:{line}: {faults[0]}", hint="the first line names the columns: id,source")
+    columns = tuple(_bare(name) for name in fields)
+    return Table(columns, tuple(_row(columns, *row) for row in found), line)
+
+
+class _Fields(NamedTuple):
+    line: int
+    fields: list[str]
+    faults: tuple[str, ...] = ()
+
+
+def _rows(lines: Sequence[str], delimiter: str, start: int) -> Iterator[_Fields]:
+    """Each row that is not empty. After one that cannot be read, the next line begins a row again; of it there is the
+    first field at most."""
+    unreadable = 0
+    while start < len(lines) and unreadable < UNREADABLE_MAX:
+        # Python 3.10 reads no zero byte: its place is kept by a sign that says the same to a reader.
+        reader = csv.reader(
+            (line.replace("\0", "\ufffd") for line in lines[start:]), delimiter=delimiter, strict=True
+        )
+        begins = start
+        try:
+            for fields in reader:
+                zero = any("\0" in line for line in lines[begins : start + reader.line_num])
+                if any(field.strip() for field in fields):
+                    yield _Fields(begins + 1, fields, ("a zero byte in it",) if zero else ())
+                begins = start + reader.line_num
+        except csv.Error as error:
+            first = lines[begins].partition(delimiter)[0]
+            yield _Fields(begins + 1, [] if '"' in first else [first], (_said(error),))
+            start, unreadable = begins + 1, unreadable + 1
+        else:
+            return
+    if start < len(lines):
+        yield _Fields(start + 1, [], ("too many rows that cannot be read before it: the rest is left out",))
+
+
+def _said(error: csv.Error) -> str:
+    said = str(error)
+    if said == "unexpected end of data":
+        return "a quotation mark that never ends"
+    if "expected after" in said:
+        return "a quotation mark that does not end where its field ends"
+    return f"no CSV: {said}"
+
+
+def _row(columns: Sequence[str], line: int, fields: list[str], faults: tuple[str, ...]) -> Row:
+    named = {name: _bare(field) for name, field in zip(columns, fields, strict=False) if name}
+    shifted = any(field.strip() for field in fields[len(columns) :])
+    found = list(faults)
+    if shifted:
+        found.append(f"{len(fields)} fields, but the first line names {len(columns)} columns")
+    if any(len(field) > FIELD_LETTERS_MAX for field in fields):
+        found.append(f"a field of more than {FIELD_LETTERS_MAX} letters")
+    return Row(line, named, tuple(found), shifted)
+
+
+def _bare(field: str) -> str:
+    """Without blanks around it, nor the invisible signs that come along when text is copied into a spreadsheet."""
+    return field.strip().strip("\ufeff\u200b\u200e\u200f\u2060").strip()
+
+
+def _delimiter(lines: Sequence[str]) -> tuple[str, int]:
+    """What stands between fields, and how many lines come before the header: Excel may say `sep=;` in the first."""
+    if lines and (said := _SEPARATOR.fullmatch(lines[0])):
+        return said[1], 1
+    header = next((line for line in lines if line.strip()), "")
+    plain = re.sub(r'"[^"]*"', "", header)
+    return max(DELIMITERS, key=plain.count), 0
+
+
+def _text(path: Path) -> str:
+    try:
+        data = path.read_bytes() if path.stat().st_size <= BYTES_MAX else None
+    except OSError as error:
+        raise UsageError(
+            f"{path}: cannot be read: {error.strerror}", hint="give a CSV file, a folder, or an export"
+        ) from error
+    if is_archive_name(path.name):
+        raise UsageError(f"{path}: an archive is no roster", hint="unpack it first, and give the folder")
+    if data is None:
+        raise UsageError(f"{path}: larger than {BYTES_MAX >> 20} MB: this is no roster")
+    return text_of(data, path)

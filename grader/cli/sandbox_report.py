@@ -1,0 +1,147 @@
+"""What this machine has of each part of the sandbox, and what mends it where it is missing."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from grader.arena.control_groups import describe, find_cgroups, has_memory
+from grader.arena.host_programs import HOST_ENV, host_program
+from grader.arena.sandbox import NAMESPACES
+from grader.arena.sandbox_probe import ULIMIT_HINT, choose, refused_limits
+from grader.arena.static_recorder import why_unrun
+from grader.cli.output import say_beside
+from grader.cli.row import Row
+from grader.errors import GraderError, HostError
+from grader.portable import user_id
+from grader.report.unwalled import without_sandbox
+from grader.rubric.load import LoadedRubric
+from grader.rubric.needs import needs_ros
+
+if TYPE_CHECKING:
+    from grader.arena.sandbox import Mode
+
+
+PROGRAMS = {"bwrap": "bubblewrap", "setpriv": "util-linux", "prlimit": "util-linux"}
+PROBE_S = 20
+SETTINGS = Path("/proc/sys")
+SWITCHES = {
+    "kernel/unprivileged_userns_clone": ("0", "sysctl -w kernel.unprivileged_userns_clone=1"),
+    "user/max_user_namespaces": ("0", "sysctl -w user.max_user_namespaces=10000"),
+    "kernel/apparmor_restrict_unprivileged_userns": (
+        "1",
+        "sysctl -w kernel.apparmor_restrict_unprivileged_userns=0",
+    ),
+}
+CONTAINER = "in a container: start it with --privileged, or with --security-opt seccomp=unconfined apparmor=unconfined"
+DELEGATE = "loginctl enable-linger, or systemd-run --user --scope -p Delegate=yes grader …, or run it as root"
+OLD_GROUPS = "run it as root, or boot with cgroup v2 (systemd.unified_cgroup_hierarchy=1)"
+ROOTS_GROUPS = "in a container: start it with --privileged; in a service: Delegate=yes in its unit"
+
+
+def walls() -> Iterator[Row]:
+    """A row for each part, then one for what `--sandbox auto` makes of them."""
+    yield from map(_program, PROGRAMS)
+    unshare = host_program("unshare") or "unshare"
+    yield _probe("user namespaces", [unshare, "--user", "--pid", "--fork", "/bin/true"], drop=user_id() == 0)
+    yield _probe("network", [sys.executable, "-I", str(NAMESPACES), "/bin/true"], drop=False)
+    yield _limits_of_trees()
+    yield from _inherited()
+    yield _limits_of_processes()
+    yield _mode()
+
+
+def _program(name: str) -> Row:
+    path, package = host_program(name), PROGRAMS[name]
+    if path is None:
+        return Row(name=name, state="limited", detail="not found", mend=f"apt-get install {package}")
+    return Row(name=name, state="ok", detail=path)
+
+
+def _probe(name: str, command: Sequence[str], *, drop: bool) -> Row:
+    """Whether namespaces of that kind can be made, by the user who needs them."""
+    setpriv = host_program("setpriv") or "setpriv"
+    nobody = [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if drop else []
+    try:
+        done = subprocess.run(
+            [*nobody, *command],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            timeout=PROBE_S,
+            env=HOST_ENV,
+            cwd="/",
+        )
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        reason = "" if done.returncode == 0 else (said or [f"exit code {done.returncode}"])[-1]
+    except (OSError, subprocess.TimeoutExpired) as error:
+        reason = str(error)
+    if not reason:
+        return Row(name=name, state="ok", detail="namespaces can be made")
+    return Row(name=name, state="limited", detail=reason[:200], mend=_switch())
+
+
+def _switch() -> str:
+    """The setting of the kernel that forbids it, where it is one."""
+    for name, (forbidding, mend) in SWITCHES.items():
+        path = SETTINGS / name
+        if path.is_file() and path.read_text(errors="replace").strip() == forbidding:
+            return mend
+    return CONTAINER
+
+
+def _inherited() -> Iterator[Row]:
+    from grader.arena.inherited import group, limits  # noqa: PLC0415 - other systems lack what it imports
+
+    for limit in (*limits(), *group()):
+        detail = f"{limit.what}: {limit.found}; a run needs {limit.needed}"
+        yield Row(
+            name=limit.name, state="missing" if limit.command else "ok", detail=detail, mend=limit.command
+        )
+
+
+def _limits_of_trees() -> Row:
+    if find_cgroups().memory is not None:
+        return Row(name="limits", state="ok", detail=describe())
+    others = DELEGATE if has_memory() else OLD_GROUPS
+    return Row(
+        name="limits", state="limited", detail=describe(), mend=ROOTS_GROUPS if user_id() == 0 else others
+    )
+
+
+def _limits_of_processes() -> Row:
+    refused = refused_limits()
+    if not refused:
+        return Row(name="ulimit", state="ok", detail="limits of students' processes can be set")
+    return Row(name="ulimit", state="missing", detail=refused, mend=ULIMIT_HINT)
+
+
+def _mode() -> Row:
+    try:
+        sandbox = choose("auto")
+    except HostError as error:
+        return Row(name="sandbox", state="missing", detail=error.message, mend=error.hint)
+    if sandbox.bubblewrap:
+        return Row(name="sandbox", state="ok", detail=f"--sandbox auto takes {sandbox.label}")
+    detail = f"{without_sandbox(sandbox.label)} --sandbox require refuses."
+    return Row(name="sandbox", state="limited", detail=detail, mend="mend the rows above")
+
+
+# Says before a command begins that students' code will run without a sandbox.
+
+
+def say_unwalled(mode: Mode, rubric: LoadedRubric | None = None) -> None:
+    """Say it on stderr, where it is so. Nothing of a rubric for which nothing is run; what keeps a sandbox from being
+    chosen is said by the grading itself."""
+    with suppress(GraderError):
+        if (rubric is not None and not needs_ros(rubric)) or why_unrun():
+            return
+        from grader.arena.sandbox_probe import choose  # noqa: PLC0415 - where nothing is run, nobody needs it
+
+        words = without_sandbox(choose(mode).label)
+        if words:
+            say_beside(words)

@@ -1,6 +1,0 @@
-"""A class's results as a table: for people, for programs, and as learning platforms import it."""
-
-from grader.gradebook.model import FORMS, Book, Form, Row
-from grader.gradebook.write import write_gradebook
-
-__all__ = ["FORMS", "Book", "Form", "Row", "write_gradebook"]

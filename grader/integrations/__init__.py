@@ -1,0 +1,1 @@
+"""The platforms that the grader runs on: GitHub, GitLab, Gradescope, PrairieLearn."""

@@ -1,6 +1,0 @@
-"""`overrides.yaml`: what people decided about criteria, read and written."""
-
-from grader.overrides.read import FILE, Overrides, read_overrides
-from grader.overrides.write import write_override
-
-__all__ = ["FILE", "Overrides", "read_overrides", "write_override"]

@@ -1,0 +1,123 @@
+"""The JSON Schema (draft 2020-12) of each format, made of the records that read and write it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from grader.authoring.mutation.model import MutantsFile, RubricTest
+from grader.evidence.events import PACKAGE_TOPIC, TOPICS
+from grader.model.batch import BatchRun
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.result import GradingResult
+from grader.model.similarity import Similarity
+from grader.model.submission_time import Override
+from grader.report.formats.keys import KEYS
+from grader.report.formats.known import FORMATS, Format
+from grader.rubric.model import Rubric
+from grader.rubric.schema import DIALECT, rubric_schema
+
+Schema = dict[str, Any]
+ROOTS: dict[str, type[Record]] = {
+    "result": GradingResult,
+    "rubric": Rubric,
+    "run": BatchRun,
+    "similarity": Similarity,
+    "mutants": MutantsFile,
+    "rubric-test": RubricTest,
+}
+"""The record that a whole file is; evidence has one for each topic, and overrides are a map."""
+
+
+def schema_of(name: str) -> Schema:
+    """The schema of the newest version of the format `name` (a key of `FORMATS`).
+
+    Of what graders write, it leaves room for keys of later ones, as this grader's reader does. Of evidence it describes
+    an object with a key for each JSON channel: a message on `/grader/host` is a value of the key `/grader/host`.
+    """
+    about, body = FORMATS[name], _MAKERS[name]()
+    for record, found in records_in(name, body):
+        _describe(record, found, about)
+    definitions = {"$defs": body.pop("$defs")} if "$defs" in body else {}
+    head = {
+        "$schema": DIALECT,
+        "$id": f"urn:ros-lab-grader:{name}:{about.is_.version}",
+        "title": f"{about.title} ({about.is_})",
+    }
+    return {**head, **{key: value for key, value in body.items() if key not in head}, **definitions}
+
+
+def records_in(name: str, schema: Schema) -> Iterator[tuple[str, Schema]]:
+    """Every record that the schema of a format describes, by its name; first that of the file itself, if it is one."""
+    if name in ROOTS:
+        yield ROOTS[name].__name__, schema
+    yield from schema.get("$defs", {}).items()
+
+
+def _describe(record: str, schema: Schema, about: Format) -> None:
+    """Each key's own text; what graders write may have more keys than a reader knows."""
+    if about.by == "grader" and schema.get("additionalProperties") is False:
+        del schema["additionalProperties"]
+    for key, found in schema.get("properties", {}).items():
+        text = KEYS.get(f"{record}.{key}")
+        if text is not None and "description" not in found:
+            found["description"] = text
+
+
+def _of(record: type[Record]) -> Callable[[], Schema]:
+    """A file that holds this record. What tells its version is always written."""
+
+    def make() -> Schema:
+        schema = record.model_json_schema(by_alias=True)
+        if "schema" in schema["properties"]:
+            schema["required"] = ["schema", *(k for k in schema.get("required", ()) if k != "schema")]
+        return schema
+
+    return make
+
+
+def _evidence() -> Schema:
+    """All JSON channels in one: their records have no name in common that means something else."""
+    definitions: Schema = {}
+    channels: Schema = {}
+    records: Mapping[str, type[Record]] = {**TOPICS, PACKAGE_TOPIC: PackageFacts}
+    for topic, record in records.items():
+        schema = record.model_json_schema(by_alias=True, ref_template="#/$defs/{model}")
+        definitions |= schema.pop("$defs", {})
+        definitions[record.__name__] = schema
+        channels[topic] = {"$ref": f"#/$defs/{record.__name__}"}
+    text = (
+        "The JSON channels of an evidence file: each message on a topic is what stands under its name here."
+    )
+    return {
+        "description": text,
+        "type": "object",
+        "properties": channels,
+        "$defs": dict(sorted(definitions.items())),
+    }
+
+
+def _overrides() -> Schema:
+    """The file is a map, not a record. What may be left out may be left empty, too."""
+    override = Override.model_json_schema(by_alias=True)
+    for key in ("comment", "author"):
+        found = override["properties"][key]
+        kept = {"title": found.pop("title"), "default": found.pop("default")}
+        override["properties"][key] = {**kept, "anyOf": [dict(found), {"type": "null"}]}
+    criteria = {"type": "object", "additionalProperties": {"$ref": "#/$defs/Override"}}
+    return {
+        "description": "What people decided: by submission, then by criterion.",
+        "type": "object",
+        "properties": {"schema": {"const": str(FORMATS["overrides"].is_), "description": KEYS["schema"]}},
+        "additionalProperties": {"anyOf": [criteria, {"type": "null"}]},
+        "$defs": {"Override": override},
+    }
+
+
+_MAKERS: dict[str, Callable[[], Schema]] = {
+    **{name: _of(record) for name, record in ROOTS.items()},
+    "rubric": rubric_schema,
+    "evidence": _evidence,
+    "overrides": _overrides,
+}
