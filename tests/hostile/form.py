@@ -175,7 +175,7 @@ class Attack(Record):
     groups: Literal["found", "with", "without", "both"] = "found"
     through: tuple[str, ...] = ()
     container: bool = False
-    full: bool = False
+    often: bool = False
     after: Literal["none", "static", "full"] = "none"
     machine_mb: int | None = None
     installed: bool = False
@@ -198,9 +198,12 @@ class Attack(Record):
         return tuple(Run(user, found) for user in self.users for found in groups)
 
     def is_for_all_only(self, run: Run) -> bool:
-        """Left out of `make test`. Of the runs of one attack the last is in it: an ordinary user without control groups
-        has the least to hold it."""
-        return self.full or (self.groups != "found" and run != self.runs[-1])
+        """Return whether only `make test-all` makes this run.
+
+        Of an attack that `make test` makes, too, it makes the last run: an ordinary user without control groups has the least
+        to hold the attack.
+        """
+        return not self.often or run != self.runs[-1]
 
 
 def attack_names() -> list[str]:
