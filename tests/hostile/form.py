@@ -200,8 +200,8 @@ class Attack(Record):
     def is_for_all_only(self, run: Run) -> bool:
         """Return whether only `make test-all` makes this run.
 
-        Of an attack that `make test` makes, too, it makes the last run: an ordinary user without control groups has the least
-        to hold the attack.
+        Of an attack that `make test` makes, too, it makes the last run: an ordinary user without control groups has the
+        least to hold the attack.
         """
         return not self.often or run != self.runs[-1]
 
