@@ -104,7 +104,7 @@ BOUNDS = {
     "names of nodes": ("ros/guard:NAME_CHARS_MAX", "ros/guard:NAMES_MAX", ("ros/guard:NAME_BYTES_MAX", KB)),
     "parameters": (
         ("ros/params:PROCESS_BYTES_MAX", MB), ("ros/params:RUN_BYTES_MAX", MB), "ros/params:LEVELS_MAX",
-        ("ros/params:VALUE_BYTES_MAX", KB), "ros/params:EVENTS_MAX", ("ros/params:EVENTS_BYTES_MAX", MB),
+        ("ros/params:VALUE_BYTES_MAX", KB), "ros/params:PARAM_EVENTS_MAX", ("ros/params:PARAM_EVENTS_BYTES_MAX", MB),
     ),
     "`/proc`": ("ros/tree:PROCESSES_MAX", "ros/owners:FILES_MAX"),
     "the kernel's tables": ("ros/sockets:SOCKETS_MAX", "ros/sockets:TABLE_ROWS_MAX"),

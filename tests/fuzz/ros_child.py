@@ -80,7 +80,7 @@ def plain(value):
 def service_answer(data):
     """The same answer to the probe and to the call."""
     services.connect = lambda *_: Socket(data)
-    services.call("/s", "rosrpc://127.0.0.1:9", "/n", type_="demo/Call", request=b"", timeout_s=1.0)
+    services.call_service("/s", "rosrpc://127.0.0.1:9", "/n", type_="demo/Call", request=b"", timeout_s=1.0)
 
 
 def topic_stream(data):

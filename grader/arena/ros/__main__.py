@@ -172,7 +172,7 @@ class Arena:
         def ask():
             request = base64.b64decode(command["data"])
             try:
-                data = services.call(
+                data = services.call_service(
                     service,
                     uri,
                     self._actor.caller_id,

@@ -14,7 +14,7 @@ import struct
 import time
 
 from arrival import note_arrivals, receive
-from framing import LENGTH
+from tcpros import LENGTH
 from wire import now_ns
 
 TOPIC = "/grader/calibration"

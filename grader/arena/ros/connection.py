@@ -1,7 +1,8 @@
 """One publisher's connection: cuts the stream into messages and hands them on, as far as there is room for them."""
 
 from arrival import receive, receive_into
-from framing import LENGTH, Waste, message_ends
+from framing import Waste, message_ends
+from tcpros import LENGTH
 
 READ_BYTES = 1 << 16
 LARGE_BYTES, LARGE_READ_BYTES = 1 << 14, 1 << 19

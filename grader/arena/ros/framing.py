@@ -1,8 +1,7 @@
 """Cuts what comes over a TCPROS connection into messages, each behind its length."""
 
-import struct
+from tcpros import LENGTH
 
-LENGTH = struct.Struct("<I")
 MESSAGE_BYTES_MAX = 16 << 20
 
 

@@ -6,7 +6,7 @@ import time
 
 from tree import TICKS_HZ
 
-PERIOD_S = 0.02
+SLEEP_S = 0.02
 REPORT_S = 0.5
 
 
@@ -49,9 +49,9 @@ class Lateness:
         after = time.monotonic()
         while not self._stopping:
             before = after
-            time.sleep(PERIOD_S)
+            time.sleep(SLEEP_S)
             after = time.monotonic()
-            late_ms.append(max(0.0, (after - before - PERIOD_S) * 1e3))
+            late_ms.append(max(0.0, (after - before - SLEEP_S) * 1e3))
             if self._stopping or after >= report_at:
                 self._report(late_ms)
                 late_ms = []

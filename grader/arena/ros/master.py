@@ -243,7 +243,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
 
     def _type_of(self, service, api):
         try:
-            return services.probe(service, api, self._own, PROBE_S)
+            return services.probe_service(service, api, self._own, PROBE_S)
         except ProtocolError:
             return ""
 

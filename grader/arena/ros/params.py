@@ -12,7 +12,7 @@ from values import cut, depth, plain, weight
 PROCESS_BYTES_MAX, RUN_BYTES_MAX = 8 << 20, 24 << 20
 """Of all values that a process, or all of them, set in a run."""
 LEVELS_MAX = 24
-EVENTS_MAX, EVENTS_BYTES_MAX = 4000, 4 << 20
+PARAM_EVENTS_MAX, PARAM_EVENTS_BYTES_MAX = 4000, 4 << 20
 VALUE_BYTES_MAX = 256 << 10
 LATEST_MAX = 200
 ALWAYS = "/use_sim_time"
@@ -77,7 +77,7 @@ class ParamLog:
             if record["name"] == ALWAYS and self._always < ALWAYS_MAX:
                 self._always += 1
                 return True
-            if self._events >= EVENTS_MAX or self._events_bytes + size > EVENTS_BYTES_MAX:
+            if self._events >= PARAM_EVENTS_MAX or self._events_bytes + size > PARAM_EVENTS_BYTES_MAX:
                 return False
             self._events += 1
             self._events_bytes += size

@@ -11,7 +11,7 @@ WORDS_CHARS_MAX = 500
 ANY = "*"
 
 
-def probe(service, uri, caller_id, timeout_s):
+def probe_service(service, uri, caller_id, timeout_s):
     """The type that the service says it has; raise ProtocolError where it says none."""
     with _connected(service, uri, caller_id, timeout_s, probe="1") as sock:
         header = _header(sock)
@@ -20,13 +20,13 @@ def probe(service, uri, caller_id, timeout_s):
     return header["type"]
 
 
-def call(service, uri, caller_id, *, type_, request, timeout_s):
+def call_service(service, uri, caller_id, *, type_, request, timeout_s):
     """The bytes of the response; raise ProtocolError, with the service's own words, for anything else.
 
     A service of another type would wait for bytes that never come, so it is asked first.
     """
     until_s = time.monotonic() + timeout_s
-    found = probe(service, uri, caller_id, timeout_s)
+    found = probe_service(service, uri, caller_id, timeout_s)
     if found != type_:
         raise ProtocolError("the service is of type {}".format(found))
     with _connected(service, uri, caller_id, until_s - time.monotonic()) as sock:
