@@ -69,7 +69,7 @@ def test_what_is_read_from_the_students_side_is_tested(row: list[str]) -> None:
 
 
 BOUNDS = {
-    "stdout and stderr": (RUN.output_bytes // MB, RUN.output_lines, "ros/streams:LINE_BYTES_MAX"),
+    "stdout and stderr": (RUN.output_bytes // MB, RUN.output_lines, "ros/processes:LINE_BYTES_MAX"),
     "what bubblewrap says": ("ros/processes:INFO_BYTES_MAX",),
     "what a step hands over": (RUN.built_bytes // MB,),
     "`built.tar`": (
@@ -86,29 +86,29 @@ BOUNDS = {
         "ros/rpc:REQUEST_S",
     ),
     "answers of nodes": (
-        ("ros/bounded:ANSWER_BYTES_MAX", MB), "ros/links:CONNECTIONS_MAX", "ros/recorder:CONNECT_S",
-        "ros/links:BUS_INFO_S", "ros/master:NOTIFY_S", "ros/pool:EACH_MAX",
+        ("ros/bounded_sockets:ANSWER_BYTES_MAX", MB), "ros/links:CONNECTIONS_MAX", "ros/recorder:CONNECT_S",
+        "ros/links:BUS_INFO_S", "ros/master:NOTIFY_S", "ros/quotas:EACH_MAX",
     ),
     "connections to": (
-        ("ros/tcpros:HEADER_BYTES_MAX", KB), "ros/tcpros_server:WAITING_MAX", "ros/tcpros_server:HANDSHAKE_S",
+        ("ros/tcpros:HEADER_BYTES_MAX", KB), "ros/actor:WAITING_MAX", "ros/actor:HANDSHAKE_S",
     ),
     "headers of publishers": (
         ("ros/tcpros:HEADER_BYTES_MAX", KB), "ros/tcpros:FIELD_CHARS_MAX", "ros/tcpros:DEFINITION_CHARS_MAX",
         "ros/recorder:OPEN_MAX", "ros/recorder:SAME_MAX", "ros/recorder:CONNECT_S",
     ),
     "messages": (
-        ("ros/framing:MESSAGE_BYTES_MAX", MB), RUN.channel_bytes // MB, RUN.channel_messages, RUN.channels,
+        ("ros/tcpros:MESSAGE_BYTES_MAX", MB), RUN.channel_bytes // MB, RUN.channel_messages, RUN.channels,
         RUN.run_bytes // MB,
     ),
-    "a service's answer": (("ros/services:ANSWER_BYTES_MAX", MB), "ros/services:WORDS_CHARS_MAX", calls.ANSWER_S),
+    "a service's answer": (("ros/tcpros:ANSWER_BYTES_MAX", MB), "ros/tcpros:WORDS_CHARS_MAX", calls.ANSWER_S),
     "names of nodes": ("ros/guard:NAME_CHARS_MAX", "ros/guard:NAMES_MAX", ("ros/guard:NAME_BYTES_MAX", KB)),
     "parameters": (
-        ("ros/params:PROCESS_BYTES_MAX", MB), ("ros/params:RUN_BYTES_MAX", MB), "ros/params:LEVELS_MAX",
-        ("ros/params:VALUE_BYTES_MAX", KB), "ros/params:PARAM_EVENTS_MAX", ("ros/params:PARAM_EVENTS_BYTES_MAX", MB),
+        ("ros/guard:PROCESS_BYTES_MAX", MB), ("ros/guard:RUN_BYTES_MAX", MB), "ros/guard:LEVELS_MAX",
+        ("ros/guard:VALUE_BYTES_MAX", KB), "ros/guard:PARAM_EVENTS_MAX", ("ros/guard:PARAM_EVENTS_BYTES_MAX", MB),
     ),
-    "`/proc`": ("ros/tree:PROCESSES_MAX", "ros/owners:FILES_MAX"),
+    "`/proc`": ("ros/process_tree:PROCESSES_MAX", "ros/sockets:FILES_MAX"),
     "the kernel's tables": ("ros/sockets:SOCKETS_MAX", "ros/sockets:TABLE_ROWS_MAX"),
-    "lines that were printed": ("ros/streams:LINE_BYTES_MAX",),
+    "lines that were printed": ("ros/processes:LINE_BYTES_MAX",),
     "names that are compared": (text.NAMES_MAX, text.NAME_CHARS_MAX),
     "definitions and messages": (
         definitions.MAX_DEFINITION_BYTES, definitions.MAX_FIELDS, definitions.MAX_DEPTH,

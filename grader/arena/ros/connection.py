@@ -1,8 +1,7 @@
 """One publisher's connection: cuts the stream into messages and hands them on, as far as there is room for them."""
 
-from arrival import receive, receive_into
-from framing import Waste, message_ends
-from tcpros import LENGTH
+from bounded_sockets import receive, receive_into
+from tcpros import LENGTH, Waste, message_ends
 
 READ_BYTES = 1 << 16
 LARGE_BYTES, LARGE_READ_BYTES = 1 << 14, 1 << 19
