@@ -97,14 +97,14 @@ BOUNDS = {
         "ros/recorder:OPEN_MAX", "ros/recorder:SAME_MAX", "ros/recorder:CONNECT_S",
     ),
     "messages": (
-        ("ros/tcpros:MESSAGE_BYTES_MAX", MB), RUN.channel_bytes // MB, RUN.channel_messages, RUN.channels,
+        ("ros/connection:MESSAGE_BYTES_MAX", MB), RUN.channel_bytes // MB, RUN.channel_messages, RUN.channels,
         RUN.run_bytes // MB,
     ),
     "a service's answer": (("ros/tcpros:ANSWER_BYTES_MAX", MB), "ros/tcpros:WORDS_CHARS_MAX", calls.ANSWER_S),
     "names of nodes": ("ros/guard:NAME_CHARS_MAX", "ros/guard:NAMES_MAX", ("ros/guard:NAME_BYTES_MAX", KB)),
     "parameters": (
-        ("ros/guard:PROCESS_BYTES_MAX", MB), ("ros/guard:RUN_BYTES_MAX", MB), "ros/guard:LEVELS_MAX",
-        ("ros/guard:VALUE_BYTES_MAX", KB), "ros/guard:PARAM_EVENTS_MAX", ("ros/guard:PARAM_EVENTS_BYTES_MAX", MB),
+        ("ros/registry_log:PROCESS_BYTES_MAX", MB), ("ros/registry_log:RUN_BYTES_MAX", MB), "ros/registry_log:LEVELS_MAX",
+        ("ros/registry_log:VALUE_BYTES_MAX", KB), "ros/registry_log:EVENTS_MAX", ("ros/registry_log:EVENTS_BYTES_MAX", MB),
     ),
     "`/proc`": ("ros/process_tree:PROCESSES_MAX", "ros/sockets:FILES_MAX"),
     "the kernel's tables": ("ros/sockets:SOCKETS_MAX", "ros/sockets:TABLE_ROWS_MAX"),

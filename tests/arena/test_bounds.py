@@ -42,7 +42,7 @@ def call(value: str) -> bytes:
     "value", [1, -1.5, True, "<&>\u202e", [1, [2]], {"a": {"b": []}}, xmlrpc.client.Binary(b"\0\xff"), ""]
 )
 def test_calls_as_clients_write_them(module, value) -> None:
-    assert module("strict").read(xmlrpc.client.dumps((value,), "m").encode()) == ((value,), "m")
+    assert module("xmlrpc_parser").read(xmlrpc.client.dumps((value,), "m").encode()) == ((value,), "m")
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_calls_as_clients_write_them(module, value) -> None:
     ],
 )
 def test_calls_that_no_client_writes(module, data, why) -> None:
-    strict = module("strict")
+    strict = module("xmlrpc_parser")
     with pytest.raises(strict.Malformed, match=why):
         strict.read(data)
 

@@ -1,6 +1,9 @@
 """The managed roscore: reads commands (one JSON object a line) on stdin, writes frames (`wire`) on stdout.
 
-Runs under ROS's own interpreter and imports nothing but the standard library and ROS. The first line configures it:
+Runs under ROS's own interpreter and imports nothing but the standard library and ROS. Every arena is a copy of one
+process, the template, which has imported all that an arena needs and does nothing else (`stand_by`).
+
+The first line of its stdin configures an arena:
 `master` (false for a build, which needs none), `port`, `limits`, `suffix` (of its nodes' names), `rosout` (a process
 spec, or null), `stage` (the folder over which what sandboxes see is mounted, and the user who writes there; null
 without a sandbox). When stdin ends, all ends.
@@ -29,10 +32,16 @@ from sockets import buffer_bytes
 from wire import Wire, set_clock
 
 PR_SET_CHILD_SUBREAPER = 36
-ROS = ("actor", "guard", "master", "owners", "recorder", "rpc", "services")
+ROS = ("actor", "guard", "master", "recorder", "rpc", "sockets", "tcpros")
 """What a run needs, and a build does not."""
 FINISH_S = 2.0
 REAP_S = 1.0
+ANSWER = struct.Struct("<id")
+DESCRIPTORS = 3
+REQUEST_BYTES = 64
+OPEN_MAX = 4096
+PYTHONS = (signal.SIGPIPE, signal.SIGXFSZ)
+"""Ignored by Python itself, and not in what it starts."""
 
 
 class Arena:
@@ -245,8 +254,6 @@ class Arena:
 
     def _exited(self, process):
         del self._processes[process.name]
-        usage = resource.getrusage(resource.RUSAGE_CHILDREN)
-        self._wire.status("exited", name=process.name, children_cpu_s=usage.ru_utime + usage.ru_stime)
         self._end_when_empty()
 
     def _end_when_empty(self):
@@ -261,7 +268,7 @@ class Arena:
             process.reap()
 
 
-def live():
+def run_arena():
     """One arena's whole life."""
     set_clock()
     libc = ctypes.CDLL(None, use_errno=True)
@@ -289,27 +296,14 @@ def live():
     os._exit(0)
 
 
-if __name__ == "__main__":
-    stand_by(live, ROS)
+def serve_requests(sock, live):
+    """Start arenas, each of which is `live()` in a session of its own, until the socket of packets closes; they live on
+    as long as their own stdin.
 
-
-# [arena.ros.template] The process of which every arena is a copy: it has imported all that an arena needs, and does nothing else.
-#
-# Reads requests from a socket of packets on stdin. `s` with three descriptors (an arena's stdin, stdout, stderr) starts
-# an arena; the answer is its process id and the CPU seconds that this process took since the last answer. `e` with a
-# process id waits for an arena that has ended, or was killed; the answer has the same id. Until then nobody else gets
-# that id. When the socket closes, so does this process: arenas live on as long as their own stdin.
-
-ANSWER = struct.Struct("<id")
-DESCRIPTORS = 3
-REQUEST_BYTES = 64
-OPEN_MAX = 4096
-PYTHONS = (signal.SIGPIPE, signal.SIGXFSZ)
-"""Ignored by Python itself, and not in what it starts."""
-
-
-def serve(sock, live):
-    """Start arenas, each of which is `live()` in a session of its own, until nobody asks any more."""
+    `s` with three descriptors (an arena's stdin, stdout, stderr) starts an arena; the answer is its process id and the
+    CPU seconds that this process took since the last answer. `e` with a process id waits for an arena that has ended,
+    or was killed; the answer has the same id. Until then no other process gets that id.
+    """
     gc.freeze()  # what is here is shared with every copy for as long as nobody touches it
     told_s = 0.0
     while True:
@@ -356,7 +350,7 @@ def _receive(sock):
     return data, list(numbers)
 
 
-def usual_signals():
+def reset_signals():
     """Signals that are ignored or blocked here would be so in all that is started from here, students' nodes too: how
     the grader was started must not change what they do."""
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
@@ -366,10 +360,14 @@ def usual_signals():
 
 def stand_by(live, modules):
     """The template's whole life. `modules` are loaded now; what cannot be loaded is missed by who needs it."""
-    usual_signals()
+    reset_signals()
     for name in modules:
         with contextlib.suppress(Exception):
             importlib.import_module(name)
     with contextlib.suppress(ConnectionError), socket.socket(fileno=0) as sock:
-        serve(sock, live)
+        serve_requests(sock, live)
     os._exit(0)
+
+
+if __name__ == "__main__":
+    stand_by(run_arena, ROS)

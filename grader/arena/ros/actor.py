@@ -12,10 +12,10 @@ import struct
 import threading
 import time
 
-from bounded_sockets import SOMEBODY, BoundedSocket, ProtocolError
+from bounded_sockets import LOOPBACK, SOMEBODY, BoundedSocket, ProtocolError
 from guard import shown
-from tcpros import HEADER_BYTES_MAX, LENGTH, Closed, check_fields, read_header, write_header
-from wire import now_ns
+from tcpros import HEADER_BYTES_MAX, Closed, check_fields, read_header, write_header
+from wire import LENGTH, now_ns
 
 SUBSCRIBERS_MAX = 64
 """Of one process."""
@@ -29,6 +29,8 @@ CLOCK = {
 }
 TIME = struct.Struct("<II")
 NS = 1000000000
+HANDSHAKE_S = 2.0
+WAITING_MAX = 128
 
 
 class SlaveApi:
@@ -56,7 +58,7 @@ class SlaveApi:
     def requestTopic(self, _caller_id, topic, protocols):
         if str(topic) not in self._actor.topics or ["TCPROS"] not in protocols:
             return 0, "no such topic or protocol", []
-        return 1, "ready", ["TCPROS", HOST, self._actor.port]
+        return 1, "ready", ["TCPROS", LOOPBACK, self._actor.port]
 
     def getPid(self, _caller_id):
         return 1, "", os.getpid()
@@ -229,15 +231,10 @@ class Clock:
         self._actor.publish("/clock", TIME.pack(*divmod(self._now_ns, NS)))
 
 
-# [arena.ros.tcpros_server] The port of the arena's own node: takes connections in, each for no longer than its header may take.
-
-HOST = "127.0.0.1"
-HANDSHAKE_S = 2.0
-WAITING_MAX = 128
-
-
 class Door:
-    """`join(sock, header, who)` keeps a connection of the process `who`, or raises ProtocolError or OSError.
+    """The port of the arena's own node: takes connections in, each for no longer than its header may take.
+
+    `join(sock, header, who)` keeps a connection of the process `who`, or raises ProtocolError or OSError.
 
     Of those that have not yet said what they want, the one that has waited for longest makes way.
     """
@@ -249,7 +246,7 @@ class Door:
         self._waiting = collections.OrderedDict()
         self._crowded = False
         self._lock = threading.Lock()
-        self._server = socket.create_server((HOST, 0), backlog=4096)
+        self._server = socket.create_server((LOOPBACK, 0), backlog=4096)
         self.port = self._server.getsockname()[1]
         loop.add_reader(self._server, self._accept)
 
@@ -288,14 +285,14 @@ class Door:
                 self._waiting.pop(sock, None)
 
     def _who(self, address):
-        return self._owners.caller(address, (HOST, self.port)) or SOMEBODY
+        return self._owners.caller(address, (LOOPBACK, self.port)) or SOMEBODY
 
     def _note_crowd(self):
         """Whose most of them are: asked once."""
         with self._lock:
             waiting, self._crowded = None if self._crowded else list(self._waiting.values()), True
         if waiting is not None:
-            whose = self._owners.callers([(address, (HOST, self.port)) for address in waiting])
+            whose = self._owners.callers([(address, (LOOPBACK, self.port)) for address in waiting])
             most = collections.Counter(whose).most_common(1)[0][0]
             detail = "opened more than {} connections to the grader's node that said nothing".format(
                 WAITING_MAX

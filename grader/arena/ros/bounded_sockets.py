@@ -1,4 +1,5 @@
-"""Sockets to and from student's programs: never waited for longer than said, never more read than said."""
+"""Sockets to and from students' programs: bounded in time and in bytes, with who is at the other end and how often they
+may call, and with the times at which the kernel saw bytes arrive (socket(7), SO_TIMESTAMPNS)."""
 
 import http.client
 import socket
@@ -13,6 +14,13 @@ from wire import now_ns
 
 LOOPBACK = "127.0.0.1"
 ANSWER_BYTES_MAX = 1 << 20
+SOMEBODY = "an unknown process"
+SO_TIMESTAMPNS = 35
+TIMESPEC = struct.Struct("@ll")
+SPACE = socket.CMSG_SPACE(TIMESPEC.size)
+APART_NS_MAX = 100_000
+AGE_NS_MAX = 5 * 10**9
+"""Older ones come from a clock that was set meanwhile."""
 
 
 class ProtocolError(Exception):
@@ -139,11 +147,6 @@ def call(method, *args):
     return value
 
 
-# [arena.ros.callers] Who is at the other end of a connection to the arena, and how often they may call.
-
-SOMEBODY = "an unknown process"
-
-
 class Pace:
     """At most so many a second, in the long run."""
 
@@ -180,16 +183,6 @@ class Caller:
     @property
     def name(self):
         return self.process or SOMEBODY
-
-
-# [arena.ros.arrival] When bytes came in, as the kernel noted it (socket(7), SO_TIMESTAMPNS): a reader that wakes late changes no times.
-
-SO_TIMESTAMPNS = 35
-TIMESPEC = struct.Struct("@ll")
-SPACE = socket.CMSG_SPACE(TIMESPEC.size)
-APART_NS_MAX = 100_000
-AGE_NS_MAX = 5 * 10**9
-"""Older ones come from a clock that was set meanwhile."""
 
 
 def note_arrivals(sock):

@@ -1,8 +1,10 @@
-"""A publisher whose loop is known: what is wrong with what the recorder sees of it, is the machine's doing.
+"""Measures how well this machine keeps time, which says whether a rate may be judged.
 
-It is a process of its own, as a student's node is, and sleeps for a tenth of a second in each turn, as a student's
-loop may. Each message says when it was sent: what a sleep took too long shows in two that follow each other. They
-come to the recorder's loop over TCP, in the form of TCPROS, and are recorded with the times of their arrival.
+`Lateness` is how late a thread wakes that asked for 20 ms. `Calibration` is a publisher whose loop is known: what is
+wrong with what the recorder sees of it is the machine's doing. It is a process of its own, as a student's node is, and
+sleeps for a tenth of a second in each turn, as a student's loop may. Each message says when it was sent: what a sleep
+took too long shows in two that follow each other. They come to the recorder's loop over TCP, in the form of TCPROS, and
+are recorded with the times of their arrival.
 """
 
 import contextlib
@@ -16,8 +18,7 @@ import time
 
 from bounded_sockets import note_arrivals, receive
 from process_tree import TICKS_HZ
-from tcpros import LENGTH
-from wire import now_ns
+from wire import LENGTH, now_ns
 
 TOPIC = "/grader/calibration"
 PERIOD_S = 0.1
@@ -26,6 +27,8 @@ DEFINITION = "uint32 seq\ntime stamp\nstring frame_id\n"
 HEADER = struct.Struct("<IIII")
 FRAME_BYTES = LENGTH.size + HEADER.size
 PR_SET_PDEATHSIG = 1
+SLEEP_S = 0.02
+REPORT_S = 0.5
 
 
 class Calibration:
@@ -107,12 +110,6 @@ def _connection():
             if address == theirs.getsockname():
                 return mine, theirs
             mine.close()
-
-
-# [arena.ros.host] How late this machine wakes a thread that asked for 20 ms: a measure of whether a rate may be judged.
-
-SLEEP_S = 0.02
-REPORT_S = 0.5
 
 
 def peak_bytes():

@@ -16,6 +16,7 @@ from quotas import Pool, cut
 
 BUS_INFO_S, ROUND_S = 0.5, 1.5
 CONNECTIONS_MAX = 2000
+UDP = "UDPROS"
 DOUBTED_ROUNDS, DOUBTS_MAX = 3, 100
 """What is said wrongly so many rounds in a row is told: each end learns at its own time that the other is gone."""
 
@@ -114,16 +115,12 @@ class Links:
         return Answer(serves, hears)
 
 
-# [arena.ros.ties] Which nodes are connected as the kernel has it: whose processes hold the two ends of a connection.
-#
-# A node's processes are those that have the socket open on which its slave API listens. A connection to that port is a
-# call, no topic's.
-
-UDP = "UDPROS"
-
-
 class Ties:
-    """The kernel's table at one moment."""
+    """Which nodes are connected in the kernel's table, read once: whose processes hold the two ends of a connection.
+
+    A node's processes are those that have the socket open on which its slave API listens. A connection to that port is
+    a call, no topic's.
+    """
 
     def __init__(self, owners):
         self._owners = owners

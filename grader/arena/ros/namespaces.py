@@ -2,7 +2,7 @@
 (man 7 namespaces).
 
 The calling process enters them itself, so there is no helper that could be left behind when a process is killed. Run as
-a script it enters them, mounts what a stage would (`stage.py`), and becomes the program that its arguments name.
+a script it enters them, mounts what a stage would, and becomes the program that its arguments name.
 """
 
 import contextlib
@@ -23,6 +23,19 @@ SIOCGIFFLAGS = 0x8913
 SIOCSIFFLAGS = 0x8914
 IFF_UP = 1
 IFREQ = struct.Struct("16sh14x")
+SIZE_BYTES = 512 << 20
+"""More than any package, with what its build left, can have."""
+INODES = 100_000
+KEYCTL_JOIN_SESSION_KEYRING = 1
+KEYCTL = {
+    "x86_64": 250,
+    "aarch64": 219,
+    "i686": 288,
+    "armv7l": 311,
+    "riscv64": 219,
+    "ppc64le": 271,
+    "s390x": 280,
+}
 PROBED = "/sys"  # in a namespace that ends with the probe
 
 
@@ -81,28 +94,24 @@ def _raise_loopback():
         fcntl.ioctl(sock, SIOCSIFFLAGS, IFREQ.pack(b"lo", flags | IFF_UP))
 
 
-if __name__ == "__main__":
-    try:
-        enter_own_namespaces()
-        mount_tmpfs(PROBED, 4096, 16, os.geteuid(), 0o755)
-    except OSError as error:
-        sys.exit(error.strerror)
-    os.execv(sys.argv[1], sys.argv[1:])  # noqa: S606 - becoming that program is what it is for
-
-
-# [arena.ros.stage] What sandboxes are shown of the grader's files: copies in memory, in the arena's own mount namespace.
-#
-# A bind mount tells where it comes from (`/proc/self/mountinfo`). What comes from here has a number in place of a path of
-# the machine. The memory in which a process tree may write comes from here too: bubblewrap's own tmpfs would have no
-# bound for the number of files.
-
-SIZE_BYTES = 512 << 20
-"""More than any package, with what its build left, can have."""
-INODES = 100_000
+def leave_keys_behind():
+    """Join a new, empty session keyring (man 7 keyrings), which all that the process starts inherits: what hangs on
+    the session of the person who grades is not for students. Where the kernel has no keys, or
+    does not let it, there is nothing that could be read either way."""
+    number = KEYCTL.get(os.uname().machine)
+    if number is not None:
+        ctypes.CDLL(None, use_errno=True).syscall(number, KEYCTL_JOIN_SESSION_KEYRING, None)
 
 
 class Stage:
-    """`folder` is empty, and every user may pass through it. Raises OSError where nothing can be mounted."""
+    """What sandboxes are shown of the grader's files: copies in memory, in the arena's own mount namespace.
+
+    A bind mount tells where it comes from (`/proc/self/mountinfo`); what comes from here has a number in place of a
+    path of the machine. The memory in which a process tree may write comes from here too: bubblewrap's own tmpfs would
+    have no bound for the number of files.
+
+    `folder` is empty, and every user may pass through it. Raises OSError where nothing can be mounted.
+    """
 
     def __init__(self, folder, owner):
         self.folder = folder
@@ -160,23 +169,10 @@ def copy_tree(source, target):
         os.chmod(target, os.stat(source).st_mode & 0o777)
 
 
-# [arena.ros.keys] The kernel's keys (man 7 keyrings): what hangs on the session of whoever runs the grader is not for students.
-
-KEYCTL_JOIN_SESSION_KEYRING = 1
-KEYCTL = {
-    "x86_64": 250,
-    "aarch64": 219,
-    "i686": 288,
-    "armv7l": 311,
-    "riscv64": 219,
-    "ppc64le": 271,
-    "s390x": 280,
-}
-
-
-def leave_keys_behind():
-    """Join a new, empty session keyring; all that the process starts inherits it. Where the kernel has no keys, or
-    does not let it, there is nothing that could be read either way."""
-    number = KEYCTL.get(os.uname().machine)
-    if number is not None:
-        ctypes.CDLL(None, use_errno=True).syscall(number, KEYCTL_JOIN_SESSION_KEYRING, None)
+if __name__ == "__main__":
+    try:
+        enter_own_namespaces()
+        mount_tmpfs(PROBED, 4096, 16, os.geteuid(), 0o755)
+    except OSError as error:
+        sys.exit(error.strerror)
+    os.execv(sys.argv[1], sys.argv[1:])  # noqa: S606 - becoming that program is what it is for

@@ -1,4 +1,4 @@
-"""A tree of processes as /proc shows it (man 5 proc)."""
+"""A tree of processes: what /proc shows of it (man 5 proc), and the control groups that hold its memory and tasks."""
 
 import contextlib
 import itertools
@@ -11,6 +11,16 @@ PROCESSES_MAX = 5000
 MAPS_MAX = 100000
 SHARED = b" /dev/zero (deleted)\n"
 PIECE_BYTES = 64 << 20
+KEYS = {
+    ("memory", 1): "memory.limit_in_bytes",
+    ("memory", 2): "memory.max",
+    ("pids", 1): "pids.max",
+    ("pids", 2): "pids.max",
+}
+SWAP = {1: "memory.memsw.limit_in_bytes", 2: "memory.swap.max"}
+PEAK = "memory.max_usage_in_bytes"
+NEAR_BYTES = 4 << 20  # the kernel charges in pieces, the largest is a huge page
+KILLS = {1: "memory.oom_control", 2: "memory.events"}
 
 
 def descendants(pid):
@@ -51,11 +61,11 @@ def cpu_s(pid):
 
 
 def descriptors(pid):
-    """How many files, pipes and sockets it has open."""
+    """Return the numbers of the files, pipes and sockets that it has open."""
     try:
-        return len(os.listdir("/proc/{}/fd".format(pid)))
+        return os.listdir("/proc/{}/fd".format(pid))
     except OSError:
-        return 0
+        return []  # it has ended, or is not ours to look into
 
 
 def shared_memory(pids):
@@ -82,20 +92,6 @@ def resident_bytes(pid):
             return int(file.read().split()[1]) * PAGE_BYTES
     except (OSError, IndexError, ValueError):
         return 0
-
-
-# [arena.ros.groups] Control groups of one process tree: memory and tasks are held by the kernel, for all of it together.
-
-KEYS = {
-    ("memory", 1): "memory.limit_in_bytes",
-    ("memory", 2): "memory.max",
-    ("pids", 1): "pids.max",
-    ("pids", 2): "pids.max",
-}
-SWAP = {1: "memory.memsw.limit_in_bytes", 2: "memory.swap.max"}
-PEAK = "memory.max_usage_in_bytes"
-NEAR_BYTES = 4 << 20  # the kernel charges in pieces, the largest is a huge page
-KILLS = {1: "memory.oom_control", 2: "memory.events"}
 
 
 class Groups:

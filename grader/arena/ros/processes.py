@@ -12,6 +12,9 @@ from process_tree import MAPS_MAX, cpu_s, descendants, descriptors, resident_byt
 WATCH_S = 0.5
 WORDS_BYTES = 200
 INFO_BYTES_MAX = 4096
+LINE_BYTES_MAX = 4096
+READ_BYTES = 65536
+PIPE_READS = 16
 
 
 class Process:
@@ -47,16 +50,13 @@ class Process:
         self._event("start", argv=spec["argv"], script=spec["script"], repairs=spec["repairs"])
         loop.call_later(WATCH_S, self._watch)
 
-    def interrupt(self):
-        """What Ctrl-C in the terminal does: SIGINT for the whole foreground process group."""
-        self._stopped_by = "INT"
-        self._signal_group(signal.SIGINT)
-
     def stop(self, int_s, term_s):
-        """INT, then TERM after `int_s`, then KILL after another `term_s`."""
+        """Send INT to the whole process group, as Ctrl-C in a terminal does, TERM after `int_s`, KILL after another
+        `term_s`."""
         if not self.alive:
             return
-        self.interrupt()
+        self._stopped_by = "INT"
+        self._signal_group(signal.SIGINT)
         self.loop.call_later(int_s, lambda: self._escalate("TERM", signal.SIGTERM))
         self.loop.call_later(int_s + term_s, self.kill)
 
@@ -203,7 +203,7 @@ class Process:
             return "more than {} processes".format(self._limits["processes"])
         if used_s > self._limits["cpu_s"]:
             return "more than {:g} s of CPU time".format(self._limits["cpu_s"])
-        if sum(map(descriptors, tree)) > self._limits["descriptors"]:
+        if sum(len(descriptors(pid)) for pid in tree) > self._limits["descriptors"]:
             return "more than {} files, pipes and sockets open".format(self._limits["descriptors"])
         return None
 
@@ -215,7 +215,7 @@ class Process:
 
     def descriptors(self):
         """Of the whole tree."""
-        return sum(map(descriptors, self.tree()))
+        return sum(len(descriptors(pid)) for pid in self.tree())
 
     def _too_much_memory(self):
         return "more than {} MB of memory".format(self._limits["memory_bytes"] >> 20)
@@ -223,11 +223,8 @@ class Process:
     def stop_for(self, excess):
         """Kill it, and say what it had too much of."""
         if self.alive:
-            self._stopped_for(excess)
+            self._limit("stopped by the grader: {}".format(excess))
             self.kill()
-
-    def _stopped_for(self, excess):
-        self._limit("stopped by the grader: {}".format(excess))
 
     def _limit(self, detail):
         self._wire.event("/grader/actor", {"action": "limit", "actor": self.name, "detail": detail})
@@ -295,7 +292,7 @@ class Process:
             return
         if self._groups.memory_kills() and self._stopped_by != "KILL":
             self._stopped_by = "KILL"
-            self._stopped_for(self._too_much_memory())
+            self._limit("stopped by the grader: {}".format(self._too_much_memory()))
         if not self._groups.remove():
             self.loop.call_later(WATCH_S, self._groups.remove)
 
@@ -330,13 +327,6 @@ def _signal_of(code):
 def _kill(pid, number):
     with contextlib.suppress(ProcessLookupError, PermissionError):  # already over
         os.kill(pid, number)
-
-
-# [arena.ros.streams] What a process writes: lines for the console, and bytes that it hands over in a file.
-
-LINE_BYTES_MAX = 4096
-READ_BYTES = 65536
-PIPE_READS = 16
 
 
 class Lines:

@@ -1,4 +1,7 @@
-"""How many messages and bytes of a run are recorded, and of which channel: nobody's flood takes what is another's."""
+"""How much of the arena students' programs may take: recorded messages, threads that wait for them, memory of values.
+
+No program's flood takes what is another's.
+"""
 
 import collections
 import contextlib
@@ -9,10 +12,17 @@ from bounded_sockets import port_of
 
 MESSAGE_BYTES = 150
 """What a message takes beside its own bytes, in the evidence and where it is judged."""
+WORKERS_MAX, EACH_MAX = 256, 64
+WAITING_MAX = 1000
+"""Jobs of one key."""
+IDLE_S = 5.0
+LARGE_BYTES = 64 << 10
+ITEM_BYTES = 64
 
 
 class Budget:
-    """`limits` holds `channel_messages`, `channel_bytes`, `run_bytes` and `channels`.
+    """How many messages and bytes of a run are recorded, and of which channel. `limits` holds `channel_messages`,
+    `channel_bytes`, `run_bytes` and `channels`.
 
     A quarter of the run's bytes is set apart, the same for each channel that there may be. Of the rest a channel takes
     no more than a part that gets smaller with every other one that needs more than was set apart for it; of the
@@ -81,18 +91,9 @@ class Account:
         return self.budget.take(self, size, messages)
 
 
-# [arena.ros.pool] Waits for student's nodes in threads of which there are never too many.
-
-WORKERS_MAX, EACH_MAX = 256, 64
-WAITING_MAX = 1000
-"""Jobs of one key."""
-IDLE_S = 5.0
-LARGE_BYTES = 64 << 10
-
-
 class Pool:
-    """At most `workers_max` jobs at a time, and `each_max` of one key (a process): who never answers takes no more
-    than its own share. Jobs of one key start in order."""
+    """Threads that wait for students' nodes. At most `workers_max` jobs at a time, and `each_max` of one key (a
+    process): who never answers takes no more than its own share. Jobs of one key start in order."""
 
     def __init__(self, workers_max=WORKERS_MAX, each_max=EACH_MAX):
         self._workers_max = workers_max
@@ -185,13 +186,6 @@ class Notifications:
         """Its threads end with the arena."""
 
 
-# [arena.ros.values] Values from student's programs: how much memory they take, and in a form that fits into the evidence.
-
-TEXT_CHARS_MAX = 1 << 16
-ITEM_BYTES = 64
-DEPTH_MAX = 30
-
-
 def weight(value, most):
     """About how many bytes of memory it takes; counting ends past `most`."""
     total, waiting = 0, [iter((value,))]
@@ -244,6 +238,6 @@ def _items(value):
 
 
 def cut(text, chars_max):
-    """Shown in evidence: no longer than that, whatever it is."""
+    """Return a value as text that is no longer than that."""
     text = str(text)
     return text if len(text) <= chars_max else text[: chars_max - 1] + "…"

@@ -16,10 +16,11 @@ import threading
 import time
 
 from bounded_sockets import ProtocolError, call, connect, note_arrivals, slave_api
-from connection import Connection
+from connection import MESSAGE_BYTES_MAX, Connection
 from guard import shown
 from quotas import Budget, Pool
-from tcpros import HEADER_BYTES_MAX, LENGTH, MESSAGE_BYTES_MAX, check_fields, read_header, write_header
+from tcpros import HEADER_BYTES_MAX, check_fields, read_header, write_header
+from wire import LENGTH
 
 HOLD_S = 1.0
 CONNECT_S = 10.0

@@ -1,6 +1,9 @@
-"""The inodes of TCP sockets of this network namespace, by their ports: `sock_diag` (man 7), else /proc/net/tcp.
+"""The sockets of this network namespace, and which process of the run has each of them open.
 
-The kernel finds a socket at once; /proc lists it after a walk over a table that may have half a million rows.
+The kernel is asked by `sock_diag` (man 7), which finds a socket at once; else /proc/net is read, a walk over a table
+that may have half a million rows. A node belongs to the process that listens on the port of its slave API, so nodes
+that `roslaunch` starts are known too, and two copies that compete for one name. A caller is the process that is
+connected from the port that the call comes from.
 """
 
 import collections
@@ -14,6 +17,7 @@ import threading
 import time
 
 from bounded_sockets import port_of
+from process_tree import descriptors
 
 NETLINK_SOCK_DIAG = 4
 SOCK_DIAG_BY_FAMILY = 20
@@ -39,6 +43,14 @@ _NO_COOKIE = b"\xff" * 8
 _ANSWER_BYTES = 1 << 16
 SOCKETS_MAX, TABLE_ROWS_MAX = 1000, 1000000
 """So many of one port are looked at, and so many rows of a table."""
+
+LOOKS_MAX = 3
+AGAIN_S = 0.2
+ASKED_MAX = 5000
+FILES_MAX = 50000
+"""Open files of one process, with all that runs below it, that a look looks at."""
+REST = 2
+"""So many times as long as the last look took, there is no other."""
 
 Row = collections.namedtuple("Row", "state near far inode")
 """A socket; `near` and `far` are ports."""
@@ -102,7 +114,7 @@ def _memory_bytes(question, answer_bytes, wanted):
     """Of the sockets that the kernel answers with; 0 where it does not answer such questions."""
     held = 0
     with contextlib.suppress(OSError):
-        for body in _dump(question):
+        for body in _answers(question, dump=True):
             at = answer_bytes
             while at + _ATTRIBUTE.size <= len(body):
                 length, kind = _ATTRIBUTE.unpack_from(body, at)
@@ -115,55 +127,38 @@ def _memory_bytes(question, answer_bytes, wanted):
     return held
 
 
-def _dump(question):
-    """The body of each answer to a question about all sockets."""
-    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, NETLINK_SOCK_DIAG) as sock:
-        sock.settimeout(1.0)
-        sock.send(
-            _HEADER.pack(_HEADER.size + len(question), SOCK_DIAG_BY_FAMILY, REQUEST | DUMP, 1, 0) + question
-        )
-        while True:
-            data, start = sock.recv(_ANSWER_BYTES), 0
-            while start + _HEADER.size <= len(data):
-                length, kind, *_ = _HEADER.unpack_from(data, start)
-                if kind in (DONE, ERROR):
-                    return
-                yield data[start + _HEADER.size : start + length]
-                start += (length + 3) & ~3
-
-
 def _asked(family, states, near, far, *, dump=False, most=SOCKETS_MAX):
     """The rows of what the kernel answers; raise OSError where it does not answer such questions."""
     (source, port), (destination, far_port) = near, far
     identity = _ID.pack(port, far_port, source.ljust(16, b"\0"), destination.ljust(16, b"\0"), _NO_COOKIE)
     question = struct.pack("=BBBBI", family, socket.IPPROTO_TCP, 0, 0, states) + identity
+    return [
+        Row(body[1], *_ANSWER_PORTS.unpack_from(body), *_ANSWER_INODE.unpack_from(body))
+        for body in itertools.islice(_answers(question, dump=dump), most)
+    ]
+
+
+def _answers(question, *, dump):
+    """The body of each answer to a question about one socket, or with `dump` about all; raise OSError."""
     flags = REQUEST | (DUMP if dump else 0)
     with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, NETLINK_SOCK_DIAG) as sock:
         sock.settimeout(1.0)
         sock.send(_HEADER.pack(_HEADER.size + len(question), SOCK_DIAG_BY_FAMILY, flags, 1, 0) + question)
-        found, more = [], True
-        while more and len(found) < most:
-            more = _take(sock.recv(_ANSWER_BYTES), found) and dump
-    return found[:most]
-
-
-def _take(data, found):
-    """Read one answer's parts; False after the last."""
-    start = 0
-    while start + _HEADER.size <= len(data):
-        length, kind, *_ = _HEADER.unpack_from(data, start)
-        body = start + _HEADER.size
-        if kind == DONE:
-            return False
-        if kind == ERROR:
-            (code,) = struct.unpack_from("=i", data, body)
-            if code != -errno.ENOENT:
-                raise OSError(-code, "sock_diag")
-            return False
-        (inode,) = _ANSWER_INODE.unpack_from(data, body)
-        found.append(Row(data[body + 1], *_ANSWER_PORTS.unpack_from(data, body), inode))
-        start += (length + 3) & ~3
-    return True
+        more = True
+        while more:
+            data, start = sock.recv(_ANSWER_BYTES), 0
+            while start + _HEADER.size <= len(data):
+                length, kind, *_ = _HEADER.unpack_from(data, start)
+                body = data[start + _HEADER.size : start + length]
+                if kind == ERROR:
+                    (code,) = struct.unpack_from("=i", body)
+                    if code != -errno.ENOENT:
+                        raise OSError(-code, "sock_diag")
+                if kind in (DONE, ERROR):
+                    return
+                yield body
+                start += (length + 3) & ~3
+            more = dump
 
 
 def _listed(tables, port=None, far_port=None):
@@ -179,20 +174,6 @@ def _listed(tables, port=None, far_port=None):
 
 def _port(address):
     return int(address.rpartition(":")[2], 16)
-
-
-# [arena.ros.owners] Which process of the run a node belongs to, and which one calls: the one that holds the socket.
-#
-# A node's is the one that listens on the port of its slave API, so nodes that `roslaunch` starts are known too, and two
-# copies that fight for one name. A caller's is the one that is connected from the port that the call comes from.
-
-LOOKS_MAX = 3
-AGAIN_S = 0.2
-ASKED_MAX = 5000
-FILES_MAX = 50000
-"""Open files of one process, with all that runs below it, that a look looks at."""
-REST = 2
-"""So many times as long as the last look took, there is no other."""
 
 
 class Owners:
@@ -278,20 +259,13 @@ class Owners:
         self._look_took_s = time.monotonic() - self._looked_s
 
     def _open_sockets(self, name, pids):
-        files = ((pid, "/proc/{}/fd/{}".format(pid, number)) for pid in pids for number in _descriptors(pid))
+        files = ((pid, "/proc/{}/fd/{}".format(pid, number)) for pid in pids for number in descriptors(pid))
         for pid, file in itertools.islice(files, FILES_MAX):
             link = _target(file)
             if link.startswith("socket:"):
                 yield pid, link
         if self.tell and next(files, None) is not None:
             self.tell(name, "had more than {} files open: not all of them are looked at".format(FILES_MAX))
-
-
-def _descriptors(pid):
-    try:
-        return os.listdir("/proc/{}/fd".format(pid))
-    except OSError:
-        return ()  # it has ended, or is not ours to look into
 
 
 def _target(link):

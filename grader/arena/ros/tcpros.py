@@ -1,17 +1,21 @@
-"""What publisher and subscriber ends of a TCPROS connection share (wiki.ros.org/ROS/TCPROS)."""
+"""TCPROS (wiki.ros.org/ROS/TCPROS): connection headers, which both ends send, and calls of services.
+
+A service is called as `rosservice` does it, with bytes that the grader has serialised."""
 
 import io
 import socket
-import struct
 import time
 
 from bounded_sockets import ProtocolError, connect, port_of
 from rosgraph.network import decode_ros_handshake_header, encode_ros_handshake_header
+from wire import LENGTH
 
-LENGTH = struct.Struct("<I")
 HEADER_BYTES_MAX = 1 << 18
 FIELD_CHARS_MAX = 256
 DEFINITION_CHARS_MAX = 1 << 16
+ANSWER_BYTES_MAX = 4 << 20
+WORDS_CHARS_MAX = 500
+ANY = "*"
 
 
 class Closed(ProtocolError):
@@ -52,72 +56,6 @@ def read_exactly(sock, count):
 
 def write_header(sock, fields):
     sock.sendall(encode_ros_handshake_header(fields))
-
-
-# [arena.ros.framing] Cuts what comes over a TCPROS connection into messages, each behind its length.
-
-MESSAGE_BYTES_MAX = 16 << 20
-
-
-def message_ends(data, at=0):
-    """Where the messages end that begin in `data` from `at` on, the last one's end maybe beyond it; and the length of
-    one that is longer than any may be, or 0."""
-    ends, last, unpack_from = [], len(data) - LENGTH.size, LENGTH.unpack_from
-    while at <= last:
-        (length,) = unpack_from(data, at)
-        if length > MESSAGE_BYTES_MAX:
-            return ends, length
-        at += LENGTH.size + length
-        ends.append(at)
-    return ends, 0
-
-
-class Waste:
-    """Counts messages that are thrown away: by their lengths as long as it `counts`, then by their bytes."""
-
-    def __init__(self):
-        self.counts = True
-        self._messages = self._counted_bytes = self._other_bytes = 0
-        self._skip = 0
-        self._rest = b""
-
-    @property
-    def begun(self):
-        """Whether it has seen the length of one at least."""
-        return self._messages > 0
-
-    @property
-    def messages(self):
-        return self._messages + self._other_bytes * self._messages // max(1, self._counted_bytes)
-
-    @property
-    def exact(self):
-        return not self._other_bytes
-
-    def feed(self, data):
-        """Count those that begin in one more piece: (how many, a length that no message has or 0)."""
-        if not self.counts:
-            self._other_bytes += len(data)
-            return 0, 0
-        self._counted_bytes += len(data)
-        if self._skip >= len(data):
-            self._skip -= len(data)
-            return 0, 0
-        if self._rest:
-            data = self._rest + bytes(data)
-        ends, too_long = message_ends(data, self._skip)
-        at = ends[-1] if ends else self._skip
-        self._skip = max(0, at - len(data))
-        self._rest = bytes(data[at:])
-        self._messages += len(ends)
-        return len(ends), too_long
-
-
-# [arena.ros.services] Calls services as `rosservice` does (wiki.ros.org/ROS/TCPROS), with bytes that the grader has serialised.
-
-ANSWER_BYTES_MAX = 4 << 20
-WORDS_CHARS_MAX = 500
-ANY = "*"
 
 
 def probe_service(service, uri, caller_id, timeout_s):
