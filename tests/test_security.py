@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from grader import files
 from grader.arena import build, built, calls, parameters, recorded
 from grader.arena.limits import SUBMISSION_MESSAGE_BYTES
 from grader.arena.limits import Limits as RunLimits
@@ -76,7 +77,7 @@ BOUNDS = {
         RUN.built_bytes // MB, built.MEMBERS_MAX, built.HEADER_BYTES_MAX // KB, built.HEADERS_BYTES_MAX // MB,
         built.HEADERS_IN_A_ROW_MAX, len(built.ELF),
     ),
-    "CMake's trace": (recorded.READ_MAX // MB, cmake_written.LINES_MAX, cmake_written.FILES_BYTES_MAX // 1000),
+    "CMake's trace": (files.READ_MAX // MB, cmake_written.LINES_MAX, cmake_written.FILES_BYTES_MAX // 1000),
     "remarks on Python files": (
         python.REPORT_BYTES_MAX // MB, "ros/syntax:SLIPS_LIMIT", "ros/syntax:ALL_SLIPS_LIMIT", build.STEP_S,
     ),

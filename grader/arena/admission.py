@@ -16,7 +16,7 @@ from typing import TypeVar
 from typing_extensions import Self
 
 from grader.arena.memory import available_bytes
-from grader.files import lock
+from grader.files import lock, open_lock
 
 NAME = "ros-lab-grader"
 
@@ -48,8 +48,7 @@ class FileLock:
     """
 
     def __init__(self, path: Path) -> None:
-        flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
-        self._descriptor = os.open(path, flags, 0o600)
+        self._descriptor = open_lock(path)
 
     def __enter__(self) -> Self:
         return self
@@ -77,7 +76,7 @@ FRESH_S = 1.0
 
 def note(path: Path, late_ms: float) -> None:
     """Write down what was just measured. Raises OSError."""
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+    descriptor = open_lock(path)
     try:
         place = os.getpid() % ENTRIES * ENTRY.size
         os.pwrite(descriptor, ENTRY.pack(time.monotonic_ns(), late_ms), place)

@@ -7,9 +7,11 @@ import re
 import stat
 import tarfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 
+from grader.files import open_untrusted
 from grader.model.record import Record
 
 ELF = b"\x7fELF"
@@ -135,11 +137,7 @@ def _ahead(archive: tarfile.TarFile, size: int) -> bytes:
 
 
 def _head(path: Path) -> bytes | None:
-    """The first bytes of an executable file, None for anything else: no link is followed, no pipe waited for."""
-    try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
-    except OSError:
-        return None
-    with os.fdopen(descriptor, "rb") as file:
-        mode = os.fstat(descriptor).st_mode
-        return file.read(len(ELF)) if stat.S_ISREG(mode) and mode & stat.S_IXUSR else None
+    """Return the first bytes of an executable file, None for anything else."""
+    with suppress(OSError), open_untrusted(path) as file:
+        return file.read(len(ELF)) if os.fstat(file.fileno()).st_mode & stat.S_IXUSR else None
+    return None

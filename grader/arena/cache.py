@@ -12,23 +12,18 @@ from contextlib import suppress
 from pathlib import Path
 
 from grader.errors import GraderError
-from grader.files import atomic_write
+from grader.files import atomic_write, open_untrusted
 
 BYTES_MAX = 8 << 20
 FILES_MAX = 8
-_ONLY_READ = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def read_kept(name: str) -> bytes | None:
     """What was kept under that name; None where there is none, it is damaged, or somebody else may have written it."""
     with suppress(OSError):
-        folder = os.open(_folder(), _ONLY_READ | os.O_DIRECTORY)
-        try:
-            if _is_private(os.fstat(folder)):
-                return _checked(_read(name, folder))
-        finally:
-            os.close(folder)
+        if _is_private(_folder().lstat()):
+            return _checked(_read(name))
     return None
 
 
@@ -60,11 +55,11 @@ def _is_private(status: os.stat_result) -> bool:
     return status.st_uid == os.geteuid() and stat.S_IMODE(status.st_mode) == stat.S_IRWXU
 
 
-def _read(name: str, folder: int) -> bytes:
-    with os.fdopen(os.open(name, _ONLY_READ, dir_fd=folder), "rb") as file:
+def _read(name: str) -> bytes:
+    with open_untrusted(_folder(), name) as file:
         status = os.fstat(file.fileno())
         own = status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE
-        return file.read(BYTES_MAX) if own and stat.S_ISREG(status.st_mode) else b""
+        return file.read(BYTES_MAX) if own else b""
 
 
 def _checked(data: bytes) -> bytes | None:

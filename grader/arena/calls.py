@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from grader.arena.process_environment import Place
-from grader.arena.recorded import read_untrusted
 from grader.arena.session import ArenaSession
 from grader.evidence.events import ActorEvent
+from grader.files import read_untrusted
 from grader.rubric.model import Call, Scenario
 
 ANSWER_S = 10.0
@@ -38,7 +38,9 @@ async def _call(call: Call, arena: ArenaSession) -> None:
     from grader.evidence.services import ServiceType  # noqa: PLC0415 - numpy, which not every run needs
 
     try:
-        type_ = ServiceType(call.type, _text(call.type, "srv", arena.place) or "", _messages(arena.place))
+        type_ = ServiceType(
+            call.type, _type_text(call.type, "srv", arena.place) or "", _messages(arena.place)
+        )
         data = base64.b64encode(type_.encode_request(call.request)).decode()
     except ValueError as error:
         arena.note(_answer(call, None, f"the grader could not call it: {error}"))
@@ -65,10 +67,10 @@ def _answer(call: Call, value: object, detail: str) -> ActorEvent:
 
 
 def _messages(place: Place) -> Callable[[str], str | None]:
-    return lambda type_: _text(type_, "msg", place)
+    return lambda type_: _type_text(type_, "msg", place)
 
 
-def _text(type_: str, kind: str, place: Place) -> str | None:
+def _type_text(type_: str, kind: str, place: Place) -> str | None:
     """The text of `<package>/<kind>/<Name>.<kind>`: the student's own, ROS's, or a stand-in's."""
     package, _, name = type_.partition("/")
     own = place.workspace.repaired / package

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from grader.arena.recorded import read_untrusted
+from grader.files import read_untrusted
 from grader.rubric.model import Param
 
 FILE_BYTES_MAX = 256 << 10

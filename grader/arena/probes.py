@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from grader.rubric.model import Probe
 
-WORD_LETTERS = 6
+PROBE_LETTERS = 6
 TEXTS_FOR_ONE_TWICE = 4
 PAUSE_BEFORE_SAME = 3
 RANGES = {
@@ -95,7 +95,7 @@ def fields_of(value: object) -> Mapping[str, Any]:
 
 def _values(probe: Probe) -> Iterator[Any]:
     twice = probe.text >= TEXTS_FOR_ONE_TWICE
-    values: list[str | int] = [_text() for _ in range(probe.text - twice)]
+    values: list[str | int] = [_two_words() for _ in range(probe.text - twice)]
     if probe.integers or probe.among:
         low, high = RANGES[probe.type]
         values += [*_integers(probe, low, high), *probe.among]
@@ -125,8 +125,8 @@ def _integers(probe: Probe, low: int, high: int) -> Iterator[int]:
         yield value
 
 
-def _text() -> str:
+def _two_words() -> str:
     """Two words of letters, large and small: never to be taken for a number of another probe."""
     return " ".join(
-        "".join(_random.choice(string.ascii_letters) for _ in range(WORD_LETTERS)) for _ in range(2)
+        "".join(_random.choice(string.ascii_letters) for _ in range(PROBE_LETTERS)) for _ in range(2)
     )

@@ -26,8 +26,7 @@ from grader.arena.inside import (
 from grader.arena.limits import Limits
 from grader.arena.ros_env import SYSTEM_PATH, RosInstallation
 from grader.arena.sandbox import Sandbox, Word, copy_of, scratch
-from grader.arena.standin_packages import SOURCES as STANDIN_SOURCES
-from grader.arena.standin_packages import with_standins
+from grader.arena.standin_packages import STANDIN_SOURCES, with_standins
 from grader.arena.system_calls import system_call_filter
 from grader.arena.workspace import Workspace
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import stat
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,20 +10,18 @@ from typing import TYPE_CHECKING
 from grader import __version__
 from grader.arena.limits import Limits
 from grader.evidence.events import ActorEvent
+from grader.files import read_untrusted
 from grader.model.package import PackageFacts, SourceFile
+from grader.model.record import Record
 from grader.model.submission import Submission
-from grader.portable import NOFOLLOW, READ
 
 if TYPE_CHECKING:
-    from grader.arena.build import BuildOutcome
     from grader.arena.ros_env import RosInstallation
     from grader.arena.sandbox import Sandbox
-    from grader.arena.scenario import ScenarioCost
 
 PACKAGE = "package"
 RETRIES = 2
 """So often a run is recorded again that could not be judged."""
-READ_MAX = 8 << 20
 ATTACHED_BYTES_MAX = 256 << 10
 ATTACHED_FILES_MAX = 60
 ATTACHED_SUFFIXES = (
@@ -47,6 +43,13 @@ STATIC_ONLY = "nothing was run: only the files were asked for"
 STILL_HOLDS = "unchanged: what was recorded before still holds"
 
 
+class RunCost(Record):
+    """CPU seconds: the grader's own share of a run, or of a build, and that of the student's processes."""
+
+    cpu_s: float
+    student_cpu_s: float
+
+
 @dataclass(kw_only=True)
 class Recording:
     """What was recorded, where, by what, and at what cost (CPU seconds)."""
@@ -59,7 +62,7 @@ class Recording:
     student_cpu_s: float = 0.0
     files: list[Path] = field(default_factory=list)
 
-    def add(self, cost: ScenarioCost | BuildOutcome) -> None:
+    def add(self, cost: RunCost) -> None:
         self.cpu_s += cost.cpu_s
         self.student_cpu_s += cost.student_cpu_s
 
@@ -102,17 +105,3 @@ def not_attached(facts: PackageFacts) -> Iterable[ActorEvent]:
 
 def _texts(facts: PackageFacts) -> list[SourceFile]:
     return [f for f in facts.files if not f.binary and f.link is None and f.path.endswith(ATTACHED_SUFFIXES)]
-
-
-def read_untrusted(path: Path, limit_bytes: int = READ_MAX) -> bytes | None:
-    """A regular file that student code may have written, or None: no link is followed, no pipe waited for. It is cut
-    at the limit: for one byte more, callers see that a file is over theirs, and say so."""
-    try:
-        descriptor = os.open(path, READ | NOFOLLOW)
-    except OSError:
-        return None
-    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-        os.close(descriptor)
-        return None
-    with os.fdopen(descriptor, "rb") as file:
-        return file.read(limit_bytes)

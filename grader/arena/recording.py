@@ -34,7 +34,6 @@ from grader.arena.recorded import (
     attachments,
     metadata,
     not_attached,
-    read_untrusted,
 )
 from grader.arena.ros_env import RosInstallation, find_ros
 from grader.arena.sandbox import Mode, Sandbox, temporary_base
@@ -44,6 +43,7 @@ from grader.arena.workspace import Workspace, make_workspace
 from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
+from grader.files import read_untrusted
 from grader.model.message_rate import RateBounds
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress

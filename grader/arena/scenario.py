@@ -11,6 +11,7 @@ from grader.arena.admission import Admission
 from grader.arena.calls import call_services
 from grader.arena.probes import advertisement, make_shots, publication
 from grader.arena.process_environment import Place
+from grader.arena.recorded import RunCost
 from grader.arena.run_state import next_look_s, settled, waiting_for
 from grader.arena.session import ArenaSession
 from grader.arena.starting import Spec, given_back, process_specs, set_params, stop
@@ -18,7 +19,6 @@ from grader.errors import ArenaError
 from grader.evidence.events import ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.message_rate import RateBounds
-from grader.model.record import Record
 from grader.rubric.model import Scenario, Start
 
 CLOCK_STEP_S = 0.05
@@ -32,13 +32,6 @@ STARTING_S = 1.5
 EXPECTED_HZ = 10.0
 
 Tell = Callable[[str], None]
-
-
-class ScenarioCost(Record):
-    """CPU seconds: the grader's own share of the run, and that of the student's processes."""
-
-    cpu_s: float
-    student_cpu_s: float
 
 
 def expected_s(scenario: Scenario) -> float:
@@ -65,7 +58,7 @@ async def run_scenario(
     rates: tuple[RateBounds, ...] = (),
     admission: Admission | None = None,
     last_run: bool = False,
-) -> ScenarioCost:
+) -> RunCost:
     """Record the scenario at `path`. An arena that fails still leaves evidence, with the outcome `host`.
 
     Processes are started when `admission` lets them: others wait until they are up. A window in which nothing but
@@ -78,7 +71,7 @@ async def run_scenario(
         session = ArenaSession(place, writer, last_run=last_run, on_lateness=admission.note_lateness)
         if not any(spec["role"] == "student" for _, spec in starts):
             session.course(ScenarioEvent(event="end", outcome="ended", detail="there was nothing to start"))
-            return ScenarioCost(cpu_s=0, student_cpu_s=0)
+            return RunCost(cpu_s=0, student_cpu_s=0)
         try:
             session.live.rate(rates)
             async with admission.start() as leave, session as arena:
@@ -90,7 +83,7 @@ async def run_scenario(
                 arena.course(ScenarioEvent(event="end", outcome=outcome, detail=detail))
         except ArenaError as error:
             session.course(ScenarioEvent(event="end", outcome="host", detail=error.message))
-    return ScenarioCost(cpu_s=session.cpu_s, student_cpu_s=session.student_cpu_s)
+    return RunCost(cpu_s=session.cpu_s, student_cpu_s=session.student_cpu_s)
 
 
 async def _run(

@@ -12,7 +12,7 @@ from catkin_pkg.packages import find_package_paths
 
 from grader.arena.ros_env import RosInstallation
 
-SOURCES = Path(__file__).resolve().parent / "standins"
+STANDIN_SOURCES = Path(__file__).resolve().parent / "standins"
 SHEBANG = b"#!"
 SHARE = "share"
 LIBRARY = "python"
@@ -21,7 +21,7 @@ CMAKE = "cmake"
 
 def known_packages() -> tuple[str, ...]:
     """Every package that can be stood in for."""
-    return tuple(sorted(p.parent.name for p in SOURCES.glob(f"*/{PACKAGE_MANIFEST_FILENAME}")))
+    return tuple(sorted(p.parent.name for p in STANDIN_SOURCES.glob(f"*/{PACKAGE_MANIFEST_FILENAME}")))
 
 
 def missing_packages(ros: RosInstallation) -> tuple[str, ...]:
@@ -35,9 +35,9 @@ def copy_standins(folder: Path, ros: RosInstallation) -> None:
     archive made of their bits."""
     (folder / SHARE).mkdir(parents=True)
     for name in (LIBRARY, CMAKE):
-        _copy(SOURCES / name, folder / name)
+        _copy(STANDIN_SOURCES / name, folder / name)
     for name in missing_packages(ros):
-        _copy(SOURCES / name, folder / SHARE / name)
+        _copy(STANDIN_SOURCES / name, folder / SHARE / name)
     for path in (folder, *folder.rglob("*")):
         path.chmod(0o755 if path.is_dir() or _is_program(path) else 0o644)
 

@@ -16,7 +16,7 @@ from grader.errors import ArenaError
 
 ANSWER = struct.Struct("<id")
 ANSWER_S = 15.0
-CLOSE_S = 2.0
+TEMPLATE_CLOSE_S = 2.0
 ERROR_BYTES = 4096
 
 
@@ -55,7 +55,7 @@ class Template:
         """End the template; the arenas that it made are not touched."""
         self._sock.close()
         try:
-            self._popen.wait(CLOSE_S)
+            self._popen.wait(TEMPLATE_CLOSE_S)
         except subprocess.TimeoutExpired:
             self._popen.kill()
             self._popen.wait()
@@ -66,7 +66,7 @@ class Template:
         """What the template said before it ended, its last line."""
         self._sock.close()
         with suppress(subprocess.TimeoutExpired):
-            self._popen.wait(CLOSE_S)
+            self._popen.wait(TEMPLATE_CLOSE_S)
         self._popen.kill()
         _, errors = self._popen.communicate()
         lines = errors[-ERROR_BYTES:].decode(errors="replace").strip().splitlines()

@@ -14,10 +14,10 @@ from grader.arena.recorded import (
     ATTACHED_FILES_MAX,
     attachments,
     not_attached,
-    read_untrusted,
 )
 from grader.arena.starting import set_params
 from grader.evidence.events import ActorEvent
+from grader.files import read_untrusted
 from grader.package import read_package
 from grader.rubric.model import Param
 from tests.package.trees import CMAKE, MANIFEST, make_package
