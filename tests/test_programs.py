@@ -37,7 +37,7 @@ STARTS = {
         "nothing: tests/arena/test_environment.py",
     ),
     "arena/ros_env.py:_from_setup": Start("base", "'/'", "nothing: ROS's own setup.bash"),
-    "arena/template.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
+    "arena/arena_process.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
     "classes/batch/child.py:_started": Start(
         "anywhere(os.environ)", None, "nothing: jobs come through a pipe, as JSON"
     ),

@@ -11,14 +11,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from grader.arena.base import NAME as BASE_NAME
-from grader.arena.base import base_spec, catkin_make, has_base, keep_base
-from grader.arena.built import read_member
+from grader.arena.base_workspace import NAME as BASE_NAME
+from grader.arena.base_workspace import base_spec, catkin_make, has_base, keep_base
 from grader.arena.process_environment import ARCHIVE, Place
-from grader.arena.recorded import RunCost
 from grader.arena.ros_env import DUMP_BYTES, excess_of, keep_ros_variables, parse_env
 from grader.arena.session import ArenaSession
-from grader.arena.workspace import run_in_place
+from grader.arena.static_recorder import RunCost
+from grader.arena.workspace import read_member, run_in_place
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.files import READ_MAX, read_untrusted

@@ -20,11 +20,14 @@ from typing_extensions import Self
 from grader.arena.admission import Admission, shared_folder
 from grader.arena.asynchronous import Stop, run_until_signal, side_by_side
 from grader.arena.build import BUILD_EXPECTED_S, build
-from grader.arena.inside import prepare
 from grader.arena.limits import Limits
-from grader.arena.order import in_order
 from grader.arena.process_environment import Place
-from grader.arena.recorded import (
+from grader.arena.ros_env import RosInstallation, find_ros
+from grader.arena.sandbox import Mode, Sandbox, temporary_base
+from grader.arena.sandbox_files import prepare
+from grader.arena.sandbox_probe import choose
+from grader.arena.scenario import expected_s, run_scenario
+from grader.arena.static_recorder import (
     NO_ROS,
     PACKAGE,
     RETRIES,
@@ -35,10 +38,6 @@ from grader.arena.recorded import (
     metadata,
     not_attached,
 )
-from grader.arena.ros_env import RosInstallation, find_ros
-from grader.arena.sandbox import Mode, Sandbox, temporary_base
-from grader.arena.sandbox_probe import choose
-from grader.arena.scenario import expected_s, run_scenario
 from grader.arena.workspace import Workspace, make_workspace
 from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent, ScenarioEvent
@@ -296,3 +295,19 @@ def _needs_answer(facts: PackageFacts, path: str) -> bool:
         return False
     shebang = file.shebang
     return file.executable is False or shebang is None or shebang.crlf or shebang.found is False
+
+
+# [arena.order] In which order the runs of one submission ask to begin. Each has an arena of its own: they go side by side.
+
+RATE = "rate"
+
+
+def in_order(rubric: Rubric) -> tuple[str, ...]:
+    """The runs' names: those in which a rate is measured first, then the longest first.
+
+    Who watches for long begins early, so that the others start meanwhile.
+    """
+    scenarios = rubric.scenarios
+    rated = {c.scenario for c in rubric.criteria if c.check == RATE}
+    measuring = {n for n, s in scenarios.items() if n in rated and s.clock == "real"}
+    return tuple(sorted(scenarios, key=lambda n: (n not in measuring, -expected_s(scenarios[n]))))

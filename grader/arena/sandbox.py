@@ -6,6 +6,7 @@ own (`ros/namespaces.py`).
 
 from __future__ import annotations
 
+import os
 import platform
 import re
 import stat
@@ -16,12 +17,11 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from grader.arena.control_groups import Cgroups
-from grader.arena.host_programs import host_program
-from grader.arena.inside import HOME, SHIMS, STANDINS
 from grader.arena.limits import Limits
 from grader.arena.ros_env import RosInstallation
-from grader.arena.system_calls import system_call_filter
+from grader.arena.sandbox_files import HOME, SHIMS, STANDINS
 from grader.errors import HostError
+from grader.host_programs import host_program
 from grader.model.record import Record
 
 Mode = Literal["auto", "require", "none"]
@@ -180,3 +180,19 @@ def temporary_base(sandbox: Sandbox | None) -> Path:
     raise HostError(
         f"{first} is closed to other users, and so is /var/tmp", hint=f"chmod o+x {first}, or set TMPDIR"
     )
+
+
+# [arena.system_calls] The filter of system calls that every sandbox gets: a program of the kernel's (seccomp), as libseccomp compiled it.
+#
+# `scripts/system_calls.py` says which calls are allowed, and writes the files that are read here. So grading needs no
+# libseccomp, and what is allowed is the same on every machine.
+
+FILTERS = Path(__file__).parent / "filters"
+MACHINES = ("x86_64", "aarch64")
+
+
+@lru_cache(maxsize=1)
+def system_call_filter() -> bytes | None:
+    """The filter for this machine's processor; None for one that there is none for."""
+    machine = os.uname().machine
+    return (FILTERS / f"{machine}.bpf").read_bytes() if machine in MACHINES else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.arena.order import in_order
+from grader.arena.recording import in_order
 from grader.rubric.model import Criterion, Rubric, Scenario, Start, Until
 
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from grader.arena.frames import Frame, FrameReader
+from grader.arena.arena_process import Frame, FrameReader
 from grader.arena.limits import Limits
 from grader.arena.session import ARENA
 from grader.checks import CHECKS

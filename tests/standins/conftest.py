@@ -8,7 +8,7 @@ from types import ModuleType
 
 import pytest
 
-from grader.arena.standin_packages import STANDIN_SOURCES
+from grader.arena.sandbox_files import STANDIN_SOURCES
 
 PURE = ("background", "canvas", "pace", "turtle", "world")
 

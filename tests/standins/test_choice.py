@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader.arena.ros_env import RosInstallation, require_ros
-from grader.arena.standin_packages import (
+from grader.arena.sandbox_files import (
     STANDIN_SOURCES,
     copy_standins,
     known_packages,

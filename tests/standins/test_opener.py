@@ -13,8 +13,8 @@ from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 
-from grader.arena.inside import BROWSERS, OPENER
 from grader.arena.ros_env import require_ros
+from grader.arena.sandbox_files import BROWSERS, OPENER
 from grader.arena.session import ARENA
 
 URL = "https://www.e-yantra.org/"

@@ -7,8 +7,10 @@ stands for that folder, and `$LD_LIBRARY_PATH:/usr/local/lib` has one wherever t
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 
 LISTS = ("PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "DYLD_FALLBACK_LIBRARY_PATH", "PYTHONPATH")
@@ -46,3 +48,18 @@ def own_module(name: str) -> list[str]:
     """The command that calls `main` of one of the grader's modules. `python -m` would look in the current folder first,
     for Python's own modules too."""
     return [sys.executable, "-c", _MODULE.format(name)]
+
+
+# [arena.host_programs] The machine's own programs that stand around students' code, and the environment that they get.
+#
+# Neither where they are looked for nor what they are told depends on anybody's variables: a program found by the PATH of
+# the person who grades, or started with a student's LD_LIBRARY_PATH, may not be the one it is taken for.
+
+HOST_PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
+HOST_ENV = {"PATH": HOST_PATH, "LANG": "C.UTF-8"}
+
+
+@lru_cache(maxsize=32)
+def host_program(name: str) -> str | None:
+    """The absolute path of a program of this machine, such as `bwrap`; None where it is not installed."""
+    return shutil.which(name, path=HOST_PATH)
