@@ -113,7 +113,7 @@ def open_untrusted(path: Path, *below: str) -> BinaryIO:
             os.close(descriptor)
             descriptor = inner
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise OSError(errno.EINVAL, "not a regular file", str(path))
+            raise OSError(errno.EINVAL, "not a regular file", str(path))  # noqa: TRY301 - closed as any other
     except OSError:
         os.close(descriptor)
         raise

@@ -74,8 +74,8 @@ BOUNDS = {
     "what bubblewrap says": ("ros/processes:INFO_BYTES_MAX",),
     "what a step hands over": (RUN.built_bytes // MB,),
     "`built.tar`": (
-        RUN.built_bytes // MB, workspace.MEMBERS_MAX, workspace.HEADER_BYTES_MAX // KB, workspace.HEADERS_BYTES_MAX // MB,
-        workspace.HEADERS_IN_A_ROW_MAX, len(workspace.ELF),
+        RUN.built_bytes // MB, workspace.MEMBERS_MAX, workspace.HEADER_BYTES_MAX // KB,
+        workspace.HEADERS_BYTES_MAX // MB, workspace.HEADERS_IN_A_ROW_MAX, len(workspace.ELF),
     ),
     "CMake's trace": (files.READ_MAX // MB, cmake_written.LINES_MAX, cmake_written.FILES_BYTES_MAX // 1000),
     "remarks on Python files": (
@@ -104,8 +104,9 @@ BOUNDS = {
     "a service's answer": (("ros/tcpros:ANSWER_BYTES_MAX", MB), "ros/tcpros:WORDS_CHARS_MAX", scenario_inputs.ANSWER_S),
     "names of nodes": ("ros/guard:NAME_CHARS_MAX", "ros/guard:NAMES_MAX", ("ros/guard:NAME_BYTES_MAX", KB)),
     "parameters": (
-        ("ros/registry_log:PROCESS_BYTES_MAX", MB), ("ros/registry_log:RUN_BYTES_MAX", MB), "ros/registry_log:LEVELS_MAX",
-        ("ros/registry_log:VALUE_BYTES_MAX", KB), "ros/registry_log:EVENTS_MAX", ("ros/registry_log:EVENTS_BYTES_MAX", MB),
+        ("ros/registry_log:PROCESS_BYTES_MAX", MB), ("ros/registry_log:RUN_BYTES_MAX", MB),
+        "ros/registry_log:LEVELS_MAX", ("ros/registry_log:VALUE_BYTES_MAX", KB), "ros/registry_log:EVENTS_MAX",
+        ("ros/registry_log:EVENTS_BYTES_MAX", MB),
     ),
     "`/proc`": ("ros/process_tree:PROCESSES_MAX", "ros/sockets:FILES_MAX"),
     "the kernel's tables": ("ros/sockets:SOCKETS_MAX", "ros/sockets:TABLE_ROWS_MAX"),
@@ -127,8 +128,8 @@ BOUNDS = {
     "files of the package": (reading.SOURCE_LIMIT_BYTES // 10**6,),
     "files for the evidence": (static_recorder.ATTACHED_BYTES_MAX // KB, static_recorder.ATTACHED_FILES_MAX),
     "YAML files": (
-        scenario_inputs.FILE_BYTES_MAX // KB, scenario_inputs.EVENTS_MAX, scenario_inputs.VALUES_MAX, scenario_inputs.DEPTH_MAX,
-        scenario_inputs.ALIASES_MAX,
+        scenario_inputs.FILE_BYTES_MAX // KB, scenario_inputs.EVENTS_MAX, scenario_inputs.VALUES_MAX,
+        scenario_inputs.DEPTH_MAX, scenario_inputs.ALIASES_MAX,
     ),
     "texts of services": (scenario_inputs.TEXT_BYTES_MAX // KB, services._PARTS_MAX),
     "what git says": (git._ANSWER_BYTES // MB, git._FILE_BYTES // MB, git._MEMORY_BYTES >> 30, gitdir._MAX_FILES),

@@ -1,4 +1,4 @@
-"""The folder in which the graders of one user find each other."""
+"""Who may start processes now, agreed by all graders of one user through locked files in a folder of theirs."""
 
 from __future__ import annotations
 
@@ -18,6 +18,18 @@ from typing_extensions import Self
 from grader.files import lock, open_lock
 
 NAME = "ros-lab-grader"
+MEMINFO = Path("/proc/meminfo")
+CONTAINER = (
+    (Path("/sys/fs/cgroup"), "memory.max", "memory.current", "inactive_file"),
+    (
+        Path("/sys/fs/cgroup/memory"),
+        "memory.limit_in_bytes",
+        "memory.usage_in_bytes",
+        "total_inactive_file",
+    ),
+)
+"""Where a container's limit stands, in control groups of version 2 and of version 1."""
+UNLIMITED_BYTES = 1 << 62
 
 
 def shared_folder() -> Path | None:
@@ -194,22 +206,6 @@ async def _until(look: Callable[[], T], patience_s: float) -> T:
     while not (found := look()) and time.monotonic() < until_s:  # noqa: ASYNC110 - others' locks tell no event loop
         await asyncio.sleep(LOOK_S)
     return found
-
-
-# [arena.memory] How much memory a run may count on.
-
-MEMINFO = Path("/proc/meminfo")
-CONTAINER = (
-    (Path("/sys/fs/cgroup"), "memory.max", "memory.current", "inactive_file"),
-    (
-        Path("/sys/fs/cgroup/memory"),
-        "memory.limit_in_bytes",
-        "memory.usage_in_bytes",
-        "total_inactive_file",
-    ),
-)
-"""Where a container's limit stands, in control groups of version 2 and of version 1."""
-UNLIMITED_BYTES = 1 << 62
 
 
 def available_bytes() -> int:

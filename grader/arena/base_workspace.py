@@ -1,6 +1,8 @@
 """The base workspace: what CMake learns of the machine in a workspace without packages, learnt once and kept.
 
-Every build unpacks it in its own memory before `catkin_make` runs, as if that had run there once before.
+Every build unpacks it in its own memory before `catkin_make` runs, as if that had run there once before. It is kept in
+a folder of the user's that no other user can write (`~/.cache/grader`) and no sandbox shows. Whatever is wrong with it,
+or with a file in it, costs time and nothing else.
 """
 
 from __future__ import annotations
@@ -64,6 +66,9 @@ BELOW = (
     "share/roslaunch/package.xml",
     "src",
 )
+BYTES_MAX = 8 << 20
+FILES_MAX = 8
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def provide_base(mode: Mode) -> None:
@@ -177,15 +182,6 @@ def _looks(place: Place) -> Iterator[tuple[str, int, int, int]]:
 
 def _entries(path: str) -> list[str]:
     return [entry for entry in path.split(os.pathsep) if entry]
-
-
-# [arena.cache] What the grader keeps for later gradings, in a folder of its user's that nobody else can write.
-#
-# No sandbox shows the folder. Whatever is wrong with it, or with a file in it, costs time and nothing else.
-
-BYTES_MAX = 8 << 20
-FILES_MAX = 8
-_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def read_kept(name: str) -> bytes | None:

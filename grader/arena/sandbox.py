@@ -42,6 +42,8 @@ WALLS = ("--unshare-user", "--unshare-pid", "--unshare-ipc", "--unshare-uts", "-
 NO_NESTING = "--disable-userns"
 COUNTS_BY_NAMESPACE = (5, 14)
 """Since this kernel RLIMIT_NPROC counts the processes of a user namespace, before it all of the user's."""
+FILTERS = Path(__file__).parent / "filters"
+MACHINES = ("x86_64", "aarch64")
 
 
 def copy_of(path: Path) -> Word:
@@ -182,17 +184,12 @@ def temporary_base(sandbox: Sandbox | None) -> Path:
     )
 
 
-# [arena.system_calls] The filter of system calls that every sandbox gets: a program of the kernel's (seccomp), as libseccomp compiled it.
-#
-# `scripts/system_calls.py` says which calls are allowed, and writes the files that are read here. So grading needs no
-# libseccomp, and what is allowed is the same on every machine.
-
-FILTERS = Path(__file__).parent / "filters"
-MACHINES = ("x86_64", "aarch64")
-
-
 @lru_cache(maxsize=1)
 def system_call_filter() -> bytes | None:
-    """The filter for this machine's processor; None for one that there is none for."""
+    """Return the filter of system calls (seccomp) that every sandbox gets; None for a processor that there is none for.
+
+    libseccomp compiled it: `scripts/system_calls.py` says which calls are allowed, and writes the files that are read
+    here. So grading needs no libseccomp, and what is allowed is the same on every machine.
+    """
     machine = os.uname().machine
     return (FILTERS / f"{machine}.bpf").read_bytes() if machine in MACHINES else None

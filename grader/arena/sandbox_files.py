@@ -1,4 +1,5 @@
-"""What every sandbox shows besides the system: paths inside of it, one user, `python`, stand-ins."""
+"""What every sandbox shows besides the system: paths inside of it, one user, `python`, and what stands in for programs
+and packages that the machine lacks (docs/how-to/standins.md)."""
 
 from __future__ import annotations
 
@@ -21,27 +22,26 @@ BASE_WORKSPACE = "/run/grader/base.tar"
 LARGE = "/run/grader/large"
 SHIMS = "/run/grader/bin"
 STANDINS = "/run/grader/arena/standins"
-SYNTAX = Path(__file__).parent / "ros" / "syntax.py"
-TERMINAL = Path(__file__).parent / "ros" / "terminal.sh"
+ROS_SIDE = Path(__file__).parent / "ros"
 TERMINALS = (
     "gnome-terminal", "konsole", "lxterminal", "mate-terminal", "rxvt", "terminator", "tilix", "urxvt",
     "x-terminal-emulator", "xfce4-terminal", "xterm",
 )  # fmt: skip
-OPENER = (Path(__file__).parent / "ros" / "open.sh", Path(__file__).parent / "ros" / "opener.py")
 BROWSERS = (
     "brave-browser", "chromium", "chromium-browser", "firefox", "firefox-esr", "google-chrome", "google-chrome-stable",
     "opera", "sensible-browser", "www-browser", "x-www-browser", "xdg-open",
 )  # fmt: skip
-KNOWN = Path(__file__).parent / "ros" / "known.sh"
 ANSWERS = "grader-known"
 QUESTIONS = (
     "lsb_release -si", "lsb_release -sd", "lsb_release -sr", "lsb_release -sc", "rosversion roslaunch", "rosversion -d",
 )  # fmt: skip
 """What catkin asks in every build, and roslaunch on every start."""
-FIND_PKG = Path(__file__).parent / "ros" / "find_pkg.sh"
-EMPY = Path(__file__).parent / "ros" / "empy.py"
 EM = "lib/python3/dist-packages/em.py"
-ROSLAUNCH = Path(__file__).parent / "ros" / "roslaunch.py"
+STANDIN_SOURCES = Path(__file__).resolve().parent / "standins"
+SHEBANG = b"#!"
+SHARE = "share"
+LIBRARY = "python"
+CMAKE = "cmake"
 
 
 def prepare(place: Path, ros: RosInstallation) -> None:
@@ -56,10 +56,10 @@ def prepare(place: Path, ros: RosInstallation) -> None:
     (etc / "hosts").write_text("127.0.0.1 localhost\n::1 localhost\n")
     for name in ("python", "python3"):
         (shims / name).symlink_to(ros.python)
-    shutil.copyfile(SYNTAX, shims / "grader-syntax.py")
-    _program(shims, TERMINAL, "grader-terminal", TERMINALS)
-    _program(shims, OPENER[0], "grader-open", BROWSERS)
-    shutil.copyfile(OPENER[1], shims / "grader-open.py")
+    shutil.copyfile(ROS_SIDE / "syntax.py", shims / "grader-syntax.py")
+    _program(shims, "terminal.sh", "grader-terminal", TERMINALS)
+    _program(shims, "open.sh", "grader-open", BROWSERS)
+    shutil.copyfile(ROS_SIDE / "opener.py", shims / "grader-open.py")
     _quicker(shims, ros)
     copy_standins(place / "standins", ros)
 
@@ -68,46 +68,33 @@ def _quicker(shims: Path, ros: RosInstallation) -> None:
     """What stands before programs that start Python to say what is known: only where the program itself is there."""
     (shims / ANSWERS).mkdir()
     asked = sorted({question.split()[0] for question in QUESTIONS})
-    _program(shims, KNOWN, "grader-answers", [name for name in asked if ros.program(name)])
+    _program(shims, "known.sh", "grader-answers", [name for name in asked if ros.program(name)])
     if ros.program("catkin_find_pkg"):
-        _program(shims, FIND_PKG, "catkin_find_pkg", ())
+        _program(shims, "find_pkg.sh", "catkin_find_pkg", ())
     empy, modules = ros.program("empy"), [Path(prefix) / EM for prefix in (*ros.prefixes, "/usr")]
     module = next((path for path in modules if path.is_file()), None)
     if empy and module and _below_shebang(Path(empy)) == _below_shebang(module):
-        _filled_in(shims / "empy", EMPY, "@EM@", str(module))
+        _filled_in(shims / "empy", "empy.py", "@EM@", str(module))
     roslaunch = ros.program("roslaunch")
-    if roslaunch and _starts_python(Path(roslaunch)):
-        _filled_in(shims / "roslaunch", ROSLAUNCH, "@PROGRAM@", roslaunch)
+    if roslaunch and b"python" in Path(roslaunch).read_bytes().partition(b"\n")[0]:
+        _filled_in(shims / "roslaunch", "roslaunch.py", "@PROGRAM@", roslaunch)
 
 
-def _filled_in(program: Path, source: Path, name: str, value: str) -> None:
-    program.write_text(source.read_text().replace(name, value))
+def _filled_in(program: Path, source: str, name: str, value: str) -> None:
+    program.write_text((ROS_SIDE / source).read_text().replace(name, value))
     program.chmod(0o755)
-
-
-def _starts_python(path: Path) -> bool:
-    return b"python" in path.read_bytes().partition(b"\n")[0]
 
 
 def _below_shebang(path: Path) -> bytes:
     return path.read_bytes().partition(b"\n")[2]
 
 
-def _program(shims: Path, source: Path, name: str, called: Sequence[str]) -> None:
+def _program(shims: Path, source: str, name: str, called: Sequence[str]) -> None:
     """One program under the names that it is called by."""
-    shutil.copyfile(source, shims / name)
+    shutil.copyfile(ROS_SIDE / source, shims / name)
     (shims / name).chmod(0o755)
     for other in called:
         (shims / other).symlink_to(name)
-
-
-# [arena.standin_packages] Packages that stand in for those that a machine lacks (docs/how-to/standins.md): which, and how ROS finds them.
-
-STANDIN_SOURCES = Path(__file__).resolve().parent / "standins"
-SHEBANG = b"#!"
-SHARE = "share"
-LIBRARY = "python"
-CMAKE = "cmake"
 
 
 def known_packages() -> tuple[str, ...]:

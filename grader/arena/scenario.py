@@ -33,6 +33,16 @@ STARTING_S = 1.5
 EXPECTED_HZ = 10.0
 
 Tell = Callable[[str], None]
+CTRL_C_S = 5.0
+LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
+TERM_S = 2.0
+HELD_S = 0.1
+UP_S, SETTLE_S = 5.0, 0.2
+"""A process is up when its nodes have registered and nothing changes for a moment; some never are."""
+BUILT_PROGRAMS_MAX = 20
+
+Spec: TypeAlias = dict[str, Any]
+"""What the arena needs to start a process (`Place.spec`)."""
 
 
 def expected_s(scenario: Scenario) -> float:
@@ -184,20 +194,6 @@ async def _look_at_connections(arena: ArenaSession) -> None:
     arena.send(do="graph")
     await arena.wait(lambda: arena.live.graphs > looks or not arena.live.running, 5.0)
     await arena.wait(lambda: not arena.live.running, GRAPH_EVERY_S)
-
-
-# [arena.starting] How a scenario's processes start and stop, and what is on the parameter server before.
-
-CTRL_C_S = 5.0
-LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
-TERM_S = 2.0
-HELD_S = 0.1
-UP_S, SETTLE_S = 5.0, 0.2
-"""A process is up when its nodes have registered and nothing changes for a moment; some never are."""
-BUILT_PROGRAMS_MAX = 20
-
-Spec: TypeAlias = dict[str, Any]
-"""What the arena needs to start a process (`Place.spec`)."""
 
 
 def process_specs(start: Start, place: Place) -> Iterator[Spec]:

@@ -1,4 +1,4 @@
-"""Messages that the grader makes up for one run: nobody can guess them."""
+"""What the grader gives to a run: messages, parameters and calls of services, with values that cannot be guessed."""
 
 from __future__ import annotations
 
@@ -30,6 +30,20 @@ RANGES = {
     for signed in (True, False)
 }
 _random = random.SystemRandom()
+FILE_BYTES_MAX = 256 << 10
+EVENTS_MAX = 2_000
+VALUES_MAX = 5_000
+DEPTH_MAX = 20
+ALIASES_MAX = 20
+WORD_LETTERS = 9
+NOT_IN_FILE = "not in the file"
+OVER = TOO_LARGE, TOO_MUCH = "too large", "too much in it"
+"""How the remark on a file ends that is more than is read."""
+_EXAMPLES: dict[str, Any] = {"text": "", "integer": 10_000, "number": 1.0}
+ANSWER_S = 10.0
+TEXT_BYTES_MAX = 64 << 10
+
+Tell = Callable[[str], None]
 
 
 class Shot(NamedTuple):
@@ -140,20 +154,6 @@ def _two_words() -> str:
     )
 
 
-# [arena.parameters] What a scenario puts on the parameter server before anything starts, with values that nobody can guess.
-
-FILE_BYTES_MAX = 256 << 10
-EVENTS_MAX = 2_000
-VALUES_MAX = 5_000
-DEPTH_MAX = 20
-ALIASES_MAX = 20
-WORD_LETTERS = 9
-NOT_IN_FILE = "not in the file"
-OVER = TOO_LARGE, TOO_MUCH = "too large", "too much in it"
-"""How the remark on a file ends that is more than is read."""
-_random_parameters = random.SystemRandom()
-
-
 class Setting(NamedTuple):
     """One parameter to set. `name` begins with a slash, `detail` says where it comes from."""
 
@@ -188,24 +188,21 @@ def made_up(like: object) -> Any:  # noqa: ANN401 - of the type that it stands f
     if isinstance(like, int):
         return int(_digits(min(max(len(str(min(abs(like), 10**9))), 5), 9)))
     if isinstance(like, float):
-        return round(_random_parameters.uniform(100, 1000), 3)
+        return round(_random.uniform(100, 1000), 3)
     if isinstance(like, list):
         return [made_up(item) for item in like]
     text = str(like)
     if text.strip().isdigit():
         return _digits(max(len(text), 5))
-    return "".join(_random_parameters.choice(string.ascii_letters) for _ in range(WORD_LETTERS))
+    return "".join(_random.choice(string.ascii_letters) for _ in range(WORD_LETTERS))
 
 
 def _digits(count: int) -> str:
     """Digits of which no two neighbours are the same: nothing that a handout would print."""
-    found = [_random_parameters.choice("123456789")]
+    found = [_random.choice("123456789")]
     while len(found) < count:
-        found.append(_random_parameters.choice([d for d in "0123456789" if d != found[-1]]))
+        found.append(_random.choice([d for d in "0123456789" if d != found[-1]]))
     return "".join(found)
-
-
-_EXAMPLES: dict[str, Any] = {"text": "", "integer": 10_000, "number": 1.0}
 
 
 class _Loader(yaml.SafeLoader):
@@ -281,14 +278,6 @@ def _leaves(content: Mapping[Any, Any], prefix: str, depth: int) -> Iterator[tup
 
 def _absolute(name: str) -> str:
     return "/" + name.strip("/")
-
-
-# [arena.calls] Service calls of a scenario: the request's bytes are the grader's, the answer is decoded by it.
-
-ANSWER_S = 10.0
-TEXT_BYTES_MAX = 64 << 10
-
-Tell = Callable[[str], None]
 
 
 async def call_services(scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:

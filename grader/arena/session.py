@@ -32,6 +32,10 @@ GROUPS_S, LOOK_S = 2.0, 0.02
 PORT = 11311
 STOPPED = "stopped by the grader"
 """Begins the details of limits for which a process is ended (`ros/processes.py`)."""
+SHORT = 0.1
+"""Where less than this part of the memory is available, helpers of the system (earlyoom, systemd-oomd) kill too."""
+BELOW = re.compile(r"Killed signal terminated program|process has died \[pid \d+, exit code -9,")
+"""What the compiler's driver and roslaunch say of a process of theirs that SIGKILL ended."""
 
 
 class _Channel(NamedTuple):
@@ -308,16 +312,9 @@ class ArenaSession:
         return f"{self._failure} {self._process.last_words()}".strip() or "it did not answer"
 
 
-# [arena.killed] Who ended a process by SIGKILL: the kernel of a machine without memory, somebody on it, or its own program.
-
-SHORT = 0.1
-"""Where less than this part of the memory is available, helpers of the system (earlyoom, systemd-oomd) kill too."""
-BELOW = re.compile(r"Killed signal terminated program|process has died \[pid \d+, exit code -9,")
-"""What the compiler's driver and roslaunch say of a process of theirs that SIGKILL ended."""
-
-
 class Killed:
-    """The processes of one run that were killed, and not by the arena; those that broke a limit are not among them.
+    """The processes of one run that were killed, and not by the arena: by the kernel of a machine without memory, by
+    somebody on it, or by their own program. Those that broke a limit are not among them.
 
     Nobody can tell a program that kills itself from one that is killed once. Who is killed in every run, while the
     machine has memory, has done it itself: nothing in a sandbox can kill the sandbox's own process.

@@ -1,4 +1,5 @@
-"""What a recording of a submission consists of, whether or not anything of it is run."""
+"""What a recording of a submission consists of, and the recorder that runs nothing: the package's files alone are
+evidence then. It needs no ROS, and no Linux."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ from typing_extensions import Self
 
 from grader import __version__
 from grader.arena.limits import Limits
-from grader.arena.ros_env import find_ros
+from grader.arena.ros_env import RosInstallation, find_ros
 from grader.evidence.events import ActorEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.files import read_untrusted
@@ -25,7 +26,6 @@ from grader.portable import system
 from grader.rubric.model import Rubric
 
 if TYPE_CHECKING:
-    from grader.arena.ros_env import RosInstallation
     from grader.arena.sandbox import Sandbox
 
 
@@ -35,19 +35,8 @@ RETRIES = 2
 ATTACHED_BYTES_MAX = 256 << 10
 ATTACHED_FILES_MAX = 60
 ATTACHED_SUFFIXES = (
-    ".py",
-    ".xml",
-    ".txt",
-    ".launch",
-    ".yaml",
-    ".yml",
-    ".cfg",
-    ".sh",
-    ".cpp",
-    ".h",
-    ".msg",
-    ".srv",
-)
+    ".py", ".xml", ".txt", ".launch", ".yaml", ".yml", ".cfg", ".sh", ".cpp", ".h", ".msg", ".srv",
+)  # fmt: skip
 NO_ROS = "no ROS 1 on this machine"
 STATIC_ONLY = "nothing was run: only the files were asked for"
 STILL_HOLDS = "unchanged: what was recorded before still holds"
@@ -93,6 +82,14 @@ def metadata(submission: Submission, recording: Recording, limits: Limits) -> di
     }
 
 
+def write_files(writer: EvidenceWriter, folder: Path, facts: PackageFacts) -> None:
+    """Write the facts of the package in `folder`, and its text files, into the evidence."""
+    now_ns = time.time_ns()
+    writer.package(facts, now_ns)
+    for name, data in attachments(folder, facts):
+        writer.attach(name, data, now_ns, "text/plain")
+
+
 def attachments(folder: Path, facts: PackageFacts) -> Iterable[tuple[str, bytes]]:
     """The package's own text files that were judged, as far as they are of a size to be looked at."""
     for file in _texts(facts)[:ATTACHED_FILES_MAX]:
@@ -117,8 +114,6 @@ def _texts(facts: PackageFacts) -> list[SourceFile]:
     return [f for f in facts.files if not f.binary and f.link is None and f.path.endswith(ATTACHED_SUFFIXES)]
 
 
-# [arena.static_recorder] A recording of which nothing is run: the package's files alone are evidence. It needs no ROS, and no Linux.
-
 def why_unrun() -> str:
     """Why no node can be run here, "" where one can. Raises RosMissing where ROS is not where it should be."""
     if system():
@@ -126,7 +121,7 @@ def why_unrun() -> str:
     return "" if find_ros() is not None else NO_ROS
 
 
-class Unrun:
+class StaticRecorder:
     """As `arena.recording.Recorder`, where nothing is to be run or can be; `reason` says why."""
 
     def __init__(
@@ -169,8 +164,5 @@ class Unrun:
         limits = Limits().shared_by(len(self._rubric.scenarios))
         about = {**metadata(self._submission, recording, limits), "not_run": self._reason}
         with EvidenceWriter(path, scenario=PACKAGE, clock="real", warp=1.0, metadata=about) as writer:
-            now_ns = time.time_ns()
-            writer.package(recording.facts, now_ns)
-            for name, data in attachments(self._submission.package.folder, recording.facts):
-                writer.attach(name, data, now_ns, "text/plain")
+            write_files(writer, self._submission.package.folder, recording.facts)
         recording.files.append(path)

@@ -2,7 +2,7 @@
 
 In a sandbox both are only read: what is built there comes back as an archive. Without one, student code writes into
 the first, and the grader never follows what it finds there. Both hold the lab's package and those packages of the
-same submission that it depends on, nothing else.
+same submission that it depends on, nothing else. What a build left is read here too, and nothing of it unpacked.
 """
 
 from __future__ import annotations
@@ -38,6 +38,17 @@ MANIFEST = """<package format="2"><name>{}</name><version>0.0.0</version><descri
 <maintainer email="student@example.org">student</maintainer><license>TODO</license>
 <buildtool_depend>catkin</buildtool_depend></package>
 """
+ELF = b"\x7fELF"
+MEMBERS_MAX = 50_000
+_TOO_MANY = f"what the build left is more than {MEMBERS_MAX} files"
+HEADER_BYTES_MAX, HEADERS_BYTES_MAX = 64 << 10, 4 << 20
+"""Of one header that goes before a file's own (a long name, say), and of all of them together."""
+HEADERS_IN_A_ROW_MAX = 4
+_DAMAGED = (OSError, tarfile.TarError, ValueError, OverflowError)
+_PAX = (tarfile.XHDTYPE, tarfile.XGLTYPE, tarfile.SOLARIS_XHDTYPE)
+_BEFORE_A_FILE = (*_PAX, tarfile.GNUTYPE_LONGNAME, tarfile.GNUTYPE_LONGLINK)
+_ODD = re.compile(rb"[0-9]{21}|GNU\.sparse")
+"""Digits that would keep tarfile's own patterns busy, and files that are made larger than they are."""
 
 
 class Workspace(Record):
@@ -211,21 +222,6 @@ def _give_to(path: Path, uid: int | None) -> None:
     for folder, folders, files in os.walk(path):
         for name in (*folders, *files):
             os.chown(Path(folder) / name, uid, uid, follow_symlinks=False)
-
-
-# [arena.built] What a build made, read from what it left. Student code may have written it: nothing is unpacked or followed here.
-
-ELF = b"\x7fELF"
-MEMBERS_MAX = 50_000
-_TOO_MANY = f"what the build left is more than {MEMBERS_MAX} files"
-HEADER_BYTES_MAX, HEADERS_BYTES_MAX = 64 << 10, 4 << 20
-"""Of one header that goes before a file's own (a long name, say), and of all of them together."""
-HEADERS_IN_A_ROW_MAX = 4
-_DAMAGED = (OSError, tarfile.TarError, ValueError, OverflowError)
-_PAX = (tarfile.XHDTYPE, tarfile.XGLTYPE, tarfile.SOLARIS_XHDTYPE)
-_BEFORE_A_FILE = (*_PAX, tarfile.GNUTYPE_LONGNAME, tarfile.GNUTYPE_LONGLINK)
-_ODD = re.compile(rb"[0-9]{21}|GNU\.sparse")
-"""Digits that would keep tarfile's own patterns busy, and files that are made larger than they are."""
 
 
 class Built(Record):

@@ -24,7 +24,7 @@ from grader.steps.options import GradeOptions
 
 if TYPE_CHECKING:
     from grader.arena.recording import Recorder
-    from grader.arena.static_recorder import Recording, Unrun
+    from grader.arena.static_recorder import Recording, StaticRecorder
 
 ROS_TYPES = "rosbags.typesys.stores.ros1_noetic"
 LATER = ("grader.evidence.decode", "grader.evidence.reader")
@@ -47,17 +47,13 @@ def recorder(
     *,
     options: GradeOptions,
     progress: Progress,
-) -> Recorder | Unrun:
+) -> Recorder | StaticRecorder:
     """What records the rubric's scenarios into the folder `evidence`; use it as a context."""
-    from grader.arena.static_recorder import (  # noqa: PLC0415
-        STATIC_ONLY,
-        Unrun,
-        why_unrun,
-    )
+    from grader.arena.static_recorder import STATIC_ONLY, StaticRecorder, why_unrun  # noqa: PLC0415 - see LATER
 
     reason = STATIC_ONLY if options.static_only or not needs_ros(rubric) else why_unrun()
     if reason:
-        return Unrun(
+        return StaticRecorder(
             submission,
             facts,
             started(rubric.rubric),
@@ -75,7 +71,6 @@ def recorder(
         evidence,
         rates=rates_of(rubric.rubric),
         mode=options.sandbox,
-        static_only=False,
         progress=progress,
         recorded=options.recorded,
         stop=options.stop,
