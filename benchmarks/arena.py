@@ -16,8 +16,8 @@ from benchmarks.figures import NotMeasured
 from benchmarks.machine import Meter
 from grader.arena.limits import Limits
 from grader.arena.process_environment import Place
+from grader.arena.scenario import process_specs
 from grader.arena.session import ArenaSession
-from grader.arena.starting import process_specs
 from grader.evidence.writer import EvidenceWriter
 from grader.rubric.model import Start
 from tests.arena.support import make_place

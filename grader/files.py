@@ -1,10 +1,12 @@
-"""Files that appear whole or not at all, and folders that are known to be writable before anything is run."""
+"""Files that appear whole or not at all, files of somebody else's that are read with care, locks, and folders that are
+known to be writable before anything is run."""
 
 from __future__ import annotations
 
 import errno
 import os
 import secrets
+import stat
 import sys
 import tempfile
 from contextlib import suppress
@@ -12,7 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from grader.errors import GraderError, HostError, OutputError
-from grader.portable import BINARY, CLOEXEC, NOFOLLOW
+from grader.portable import BINARY, CLOEXEC, DIRECTORY, NOFOLLOW, READ
 
 if sys.platform != "win32":
     import fcntl
@@ -20,6 +22,8 @@ if sys.platform != "win32":
 HAS_LOCKS = sys.platform != "win32"
 FILE, FOLDER = 0o600, 0o700
 """Modes of what is for its owner alone: marks are."""
+
+READ_MAX = 8 << 20
 
 FULL = {
     errno.ENOSPC: "the disk is full",
@@ -85,6 +89,37 @@ def keep_private(path: Path) -> None:
             path.chmod(FOLDER if path.is_dir() else FILE)
 
 
+def read_untrusted(path: Path, limit_bytes: int = READ_MAX) -> bytes | None:
+    """Return what a regular file that student code may have written begins with; None where there is none.
+
+    It is cut at the limit: for one byte more, callers see that a file is over theirs, and say so.
+    """
+    try:
+        with open_untrusted(path) as file:
+            return file.read(limit_bytes)
+    except OSError:
+        return None
+
+
+def open_untrusted(path: Path, *below: str) -> BinaryIO:
+    """Open a regular file that others may have written, named by its folder and the names `below` it.
+
+    No link is followed from `path` on, and no pipe waited for. Raises OSError, also for what is no regular file.
+    """
+    descriptor = os.open(path, READ | NOFOLLOW | (DIRECTORY if below else 0))
+    try:
+        for left, name in enumerate(below, 1 - len(below)):
+            inner = os.open(name, READ | NOFOLLOW | (DIRECTORY if left else 0), dir_fd=descriptor)
+            os.close(descriptor)
+            descriptor = inner
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise OSError(errno.EINVAL, "not a regular file", str(path))  # noqa: TRY301 - closed as any other
+    except OSError:
+        os.close(descriptor)
+        raise
+    return os.fdopen(descriptor, "rb")
+
+
 def _write_into(path: Path, data: bytes) -> None:
     try:
         with path.open("wb") as file:
@@ -131,6 +166,13 @@ def sync(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def open_lock(path: Path, *, public: bool = False) -> int:
+    """Return a descriptor of a file that programs lock to keep each other out, made where it is missing. Raises
+    OSError."""
+    flags = os.O_RDWR | os.O_CREAT | CLOEXEC | NOFOLLOW
+    return os.open(path, flags, 0o666 if public else FILE)
 
 
 def lock(descriptor: int, *, shared: bool = False) -> bool:

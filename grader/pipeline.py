@@ -42,7 +42,7 @@ __all__ = ["GradeOptions", "console_log", "grade", "prepare", "record"]
 
 def prepare(options: GradeOptions) -> None:
     """Before many gradings: make what they share. What keeps it from being made, each of them says for itself."""
-    from grader.arena.base import provide_base  # noqa: PLC0415 - see steps.recorded.LATER
+    from grader.arena.base_workspace import provide_base  # noqa: PLC0415 - see steps.recorded.LATER
 
     if not options.static_only:
         with suppress(GraderError), waited_for():

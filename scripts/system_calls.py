@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from grader.arena.system_calls import FILTERS, MACHINES
+from grader.arena.sandbox import FILTERS, MACHINES
 
 FILES = """
 access alarm brk chdir chmod chown close close_range copy_file_range creat dup dup2 dup3 faccessat faccessat2

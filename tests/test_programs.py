@@ -16,7 +16,7 @@ GRADER = Path(__file__).resolve().parent.parent / "grader"
 INSIDE = {
     "arena/ros/opener.py": "runs behind the wall, as the program that a student's launch file names",
     "arena/ros/calibration.py": "a copy of the arena, which starts nothing",
-    "arena/ros/template.py": "a copy of the template, which becomes an arena",
+    "arena/ros/__main__.py": "a copy of the template, which becomes an arena",
 }
 """What makes a process, but starts no program of the machine's."""
 
@@ -37,7 +37,7 @@ STARTS = {
         "nothing: tests/arena/test_environment.py",
     ),
     "arena/ros_env.py:_from_setup": Start("base", "'/'", "nothing: ROS's own setup.bash"),
-    "arena/template.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
+    "arena/arena_process.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
     "classes/batch/child.py:_started": Start(
         "anywhere(os.environ)", None, "nothing: jobs come through a pipe, as JSON"
     ),

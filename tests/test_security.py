@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import build, built, calls, parameters, recorded
+from grader import files
+from grader.arena import build, scenario_inputs, static_recorder, workspace
 from grader.arena.limits import SUBMISSION_MESSAGE_BYTES
 from grader.arena.limits import Limits as RunLimits
 from grader.arena.ros_env import DUMP_BYTES, NAMES_MAX, VALUE_BYTES
@@ -69,14 +70,14 @@ def test_what_is_read_from_the_students_side_is_tested(row: list[str]) -> None:
 
 
 BOUNDS = {
-    "stdout and stderr": (RUN.output_bytes // MB, RUN.output_lines, "ros/streams:LINE_BYTES_MAX"),
+    "stdout and stderr": (RUN.output_bytes // MB, RUN.output_lines, "ros/processes:LINE_BYTES_MAX"),
     "what bubblewrap says": ("ros/processes:INFO_BYTES_MAX",),
     "what a step hands over": (RUN.built_bytes // MB,),
     "`built.tar`": (
-        RUN.built_bytes // MB, built.MEMBERS_MAX, built.HEADER_BYTES_MAX // KB, built.HEADERS_BYTES_MAX // MB,
-        built.HEADERS_IN_A_ROW_MAX, len(built.ELF),
+        RUN.built_bytes // MB, workspace.MEMBERS_MAX, workspace.HEADER_BYTES_MAX // KB,
+        workspace.HEADERS_BYTES_MAX // MB, workspace.HEADERS_IN_A_ROW_MAX, len(workspace.ELF),
     ),
-    "CMake's trace": (recorded.READ_MAX // MB, cmake_written.LINES_MAX, cmake_written.FILES_BYTES_MAX // 1000),
+    "CMake's trace": (files.READ_MAX // MB, cmake_written.LINES_MAX, cmake_written.FILES_BYTES_MAX // 1000),
     "remarks on Python files": (
         python.REPORT_BYTES_MAX // MB, "ros/syntax:SLIPS_LIMIT", "ros/syntax:ALL_SLIPS_LIMIT", build.STEP_S,
     ),
@@ -86,29 +87,30 @@ BOUNDS = {
         "ros/rpc:REQUEST_S",
     ),
     "answers of nodes": (
-        ("ros/bounded:ANSWER_BYTES_MAX", MB), "ros/links:CONNECTIONS_MAX", "ros/recorder:CONNECT_S",
-        "ros/links:BUS_INFO_S", "ros/master:NOTIFY_S", "ros/pool:EACH_MAX",
+        ("ros/bounded_sockets:ANSWER_BYTES_MAX", MB), "ros/links:CONNECTIONS_MAX", "ros/recorder:CONNECT_S",
+        "ros/links:BUS_INFO_S", "ros/master:NOTIFY_S", "ros/quotas:EACH_MAX",
     ),
     "connections to": (
-        ("ros/tcpros:HEADER_BYTES_MAX", KB), "ros/tcpros_server:WAITING_MAX", "ros/tcpros_server:HANDSHAKE_S",
+        ("ros/tcpros:HEADER_BYTES_MAX", KB), "ros/actor:WAITING_MAX", "ros/actor:HANDSHAKE_S",
     ),
     "headers of publishers": (
         ("ros/tcpros:HEADER_BYTES_MAX", KB), "ros/tcpros:FIELD_CHARS_MAX", "ros/tcpros:DEFINITION_CHARS_MAX",
         "ros/recorder:OPEN_MAX", "ros/recorder:SAME_MAX", "ros/recorder:CONNECT_S",
     ),
     "messages": (
-        ("ros/framing:MESSAGE_BYTES_MAX", MB), RUN.channel_bytes // MB, RUN.channel_messages, RUN.channels,
+        ("ros/connection:MESSAGE_BYTES_MAX", MB), RUN.channel_bytes // MB, RUN.channel_messages, RUN.channels,
         RUN.run_bytes // MB,
     ),
-    "a service's answer": (("ros/services:ANSWER_BYTES_MAX", MB), "ros/services:WORDS_CHARS_MAX", calls.ANSWER_S),
+    "a service's answer": (("ros/tcpros:ANSWER_BYTES_MAX", MB), "ros/tcpros:WORDS_CHARS_MAX", scenario_inputs.ANSWER_S),
     "names of nodes": ("ros/guard:NAME_CHARS_MAX", "ros/guard:NAMES_MAX", ("ros/guard:NAME_BYTES_MAX", KB)),
     "parameters": (
-        ("ros/params:PROCESS_BYTES_MAX", MB), ("ros/params:RUN_BYTES_MAX", MB), "ros/params:LEVELS_MAX",
-        ("ros/params:VALUE_BYTES_MAX", KB), "ros/params:EVENTS_MAX", ("ros/params:EVENTS_BYTES_MAX", MB),
+        ("ros/registry_log:PROCESS_BYTES_MAX", MB), ("ros/registry_log:RUN_BYTES_MAX", MB),
+        "ros/registry_log:LEVELS_MAX", ("ros/registry_log:VALUE_BYTES_MAX", KB), "ros/registry_log:EVENTS_MAX",
+        ("ros/registry_log:EVENTS_BYTES_MAX", MB),
     ),
-    "`/proc`": ("ros/tree:PROCESSES_MAX", "ros/owners:FILES_MAX"),
+    "`/proc`": ("ros/process_tree:PROCESSES_MAX", "ros/sockets:FILES_MAX"),
     "the kernel's tables": ("ros/sockets:SOCKETS_MAX", "ros/sockets:TABLE_ROWS_MAX"),
-    "lines that were printed": ("ros/streams:LINE_BYTES_MAX",),
+    "lines that were printed": ("ros/processes:LINE_BYTES_MAX",),
     "names that are compared": (text.NAMES_MAX, text.NAME_CHARS_MAX),
     "definitions and messages": (
         definitions.MAX_DEFINITION_BYTES, definitions.MAX_FIELDS, definitions.MAX_DEPTH,
@@ -124,12 +126,12 @@ BOUNDS = {
     ),
     "`CMakeLists.txt`": (cmake_parse._FILE_LIMIT_BYTES // 1000, cmake_parse._STEPS_LIMIT),
     "files of the package": (reading.SOURCE_LIMIT_BYTES // 10**6,),
-    "files for the evidence": (recorded.ATTACHED_BYTES_MAX // KB, recorded.ATTACHED_FILES_MAX),
+    "files for the evidence": (static_recorder.ATTACHED_BYTES_MAX // KB, static_recorder.ATTACHED_FILES_MAX),
     "YAML files": (
-        parameters.FILE_BYTES_MAX // KB, parameters.EVENTS_MAX, parameters.VALUES_MAX, parameters.DEPTH_MAX,
-        parameters.ALIASES_MAX,
+        scenario_inputs.FILE_BYTES_MAX // KB, scenario_inputs.EVENTS_MAX, scenario_inputs.VALUES_MAX,
+        scenario_inputs.DEPTH_MAX, scenario_inputs.ALIASES_MAX,
     ),
-    "texts of services": (calls.TEXT_BYTES_MAX // KB, services._PARTS_MAX),
+    "texts of services": (scenario_inputs.TEXT_BYTES_MAX // KB, services._PARTS_MAX),
     "what git says": (git._ANSWER_BYTES // MB, git._FILE_BYTES // MB, git._MEMORY_BYTES >> 30, gitdir._MAX_FILES),
 }  # fmt: skip
 """By how a reading begins: the numbers in its bound, each a constant of the code, of ROS's side as `file:NAME`."""

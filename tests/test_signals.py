@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from grader import grade
-from grader.arena import template
+from grader.arena import arena_process
 from grader.arena.sandbox_probe import why_not
 from grader.errors import HostError
 from grader.steps import waited_for
@@ -74,8 +74,8 @@ for line in open("/proc/self/status"):
         name, mask = line.split()
         print(name, [number for number in range(1, 32) if int(mask, 16) >> number - 1 & 1])
 """
-    made: dict[tuple[object, ...], template.Template] = {}
-    monkeypatch.setattr(template, "_templates", made)
+    made: dict[tuple[object, ...], arena_process.Template] = {}
+    monkeypatch.setattr(arena_process, "_templates", made)
     held = {signal.SIGTERM, signal.SIGCHLD, signal.SIGUSR2}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, held)
     try:

@@ -1,4 +1,4 @@
-"""The folder in which the graders of one user find each other."""
+"""Who may start processes now, agreed by all graders of one user through locked files in a folder of theirs."""
 
 from __future__ import annotations
 
@@ -15,10 +15,21 @@ from typing import TypeVar
 
 from typing_extensions import Self
 
-from grader.arena.memory import available_bytes
-from grader.files import lock
+from grader.files import lock, open_lock
 
 NAME = "ros-lab-grader"
+MEMINFO = Path("/proc/meminfo")
+CONTAINER = (
+    (Path("/sys/fs/cgroup"), "memory.max", "memory.current", "inactive_file"),
+    (
+        Path("/sys/fs/cgroup/memory"),
+        "memory.limit_in_bytes",
+        "memory.usage_in_bytes",
+        "total_inactive_file",
+    ),
+)
+"""Where a container's limit stands, in control groups of version 2 and of version 1."""
+UNLIMITED_BYTES = 1 << 62
 
 
 def shared_folder() -> Path | None:
@@ -48,8 +59,7 @@ class FileLock:
     """
 
     def __init__(self, path: Path) -> None:
-        flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
-        self._descriptor = os.open(path, flags, 0o600)
+        self._descriptor = open_lock(path)
 
     def __enter__(self) -> Self:
         return self
@@ -77,7 +87,7 @@ FRESH_S = 1.0
 
 def note(path: Path, late_ms: float) -> None:
     """Write down what was just measured. Raises OSError."""
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+    descriptor = open_lock(path)
     try:
         place = os.getpid() % ENTRIES * ENTRY.size
         os.pwrite(descriptor, ENTRY.pack(time.monotonic_ns(), late_ms), place)
@@ -196,3 +206,23 @@ async def _until(look: Callable[[], T], patience_s: float) -> T:
     while not (found := look()) and time.monotonic() < until_s:  # noqa: ASYNC110 - others' locks tell no event loop
         await asyncio.sleep(LOOK_S)
     return found
+
+
+def available_bytes() -> int:
+    """What new processes can have without anything being swapped out, of the machine and of its container."""
+    machine = _numbers(MEMINFO).get("MemAvailable", UNLIMITED_BYTES >> 10) * 1024
+    return min([machine, *(_left_bytes(*place) for place in CONTAINER)])
+
+
+def _left_bytes(folder: Path, limit: str, used: str, cache: str) -> int:
+    """What a control group still gives; its page cache is given up where it is needed."""
+    with suppress(OSError, ValueError):  # no such group, or no limit: it says "max"
+        reclaimable = _numbers(folder / "memory.stat").get(cache, 0)
+        return int((folder / limit).read_text()) - int((folder / used).read_text()) + reclaimable
+    return UNLIMITED_BYTES
+
+
+def _numbers(path: Path) -> dict[str, int]:
+    """`name number` or `name: number`, a line each."""
+    words = [line.replace(":", " ").split() for line in path.read_text().splitlines()]
+    return {word[0]: int(word[1]) for word in words if len(word) > 1 and word[1].isdigit()}

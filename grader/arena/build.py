@@ -11,17 +11,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from grader.arena.base import NAME as BASE_NAME
-from grader.arena.base import base_spec, catkin_make, has_base, keep_base
-from grader.arena.built import read_member
+from grader.arena.base_workspace import NAME as BASE_NAME
+from grader.arena.base_workspace import base_spec, catkin_make, has_base, keep_base
 from grader.arena.process_environment import ARCHIVE, Place
-from grader.arena.recorded import READ_MAX, read_untrusted
 from grader.arena.ros_env import DUMP_BYTES, excess_of, keep_ros_variables, parse_env
 from grader.arena.session import ArenaSession
-from grader.arena.workspace import run_in_place
+from grader.arena.static_recorder import RunCost
+from grader.arena.workspace import read_member, run_in_place
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
-from grader.model.record import Record
+from grader.files import READ_MAX, read_untrusted
 from grader.package.cmake_written import written_calls
 from grader.package.python import REPORT_BYTES_MAX
 
@@ -40,15 +39,13 @@ DUMP = """for name in $(compgen -e); do printf '%s=%s\\0' "$name" "${!name}"; do
 """As `env -0` does, which could not even be started where a variable is too large for the kernel."""
 
 
-class BuildOutcome(Record):
+class BuildOutcome(RunCost):
     """`trace` and `syntax` are copies that no student's process can reach; `root` is the package as CMake saw it."""
 
     ok: bool
     trace: Path | None
     root: str
     syntax: Path | None
-    cpu_s: float
-    student_cpu_s: float
 
 
 async def build(

@@ -10,9 +10,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from grader.arena.built import Built, read_archive, read_folder
-from grader.arena.host_programs import host_program
-from grader.arena.inside import (
+from grader.arena.limits import Limits
+from grader.arena.ros_env import SYSTEM_PATH, RosInstallation
+from grader.arena.sandbox import Sandbox, Word, copy_of, scratch, system_call_filter
+from grader.arena.sandbox_files import (
     BASE_WORKSPACE,
     BUILT,
     HOME,
@@ -21,15 +22,12 @@ from grader.arena.inside import (
     OUTPUT,
     SHIMS,
     SOURCES,
+    STANDIN_SOURCES,
     STANDINS,
+    with_standins,
 )
-from grader.arena.limits import Limits
-from grader.arena.ros_env import SYSTEM_PATH, RosInstallation
-from grader.arena.sandbox import Sandbox, Word, copy_of, scratch
-from grader.arena.standin_packages import SOURCES as STANDIN_SOURCES
-from grader.arena.standin_packages import with_standins
-from grader.arena.system_calls import system_call_filter
-from grader.arena.workspace import Workspace
+from grader.arena.workspace import Built, Workspace, read_archive, read_folder
+from grader.host_programs import host_program
 
 LOOPBACK = "127.0.0.1"
 """As an address: not every machine knows the name localhost."""

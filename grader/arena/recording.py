@@ -11,7 +11,7 @@ import shutil
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -20,30 +20,28 @@ from typing_extensions import Self
 from grader.arena.admission import Admission, shared_folder
 from grader.arena.asynchronous import Stop, run_until_signal, side_by_side
 from grader.arena.build import BUILD_EXPECTED_S, build
-from grader.arena.inside import prepare
 from grader.arena.limits import Limits
-from grader.arena.order import in_order
 from grader.arena.process_environment import Place
-from grader.arena.recorded import (
+from grader.arena.ros_env import INSTALL_HINT, find_ros
+from grader.arena.sandbox import Mode, temporary_base
+from grader.arena.sandbox_files import prepare
+from grader.arena.sandbox_probe import choose
+from grader.arena.scenario import expected_s, run_scenario
+from grader.arena.static_recorder import (
     NO_ROS,
     PACKAGE,
     RETRIES,
-    STATIC_ONLY,
     STILL_HOLDS,
     Recording,
-    attachments,
     metadata,
     not_attached,
-    read_untrusted,
+    write_files,
 )
-from grader.arena.ros_env import RosInstallation, find_ros
-from grader.arena.sandbox import Mode, Sandbox, temporary_base
-from grader.arena.sandbox_probe import choose
-from grader.arena.scenario import expected_s, run_scenario
-from grader.arena.workspace import Workspace, make_workspace
-from grader.errors import ArenaError
+from grader.arena.workspace import make_workspace
+from grader.errors import ArenaError, RosMissing
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
+from grader.files import read_untrusted
 from grader.model.message_rate import RateBounds
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
@@ -74,7 +72,6 @@ class Recorder:
         folder: Path,
         *,
         mode: Mode,
-        static_only: bool,
         progress: Progress,
         rates: Mapping[str, tuple[RateBounds, ...]] | None = None,
         recorded: Mapping[str, Path] | None = None,
@@ -87,16 +84,18 @@ class Recorder:
         self._rubric = rubric
         self._progress = progress
         self._limits = Limits().shared_by(len(rubric.scenarios))
-        ros = None if static_only else find_ros()
-        self._not_run = STATIC_ONLY if static_only else "" if ros else NO_ROS
-        self.recording = Recording(folder=folder, facts=facts, ros=ros, sandbox=choose(mode) if ros else None)
+        ros = find_ros()
+        if ros is None:
+            raise RosMissing(NO_ROS, hint=INSTALL_HINT)
+        self._ros, self._sandbox, self._not_run = ros, choose(mode), ""
+        self.recording = Recording(folder=folder, facts=facts, ros=ros, sandbox=self._sandbox)
         self._place: Place | None = None
         self._stack = ExitStack()
         self._admission = Admission(None)
         self._runs: Counter[str] = Counter()
 
     def __enter__(self) -> Self:
-        base = temporary_base(self.recording.sandbox)
+        base = temporary_base(self._sandbox)
         self._folder = self._stack.enter_context(temporary_folder("run", base))
         self._folder.chmod(0o711)
         return self
@@ -105,8 +104,8 @@ class Recorder:
         self._stack.close()
 
     def record_all(self, meanwhile: Callable[[], None]) -> None:
-        """The package with its build, then every scenario, side by side. Where there is a build to wait for,
-        `meanwhile` is called beside it, in another thread."""
+        """The package with its build, then every scenario, side by side. `meanwhile` is called beside the build, in
+        another thread."""
         run_until_signal(self._record_all(meanwhile), self._stop)
 
     def record_again(self, scenarios: Iterable[str]) -> None:
@@ -115,16 +114,12 @@ class Recorder:
 
     async def _record_all(self, meanwhile: Callable[[], None]) -> None:
         self._admission = Admission(shared_folder())
-        names = [name for name in in_order(self._rubric) if name not in self._recorded]
+        names = [name for name in in_order(self._rubric, self._rates) if name not in self._recorded]
         self._copy_recorded()
-        if not self._not_run:
-            self._progress.step("build", "waiting", "", BUILD_EXPECTED_S)
-            for name in names:
-                self._progress.step(
-                    name, "waiting", "for the build", expected_s(self._rubric.scenarios[name])
-                )
-        beside = () if self._not_run else (asyncio.to_thread(meanwhile),)
-        await side_by_side(self._record_package(), *beside)
+        self._progress.step("build", "waiting", "", BUILD_EXPECTED_S)
+        for name in names:
+            self._progress.step(name, "waiting", "for the build", expected_s(self._rubric.scenarios[name]))
+        await side_by_side(self._record_package(), asyncio.to_thread(meanwhile))
         if self._place is None:
             for name in names:
                 self._progress.step(name, "skipped", self._not_run)
@@ -153,18 +148,12 @@ class Recorder:
     async def _write_package(self, folder: Path, *, last: bool) -> None:
         recording = self.recording
         path = recording.folder / f"{PACKAGE}.mcap"
-        about = self._metadata() | ({"not_run": self._not_run} if self._not_run else {})
+        about = self._metadata()
         with EvidenceWriter(path, scenario=PACKAGE, clock="real", warp=1.0, metadata=about) as writer:
-            if recording.ros is not None and recording.sandbox is not None:
-                await self._build(
-                    self._make_place(folder, recording.ros, recording.sandbox), writer, last=last
-                )
-            now_ns = time.time_ns()
-            writer.package(recording.facts, now_ns)
-            for name, data in attachments(self._submission.package.folder, recording.facts):
-                writer.attach(name, data, now_ns, "text/plain")
+            await self._build(self._make_place(folder), writer, last=last)
+            write_files(writer, self._submission.package.folder, recording.facts)
             for event in not_attached(recording.facts):
-                writer.event("/grader/actor", now_ns, event)
+                writer.event("/grader/actor", time.time_ns(), event)
         recording.files.append(path)
 
     async def _build(self, place: Place, writer: EvidenceWriter, *, last: bool) -> None:
@@ -201,13 +190,13 @@ class Recorder:
             "build", "done" if outcome.ok else "failed", "" if outcome.ok else "catkin_make failed"
         )
 
-    def _make_place(self, folder: Path, ros: RosInstallation, sandbox: Sandbox) -> Place:
+    def _make_place(self, folder: Path) -> Place:
         folder.mkdir()
         folder.chmod(0o711)
         with _readable_by_all():
-            prepare(folder, ros)
-            workspace: Workspace = make_workspace(
-                folder, self._submission, self.recording.facts, self._scripts(), sandbox
+            prepare(folder, self._ros)
+            workspace = make_workspace(
+                folder, self._submission, self.recording.facts, self._scripts(), self._sandbox
             )
         name = (
             self.recording.facts.manifest.name
@@ -215,7 +204,12 @@ class Recorder:
             else self._submission.package.name
         )
         return Place(
-            folder=folder, ros=ros, sandbox=sandbox, limits=self._limits, workspace=workspace, package=name
+            folder=folder,
+            ros=self._ros,
+            sandbox=self._sandbox,
+            limits=self._limits,
+            workspace=workspace,
+            package=name,
         )
 
     def _scripts(self) -> list[str]:
@@ -296,3 +290,11 @@ def _needs_answer(facts: PackageFacts, path: str) -> bool:
         return False
     shebang = file.shebang
     return file.executable is False or shebang is None or shebang.crlf or shebang.found is False
+
+
+def in_order(rubric: Rubric, rated: Container[str]) -> tuple[str, ...]:
+    """Return the runs' names in the order in which they ask to begin: those that measure a rate (in real time) first,
+    then the longest, so that the others start while it is watched."""
+    scenarios = rubric.scenarios
+    measuring = {n for n, s in scenarios.items() if n in rated and s.clock == "real"}
+    return tuple(sorted(scenarios, key=lambda n: (n not in measuring, -expected_s(scenarios[n]))))

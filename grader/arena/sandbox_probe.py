@@ -16,11 +16,10 @@ from functools import lru_cache
 from pathlib import Path
 
 from grader.arena.control_groups import find_cgroups
-from grader.arena.host_programs import HOST_ENV, host_program
 from grader.arena.limits import Limits
-from grader.arena.sandbox import NAMESPACES, NO_NESTING, WALLS, Mode, Sandbox
-from grader.arena.system_calls import system_call_filter
+from grader.arena.sandbox import NAMESPACES, NO_NESTING, WALLS, Mode, Sandbox, system_call_filter
 from grader.errors import HostError, SandboxMissing
+from grader.host_programs import HOST_ENV, host_program
 
 UID_MAP = Path("/proc/self/uid_map")
 UNUSED_UIDS = (1_900_000_000, 2_000_000_000)

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from contextlib import asynccontextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, TypeAlias
 
-from grader.arena.admission import Admission
-from grader.arena.calls import call_services
-from grader.arena.probes import advertisement, make_shots, publication
+from grader.arena.admission import Admission, Leave
 from grader.arena.process_environment import Place
 from grader.arena.run_state import next_look_s, settled, waiting_for
+from grader.arena.scenario_inputs import OVER, advertisement, call_services, make_shots, publication, settings
 from grader.arena.session import ArenaSession
-from grader.arena.starting import Spec, given_back, process_specs, set_params, stop
+from grader.arena.static_recorder import RunCost
 from grader.errors import ArenaError
-from grader.evidence.events import ScenarioEvent
+from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.message_rate import RateBounds
-from grader.model.record import Record
-from grader.rubric.model import Scenario, Start
+from grader.rubric.model import Param, Scenario, Start
 
 CLOCK_STEP_S = 0.05
 UNFOLLOWED_S = 2.0
@@ -32,13 +33,16 @@ STARTING_S = 1.5
 EXPECTED_HZ = 10.0
 
 Tell = Callable[[str], None]
+CTRL_C_S = 5.0
+LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
+TERM_S = 2.0
+HELD_S = 0.1
+UP_S, SETTLE_S = 5.0, 0.2
+"""A process is up when its nodes have registered and nothing changes for a moment; some never are."""
+BUILT_PROGRAMS_MAX = 20
 
-
-class ScenarioCost(Record):
-    """CPU seconds: the grader's own share of the run, and that of the student's processes."""
-
-    cpu_s: float
-    student_cpu_s: float
+Spec: TypeAlias = dict[str, Any]
+"""What the arena needs to start a process (`Place.spec`)."""
 
 
 def expected_s(scenario: Scenario) -> float:
@@ -65,7 +69,7 @@ async def run_scenario(
     rates: tuple[RateBounds, ...] = (),
     admission: Admission | None = None,
     last_run: bool = False,
-) -> ScenarioCost:
+) -> RunCost:
     """Record the scenario at `path`. An arena that fails still leaves evidence, with the outcome `host`.
 
     Processes are started when `admission` lets them: others wait until they are up. A window in which nothing but
@@ -78,7 +82,7 @@ async def run_scenario(
         session = ArenaSession(place, writer, last_run=last_run, on_lateness=admission.note_lateness)
         if not any(spec["role"] == "student" for _, spec in starts):
             session.course(ScenarioEvent(event="end", outcome="ended", detail="there was nothing to start"))
-            return ScenarioCost(cpu_s=0, student_cpu_s=0)
+            return RunCost(cpu_s=0, student_cpu_s=0)
         try:
             session.live.rate(rates)
             async with admission.start() as leave, session as arena:
@@ -90,7 +94,7 @@ async def run_scenario(
                 arena.course(ScenarioEvent(event="end", outcome=outcome, detail=detail))
         except ArenaError as error:
             session.course(ScenarioEvent(event="end", outcome="host", detail=error.message))
-    return ScenarioCost(cpu_s=session.cpu_s, student_cpu_s=session.student_cpu_s)
+    return RunCost(cpu_s=session.cpu_s, student_cpu_s=session.student_cpu_s)
 
 
 async def _run(
@@ -190,3 +194,99 @@ async def _look_at_connections(arena: ArenaSession) -> None:
     arena.send(do="graph")
     await arena.wait(lambda: arena.live.graphs > looks or not arena.live.running, 5.0)
     await arena.wait(lambda: not arena.live.running, GRAPH_EVERY_S)
+
+
+def process_specs(start: Start, place: Place) -> Iterator[Spec]:
+    """How `rosrun`, `roslaunch` or `rosparam` would start it; nothing for a file that is not in the package."""
+    if start.launch is not None:
+        yield place.spec(start.name, ["roslaunch", place.package, start.launch, *start.args])
+    elif start.load is not None:
+        yield from _loading(start.name, start.load, place)
+    elif start.program is not None:
+        package, _, program = start.program.partition("/")
+        argv = ["rosrun", package, program, *start.args]
+        yield replace(place, env={}).spec(start.name, argv, role="grader", copy=False)
+    elif start.built:
+        for program in built_programs(place):
+            yield place.spec(f"{start.name}/{program}", [f"{place.devel_programs}/{program}", *start.args])
+    else:
+        yield from _script(start, place)
+
+
+def _script(start: Start, place: Place) -> Iterator[Spec]:
+    found = place.find_program(start.script or "")
+    if found is not None:
+        program, path = found
+        repairs = list(place.workspace.repairs.get(path, ()))
+        yield place.spec(start.name, [program, *start.args], script=path, repairs=repairs)
+
+
+def _loading(name: str, file: str, place: Place) -> Iterator[Spec]:
+    found = place.script_path(file)
+    if found is not None:
+        yield place.spec(name, ["rosparam", "load", f"{place.package_folder}/{found}"], script=found)
+
+
+def built_programs(place: Place) -> list[str]:
+    """The names of what the compiler made for `rosrun` to find, in order."""
+    return sorted(place.built.compiled)[:BUILT_PROGRAMS_MAX]
+
+
+def set_params(params: tuple[Param, ...], arena: ArenaSession) -> None:
+    """Set them, each with its event in the evidence; a file that cannot be read, or is too much, is noted there."""
+    found, remarks = settings(params, arena.place.package_file)
+    for remark in remarks:
+        over = remark.endswith(OVER)
+        actor = "the package" if over else "grader"
+        arena.note(ActorEvent(action="limit" if over else "note", actor=actor, detail=remark))
+    for one in found:
+        record = {
+            "action": "param",
+            "actor": "grader",
+            "topic": one.name,
+            "value": one.value,
+            "detail": one.detail,
+        }
+        arena.send(do="set_param", name=one.name, value=one.value, record=record)
+
+
+@asynccontextmanager
+async def given_back(leave: Leave, names: set[str], arena: ArenaSession) -> AsyncIterator[None]:
+    """Inside, the leave to start is given back as soon as these processes are up."""
+
+    async def give_back() -> None:
+        live = arena.live
+        await arena.wait(lambda: names <= live.registered | live.ended, UP_S)
+        await arena.wait(lambda: time.monotonic() > live.graph_changed_s + SETTLE_S, SETTLE_S)
+        leave.release()
+
+    task = asyncio.ensure_future(give_back())
+    try:
+        yield
+    finally:
+        task.cancel()
+        with suppress(asyncio.CancelledError, ArenaError):  # the block meets the same error itself
+            await task
+        leave.release()
+
+
+async def stop(starts: tuple[Start, ...], arena: ArenaSession, *, warped: bool) -> None:
+    """Take a last look at the graph, then Ctrl-C for everything that runs, the grader's own programs last.
+
+    A clock that runs fast stands still first: Ctrl-C in the middle of a message locks rospy up, and nodes that sleep
+    send none.
+    """
+    if warped:
+        arena.send(do="hold_clock")
+        await arena.wait(lambda: not arena.live.running, HELD_S)
+    if arena.live.running:
+        looks = arena.live.graphs
+        arena.send(do="graph")
+        await arena.wait(lambda: arena.live.graphs > looks, 2.0)
+    launched = {start.name for start in starts if start.launch is not None}
+    for names in (arena.live.running, arena.live.helpers):
+        stops = [
+            arena.interrupt(name, int_s=LAUNCH_CTRL_C_S if name in launched else CTRL_C_S, term_s=TERM_S)
+            for name in sorted(names)
+        ]
+        await asyncio.gather(*stops)

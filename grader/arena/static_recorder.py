@@ -1,23 +1,117 @@
-"""A recording of which nothing is run: the package's files alone are evidence. It needs no ROS, and no Linux."""
+"""What a recording of a submission consists of, and the recorder that runs nothing: the package's files alone are
+evidence then. It needs no ROS, and no Linux."""
 
 from __future__ import annotations
 
 import shutil
 import time
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from typing_extensions import Self
 
+from grader import __version__
 from grader.arena.limits import Limits
-from grader.arena.recorded import NO_ROS, PACKAGE, STILL_HOLDS, Recording, attachments, metadata
-from grader.arena.ros_env import find_ros
+from grader.arena.ros_env import RosInstallation, find_ros
+from grader.evidence.events import ActorEvent
 from grader.evidence.writer import EvidenceWriter
-from grader.model.package import PackageFacts
+from grader.files import read_untrusted
+from grader.model.package import PackageFacts, SourceFile
 from grader.model.progress import Progress
+from grader.model.record import Record
 from grader.model.submission import Submission
 from grader.portable import system
 from grader.rubric.model import Rubric
+
+if TYPE_CHECKING:
+    from grader.arena.sandbox import Sandbox
+
+
+PACKAGE = "package"
+RETRIES = 2
+"""So often a run is recorded again that could not be judged."""
+ATTACHED_BYTES_MAX = 256 << 10
+ATTACHED_FILES_MAX = 60
+ATTACHED_SUFFIXES = (
+    ".py", ".xml", ".txt", ".launch", ".yaml", ".yml", ".cfg", ".sh", ".cpp", ".h", ".msg", ".srv",
+)  # fmt: skip
+NO_ROS = "no ROS 1 on this machine"
+STATIC_ONLY = "nothing was run: only the files were asked for"
+STILL_HOLDS = "unchanged: what was recorded before still holds"
+
+
+class RunCost(Record):
+    """CPU seconds: the grader's own share of a run, or of a build, and that of the student's processes."""
+
+    cpu_s: float
+    student_cpu_s: float
+
+
+@dataclass(kw_only=True)
+class Recording:
+    """What was recorded, where, by what, and at what cost (CPU seconds)."""
+
+    folder: Path
+    facts: PackageFacts
+    ros: RosInstallation | None = None
+    sandbox: Sandbox | None = None
+    cpu_s: float = 0.0
+    student_cpu_s: float = 0.0
+    files: list[Path] = field(default_factory=list)
+
+    def add(self, cost: RunCost) -> None:
+        self.cpu_s += cost.cpu_s
+        self.student_cpu_s += cost.student_cpu_s
+
+
+def metadata(submission: Submission, recording: Recording, limits: Limits) -> dict[str, str]:
+    """What every file of evidence says of where it comes from."""
+    return {
+        "submission.id": submission.id,
+        "submission.source": submission.source,
+        "submission.commit": submission.commit or "",
+        "submission.digest": submission.digest,
+        "submission.package": submission.package.name,
+        "grader": __version__,
+        "ros": recording.ros.label if recording.ros else "",
+        "python": recording.ros.python if recording.ros else "",
+        "sandbox": recording.sandbox.label if recording.sandbox else "",
+        "limits": limits.model_dump_json(),
+    }
+
+
+def write_files(writer: EvidenceWriter, folder: Path, facts: PackageFacts) -> None:
+    """Write the facts of the package in `folder`, and its text files, into the evidence."""
+    now_ns = time.time_ns()
+    writer.package(facts, now_ns)
+    for name, data in attachments(folder, facts):
+        writer.attach(name, data, now_ns, "text/plain")
+
+
+def attachments(folder: Path, facts: PackageFacts) -> Iterable[tuple[str, bytes]]:
+    """The package's own text files that were judged, as far as they are of a size to be looked at."""
+    for file in _texts(facts)[:ATTACHED_FILES_MAX]:
+        data = read_untrusted(folder / file.path, ATTACHED_BYTES_MAX)
+        if data is not None:
+            yield file.path, data
+
+
+def not_attached(facts: PackageFacts) -> Iterable[ActorEvent]:
+    """What `attachments` leaves out, as limits that were met."""
+    texts = _texts(facts)
+    for file in texts[:ATTACHED_FILES_MAX]:
+        if file.size_bytes > ATTACHED_BYTES_MAX:
+            detail = f"is larger than {ATTACHED_BYTES_MAX >> 10} kB: only its beginning is in the evidence"
+            yield ActorEvent(action="limit", actor=file.path, detail=detail)
+    if len(texts) > ATTACHED_FILES_MAX:
+        detail = f"holds more than {ATTACHED_FILES_MAX} text files: only the first are in the evidence"
+        yield ActorEvent(action="limit", actor="the package", detail=detail)
+
+
+def _texts(facts: PackageFacts) -> list[SourceFile]:
+    return [f for f in facts.files if not f.binary and f.link is None and f.path.endswith(ATTACHED_SUFFIXES)]
 
 
 def why_unrun() -> str:
@@ -27,7 +121,7 @@ def why_unrun() -> str:
     return "" if find_ros() is not None else NO_ROS
 
 
-class Unrun:
+class StaticRecorder:
     """As `arena.recording.Recorder`, where nothing is to be run or can be; `reason` says why."""
 
     def __init__(
@@ -70,8 +164,5 @@ class Unrun:
         limits = Limits().shared_by(len(self._rubric.scenarios))
         about = {**metadata(self._submission, recording, limits), "not_run": self._reason}
         with EvidenceWriter(path, scenario=PACKAGE, clock="real", warp=1.0, metadata=about) as writer:
-            now_ns = time.time_ns()
-            writer.package(recording.facts, now_ns)
-            for name, data in attachments(self._submission.package.folder, recording.facts):
-                writer.attach(name, data, now_ns, "text/plain")
+            write_files(writer, self._submission.package.folder, recording.facts)
         recording.files.append(path)

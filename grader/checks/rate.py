@@ -72,8 +72,8 @@ class RateParams(Record):
         return self.period_ns * (1 - self.gap_tolerance), self.period_ns * (1 + self.gap_tolerance)
 
     @property
-    def bounds(self) -> RateBounds:
-        """What whoever records it has to know of it."""
+    def rate_bounds(self) -> RateBounds:
+        """What the recorder has to know of the rate: a run may end when it is clear."""
         low_ns, high_ns = self.bounds_ns
         return RateBounds(
             topic=self.topic,

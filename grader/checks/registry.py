@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 
+from grader.model.message_rate import RateBounds
 from grader.model.record import Record
 from grader.model.verdict import Verdict
 
@@ -52,6 +53,13 @@ class Check:
     @property
     def family(self) -> str:
         return self.function.__module__.rpartition(".")[2]
+
+    def rate_bounds(self, parameters: Mapping[str, object]) -> RateBounds | None:
+        """Return the rate that a criterion with these parameters judges, or None where it judges none."""
+        if not hasattr(self.params, "rate_bounds"):
+            return None
+        bounds: RateBounds = self.params.model_validate(parameters).rate_bounds
+        return bounds
 
 
 CHECKS: dict[str, Check] = {}

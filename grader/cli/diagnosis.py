@@ -13,14 +13,13 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from grader.arena.host_programs import HOST_ENV, host_program
 from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
-from grader.arena.standin_packages import missing_packages
+from grader.arena.sandbox_files import missing_packages
 from grader.cli.platform_support import elsewhere
 from grader.cli.row import Row
 from grader.cli.sandbox_report import walls
 from grader.errors import RosMissing
-from grader.outside import LISTS
+from grader.host_programs import HOST_ENV, LISTS, host_program
 from grader.portable import cores, system, user_id
 
 PROGRAMS = {"git": "git", "cmake": "cmake", "make": "make", "c++": "g++"}

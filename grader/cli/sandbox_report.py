@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from grader.arena.control_groups import describe, find_cgroups, has_memory
-from grader.arena.host_programs import HOST_ENV, host_program
 from grader.arena.sandbox import NAMESPACES
 from grader.arena.sandbox_probe import ULIMIT_HINT, choose, refused_limits
 from grader.arena.static_recorder import why_unrun
 from grader.cli.output import say_beside
 from grader.cli.row import Row
 from grader.errors import GraderError, HostError
+from grader.host_programs import HOST_ENV, host_program
 from grader.portable import user_id
 from grader.report.unwalled import without_sandbox
 from grader.rubric.load import LoadedRubric

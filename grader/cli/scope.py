@@ -18,7 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from grader.arena.control_groups import SYSTEMD, find_cgroups, has_memory, own_group
-from grader.arena.host_programs import HOST_ENV, host_program
+from grader.host_programs import HOST_ENV, host_program
 from grader.portable import system
 
 LOGINS = "/user.slice/"

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+from grader.host_programs import anywhere, program
 from grader.intake.credentials import Access, refused, scrubbed
-from grader.outside import anywhere, program
 from grader.portable import kill_group
 
 _QUIET = {

@@ -14,9 +14,9 @@ from typing import Literal
 
 from pydantic import Field
 
+from grader.host_programs import anywhere
 from grader.model.package import Fault, PythonSlip
 from grader.model.record import Record
-from grader.outside import anywhere
 from grader.package.python_causes import cause_of
 from grader.package.reading import printable
 

@@ -1,20 +1,20 @@
-"""The rates that a rubric judges, for whoever records them: a run may end when they are clear."""
+"""The rates that a rubric judges, for the recorder: a run may end when they are clear."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 
-from grader.checks.rate import RateParams
+from grader.checks import CHECKS
 from grader.model.message_rate import RateBounds
 from grader.rubric.model import Rubric
 
-RATE = "rate"
-
 
 def rates_of(rubric: Rubric) -> dict[str, tuple[RateBounds, ...]]:
-    """By scenario."""
+    """Return them by scenario."""
     found: dict[str, list[RateBounds]] = defaultdict(list)
     for criterion in rubric.criteria:
-        if criterion.check == RATE and criterion.scenario is not None:
-            found[criterion.scenario].append(RateParams.model_validate(criterion.parameters).bounds)
+        check = CHECKS.get(criterion.check)
+        bounds = check.rate_bounds(criterion.parameters) if check and criterion.scenario else None
+        if bounds is not None:
+            found[criterion.scenario or ""].append(bounds)
     return {scenario: tuple(rates) for scenario, rates in found.items()}

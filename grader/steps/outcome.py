@@ -22,7 +22,7 @@ from grader.model.result import (
 from grader.rubric.load import LoadedRubric
 
 if TYPE_CHECKING:
-    from grader.arena.recorded import Recording
+    from grader.arena.static_recorder import Recording
 
 
 NOTHING_TOOK = TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0)

@@ -23,9 +23,8 @@ from grader.steps.judged import judged_again
 from grader.steps.options import GradeOptions
 
 if TYPE_CHECKING:
-    from grader.arena.recorded import Recording
     from grader.arena.recording import Recorder
-    from grader.arena.static_recorder import Unrun
+    from grader.arena.static_recorder import Recording, StaticRecorder
 
 ROS_TYPES = "rosbags.typesys.stores.ros1_noetic"
 LATER = ("grader.evidence.decode", "grader.evidence.reader")
@@ -48,14 +47,13 @@ def recorder(
     *,
     options: GradeOptions,
     progress: Progress,
-) -> Recorder | Unrun:
+) -> Recorder | StaticRecorder:
     """What records the rubric's scenarios into the folder `evidence`; use it as a context."""
-    from grader.arena.recorded import STATIC_ONLY  # noqa: PLC0415 - see LATER
-    from grader.arena.static_recorder import Unrun, why_unrun  # noqa: PLC0415
+    from grader.arena.static_recorder import STATIC_ONLY, StaticRecorder, why_unrun  # noqa: PLC0415 - see LATER
 
     reason = STATIC_ONLY if options.static_only or not needs_ros(rubric) else why_unrun()
     if reason:
-        return Unrun(
+        return StaticRecorder(
             submission,
             facts,
             started(rubric.rubric),
@@ -73,7 +71,6 @@ def recorder(
         evidence,
         rates=rates_of(rubric.rubric),
         mode=options.sandbox,
-        static_only=False,
         progress=progress,
         recorded=options.recorded,
         stop=options.stop,
@@ -86,7 +83,7 @@ def recorded_and_judged(
     """What the evidence cannot say because the machine was late is recorded again, alone, at most twice."""
     facts = read_facts(submission, progress)
     progress.early(lambda: _early(facts, rubric, options))
-    from grader.arena.recorded import RETRIES  # noqa: PLC0415 - see LATER
+    from grader.arena.static_recorder import RETRIES  # noqa: PLC0415 - see LATER
 
     with recorder(submission, facts, rubric, evidence, options=options, progress=progress) as at_work:
         at_work.record_all(partial(loaded_meanwhile, rubric))

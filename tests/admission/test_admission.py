@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import admission, memory
+from grader.arena import admission
 from grader.arena import admission as module
 from grader.arena.admission import Admission, FileLock, shared_folder
 
@@ -246,11 +246,11 @@ def test_the_memory_of_a_container_counts(tmp_path: Path, monkeypatch: pytest.Mo
     (tmp_path / "memory.max").write_text("3000000\n")
     (tmp_path / "memory.current").write_text("2500000\n")
     (tmp_path / "memory.stat").write_text("anon 1\ninactive_file 500000\n")
-    monkeypatch.setattr(memory, "MEMINFO", tmp_path / "meminfo")
-    monkeypatch.setattr(memory, "CONTAINER", ())
-    assert memory.available_bytes() == 4000 * 1024
+    monkeypatch.setattr(admission, "MEMINFO", tmp_path / "meminfo")
+    monkeypatch.setattr(admission, "CONTAINER", ())
+    assert admission.available_bytes() == 4000 * 1024
     place = (tmp_path, "memory.max", "memory.current", "inactive_file")
-    monkeypatch.setattr(memory, "CONTAINER", (place,))
-    assert memory.available_bytes() == 1_000_000
+    monkeypatch.setattr(admission, "CONTAINER", (place,))
+    assert admission.available_bytes() == 1_000_000
     (tmp_path / "memory.max").write_text("max\n")
-    assert memory.available_bytes() == 4000 * 1024
+    assert admission.available_bytes() == 4000 * 1024

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.inside import prepare
 from grader.arena.limits import Limits
 from grader.arena.process_environment import Place
 from grader.arena.ros_env import require_ros
+from grader.arena.sandbox_files import prepare
 from grader.arena.sandbox_probe import choose, why_not
 from grader.arena.scenario import run_scenario
 from grader.arena.workspace import make_workspace, run_in_place

@@ -11,11 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import base, build
-from grader.arena.base import base_spec, has_base, provide_base
-from grader.arena.cache import FILES_MAX, keep, read_kept
-from grader.arena.inside import ANSWERS, QUESTIONS
+from grader.arena import base_workspace, build
+from grader.arena.base_workspace import FILES_MAX, base_spec, has_base, keep, provide_base, read_kept
 from grader.arena.process_environment import Place
+from grader.arena.sandbox_files import ANSWERS, QUESTIONS
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter
@@ -145,11 +144,11 @@ def test_a_build_on_the_base_is_the_one_without_it(
 @pytest.mark.ros
 def test_a_first_build_makes_it_beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1})
-    monkeypatch.setattr(base, "SCRIPT", "echo learnt >&{collect}")
+    monkeypatch.setattr(base_workspace, "SCRIPT", "echo learnt >&{collect}")
     with make_place({"src/node.py": SCRIPT}) as place:
         ok, run, _, _ = _build(place, tmp_path)
         assert ok
-        assert base.NAME in {event.name for _, event in run.processes}
+        assert base_workspace.NAME in {event.name for _, event in run.processes}
         assert place.base.read_bytes() == b"learnt\n"
     with make_place({"src/another.py": SCRIPT}) as another:
         assert has_base(another)
@@ -223,7 +222,7 @@ def test_the_base_is_of_this_machine_as_it_is(
         spec = base_spec(place)
         assert str(place.workspace.repaired) not in spec["argv"]
         assert spec["collect"]["file"] == str(place.base)
-        monkeypatch.setattr(base, "SYSTEM", (*base.SYSTEM, str(tmp_path)))
+        monkeypatch.setattr(base_workspace, "SYSTEM", (*base_workspace.SYSTEM, str(tmp_path)))
         assert not has_base(place)
 
 

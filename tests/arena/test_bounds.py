@@ -42,7 +42,7 @@ def call(value: str) -> bytes:
     "value", [1, -1.5, True, "<&>\u202e", [1, [2]], {"a": {"b": []}}, xmlrpc.client.Binary(b"\0\xff"), ""]
 )
 def test_calls_as_clients_write_them(module, value) -> None:
-    assert module("strict").read(xmlrpc.client.dumps((value,), "m").encode()) == ((value,), "m")
+    assert module("xmlrpc_parser").read(xmlrpc.client.dumps((value,), "m").encode()) == ((value,), "m")
 
 
 @pytest.mark.parametrize(
@@ -67,14 +67,14 @@ def test_calls_as_clients_write_them(module, value) -> None:
     ],
 )
 def test_calls_that_no_client_writes(module, data, why) -> None:
-    strict = module("strict")
+    strict = module("xmlrpc_parser")
     with pytest.raises(strict.Malformed, match=why):
         strict.read(data)
 
 
 def budget(module, **limits):
     whole = {"channel_messages": 20_000, "channel_bytes": 64 * MB, "run_bytes": 64 * MB, "channels": 300}
-    return module("budget").Budget({**whole, **limits})
+    return module("quotas").Budget({**whole, **limits})
 
 
 def key(topic: str) -> tuple[str, ...]:
@@ -228,7 +228,7 @@ def read_on(sock: socket.socket, size: int) -> None:
 
 def test_a_socket_is_waited_for_once(module) -> None:
     """A byte now and then buys no time, and endless bytes no memory."""
-    bounded = module("bounded")
+    bounded = module("bounded_sockets")
     with socket.create_server(("127.0.0.1", 0)) as server:
         sock = bounded.connect(server.getsockname()[1], 0.5, 1000)
         far, _ = server.accept()
@@ -250,7 +250,7 @@ def test_a_socket_is_waited_for_once(module) -> None:
 
 
 def test_who_never_answers_takes_no_more_than_its_share(module) -> None:
-    pool = module("pool").Pool(workers_max=10, each_max=2)
+    pool = module("quotas").Pool(workers_max=10, each_max=2)
     stuck, done = threading.Event(), threading.Event()
     for _ in range(50):
         assert pool.submit("mute", stuck.wait)
@@ -260,7 +260,7 @@ def test_who_never_answers_takes_no_more_than_its_share(module) -> None:
 
 
 def test_values_of_any_kind_fit_into_the_evidence(module) -> None:
-    values = module("values")
+    values = module("quotas")
     strange = {"b": xmlrpc.client.Binary(b"\0"), "l": [{"d": xmlrpc.client.DateTime(0)}, None, 1.5]}
     assert values.plain(strange, 10_000)["l"][1:] == [None, 1.5]
     assert values.plain("x" * 1000, 500) is None
@@ -279,7 +279,7 @@ class Printing:
         self.process.__dict__.update(known, _limits=limits, _wire=self, loop=self)
         reader, self._end = os.pipe()
         self._file = os.fdopen(reader, "rb", buffering=0)
-        module("streams").Lines(self.process, "stdout", self._file)
+        module("processes").Lines(self.process, "stdout", self._file)
 
     def event(self, _topic: str, record: dict[str, object]) -> None:
         self.told.append(record)
@@ -328,7 +328,7 @@ def test_of_thousands_of_sockets_on_one_port_some_are_looked_at(module, monkeypa
 
 
 def test_who_has_very_many_files_open_is_looked_at_so_far_and_named(module, monkeypatch) -> None:
-    owners = module("owners")
+    owners = module("sockets")
     monkeypatch.setattr(owners, "FILES_MAX", 5)
     told = []
     known = owners.Owners(lambda: [("hoarder", [os.getpid()]), ("gone", [1 << 30])])
@@ -363,10 +363,10 @@ def tcpros(monkeypatch):
     network.encode_ros_handshake_header = lambda fields: header_of(**fields)  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "rosgraph", ModuleType("rosgraph"))
     monkeypatch.setitem(sys.modules, "rosgraph.network", network)
-    for name in ("services", "tcpros"):
+    for name in ("tcpros",):
         monkeypatch.delitem(sys.modules, name, raising=False)
     yield
-    for name in ("services", "tcpros"):
+    for name in ("tcpros",):
         sys.modules.pop(name, None)
 
 
@@ -382,7 +382,7 @@ def tcpros(monkeypatch):
     ],
 )
 def test_what_a_service_answers_is_bounded(module, answer: bytes, why: str) -> None:
-    services = module("services")
+    services = module("tcpros")
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def serve() -> None:
@@ -398,6 +398,6 @@ def test_what_a_service_answers_is_bounded(module, answer: bytes, why: str) -> N
         thread.start()
         uri = f"rosrpc://127.0.0.1:{server.getsockname()[1]}"
         with pytest.raises(services.ProtocolError) as failure:
-            services.call("/s", uri, "/me", type_="a/b", request=b"", timeout_s=5)
+            services.call_service("/s", uri, "/me", type_="a/b", request=b"", timeout_s=5)
     assert why in str(failure.value)
     assert len(str(failure.value)) <= 500

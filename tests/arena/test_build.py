@@ -9,7 +9,7 @@ import pytest
 
 from grader.arena.build import BuildOutcome, build
 from grader.arena.process_environment import Place
-from grader.arena.recorded import READ_MAX
+from grader.arena.static_recorder import READ_MAX
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter

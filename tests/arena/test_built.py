@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.built import ELF, HEADERS_BYTES_MAX, MEMBERS_MAX, read_archive, read_folder, read_member
+from grader.arena.workspace import ELF, HEADERS_BYTES_MAX, MEMBERS_MAX, read_archive, read_folder, read_member
 
 SIZE_BYTES = 32 << 20
 CPU_S = 10.0
@@ -102,7 +102,7 @@ def test_one_that_was_cut_off_is_read_so_far_and_nothing_is_said(
 
 
 def test_a_folder_of_very_many_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("grader.arena.built.MEMBERS_MAX", 20)
+    monkeypatch.setattr("grader.arena.workspace.MEMBERS_MAX", 20)
     folder = tmp_path / "lib" / "lab"
     folder.mkdir(parents=True)
     for number in range(21):

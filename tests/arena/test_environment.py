@@ -14,7 +14,6 @@ from typing import Any
 import pytest
 
 from grader.arena.build import build
-from grader.arena.host_programs import HOST_PATH
 from grader.arena.process_environment import Place
 from grader.arena.ros_env import (
     DUMP_BYTES,
@@ -28,6 +27,7 @@ from grader.arena.ros_env import (
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter
+from grader.host_programs import HOST_PATH
 from tests.arena.support import CMAKE, SCRIPT, make_place, needs_sandbox, printed, run_script
 
 CANARY = "CANARY"

@@ -7,17 +7,16 @@ from types import SimpleNamespace
 
 import pytest
 
-from grader.arena.calls import TEXT_BYTES_MAX, _messages
-from grader.arena.parameters import FILE_BYTES_MAX
-from grader.arena.recorded import (
+from grader.arena.scenario import set_params
+from grader.arena.scenario_inputs import FILE_BYTES_MAX, TEXT_BYTES_MAX, _messages
+from grader.arena.static_recorder import (
     ATTACHED_BYTES_MAX,
     ATTACHED_FILES_MAX,
     attachments,
     not_attached,
-    read_untrusted,
 )
-from grader.arena.starting import set_params
 from grader.evidence.events import ActorEvent
+from grader.files import read_untrusted
 from grader.package import read_package
 from grader.rubric.model import Param
 from tests.package.trees import CMAKE, MANIFEST, make_package

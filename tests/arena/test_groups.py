@@ -13,7 +13,7 @@ import pytest
 from grader.arena.control_groups import find_cgroups
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "grader" / "arena" / "ros"))
-from groups import Groups
+from process_tree import Groups
 
 FOUND = find_cgroups().memory
 MB = 1 << 20

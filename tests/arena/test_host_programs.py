@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.host_programs import HOST_ENV, host_program
+from grader.host_programs import HOST_ENV, host_program
 
 
 @pytest.fixture(autouse=True)

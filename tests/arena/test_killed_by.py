@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import killed as killed_module
-from grader.arena.killed import Killed
+from grader.arena import session as killed_module
+from grader.arena.session import Killed
 
 INSIDE = {"signal": 9, "exit_code": 137, "stopped_by": None}
 WALL = {"signal": 9, "exit_code": None, "stopped_by": None}

@@ -18,8 +18,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "grader" / "arena" 
 import links
 import sockets
 from guard import Guard
-from owners import Owners
-from ties import Ties
+from links import Ties
+from sockets import Owners
 
 Entries = list[Any]
 

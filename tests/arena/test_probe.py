@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from grader.arena import sandbox_probe
-from grader.arena.host_programs import HOST_ENV, host_program
-from grader.arena.system_calls import system_call_filter
+from grader.arena.sandbox import system_call_filter
 from grader.errors import ExitCode, HostError, SandboxMissing
+from grader.host_programs import HOST_ENV, host_program
 
 FORBIDDEN = (
     (

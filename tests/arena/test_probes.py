@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from grader.arena.probes import make_shots
+from grader.arena.scenario_inputs import make_shots
 from grader.rubric.model import Probe
 
 CHATTER = Probe(topic="/chatter", type="std_msgs/String", text=8)

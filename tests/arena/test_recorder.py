@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from grader.arena.frames import Frame, FrameReader
+from grader.arena.arena_process import Frame, FrameReader
 from grader.arena.limits import Limits
 from grader.arena.session import ARENA
 from grader.checks import CHECKS
@@ -104,7 +104,7 @@ def connected(module) -> Iterator[Callable[..., tuple[Any, socket.socket]]]:
             open_.extend((sock, far))
             far.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             sock.setblocking(False)
-            account = module("budget").Budget({**LIMITS, **limits}).open(("/c", "/n"), "p")
+            account = module("quotas").Budget({**LIMITS, **limits}).open(("/c", "/n"), "p")
             connection = module("connection").Connection(
                 around, sock, topic="/c", caller_id="/n", header=HEADER, account=account
             )

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.system_calls import FILTERS, MACHINES, system_call_filter
+from grader.arena.sandbox import FILTERS, MACHINES, system_call_filter
 from scripts.system_calls import ALLOWED, FCNTL, FCNTL_LOCKS, NEW_NAMESPACES, compile_filter
 from tests.arena.support import needs_sandbox, printed, run_script
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.recorded import read_untrusted
 from grader.arena.workspace import LARGE_BYTES
+from grader.files import read_untrusted
 from grader.rubric.model import Scenario, Start, Until
 from tests.arena.support import SCRIPT, make_place, printed, run
 

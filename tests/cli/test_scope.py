@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import pytest
 
-from grader.arena import control_groups, host_programs
+from grader import host_programs
+from grader.arena import control_groups
 from grader.arena.control_groups import LEAF
 from grader.cli import main, scope
 from tests.arena.fake_groups import FakeGroups

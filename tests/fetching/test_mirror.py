@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import cache as arena_cache
+from grader.arena import base_workspace as arena_cache
 from grader.classes.fetching import Rule, prefetch
 from grader.classes.fetching.cache import cache_folder, locked, tidy
 from tests.fetching.samples import AT_ONCE, DEADLINE, HOST, commit_at, entry

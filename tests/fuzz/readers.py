@@ -15,10 +15,10 @@ from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
 
-from grader.arena.built import read_archive, read_member
-from grader.arena.parameters import settings
 from grader.arena.sandbox import Sandbox
+from grader.arena.scenario_inputs import settings
 from grader.arena.session import ArenaSession
+from grader.arena.workspace import read_archive, read_member
 from grader.authoring.mutation.load import load_mutants
 from grader.classes.gradebook import write_gradebook
 from grader.classes.gradebook.sheet import read_sheet

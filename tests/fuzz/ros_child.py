@@ -9,10 +9,9 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent.parent / "grader" / "arena" / "ros")]
 
-import bounded  # noqa: E402 - found by the path above
-import budget  # noqa: E402
+import bounded_sockets  # noqa: E402 - found by the path above
 import connection  # noqa: E402
-import services  # noqa: E402
+import quotas  # noqa: E402
 import tcpros  # noqa: E402
 import xmlrpc_parser  # noqa: E402
 from loop import serve  # noqa: E402
@@ -79,15 +78,15 @@ def plain(value):
 
 def service_answer(data):
     """The same answer to the probe and to the call."""
-    services.connect = lambda *_: Socket(data)
-    services.call("/s", "rosrpc://127.0.0.1:9", "/n", type_="demo/Call", request=b"", timeout_s=1.0)
+    tcpros.connect = lambda *_: Socket(data)
+    tcpros.call_service("/s", "rosrpc://127.0.0.1:9", "/n", type_="demo/Call", request=b"", timeout_s=1.0)
 
 
 def topic_stream(data):
     """Every message that is whole comes out as it was sent, and all memory that was reserved is given back."""
     recorder = _Recorder()
     header_ = {"type": "demo/A", "md5sum": "x"}
-    account = budget.Budget({"channel_messages": 50, "channel_bytes": 1 << 16}).open(("/c", "/n"), "p")
+    account = quotas.Budget({"channel_messages": 50, "channel_bytes": 1 << 16}).open(("/c", "/n"), "p")
     found = connection.Connection(
         recorder, Socket(data), topic="/c", caller_id="/n", header=header_, account=account
     )
@@ -122,9 +121,9 @@ class _Recorder:
 
 NOTHING = ()
 TARGETS = {
-    "header": (header, (bounded.ProtocolError,)),
+    "header": (header, (bounded_sockets.ProtocolError,)),
     "xmlrpc": (xmlrpc_answer, (xmlrpc_parser.Malformed, xmlrpc.client.Fault)),
-    "service-answer": (service_answer, (bounded.ProtocolError,)),
+    "service-answer": (service_answer, (bounded_sockets.ProtocolError,)),
     "topic-stream": (topic_stream, NOTHING),
 }
 

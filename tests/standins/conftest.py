@@ -8,7 +8,7 @@ from types import ModuleType
 
 import pytest
 
-from grader.arena.standin_packages import SOURCES
+from grader.arena.sandbox_files import STANDIN_SOURCES
 
 PURE = ("background", "canvas", "pace", "turtle", "world")
 
@@ -25,10 +25,10 @@ class Simulator:
 
 @pytest.fixture(scope="session")
 def simulator() -> Simulator:
-    sys.path.insert(0, str(SOURCES / "turtlesim"))
+    sys.path.insert(0, str(STANDIN_SOURCES / "turtlesim"))
     try:
         for name in PURE:
             setattr(Simulator, name, importlib.import_module(f"simulator.{name}"))
     finally:
-        sys.path.remove(str(SOURCES / "turtlesim"))
+        sys.path.remove(str(STANDIN_SOURCES / "turtlesim"))
     return Simulator()

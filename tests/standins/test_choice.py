@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from grader.arena.ros_env import RosInstallation, require_ros
-from grader.arena.standin_packages import (
-    SOURCES,
+from grader.arena.sandbox_files import (
+    STANDIN_SOURCES,
     copy_standins,
     known_packages,
     missing_packages,
@@ -91,10 +91,10 @@ def test_nothing_is_told_where_nothing_is_missing(tmp_path: Path) -> None:
     "path",
     [
         p
-        for p in sorted(SOURCES.rglob("*"))
+        for p in sorted(STANDIN_SOURCES.rglob("*"))
         if p.is_file() and (p.suffix == ".py" or p.read_bytes()[:2] == b"#!")
     ],
-    ids=lambda path: path.relative_to(SOURCES).as_posix(),
+    ids=lambda path: path.relative_to(STANDIN_SOURCES).as_posix(),
 )
 def test_the_sources_are_python_3_8(path: Path) -> None:
     assert isinstance(ast.parse(path.read_text(encoding="utf-8"), feature_version=(3, 8)), ast.Module)

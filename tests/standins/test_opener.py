@@ -13,8 +13,8 @@ from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 
-from grader.arena.inside import BROWSERS, OPENER
 from grader.arena.ros_env import require_ros
+from grader.arena.sandbox_files import BROWSERS, ROS_SIDE
 from grader.arena.session import ARENA
 
 URL = "https://www.e-yantra.org/"
@@ -41,9 +41,9 @@ def shims(tmp_path: Path) -> Path:
     """A folder as the sandbox's `bin/` is."""
     folder = tmp_path / "bin"
     folder.mkdir()
-    (folder / "grader-open").write_bytes(OPENER[0].read_bytes())
+    (folder / "grader-open").write_bytes((ROS_SIDE / "open.sh").read_bytes())
     (folder / "grader-open").chmod(0o755)
-    (folder / "grader-open.py").write_bytes(OPENER[1].read_bytes())
+    (folder / "grader-open.py").write_bytes((ROS_SIDE / "opener.py").read_bytes())
     (folder / "python3").symlink_to(sys.executable)
     for name in BROWSERS:
         (folder / name).symlink_to("grader-open")

@@ -1,36 +1,47 @@
 """The managed roscore: reads commands (one JSON object a line) on stdin, writes frames (`wire`) on stdout.
 
-Runs under ROS's own interpreter and imports nothing but the standard library and ROS. The first line configures it:
+Runs under ROS's own interpreter and imports nothing but the standard library and ROS. Every arena is a copy of one
+process, the template, which has imported all that an arena needs and does nothing else (`stand_by`).
+
+The first line of its stdin configures an arena:
 `master` (false for a build, which needs none), `port`, `limits`, `suffix` (of its nodes' names), `rosout` (a process
 spec, or null), `stage` (the folder over which what sandboxes see is mounted, and the user who writes there; null
 without a sandbox). When stdin ends, all ends.
 """
 
+import array
 import base64
+import contextlib
 import ctypes
+import gc
+import importlib
 import json
 import os
 import resource
 import signal
+import socket
+import struct
 import threading
 
-from calibration import Calibration
-from groups import Groups
-from host import Lateness, peak_bytes
-from keys import leave_keys_behind
+from calibration import Calibration, Lateness, peak_bytes
 from loop import Loop
-from namespaces import enter_own_namespaces
+from namespaces import Stage, enter_own_namespaces, leave_keys_behind
+from process_tree import Groups
 from processes import WATCH_S, Process, kill_orphans, reap_all
 from sockets import buffer_bytes
-from stage import Stage
-from template import stand_by
 from wire import Wire, set_clock
 
 PR_SET_CHILD_SUBREAPER = 36
-ROS = ("actor", "guard", "master", "owners", "recorder", "rpc", "services")
+ROS = ("actor", "guard", "master", "recorder", "rpc", "sockets", "tcpros")
 """What a run needs, and a build does not."""
 FINISH_S = 2.0
 REAP_S = 1.0
+ANSWER = struct.Struct("<id")
+DESCRIPTORS = 3
+REQUEST_BYTES = 64
+OPEN_MAX = 4096
+PYTHONS = (signal.SIGPIPE, signal.SIGXFSZ)
+"""Ignored by Python itself, and not in what it starts."""
 
 
 class Arena:
@@ -62,9 +73,9 @@ class Arena:
         from actor import Actor, SlaveApi  # noqa: PLC0415 - a build needs no ROS imports
         from guard import Guard  # noqa: PLC0415
         from master import RecordingMaster  # noqa: PLC0415
-        from owners import Owners  # noqa: PLC0415
         from recorder import Recorder  # noqa: PLC0415
         from rpc import serve  # noqa: PLC0415
+        from sockets import Owners  # noqa: PLC0415
 
         name = "/grader_{}" + config["suffix"]
         guard, owners, own_ports = Guard(self._wire), Owners(self._trees), set()
@@ -161,7 +172,7 @@ class Arena:
 
     def _call(self, command):
         """Call a service, beside the loop: its answer goes to the grader, who can read it."""
-        import services  # noqa: PLC0415 - a build needs no ROS imports
+        import tcpros  # noqa: PLC0415 - a build needs no ROS imports
 
         service, uri = command["service"], self._master.service_api(command["service"])
         self._wire.event("/grader/actor", command["record"])
@@ -172,7 +183,7 @@ class Arena:
         def ask():
             request = base64.b64decode(command["data"])
             try:
-                data = services.call(
+                data = tcpros.call_service(
                     service,
                     uri,
                     self._actor.caller_id,
@@ -180,7 +191,7 @@ class Arena:
                     request=request,
                     timeout_s=command["timeout_s"],
                 )
-            except services.ProtocolError as error:
+            except tcpros.ProtocolError as error:
                 self._wire.status("answer", id=command["id"], error=str(error))
             else:
                 self._wire.status("answer", id=command["id"], data=base64.b64encode(data).decode())
@@ -243,8 +254,6 @@ class Arena:
 
     def _exited(self, process):
         del self._processes[process.name]
-        usage = resource.getrusage(resource.RUSAGE_CHILDREN)
-        self._wire.status("exited", name=process.name, children_cpu_s=usage.ru_utime + usage.ru_stime)
         self._end_when_empty()
 
     def _end_when_empty(self):
@@ -259,7 +268,7 @@ class Arena:
             process.reap()
 
 
-def live():
+def run_arena():
     """One arena's whole life."""
     set_clock()
     libc = ctypes.CDLL(None, use_errno=True)
@@ -287,5 +296,78 @@ def live():
     os._exit(0)
 
 
+def serve_requests(sock, live):
+    """Start arenas, each of which is `live()` in a session of its own, until the socket of packets closes; they live on
+    as long as their own stdin.
+
+    `s` with three descriptors (an arena's stdin, stdout, stderr) starts an arena; the answer is its process id and the
+    CPU seconds that this process took since the last answer. `e` with a process id waits for an arena that has ended,
+    or was killed; the answer has the same id. Until then no other process gets that id.
+    """
+    gc.freeze()  # what is here is shared with every copy for as long as nobody touches it
+    told_s = 0.0
+    while True:
+        request, descriptors = _receive(sock)
+        if not request:
+            return
+        if request[:1] == b"s":
+            pid = _start(sock, descriptors, live)
+        else:
+            (pid,) = struct.unpack_from("<i", request, 1)
+            with contextlib.suppress(ChildProcessError):  # none of ours
+                os.waitpid(pid, 0)
+        used = resource.getrusage(resource.RUSAGE_SELF)
+        used_s = used.ru_utime + used.ru_stime
+        sock.send(ANSWER.pack(pid, used_s - told_s))
+        told_s = used_s
+
+
+def _start(sock, descriptors, live):
+    pid = os.fork()
+    if pid:
+        for number in descriptors:
+            os.close(number)
+        return pid
+    try:
+        os.setsid()
+        sock.detach()
+        for target, number in enumerate(descriptors):
+            os.dup2(number, target)
+        os.closerange(DESCRIPTORS, OPEN_MAX)
+        live()
+    except BaseException as error:  # noqa: BLE001 - the copy must not go on as the template; the grader reads this
+        os.write(2, "{}: {}\n".format(type(error).__name__, error).encode("utf-8", "replace"))
+    finally:
+        os._exit(1)
+
+
+def _receive(sock):
+    numbers = array.array("i")
+    data, notes, _, _ = sock.recvmsg(REQUEST_BYTES, socket.CMSG_SPACE(DESCRIPTORS * numbers.itemsize))
+    for level, kind, value in notes:
+        if level == socket.SOL_SOCKET and kind == socket.SCM_RIGHTS:
+            numbers.frombytes(value[: len(value) - len(value) % numbers.itemsize])
+    return data, list(numbers)
+
+
+def reset_signals():
+    """Signals that are ignored or blocked here would be so in all that is started from here, students' nodes too: how
+    the grader was started must not change what they do."""
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+    for number in signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, *PYTHONS}:
+        signal.signal(number, signal.SIG_DFL)
+
+
+def stand_by(live, modules):
+    """The template's whole life. `modules` are loaded now; what cannot be loaded is missed by who needs it."""
+    reset_signals()
+    for name in modules:
+        with contextlib.suppress(Exception):
+            importlib.import_module(name)
+    with contextlib.suppress(ConnectionError), socket.socket(fileno=0) as sock:
+        serve_requests(sock, live)
+    os._exit(0)
+
+
 if __name__ == "__main__":
-    stand_by(live, ROS)
+    stand_by(run_arena, ROS)

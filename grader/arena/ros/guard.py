@@ -9,8 +9,8 @@ import json
 import re
 import threading
 
-from bounded import port_of
-from values import cut
+from bounded_sockets import port_of
+from quotas import cut
 
 EVENTS_MAX = 50
 NAME_CHARS_MAX = 256

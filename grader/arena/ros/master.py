@@ -10,14 +10,12 @@ import time
 
 import rosmaster.master_api
 import rosmaster.registrations
-import services
-from bounded import ProtocolError, slave_api
-from graph import GraphLog
+import tcpros
+from bounded_sockets import ProtocolError, slave_api
 from guard import OWN_NODE, ROSOUT, Rules
 from links import Links
-from params import ParamLog
-from pool import Notifications, Pool
-from values import cut
+from quotas import Notifications, Pool, cut
+from registry_log import GraphLog, ParamLog
 
 NOTIFY_S = 10.0
 OPENED_MAX, ARGUMENTS_MAX, ARGUMENT_CHARS = 100, 20, 1000
@@ -243,7 +241,7 @@ class RecordingMaster(rosmaster.master_api.ROSMasterHandler):
 
     def _type_of(self, service, api):
         try:
-            return services.probe(service, api, self._own, PROBE_S)
+            return tcpros.probe_service(service, api, self._own, PROBE_S)
         except ProtocolError:
             return ""
 

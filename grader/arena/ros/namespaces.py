@@ -2,12 +2,14 @@
 (man 7 namespaces).
 
 The calling process enters them itself, so there is no helper that could be left behind when a process is killed. Run as
-a script it enters them, mounts what a stage would (`stage.py`), and becomes the program that its arguments name.
+a script it enters them, mounts what a stage would, and becomes the program that its arguments name.
 """
 
+import contextlib
 import ctypes
 import fcntl
 import os
+import shutil
 import socket
 import struct
 import sys
@@ -21,6 +23,19 @@ SIOCGIFFLAGS = 0x8913
 SIOCSIFFLAGS = 0x8914
 IFF_UP = 1
 IFREQ = struct.Struct("16sh14x")
+SIZE_BYTES = 512 << 20
+"""More than any package, with what its build left, can have."""
+INODES = 100_000
+KEYCTL_JOIN_SESSION_KEYRING = 1
+KEYCTL = {
+    "x86_64": 250,
+    "aarch64": 219,
+    "i686": 288,
+    "armv7l": 311,
+    "riscv64": 219,
+    "ppc64le": 271,
+    "s390x": 280,
+}
 PROBED = "/sys"  # in a namespace that ends with the probe
 
 
@@ -77,6 +92,81 @@ def _raise_loopback():
         request = IFREQ.pack(b"lo", 0)
         _, flags = IFREQ.unpack(fcntl.ioctl(sock, SIOCGIFFLAGS, request))
         fcntl.ioctl(sock, SIOCSIFFLAGS, IFREQ.pack(b"lo", flags | IFF_UP))
+
+
+def leave_keys_behind():
+    """Join a new, empty session keyring (man 7 keyrings), which all that the process starts inherits: what hangs on
+    the session of the person who grades is not for students. Where the kernel has no keys, or
+    does not let it, there is nothing that could be read either way."""
+    number = KEYCTL.get(os.uname().machine)
+    if number is not None:
+        ctypes.CDLL(None, use_errno=True).syscall(number, KEYCTL_JOIN_SESSION_KEYRING, None)
+
+
+class Stage:
+    """What sandboxes are shown of the grader's files: copies in memory, in the arena's own mount namespace.
+
+    A bind mount tells where it comes from (`/proc/self/mountinfo`); what comes from here has a number in place of a
+    path of the machine. The memory in which a process tree may write comes from here too: bubblewrap's own tmpfs would
+    have no bound for the number of files.
+
+    `folder` is empty, and every user may pass through it. Raises OSError where nothing can be mounted.
+    """
+
+    def __init__(self, folder, owner):
+        self.folder = folder
+        self._owner = owner
+        self._copies = {}
+        self._number = 0
+        mount_tmpfs(folder, SIZE_BYTES, INODES, os.geteuid(), 0o711)
+
+    def copy(self, path):
+        """The name, relative to `folder`, of a copy of this file or folder as it was when it was first asked for."""
+        if path not in self._copies:
+            name = self._new_name()
+            copy_tree(path, os.path.join(self.folder, name))
+            self._copies[path] = name
+        return self._copies[path]
+
+    def scratch(self, size_bytes, inodes):
+        """The name of new memory for files that students' processes may write."""
+        name = self._new_name()
+        folder = os.path.join(self.folder, name)
+        os.mkdir(folder)
+        mount_tmpfs(folder, size_bytes, inodes, self._owner, 0o755)
+        return name
+
+    def used_bytes(self, name):
+        """What is written in a scratch."""
+        try:
+            found = os.statvfs(os.path.join(self.folder, name))
+        except OSError:
+            return 0
+        return (found.f_blocks - found.f_bfree) * found.f_frsize
+
+    def give_up(self, name):
+        """A scratch whose processes have ended."""
+        folder = os.path.join(self.folder, name)
+        unmount(folder)
+        with contextlib.suppress(OSError):  # it goes with the arena
+            os.rmdir(folder)
+
+    def _new_name(self):
+        self._number += 1
+        return str(self._number)
+
+
+def copy_tree(source, target):
+    """Links as links, files with their modes, nothing else. What was written by a student is followed nowhere."""
+    if os.path.islink(source):
+        os.symlink(os.readlink(source), target)
+    elif os.path.isdir(source):
+        os.mkdir(target, 0o755)
+        for entry in os.scandir(source):
+            copy_tree(entry.path, os.path.join(target, entry.name))
+    elif os.path.isfile(source):
+        shutil.copyfile(source, target)
+        os.chmod(target, os.stat(source).st_mode & 0o777)
 
 
 if __name__ == "__main__":

@@ -7,12 +7,14 @@ import signal
 import time
 
 from launching import launch
-from streams import Collected, Lines
-from tree import MAPS_MAX, cpu_s, descendants, descriptors, resident_bytes, shared_memory
+from process_tree import MAPS_MAX, cpu_s, descendants, descriptors, resident_bytes, shared_memory
 
 WATCH_S = 0.5
 WORDS_BYTES = 200
 INFO_BYTES_MAX = 4096
+LINE_BYTES_MAX = 4096
+READ_BYTES = 65536
+PIPE_READS = 16
 
 
 class Process:
@@ -48,16 +50,13 @@ class Process:
         self._event("start", argv=spec["argv"], script=spec["script"], repairs=spec["repairs"])
         loop.call_later(WATCH_S, self._watch)
 
-    def interrupt(self):
-        """What Ctrl-C in the terminal does: SIGINT for the whole foreground process group."""
-        self._stopped_by = "INT"
-        self._signal_group(signal.SIGINT)
-
     def stop(self, int_s, term_s):
-        """INT, then TERM after `int_s`, then KILL after another `term_s`."""
+        """Send INT to the whole process group, as Ctrl-C in a terminal does, TERM after `int_s`, KILL after another
+        `term_s`."""
         if not self.alive:
             return
-        self.interrupt()
+        self._stopped_by = "INT"
+        self._signal_group(signal.SIGINT)
         self.loop.call_later(int_s, lambda: self._escalate("TERM", signal.SIGTERM))
         self.loop.call_later(int_s + term_s, self.kill)
 
@@ -204,7 +203,7 @@ class Process:
             return "more than {} processes".format(self._limits["processes"])
         if used_s > self._limits["cpu_s"]:
             return "more than {:g} s of CPU time".format(self._limits["cpu_s"])
-        if sum(map(descriptors, tree)) > self._limits["descriptors"]:
+        if sum(len(descriptors(pid)) for pid in tree) > self._limits["descriptors"]:
             return "more than {} files, pipes and sockets open".format(self._limits["descriptors"])
         return None
 
@@ -216,7 +215,7 @@ class Process:
 
     def descriptors(self):
         """Of the whole tree."""
-        return sum(map(descriptors, self.tree()))
+        return sum(len(descriptors(pid)) for pid in self.tree())
 
     def _too_much_memory(self):
         return "more than {} MB of memory".format(self._limits["memory_bytes"] >> 20)
@@ -224,11 +223,8 @@ class Process:
     def stop_for(self, excess):
         """Kill it, and say what it had too much of."""
         if self.alive:
-            self._stopped_for(excess)
+            self._limit("stopped by the grader: {}".format(excess))
             self.kill()
-
-    def _stopped_for(self, excess):
-        self._limit("stopped by the grader: {}".format(excess))
 
     def _limit(self, detail):
         self._wire.event("/grader/actor", {"action": "limit", "actor": self.name, "detail": detail})
@@ -296,7 +292,7 @@ class Process:
             return
         if self._groups.memory_kills() and self._stopped_by != "KILL":
             self._stopped_by = "KILL"
-            self._stopped_for(self._too_much_memory())
+            self._limit("stopped by the grader: {}".format(self._too_much_memory()))
         if not self._groups.remove():
             self.loop.call_later(WATCH_S, self._groups.remove)
 
@@ -331,3 +327,92 @@ def _signal_of(code):
 def _kill(pid, number):
     with contextlib.suppress(ProcessLookupError, PermissionError):  # already over
         os.kill(pid, number)
+
+
+class Lines:
+    """One of a process's two output streams, cut into lines."""
+
+    def __init__(self, process, name, pipe):
+        self._process = process
+        self._name = name
+        self._pipe = pipe
+        self._rest = b""
+        os.set_blocking(pipe.fileno(), False)
+        process.loop.add_reader(pipe, self._readable)
+
+    def _readable(self):
+        try:
+            chunk = os.read(self._pipe.fileno(), READ_BYTES)
+        except BlockingIOError:
+            return
+        if not chunk:
+            if self._rest:
+                self._process.line(self._name, self._rest, False)
+            self._process.loop.remove_reader(self._pipe)
+            self._pipe.close()
+            self._process.stream_closed()
+            return
+        if self._process.printed_too_much:  # read, so that it does not wait for room, and thrown away
+            self._rest = b""
+            return
+        *lines, self._rest = (self._rest + chunk).split(b"\n")
+        for line in lines:
+            self._line(line)
+        if len(self._rest) > LINE_BYTES_MAX:
+            self._line(self._rest)
+            self._rest = b""
+
+    def _line(self, line):
+        cut = len(line) > LINE_BYTES_MAX
+        self._process.line(self._name, line[:LINE_BYTES_MAX].rstrip(b"\r"), cut)
+
+
+class Collected:
+    """What a process hands over: a file that is there once the process has ended, and whole or not at all."""
+
+    def __init__(self, process, descriptor, file, bytes):  # noqa: A002 - the spec's own words
+        self._process = process
+        self._descriptor = descriptor
+        self._path = file
+        self._limit_bytes = self._left_bytes = bytes
+        self._file = open(file + ".part", "wb")  # noqa: SIM115 - stays open until the process has ended
+        os.set_blocking(descriptor, False)
+        process.loop.add_reader(descriptor, self._readable)
+
+    def _readable(self):
+        if not self._read():
+            self._end()
+            self._process.stream_closed()
+
+    def _read(self):
+        """Take a piece; False at the end."""
+        try:
+            chunk = os.read(self._descriptor, READ_BYTES)
+        except BlockingIOError:
+            return True
+        self._left_bytes -= len(chunk)
+        if self._left_bytes >= 0:
+            self._file.write(chunk)
+        return bool(chunk)
+
+    def close(self):
+        """Take what is still in the pipe, and no more."""
+        for _ in range(PIPE_READS):
+            if self._descriptor is None or not self._read():
+                break
+        self._end()
+
+    def _end(self):
+        if self._descriptor is None:
+            return
+        self._process.loop.remove_reader(self._descriptor)
+        os.close(self._descriptor)
+        self._descriptor = None
+        self._file.close()
+        part = self._path + ".part"
+        if self._left_bytes >= 0:
+            os.chmod(part, 0o644)
+            os.replace(part, self._path)
+        else:
+            os.unlink(part)
+            self._process.too_much_collected(self._limit_bytes)

@@ -15,14 +15,12 @@ import contextlib
 import threading
 import time
 
-from arrival import note_arrivals
-from bounded import ProtocolError, call, connect, slave_api
-from budget import Budget
-from connection import Connection
-from framing import MESSAGE_BYTES_MAX
+from bounded_sockets import ProtocolError, call, connect, note_arrivals, slave_api
+from connection import MESSAGE_BYTES_MAX, Connection
 from guard import shown
-from pool import Pool
-from tcpros import HEADER_BYTES_MAX, LENGTH, check_fields, read_header, write_header
+from quotas import Budget, Pool
+from tcpros import HEADER_BYTES_MAX, check_fields, read_header, write_header
+from wire import LENGTH
 
 HOLD_S = 1.0
 CONNECT_S = 10.0

@@ -10,11 +10,10 @@ import threading
 import xmlrpc.client
 
 import xmlrpc_parser
-from bounded import BoundedSocket
-from callers import SOMEBODY, Caller, Pace
+from bounded_sockets import SOMEBODY, BoundedSocket, Caller, Pace
 from guard import shown
+from quotas import weight
 from rosgraph.network import get_address_override, get_bind_address
-from values import weight
 
 BODY_BYTES_MAX = 8 << 20
 ANSWER_BYTES_MAX = 24 << 20

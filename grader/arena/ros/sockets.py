@@ -1,14 +1,23 @@
-"""The inodes of TCP sockets of this network namespace, by their ports: `sock_diag` (man 7), else /proc/net/tcp.
+"""The sockets of this network namespace, and which process of the run has each of them open.
 
-The kernel finds a socket at once; /proc lists it after a walk over a table that may have half a million rows.
+The kernel is asked by `sock_diag` (man 7), which finds a socket at once; else /proc/net is read, a walk over a table
+that may have half a million rows. A node belongs to the process that listens on the port of its slave API, so nodes
+that `roslaunch` starts are known too, and two copies that compete for one name. A caller is the process that is
+connected from the port that the call comes from.
 """
 
 import collections
 import contextlib
 import errno
 import itertools
+import os
 import socket
 import struct
+import threading
+import time
+
+from bounded_sockets import port_of
+from process_tree import descriptors
 
 NETLINK_SOCK_DIAG = 4
 SOCK_DIAG_BY_FAMILY = 20
@@ -34,6 +43,14 @@ _NO_COOKIE = b"\xff" * 8
 _ANSWER_BYTES = 1 << 16
 SOCKETS_MAX, TABLE_ROWS_MAX = 1000, 1000000
 """So many of one port are looked at, and so many rows of a table."""
+
+LOOKS_MAX = 3
+AGAIN_S = 0.2
+ASKED_MAX = 5000
+FILES_MAX = 50000
+"""Open files of one process, with all that runs below it, that a look looks at."""
+REST = 2
+"""So many times as long as the last look took, there is no other."""
 
 Row = collections.namedtuple("Row", "state near far inode")
 """A socket; `near` and `far` are ports."""
@@ -97,7 +114,7 @@ def _memory_bytes(question, answer_bytes, wanted):
     """Of the sockets that the kernel answers with; 0 where it does not answer such questions."""
     held = 0
     with contextlib.suppress(OSError):
-        for body in _dump(question):
+        for body in _answers(question, dump=True):
             at = answer_bytes
             while at + _ATTRIBUTE.size <= len(body):
                 length, kind = _ATTRIBUTE.unpack_from(body, at)
@@ -110,55 +127,38 @@ def _memory_bytes(question, answer_bytes, wanted):
     return held
 
 
-def _dump(question):
-    """The body of each answer to a question about all sockets."""
-    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, NETLINK_SOCK_DIAG) as sock:
-        sock.settimeout(1.0)
-        sock.send(
-            _HEADER.pack(_HEADER.size + len(question), SOCK_DIAG_BY_FAMILY, REQUEST | DUMP, 1, 0) + question
-        )
-        while True:
-            data, start = sock.recv(_ANSWER_BYTES), 0
-            while start + _HEADER.size <= len(data):
-                length, kind, *_ = _HEADER.unpack_from(data, start)
-                if kind in (DONE, ERROR):
-                    return
-                yield data[start + _HEADER.size : start + length]
-                start += (length + 3) & ~3
-
-
 def _asked(family, states, near, far, *, dump=False, most=SOCKETS_MAX):
     """The rows of what the kernel answers; raise OSError where it does not answer such questions."""
     (source, port), (destination, far_port) = near, far
     identity = _ID.pack(port, far_port, source.ljust(16, b"\0"), destination.ljust(16, b"\0"), _NO_COOKIE)
     question = struct.pack("=BBBBI", family, socket.IPPROTO_TCP, 0, 0, states) + identity
+    return [
+        Row(body[1], *_ANSWER_PORTS.unpack_from(body), *_ANSWER_INODE.unpack_from(body))
+        for body in itertools.islice(_answers(question, dump=dump), most)
+    ]
+
+
+def _answers(question, *, dump):
+    """The body of each answer to a question about one socket, or with `dump` about all; raise OSError."""
     flags = REQUEST | (DUMP if dump else 0)
     with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, NETLINK_SOCK_DIAG) as sock:
         sock.settimeout(1.0)
         sock.send(_HEADER.pack(_HEADER.size + len(question), SOCK_DIAG_BY_FAMILY, flags, 1, 0) + question)
-        found, more = [], True
-        while more and len(found) < most:
-            more = _take(sock.recv(_ANSWER_BYTES), found) and dump
-    return found[:most]
-
-
-def _take(data, found):
-    """Read one answer's parts; False after the last."""
-    start = 0
-    while start + _HEADER.size <= len(data):
-        length, kind, *_ = _HEADER.unpack_from(data, start)
-        body = start + _HEADER.size
-        if kind == DONE:
-            return False
-        if kind == ERROR:
-            (code,) = struct.unpack_from("=i", data, body)
-            if code != -errno.ENOENT:
-                raise OSError(-code, "sock_diag")
-            return False
-        (inode,) = _ANSWER_INODE.unpack_from(data, body)
-        found.append(Row(data[body + 1], *_ANSWER_PORTS.unpack_from(data, body), inode))
-        start += (length + 3) & ~3
-    return True
+        more = True
+        while more:
+            data, start = sock.recv(_ANSWER_BYTES), 0
+            while start + _HEADER.size <= len(data):
+                length, kind, *_ = _HEADER.unpack_from(data, start)
+                body = data[start + _HEADER.size : start + length]
+                if kind == ERROR:
+                    (code,) = struct.unpack_from("=i", body)
+                    if code != -errno.ENOENT:
+                        raise OSError(-code, "sock_diag")
+                if kind in (DONE, ERROR):
+                    return
+                yield body
+                start += (length + 3) & ~3
+            more = dump
 
 
 def _listed(tables, port=None, far_port=None):
@@ -174,3 +174,102 @@ def _listed(tables, port=None, far_port=None):
 
 def _port(address):
     return int(address.rpartition(":")[2], 16)
+
+
+class Owners:
+    """`trees` gives, for each process of the run that lives, its name and the ids of all that runs below it. `tell` is
+    told, as `guard.limit` is, which process has more than is looked at."""
+
+    def __init__(self, trees):
+        self._trees = trees
+        self.tell = None
+        self._known = {}
+        self._asked = {}
+        self._looking = threading.Lock()
+        self._looked_s = self._look_took_s = 0.0
+        self._holders = {}
+        self._pids = {}
+
+    def of(self, api):
+        """The name of the process whose node has this address; None where it cannot be told."""
+        if api not in self._known and self._may_look(api):
+            self.look(api)
+        return self._known.get(api)
+
+    def known(self, api):
+        """The same, without a look."""
+        return self._known.get(api)
+
+    def look(self, api):
+        """The owner, found out anew: ports are used again."""
+        port = port_of(api)
+        owner = self._holder(listening(port)) if port else None
+        if owner is not None:
+            self._known[api] = owner
+        return owner
+
+    def caller(self, near, far):
+        """The name of the process whose connection goes from `near` to `far`, both (address, port), or None."""
+        return self._holder(connected(near, far))
+
+    def callers(self, connections):
+        """The same of many connections, each (near, far)."""
+        inodes = [next(iter(connected(*ends)), None) for ends in connections]
+        with self._looking:
+            self._look_at_all()
+            return [self._holders.get("socket:[{}]".format(inode)) for inode in inodes]
+
+    def pids(self, inodes):
+        """For each of these sockets the ids of the processes that have it open: one look at all of them."""
+        with self._looking:
+            self._look_at_all()
+            return {inode: self._pids.get("socket:[{}]".format(inode), frozenset()) for inode in inodes}
+
+    def _may_look(self, api):
+        """An address that nobody listens on costs a few looks, not one at every change of the graph."""
+        now_s = time.monotonic()
+        looks, last_s = self._asked.get(api, (0, 0.0))
+        if looks >= LOOKS_MAX or now_s - last_s < AGAIN_S or len(self._asked) > ASKED_MAX:
+            return False
+        self._asked[api] = looks + 1, now_s
+        return True
+
+    def _holder(self, inodes):
+        """The process that has one of these sockets open. Many who ask at once share one look at all processes."""
+        wanted = ["socket:[{}]".format(inode) for inode in inodes]
+        if not wanted:
+            return None
+        asked_s = time.monotonic()
+        with self._looking:
+            if self._looked_s < asked_s:
+                self._look_at_all()
+            return next((self._holders[link] for link in wanted if link in self._holders), None)
+
+    def _look_at_all(self):
+        """Thousands of open files make looks rarer, not the arena slower."""
+        pause_s = REST * self._look_took_s - (time.monotonic() - self._looked_s)
+        if pause_s > 0:
+            threading.Event().wait(pause_s)
+        self._looked_s = time.monotonic()
+        self._holders, self._pids = {}, collections.defaultdict(set)
+        for name, pids in self._trees():
+            for pid, link in self._open_sockets(name, pids):
+                self._holders.setdefault(link, name)
+                self._pids[link].add(pid)
+        self._look_took_s = time.monotonic() - self._looked_s
+
+    def _open_sockets(self, name, pids):
+        files = ((pid, "/proc/{}/fd/{}".format(pid, number)) for pid in pids for number in descriptors(pid))
+        for pid, file in itertools.islice(files, FILES_MAX):
+            link = _target(file)
+            if link.startswith("socket:"):
+                yield pid, link
+        if self.tell and next(files, None) is not None:
+            self.tell(name, "had more than {} files open: not all of them are looked at".format(FILES_MAX))
+
+
+def _target(link):
+    try:
+        return os.readlink(link)
+    except OSError:
+        return ""  # closed meanwhile

@@ -18,7 +18,7 @@ import time
 
 HEADER = struct.Struct("<BIQ")
 MESSAGES = struct.Struct("<BIQI")
-CHANNEL_ID = struct.Struct("<I")
+CHANNEL_ID = LENGTH = struct.Struct("<I")
 F_SETPIPE_SZ = 1031
 PIPE_BYTES = 1 << 20
 WRITE_BYTES = 256 << 10

@@ -17,7 +17,7 @@ from types import FrameType
 from typing import IO, Any
 
 from grader.classes.batch.job import Job, Outcome
-from grader.outside import anywhere, own_module
+from grader.host_programs import anywhere, own_module
 
 HEAD_BYTES = 8
 LEAVE_S = 30.0  # to end its work in order, once it is told to

@@ -1,6 +1,8 @@
 """The base workspace: what CMake learns of the machine in a workspace without packages, learnt once and kept.
 
-Every build unpacks it in its own memory before `catkin_make` runs, as if that had run there once before.
+Every build unpacks it in its own memory before `catkin_make` runs, as if that had run there once before. It is kept in
+a folder of the user's that no other user can write (`~/.cache/grader`) and no sandbox shows. Whatever is wrong with it,
+or with a file in it, costs time and nothing else.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ import json
 import os
 import platform
 import shutil
+import stat
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -18,18 +21,17 @@ from typing import Any
 
 from grader import __version__
 from grader.arena.asynchronous import run_until_signal
-from grader.arena.built import read_member
-from grader.arena.cache import keep, read_kept
-from grader.arena.inside import ANSWERS, INSIDE_WORKSPACE, QUESTIONS, prepare
 from grader.arena.limits import Limits
 from grader.arena.process_environment import BASE, Place
 from grader.arena.ros_env import find_ros
 from grader.arena.sandbox import Mode, temporary_base
+from grader.arena.sandbox_files import ANSWERS, INSIDE_WORKSPACE, QUESTIONS, prepare
 from grader.arena.sandbox_probe import choose
 from grader.arena.session import ArenaSession
-from grader.arena.workspace import Workspace
-from grader.errors import ArenaError
+from grader.arena.workspace import Workspace, read_member
+from grader.errors import ArenaError, GraderError
 from grader.evidence.writer import EvidenceWriter
+from grader.files import atomic_write, open_untrusted
 from grader.temporary import temporary_folder
 
 NAME = "base workspace"
@@ -64,6 +66,9 @@ BELOW = (
     "share/roslaunch/package.xml",
     "src",
 )
+BYTES_MAX = 8 << 20
+FILES_MAX = 8
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def provide_base(mode: Mode) -> None:
@@ -177,3 +182,55 @@ def _looks(place: Place) -> Iterator[tuple[str, int, int, int]]:
 
 def _entries(path: str) -> list[str]:
     return [entry for entry in path.split(os.pathsep) if entry]
+
+
+def read_kept(name: str) -> bytes | None:
+    """What was kept under that name; None where there is none, it is damaged, or somebody else may have written it."""
+    with suppress(OSError):
+        if _is_private(_folder().lstat()):
+            return _checked(_read(name))
+    return None
+
+
+def keep(name: str, data: bytes) -> None:
+    """Keep it, if that can be done here. Of the files that are kept, the newest stay."""
+    folder = _folder()
+    with suppress(OSError, GraderError):
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if folder.is_symlink() or folder.stat().st_uid != os.geteuid():
+            return
+        folder.chmod(0o700)
+        target = folder / name
+        if target.is_symlink():
+            target.unlink()
+        atomic_write(target, _sum(data) + data)
+        files = [path for path in folder.iterdir() if stat.S_ISREG(path.lstat().st_mode)]
+        files.sort(key=lambda path: path.lstat().st_mtime_ns, reverse=True)
+        for old in files[FILES_MAX:]:
+            old.unlink()
+
+
+def _folder() -> Path:
+    """As the XDG base directory specification says it: a relative path does not count."""
+    named = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return (named if named.is_absolute() else Path(os.path.expanduser("~"), ".cache")) / "grader"  # noqa: PTH111 - never raises
+
+
+def _is_private(status: os.stat_result) -> bool:
+    return status.st_uid == os.geteuid() and stat.S_IMODE(status.st_mode) == stat.S_IRWXU
+
+
+def _read(name: str) -> bytes:
+    with open_untrusted(_folder(), name) as file:
+        status = os.fstat(file.fileno())
+        own = status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE
+        return file.read(BYTES_MAX) if own else b""
+
+
+def _checked(data: bytes) -> bytes | None:
+    content = data[hashlib.sha256().digest_size :]
+    return content if data[: -len(content) or None] == _sum(content) else None
+
+
+def _sum(data: bytes) -> bytes:
+    return hashlib.sha256(data).digest()

@@ -1,20 +1,27 @@
-"""Programs that run outside of every sandbox: how they are found, and what they are told of where to look.
+"""Programs that run outside of every sandbox: how they are found, and which environment they get.
 
-You may stand in a student's folder when you grade, and git is started in one. An empty entry in a list of folders
-stands for that folder, and `$LD_LIBRARY_PATH:/usr/local/lib` has one wherever the variable was empty before.
+Those that stand around students' code are looked for, and told, nothing that depends on anybody's variables: a program
+found by the PATH of the person who grades, or started with a student's LD_LIBRARY_PATH, may not be the one it is taken
+for. Others (git, Python) are those of the user. You may stand in a student's folder when you grade, and git is started
+in one. An empty entry in a list of folders stands for that folder, and `$LD_LIBRARY_PATH:/usr/local/lib` has one
+wherever the variable was empty before.
 """
 
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 
 LISTS = ("PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "DYLD_FALLBACK_LIBRARY_PATH", "PYTHONPATH")
 _PATH = "/usr/bin:/bin"
 _SUFFIXES = (".exe", "") if sys.platform == "win32" else ("",)
 _MODULE = "import sys; sys.path[:] = filter(None, sys.path); from {} import main; sys.exit(main())"
+HOST_PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
+HOST_ENV = {"PATH": HOST_PATH, "LANG": "C.UTF-8"}
 
 
 def anywhere(environment: Mapping[str, str]) -> dict[str, str]:
@@ -46,3 +53,9 @@ def own_module(name: str) -> list[str]:
     """The command that calls `main` of one of the grader's modules. `python -m` would look in the current folder first,
     for Python's own modules too."""
     return [sys.executable, "-c", _MODULE.format(name)]
+
+
+@lru_cache(maxsize=32)
+def host_program(name: str) -> str | None:
+    """The absolute path of a program of this machine, such as `bwrap`; None where it is not installed."""
+    return shutil.which(name, path=HOST_PATH)

@@ -1,15 +1,26 @@
-"""Sockets to and from student's programs: never waited for longer than said, never more read than said."""
+"""Sockets to and from students' programs: bounded in time and in bytes, with who is at the other end and how often they
+may call, and with the times at which the kernel saw bytes arrive (socket(7), SO_TIMESTAMPNS)."""
 
 import http.client
 import socket
+import struct
+import threading
 import time
 import xmlrpc.client
 from urllib.parse import urlparse
 
 import xmlrpc_parser
+from wire import now_ns
 
 LOOPBACK = "127.0.0.1"
 ANSWER_BYTES_MAX = 1 << 20
+SOMEBODY = "an unknown process"
+SO_TIMESTAMPNS = 35
+TIMESPEC = struct.Struct("@ll")
+SPACE = socket.CMSG_SPACE(TIMESPEC.size)
+APART_NS_MAX = 100_000
+AGE_NS_MAX = 5 * 10**9
+"""Older ones come from a clock that was set meanwhile."""
 
 
 class ProtocolError(Exception):
@@ -134,3 +145,75 @@ def call(method, *args):
     if code != 1:
         raise ProtocolError(str(message)[:200])
     return value
+
+
+class Pace:
+    """At most so many a second, in the long run."""
+
+    def __init__(self, per_s, at_once):
+        self._per_s, self._at_once = per_s, at_once
+        self._next_s = 0.0
+        self._lock = threading.Lock()
+
+    def wait_s(self, count):
+        """How long these calls have to wait (s)."""
+        now_s = time.monotonic()
+        with self._lock:
+            self._next_s = max(self._next_s, now_s - self._at_once / self._per_s) + count / self._per_s
+            return self._next_s - now_s
+
+
+class Caller:
+    """Who is at the other end of a connection; `process` is looked up when it is first asked for."""
+
+    def __init__(self, owners, near, far):
+        self._owners = owners
+        self._ends = near, far
+        self._found = None
+        self._looked = False
+
+    @property
+    def process(self):
+        """The name of the process of the run, or None."""
+        if not self._looked:
+            self._looked = True
+            self._found = self._owners.caller(*self._ends)
+        return self._found
+
+    @property
+    def name(self):
+        return self.process or SOMEBODY
+
+
+def note_arrivals(sock):
+    """From now on the kernel notes for this socket when its bytes arrive; some kernels do not."""
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+    except OSError:
+        return False
+    return True
+
+
+def receive(sock, size):
+    """(bytes, when the last of them arrived, on the arena's clock). Raises what `recv` raises."""
+    data, notes, _, _ = sock.recvmsg(size, SPACE)
+    return data, _arrived_ns(notes)
+
+
+def receive_into(sock, view):
+    """(how many bytes, when the last of them arrived)."""
+    count, notes, _, _ = sock.recvmsg_into([view], SPACE)
+    return count, _arrived_ns(notes)
+
+
+def _arrived_ns(notes):
+    """The kernel's time is the wall clock's: how long ago that was tells it on the arena's clock."""
+    for level, kind, value in notes:
+        if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS and len(value) >= TIMESPEC.size:
+            seconds, nanoseconds = TIMESPEC.unpack_from(value)
+            before_ns, wall_ns, after_ns = now_ns(), time.time_ns(), now_ns()
+            if after_ns - before_ns > APART_NS_MAX:  # somebody else had the processor between the two clocks
+                before_ns, wall_ns = now_ns(), time.time_ns()
+            age_ns = wall_ns - seconds * 10**9 - nanoseconds
+            return before_ns - age_ns if 0 <= age_ns < AGE_NS_MAX else before_ns
+    return now_ns()

@@ -1,0 +1,295 @@
+"""The arena's own process: started, spoken to, ended. Its output comes to the event loop that started it."""
+
+from __future__ import annotations
+
+import array
+import asyncio
+import atexit
+import contextlib
+import json
+import os
+import signal
+import socket
+import struct
+import subprocess
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+from grader.errors import ArenaError
+
+READ_BYTES = 1 << 18
+STDERR_BYTES = 4096
+CLOSE_S = 1.5
+
+
+class ArenaProcess:
+    """`take` gets each piece of its output, and empty bytes at the end. `cpu_s` is what making it took.
+
+    Raises ArenaError where it cannot be started.
+    """
+
+    def __init__(self, argv: Sequence[str], env: dict[str, str], take: Callable[[bytes], None]) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._ended = asyncio.Event()
+        self._open: set[int] = set()
+        self._errors = b""
+        pipes = [os.pipe() for _ in range(3)]
+        (commands_r, self._commands), (self._output, output_w), (self._words, words_w) = pipes
+        try:
+            self._template, self.pid, self.cpu_s = start_arena(argv, env, [commands_r, output_w, words_w])
+        except BaseException:
+            for number in (self._commands, self._output, self._words):
+                os.close(number)
+            raise
+        finally:
+            for number in (commands_r, output_w, words_w):
+                os.close(number)
+        self._watch(self._output, take)
+        self._watch(self._words, self._keep_errors)
+
+    def send(self, command: dict[str, Any]) -> None:
+        """One command, as a line of JSON. That it has ended is told by its output's end."""
+        data = memoryview(json.dumps(command).encode() + b"\n")
+        with contextlib.suppress(BrokenPipeError):
+            while data:
+                data = data[os.write(self._commands, data) :]
+
+    def last_words(self) -> str:
+        """The last line that it wrote to stderr."""
+        return (self._errors.decode(errors="replace").strip().splitlines() or [""])[-1]
+
+    async def end(self) -> None:
+        """End it: closed commands first, so that it ends what it started; then by force."""
+        try:
+            os.close(self._commands)
+            timer = self._loop.call_later(CLOSE_S, self._ended.set)
+            await self._ended.wait()
+            timer.cancel()
+        finally:
+            self._kill()
+            self._template.forget(self.pid)
+            for descriptor in self._open:
+                self._loop.remove_reader(descriptor)
+            for descriptor in (self._output, self._words):
+                os.close(descriptor)
+
+    def _kill(self) -> None:
+        """With its group: a bubblewrap that is killed while it starts leaves a second process that waits for ever."""
+        with contextlib.suppress(ProcessLookupError):  # all of it has ended
+            os.killpg(self.pid, signal.SIGKILL)
+
+    def _watch(self, descriptor: int, take: Callable[[bytes], None]) -> None:
+        os.set_blocking(descriptor, False)
+        self._open.add(descriptor)
+
+        def readable() -> None:
+            try:
+                chunk = os.read(descriptor, READ_BYTES)
+            except BlockingIOError:
+                return
+            if not chunk:
+                self._loop.remove_reader(descriptor)
+                self._open.discard(descriptor)
+                if not self._open:
+                    self._ended.set()
+            take(chunk)
+
+        self._loop.add_reader(descriptor, readable)
+
+    def _keep_errors(self, chunk: bytes) -> None:
+        self._errors = (self._errors + chunk)[-STDERR_BYTES:]
+
+
+# [arena.frames] Takes the arena's frames apart (grader/arena/ros/wire.py says what they hold).
+
+HEADER = struct.Struct("<BIQ")
+CHANNEL_ID = LENGTH = struct.Struct("<I")
+FRAME_BYTES_MAX = 24 << 20
+
+
+class Frame(NamedTuple):
+    """`kind` is one of C, M, E, S; `channel` and `datas` (messages) belong to M, `fields` to the others."""
+
+    kind: str
+    time_ns: int
+    channel: int
+    datas: list[bytes]
+    fields: dict[str, Any]
+
+
+class FrameReader:
+    """Bytes in, whole frames out. Raises ArenaError for what is none."""
+
+    def __init__(self) -> None:
+        self._pieces: list[bytes] = []
+        self._size = 0
+        self._needed = HEADER.size
+
+    def feed(self, chunk: bytes) -> Iterator[Frame]:
+        self._pieces.append(chunk)
+        self._size += len(chunk)
+        if self._size < self._needed:
+            return
+        data, start = b"".join(self._pieces), 0
+        self._needed = HEADER.size
+        while len(data) - start >= HEADER.size:
+            kind, length, time_ns = HEADER.unpack_from(data, start)
+            if length > FRAME_BYTES_MAX:
+                raise ArenaError("the arena sent bytes that are no frame")
+            end = start + HEADER.size + length
+            if end > len(data):
+                self._needed = end - start
+                break
+            yield _frame(chr(kind), time_ns, data, start + HEADER.size, end)
+            start = end
+        self._pieces = [data[start:]]
+        self._size = len(data) - start
+
+
+def _frame(kind: str, time_ns: int, data: bytes, start: int, end: int) -> Frame:
+    try:
+        if kind == "M":
+            (channel,) = CHANNEL_ID.unpack_from(data[start : min(end, start + CHANNEL_ID.size)])
+            return Frame(kind, time_ns, channel, _messages(data, start + CHANNEL_ID.size, end), {})
+        return Frame(kind, time_ns, 0, [], _fields(data[start:end]))
+    except (struct.error, ValueError, TypeError, RecursionError) as error:
+        raise ArenaError("the arena sent bytes that are no frame") from error
+
+
+def _messages(data: bytes, start: int, end: int) -> list[bytes]:
+    found, unpack_from = [], LENGTH.unpack_from
+    while start < end:
+        (length,) = unpack_from(data, start)
+        start += LENGTH.size
+        found.append(data[start : start + length])
+        start += length
+    if start != end:
+        raise ValueError("a message that is not whole")
+    return found
+
+
+def _fields(payload: bytes) -> dict[str, Any]:
+    """Halves of surrogate pairs, which no record can hold, become question marks."""
+    fields = json.loads(payload)
+    if b"\\ud" in payload or b"\xed" in payload:
+        fields = json.loads(json.dumps(fields, ensure_ascii=False).encode(errors="replace"))
+    return dict(fields)
+
+
+# [arena.template] Starts arenas as copies of one process that has imported ROS already: one for each grader, as long as it lives.
+
+ANSWER = struct.Struct("<id")
+ANSWER_S = 15.0
+TEMPLATE_CLOSE_S = 2.0
+ERROR_BYTES = 4096
+
+
+class Template:
+    """The template's process (`ros/template.py`). It ends with this object's socket, at the latest with the grader."""
+
+    def __init__(self, argv: Sequence[str], env: Mapping[str, str]) -> None:
+        self._lock = threading.Lock()
+        self._sock, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._sock.settimeout(ANSWER_S)
+        with theirs:
+            self._popen = subprocess.Popen(
+                argv,
+                stdin=theirs.fileno(),
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                env=dict(env),
+                cwd="/",
+                start_new_session=True,
+            )
+
+    def start(self, descriptors: Sequence[int]) -> tuple[int, float]:
+        """A new arena with these as stdin, stdout and stderr: its process id, and the CPU seconds that making it took.
+
+        Raises OSError where the template has ended or does not answer.
+        """
+        passed = array.array("i", descriptors)
+        return self._ask(b"s", [(socket.SOL_SOCKET, socket.SCM_RIGHTS, passed)])
+
+    def forget(self, pid: int) -> None:
+        """That arena has ended, or was killed: wait for it. Only from then on its id may be another process's."""
+        with suppress(OSError):  # a template that has ended left it to somebody who waits for all
+            self._ask(b"e" + struct.pack("<i", pid))
+
+    def close(self) -> None:
+        """End the template; the arenas that it made are not touched."""
+        self._sock.close()
+        try:
+            self._popen.wait(TEMPLATE_CLOSE_S)
+        except subprocess.TimeoutExpired:
+            self._popen.kill()
+            self._popen.wait()
+        if self._popen.stderr is not None:
+            self._popen.stderr.close()
+
+    def last_words(self) -> str:
+        """What the template said before it ended, its last line."""
+        self._sock.close()
+        with suppress(subprocess.TimeoutExpired):
+            self._popen.wait(TEMPLATE_CLOSE_S)
+        self._popen.kill()
+        _, errors = self._popen.communicate()
+        lines = errors[-ERROR_BYTES:].decode(errors="replace").strip().splitlines()
+        return lines[-1] if lines else "it said nothing"
+
+    def _ask(
+        self, request: bytes, passed: Sequence[tuple[int, int, array.array[int]]] = ()
+    ) -> tuple[int, float]:
+        with self._lock:
+            self._sock.sendmsg([request], passed)
+            answer = self._sock.recv(ANSWER.size)
+        if len(answer) != ANSWER.size:
+            raise ConnectionResetError("the template has ended")
+        pid, cpu_s = ANSWER.unpack(answer)
+        return int(pid), float(cpu_s)
+
+
+_templates: dict[tuple[object, ...], Template] = {}
+_making = threading.Lock()
+
+
+def template_of(argv: Sequence[str], env: Mapping[str, str]) -> Template:
+    """This process's template for that command and environment, started where there is none yet."""
+    key = (os.getpid(), tuple(argv), tuple(sorted(env.items())))
+    with _making:
+        if key not in _templates:
+            if not _templates:
+                atexit.register(_close_all)
+            _templates[key] = Template(argv, env)
+        return _templates[key]
+
+
+def start_arena(
+    argv: Sequence[str], env: Mapping[str, str], descriptors: Sequence[int]
+) -> tuple[Template, int, float]:
+    """A new arena of the template; a template that somebody has ended is made anew, once. Raises ArenaError."""
+    template = template_of(argv, env)
+    try:
+        return template, *template.start(descriptors)
+    except OSError:
+        _drop(template)
+    template = template_of(argv, env)
+    try:
+        return template, *template.start(descriptors)
+    except OSError as error:
+        _drop(template)
+        message = f"the managed roscore did not start: {template.last_words()}"
+        raise ArenaError(message, hint="grader doctor") from error
+
+
+def _drop(template: Template) -> None:
+    with _making:
+        for key in [key for key, known in _templates.items() if known is template]:
+            del _templates[key]
+
+
+def _close_all() -> None:
+    for key, template in list(_templates.items()):
+        if key[0] == os.getpid():
+            template.close()

@@ -1,0 +1,163 @@
+"""What every sandbox shows besides the system: paths inside of it, one user, `python`, and what stands in for programs
+and packages that the machine lacks (docs/how-to/standins.md)."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from catkin_pkg.package import PACKAGE_MANIFEST_FILENAME
+from catkin_pkg.packages import find_package_paths
+
+from grader.arena.ros_env import RosInstallation
+
+HOME = "/home/student"
+INSIDE_WORKSPACE = f"{HOME}/catkin_ws"
+OUTPUT = "/run/grader/out"
+SOURCES = "/run/grader/src"
+BUILT = "/run/grader/built.tar"
+BASE_WORKSPACE = "/run/grader/base.tar"
+LARGE = "/run/grader/large"
+SHIMS = "/run/grader/bin"
+STANDINS = "/run/grader/arena/standins"
+ROS_SIDE = Path(__file__).parent / "ros"
+TERMINALS = (
+    "gnome-terminal", "konsole", "lxterminal", "mate-terminal", "rxvt", "terminator", "tilix", "urxvt",
+    "x-terminal-emulator", "xfce4-terminal", "xterm",
+)  # fmt: skip
+BROWSERS = (
+    "brave-browser", "chromium", "chromium-browser", "firefox", "firefox-esr", "google-chrome", "google-chrome-stable",
+    "opera", "sensible-browser", "www-browser", "x-www-browser", "xdg-open",
+)  # fmt: skip
+ANSWERS = "grader-known"
+QUESTIONS = (
+    "lsb_release -si", "lsb_release -sd", "lsb_release -sr", "lsb_release -sc", "rosversion roslaunch", "rosversion -d",
+)  # fmt: skip
+"""What catkin asks in every build, and roslaunch on every start."""
+EM = "lib/python3/dist-packages/em.py"
+STANDIN_SOURCES = Path(__file__).resolve().parent / "standins"
+SHEBANG = b"#!"
+SHARE = "share"
+LIBRARY = "python"
+CMAKE = "cmake"
+
+
+def prepare(place: Path, ros: RosInstallation) -> None:
+    """Write what every sandbox binds: `etc/` with one user in it, `bin/` with `python` as ROS means it, stand-ins
+    for terminals, which launch files name as their `launch-prefix`, and for browsers, and `standins/` with the
+    packages that this ROS lacks."""
+    etc, shims = place / "etc", place / "bin"
+    for folder in (etc, shims, place / "home"):
+        folder.mkdir(parents=True)
+    (etc / "passwd").write_text(f"student:x:1000:1000:student:{HOME}:/bin/bash\n")
+    (etc / "group").write_text("student:x:1000:\n")
+    (etc / "hosts").write_text("127.0.0.1 localhost\n::1 localhost\n")
+    for name in ("python", "python3"):
+        (shims / name).symlink_to(ros.python)
+    shutil.copyfile(ROS_SIDE / "syntax.py", shims / "grader-syntax.py")
+    _program(shims, "terminal.sh", "grader-terminal", TERMINALS)
+    _program(shims, "open.sh", "grader-open", BROWSERS)
+    shutil.copyfile(ROS_SIDE / "opener.py", shims / "grader-open.py")
+    _quicker(shims, ros)
+    copy_standins(place / "standins", ros)
+
+
+def _quicker(shims: Path, ros: RosInstallation) -> None:
+    """What stands before programs that start Python to say what is known: only where the program itself is there."""
+    (shims / ANSWERS).mkdir()
+    asked = sorted({question.split()[0] for question in QUESTIONS})
+    _program(shims, "known.sh", "grader-answers", [name for name in asked if ros.program(name)])
+    if ros.program("catkin_find_pkg"):
+        _program(shims, "find_pkg.sh", "catkin_find_pkg", ())
+    empy, modules = ros.program("empy"), [Path(prefix) / EM for prefix in (*ros.prefixes, "/usr")]
+    module = next((path for path in modules if path.is_file()), None)
+    if empy and module and _below_shebang(Path(empy)) == _below_shebang(module):
+        _filled_in(shims / "empy", "empy.py", "@EM@", str(module))
+    roslaunch = ros.program("roslaunch")
+    if roslaunch and b"python" in Path(roslaunch).read_bytes().partition(b"\n")[0]:
+        _filled_in(shims / "roslaunch", "roslaunch.py", "@PROGRAM@", roslaunch)
+
+
+def _filled_in(program: Path, source: str, name: str, value: str) -> None:
+    program.write_text((ROS_SIDE / source).read_text().replace(name, value))
+    program.chmod(0o755)
+
+
+def _below_shebang(path: Path) -> bytes:
+    return path.read_bytes().partition(b"\n")[2]
+
+
+def _program(shims: Path, source: str, name: str, called: Sequence[str]) -> None:
+    """One program under the names that it is called by."""
+    shutil.copyfile(ROS_SIDE / source, shims / name)
+    (shims / name).chmod(0o755)
+    for other in called:
+        (shims / other).symlink_to(name)
+
+
+def known_packages() -> tuple[str, ...]:
+    """Every package that can be stood in for."""
+    return tuple(sorted(p.parent.name for p in STANDIN_SOURCES.glob(f"*/{PACKAGE_MANIFEST_FILENAME}")))
+
+
+def missing_packages(ros: RosInstallation) -> tuple[str, ...]:
+    """Those of them that this ROS does not know."""
+    known = set(_installed(ros)) | set(_overlaid(ros))
+    return tuple(name for name in known_packages() if name not in known)
+
+
+def copy_standins(folder: Path, ros: RosInstallation) -> None:
+    """Write what this ROS lacks into `folder`, an install space: `share/<package>`, programs executable whatever an
+    archive made of their bits."""
+    (folder / SHARE).mkdir(parents=True)
+    for name in (LIBRARY, CMAKE):
+        _copy(STANDIN_SOURCES / name, folder / name)
+    for name in missing_packages(ros):
+        _copy(STANDIN_SOURCES / name, folder / SHARE / name)
+    for path in (folder, *folder.rglob("*")):
+        path.chmod(0o755 if path.is_dir() or _is_program(path) else 0o644)
+
+
+def with_standins(env: Mapping[str, str], copied: Path, inside: str) -> dict[str, str]:
+    """The environment in which ROS finds the stand-ins after everything else. `copied` is the folder that
+    `copy_standins` wrote, `inside` where processes see it."""
+    packages = sorted(p.name for p in (copied / SHARE).iterdir())
+    if not packages:
+        return dict(env)
+    python = [f"{inside}/{LIBRARY}", *(f"{inside}/{SHARE}/{name}/{LIBRARY}" for name in packages)]
+    added = {"ROS_PACKAGE_PATH": [f"{inside}/{SHARE}"], "PYTHONPATH": python, "CMAKE_PREFIX_PATH": [inside]}
+    return {**env, **{name: _append(env.get(name, ""), entries) for name, entries in added.items()}}
+
+
+def _copy(source: Path, target: Path) -> None:
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(source, target, ignore=ignored, copy_function=shutil.copyfile)
+
+
+def _append(path: str, entries: list[str]) -> str:
+    before = [entry for entry in path.split(os.pathsep) if entry and entry not in entries]
+    return os.pathsep.join([*before, *entries])
+
+
+def _is_program(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(SHEBANG)) == SHEBANG
+
+
+def _installed(ros: RosInstallation) -> Iterator[str]:
+    entries = [Path(entry) for entry in _package_path(ros)]
+    for share in (*entries, *(Path(prefix) / SHARE for prefix in ros.prefixes)):
+        yield from (name for name in known_packages() if (share / name / PACKAGE_MANIFEST_FILENAME).is_file())
+
+
+def _overlaid(ros: RosInstallation) -> Iterator[str]:
+    """Packages of the workspaces that a `setup.bash` is made of, which may lie deeper, or be the entry itself."""
+    for entry in _package_path(ros):
+        if Path(entry).name != SHARE and Path(entry).is_dir():
+            yield from (Path(entry, path).resolve().name for path in find_package_paths(entry))
+
+
+def _package_path(ros: RosInstallation) -> list[str]:
+    return [entry for entry in ros.env.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if entry]

@@ -1,0 +1,345 @@
+"""What the grader gives to a run: messages, parameters and calls of services, with values that cannot be guessed."""
+
+from __future__ import annotations
+
+import base64
+import math
+import random
+import string
+from collections.abc import Callable, Iterator, Mapping
+from itertools import pairwise, zip_longest
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+from grader.arena.process_environment import Place
+from grader.arena.session import ArenaSession
+from grader.evidence.events import ActorEvent
+from grader.files import read_untrusted
+from grader.rubric.model import Call, Param, Probe, Scenario
+
+PROBE_LETTERS = 6
+TEXTS_FOR_ONE_TWICE = 4
+PAUSE_BEFORE_SAME = 3
+RANGES = {
+    f"std_msgs/{'U' * (not signed)}Int{bits}": (-(1 << bits - 1), (1 << bits - 1) - 1)
+    if signed
+    else (0, (1 << bits) - 1)
+    for bits in (8, 16, 32, 64)
+    for signed in (True, False)
+}
+_random = random.SystemRandom()
+FILE_BYTES_MAX = 256 << 10
+EVENTS_MAX = 2_000
+VALUES_MAX = 5_000
+DEPTH_MAX = 20
+ALIASES_MAX = 20
+WORD_LETTERS = 9
+NOT_IN_FILE = "not in the file"
+OVER = TOO_LARGE, TOO_MUCH = "too large", "too much in it"
+"""How the remark on a file ends that is more than is read."""
+_EXAMPLES: dict[str, Any] = {"text": "", "integer": 10_000, "number": 1.0}
+ANSWER_S = 10.0
+TEXT_BYTES_MAX = 64 << 10
+
+Tell = Callable[[str], None]
+
+
+class Shot(NamedTuple):
+    """One message to send; `pause_s` is the time to the next one. `value` is its `data`, or a map of its fields."""
+
+    topic: str
+    type: str
+    value: Any
+    pause_s: float
+
+    @property
+    def word(self) -> str | None:
+        """What a listener prints of it; None where that is no single word."""
+        return (
+            str(self.value)
+            if isinstance(self.value, str | int) and not isinstance(self.value, bool)
+            else None
+        )
+
+
+def make_shots(probes: tuple[Probe, ...]) -> list[Shot]:
+    """All probes' messages in the order of sending: the topics take turns.
+
+    Before a text comes a second time there is a longer pause, in which the first one can be printed.
+    """
+    rows = zip_longest(*(list(_values(probe)) for probe in probes))
+    shots: list[Shot] = []
+    for row in rows:
+        sent = [(p, v) for p, v in zip(probes, row, strict=True) if v is not None]
+        shots += [Shot(p.topic, p.type, v, 1 / p.rate_hz / len(sent)) for p, v in sent]
+    return [*(_before(shot, following) for shot, following in pairwise(shots)), *shots[-1:]]
+
+
+def _before(shot: Shot, following: Shot) -> Shot:
+    same = (shot.topic, shot.value) == (following.topic, following.value) and isinstance(shot.value, str)
+    return shot._replace(pause_s=shot.pause_s * PAUSE_BEFORE_SAME) if same else shot
+
+
+def advertisement(probe: Probe) -> dict[str, Any]:
+    """The fields of the arena's command `advertise`."""
+    from grader.evidence.decode import definition, md5sum  # noqa: PLC0415 - numpy, which not every run needs
+
+    return {
+        "topic": probe.topic,
+        "type": probe.type,
+        "md5sum": md5sum(probe.type),
+        "definition": definition(probe.type),
+        "latching": False,
+    }
+
+
+def publication(shot: Shot) -> dict[str, Any]:
+    """The fields of the arena's command `publish`."""
+    from grader.evidence.decode import encode  # noqa: PLC0415 - as above
+
+    record = {
+        "action": "publish",
+        "actor": "grader",
+        "topic": shot.topic,
+        "type": shot.type,
+        "value": shot.value,
+    }
+    data = base64.b64encode(encode(shot.type, fields_of(shot.value))).decode()
+    return {"topic": shot.topic, "data": data, "record": record}
+
+
+def fields_of(value: object) -> Mapping[str, Any]:
+    """A message by its fields; a bare value is the field `data`."""
+    return value if isinstance(value, Mapping) else {"data": value}
+
+
+def _values(probe: Probe) -> Iterator[Any]:
+    twice = probe.text >= TEXTS_FOR_ONE_TWICE
+    values: list[str | int] = [_two_words() for _ in range(probe.text - twice)]
+    if probe.integers or probe.among:
+        low, high = RANGES[probe.type]
+        values += [*_integers(probe, low, high), *probe.among]
+    _random.shuffle(values)
+    if twice:
+        _repeat_one(values)
+    yield from values
+    for _ in range(probe.times if probe.values else 0):
+        yield from probe.values
+
+
+def _repeat_one(values: list[str | int]) -> None:
+    """One text comes twice running, neither first nor last: a listener may not leave out what it knows already."""
+    texts = [i for i, value in enumerate(values) if isinstance(value, str)]
+    at = _random.choice(texts[1:-1])
+    values.insert(at, values[at])
+
+
+def _integers(probe: Probe, low: int, high: int) -> Iterator[int]:
+    """Different from each other and from those of `among`."""
+    taken = set(probe.among)
+    for _ in range(min(probe.integers, high - low + 1 - len(taken))):
+        value = _random.randint(low, high)
+        while value in taken:
+            value = _random.randint(low, high)
+        taken.add(value)
+        yield value
+
+
+def _two_words() -> str:
+    """Two words of letters, large and small: never to be taken for a number of another probe."""
+    return " ".join(
+        "".join(_random.choice(string.ascii_letters) for _ in range(PROBE_LETTERS)) for _ in range(2)
+    )
+
+
+class Setting(NamedTuple):
+    """One parameter to set. `name` begins with a slash, `detail` says where it comes from."""
+
+    name: str
+    value: Any
+    detail: str
+
+
+def settings(
+    params: tuple[Param, ...], find: Callable[[str], Path | None]
+) -> tuple[list[Setting], list[str]]:
+    """What to set in this order, and a remark for each file that could not be read. `find` gives a file's place."""
+    found: list[Setting] = []
+    remarks: list[str] = []
+    for param in params:
+        if param.file is None:
+            value = param.value if param.made_up is None else made_up(_EXAMPLES[param.made_up])
+            found.append(Setting(_absolute(param.name or ""), value, "made up" if param.made_up else "given"))
+            continue
+        leaves, remark = _file(find(param.file))
+        remarks += [f"{param.file}: {remark}"] if remark else []
+        found += [Setting(name, value, f"made up, for {param.file}") for name, value in leaves.items()]
+        lacking = [name for name in map(_absolute, param.also) if name not in leaves]
+        found += [Setting(name, made_up(""), f"made up, {NOT_IN_FILE} {param.file}") for name in lacking]
+    return found, remarks
+
+
+def made_up(like: object) -> Any:  # noqa: ANN401 - of the type that it stands for
+    """A value of the same type that nobody can guess; digits stay digits."""
+    if isinstance(like, bool) or like is None:
+        return like
+    if isinstance(like, int):
+        return int(_digits(min(max(len(str(min(abs(like), 10**9))), 5), 9)))
+    if isinstance(like, float):
+        return round(_random.uniform(100, 1000), 3)
+    if isinstance(like, list):
+        return [made_up(item) for item in like]
+    text = str(like)
+    if text.strip().isdigit():
+        return _digits(max(len(text), 5))
+    return "".join(_random.choice(string.ascii_letters) for _ in range(WORD_LETTERS))
+
+
+def _digits(count: int) -> str:
+    """Digits of which no two neighbours are the same: nothing that a handout would print."""
+    found = [_random.choice("123456789")]
+    while len(found) < count:
+        found.append(_random.choice([d for d in "0123456789" if d != found[-1]]))
+    return "".join(found)
+
+
+class _Loader(yaml.SafeLoader):
+    """`yaml.safe_load`, and `rosparam`'s own tags (`!degrees`) as plain text."""
+
+
+def _plain(loader: yaml.SafeLoader, _suffix: str, node: yaml.Node) -> Any:  # noqa: ANN401 - YAML
+    if isinstance(node, yaml.ScalarNode):
+        return loader.construct_scalar(node)
+    return loader.construct_sequence(node) if isinstance(node, yaml.SequenceNode) else {}
+
+
+_Loader.add_multi_constructor("!", _plain)
+
+
+class _UnreadableError(ValueError):
+    """Why nothing comes of a file, in a few words."""
+
+
+def _file(path: Path | None) -> tuple[dict[str, Any], str]:
+    """Values made up for the file's leaves, by their names, or why there are none."""
+    data = read_untrusted(path, FILE_BYTES_MAX + 1) if path else None
+    try:
+        leaves = dict(_leaves(_content(data), "", 0))
+        _check_size(list(leaves.values()))
+        return {name: made_up(value) for name, value in leaves.items()}, ""
+    except _UnreadableError as error:
+        return {}, str(error)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        return {}, f"not YAML: {str(error).splitlines()[0]}"
+
+
+def _content(data: bytes | None) -> dict[Any, Any]:
+    if data is None:
+        raise _UnreadableError("no such file")
+    if len(data) > FILE_BYTES_MAX:
+        raise _UnreadableError(TOO_LARGE)
+    text = data.decode()
+    aliases = depth = 0
+    for count, event in enumerate(yaml.parse(text, _Loader)):
+        aliases += isinstance(event, yaml.AliasEvent)
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if count > EVENTS_MAX or aliases > ALIASES_MAX or depth > 2 * DEPTH_MAX:
+            raise _UnreadableError(TOO_MUCH)
+    content = yaml.load(text, _Loader)  # noqa: S506 - a SafeLoader
+    if not isinstance(content, dict):
+        raise _UnreadableError("no names in it")
+    return content
+
+
+def _check_size(values: list[Any]) -> None:
+    """Aliases let a few letters stand for lists without number or end."""
+    count, waiting = 0, [(values, 0)]
+    for items, depth in waiting:
+        count += len(items)
+        if count > VALUES_MAX or depth > DEPTH_MAX:
+            raise _UnreadableError(TOO_MUCH)
+        waiting += [(item, depth + 1) for item in items if isinstance(item, list)]
+
+
+def _leaves(content: Mapping[Any, Any], prefix: str, depth: int) -> Iterator[tuple[str, Any]]:
+    for key, value in content.items():
+        name = f"{prefix}/{str(key).strip('/')}".encode(errors="replace").decode()
+        if isinstance(value, dict) and value and depth < DEPTH_MAX:
+            yield from _leaves(value, name, depth + 1)
+        elif isinstance(value, float) and not math.isfinite(value):
+            yield name, 1.0
+        elif isinstance(value, bool | int | float | str | list):
+            yield name, value
+        else:
+            yield name, str(value)
+
+
+def _absolute(name: str) -> str:
+    return "/" + name.strip("/")
+
+
+async def call_services(scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:
+    """Call each service once it is offered; requests and answers are events of `/grader/actor`."""
+    for call in scenario.calls:
+        tell(f"waiting for the service {call.service}")
+        if await _offered(call.service, arena, scenario.until.first_message_s):
+            await arena.wait(lambda: not arena.live.running, call.delay_s)
+            tell(f"calling {call.service}")
+            await _call(call, arena)
+
+
+async def _offered(service: str, arena: ArenaSession, patience_s: float) -> bool:
+    live = arena.live
+    await arena.wait(lambda: service in live.services or not live.running, patience_s)
+    return service in live.services
+
+
+async def _call(call: Call, arena: ArenaSession) -> None:
+    from grader.evidence.services import ServiceType  # noqa: PLC0415 - numpy, which not every run needs
+
+    try:
+        type_ = ServiceType(
+            call.type, _type_text(call.type, "srv", arena.place) or "", _messages(arena.place)
+        )
+        data = base64.b64encode(type_.encode_request(call.request)).decode()
+    except ValueError as error:
+        arena.note(_answer(call, None, f"the grader could not call it: {error}"))
+        return
+    record = {
+        "action": "call",
+        "actor": "grader",
+        "topic": call.service,
+        "type": call.type,
+        "value": call.request,
+    }
+    answer = await arena.call(ANSWER_S, service=call.service, type=call.type, data=data, record=record)
+    if "data" not in answer:
+        arena.note(_answer(call, None, answer["error"]))
+        return
+    value = type_.decode_response(base64.b64decode(answer["data"]))
+    arena.note(_answer(call, value, "" if value is not None else f"the answer is no {call.type}"))
+
+
+def _answer(call: Call, value: object, detail: str) -> ActorEvent:
+    return ActorEvent(
+        action="answer", actor="grader", topic=call.service, type=call.type, value=value, detail=detail
+    )
+
+
+def _messages(place: Place) -> Callable[[str], str | None]:
+    return lambda type_: _type_text(type_, "msg", place)
+
+
+def _type_text(type_: str, kind: str, place: Place) -> str | None:
+    """The text of `<package>/<kind>/<Name>.<kind>`: the student's own, ROS's, or a stand-in's."""
+    package, _, name = type_.partition("/")
+    own = place.workspace.repaired / package
+    for folder in (own, *(Path(p) / package for p in place.share_folders)):
+        data = read_untrusted(folder / kind / f"{name}.{kind}", TEXT_BYTES_MAX + 1)
+        if data is not None and len(data) > TEXT_BYTES_MAX:
+            raise ValueError(f"{name}.{kind} is larger than {TEXT_BYTES_MAX >> 10} kB")
+        if data is not None:
+            return data.decode(errors="replace")
+    return None
