@@ -28,7 +28,7 @@ from grader.report.hidden import hidden_ids, without_hidden
 from grader.report.terminal import open_console
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_ros
-from grader.student.git_status import write_staged
+from grader.student.git_view import write_staged
 from grader.temporary import temporary_folder
 
 if TYPE_CHECKING:
