@@ -15,7 +15,7 @@ from grader.cli.output import say_beside
 from grader.model.git_status import Point, Standing
 from grader.report.terminal import emit
 from grader.report.text import line
-from grader.student.git_status import ask, standing, surroundings
+from grader.student.git_status import advise, read_environment
 
 TITLE = "What is marked is what is pushed. It differs from what was checked:"
 REMARKS = "Handing in"
@@ -28,7 +28,7 @@ class Inquiry:
 
     def __init__(self, package: Path, base: Path) -> None:
         self._package, self._base = package, base
-        self._around = surroundings(os.environ, Path.cwd())
+        self._environment = read_environment(os.environ, Path.cwd())
         self._found = Standing()
         self._thread = threading.Thread(target=self._ask, daemon=True)
         self._thread.start()
@@ -39,7 +39,7 @@ class Inquiry:
         return self._found
 
     def _ask(self) -> None:
-        self._found = standing(ask(self._package, self._base), self._around)
+        self._found = advise(self._package, self._base, self._environment)
 
 
 def news(found: Standing, told: set[str]) -> Standing:

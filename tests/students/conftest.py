@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from grader.model.git_status import Standing
-from grader.student.git_status import ask, standing, surroundings
+from grader.student.git_status import advise, read_environment
 
 MANIFEST = """<package format="2"><name>{name}</name><version>0.0.1</version><description>d</description>
 <maintainer email="a@b.org">A</maintainer><license>MIT</license><buildtool_depend>catkin</buildtool_depend>
@@ -71,8 +71,7 @@ class Clone:
 
     def standing(self, base: Path, *, here: Path | None = None, **environment: str) -> Standing:
         """What the student is told."""
-        asked = ask(self.package, base / "asked")
-        return standing(asked, surroundings(environment, here or self.package))
+        return advise(self.package, base / "asked", read_environment(environment, here or self.package))
 
     def kinds(self, base: Path, **environment: str) -> list[str]:
         return [point.kind for point in self.standing(base, **environment).points]

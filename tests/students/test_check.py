@@ -61,9 +61,9 @@ def test_what_is_not_handed_in_stands_below_the_report_in_80_columns(lab: Clone)
         "What is marked is what is pushed. It differs from what was checked:"
     )
     assert "All criteria" in report
-    assert "1 file that was checked is not committed: src/listener.py" in below
+    assert "1 change is not committed: src/listener.py" in below
     assert "git add src/listener.py\n" in below
-    assert "30 files that were checked are not in git:" in below
+    assert "30 files of the package are not in git:" in below
     assert max(map(len, done.stdout.splitlines())) <= 80
 
 

@@ -19,7 +19,7 @@ LOADED = (
         "pipeline",
         "intake",
         "package",
-        "standing",
+        "student",
         "judging",
     ),
     *(

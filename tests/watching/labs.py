@@ -1,23 +1,13 @@
-"""Copies of correct packages, and pictures of them before and after a change."""
+"""Copies of correct packages."""
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 from grader.rubric.load import LoadedRubric, load_rubric
-from grader.student.watching.affected import concerned
-from grader.student.watching.snapshot import Picture, take_picture
 
 ROOT = Path(__file__).resolve().parents[2]
-LABS = (
-    "eyantra-ros-basics",
-    "leeds-comp3631-lab1",
-    "mcr2-basic-comms",
-    "sheffield-com2009-week1",
-    "york-ele00118m-lab7",
-)
 
 
 def copy_of(lab: str, folder: Path) -> Path:
@@ -26,18 +16,6 @@ def copy_of(lab: str, folder: Path) -> Path:
     package = folder / solution.name
     shutil.copytree(solution, package, ignore=shutil.ignore_patterns("__pycache__"))
     return package
-
-
-def picture(package: Path, lab: str = "leeds-comp3631-lab1") -> Picture:
-    """The package as it is now."""
-    return take_picture(str(package), load_rubric(lab).rubric.package)
-
-
-def concerned_by(lab: str, package: Path, change: Callable[[], object]) -> frozenset[str]:
-    """The scenarios that are to be run again after `change`."""
-    before = picture(package, lab)
-    change()
-    return concerned(rubric(lab).rubric, before, picture(package, lab))
 
 
 def rubric(lab: str) -> LoadedRubric:

@@ -1,8 +1,8 @@
-"""Saves that a test tells of, a grading that only notes what it would run, and a display that only remembers."""
+"""Saves that a test makes up, a grading that only counts, and a screen that only remembers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -11,30 +11,25 @@ from grader.errors import ExitCode
 from grader.model.result import CriterionResult, ErrorInfo, GradingResult
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
-from grader.student.watching.kept import Kept
-from grader.student.watching.loop import WAIT_S, Outcome, Watched, watch
-from grader.student.watching.snapshot import take_picture
+from grader.student.watching import UNDECIDED, WAIT_S, Outcome, Saves, Screen, Watch, take_snapshot
 from tests.report.hostile import criterion, result
 
 Step = Callable[[], object]
 
 
-class MadeUpSaves:
+class MadeUpSaves(Saves):
     """Goes through `steps`, one whenever the loop waits for a save; then it is as if somebody pressed Ctrl-C.
 
     A step that returns a path, or several, has saved them; None stands for a while in which nothing happened.
     """
 
     def __init__(self, *steps: Step) -> None:
+        super().__init__()
         self.steps = list(steps)
         self.pending: set[str] = set()
         self.stop: Stop | None = None
-        self.followed: list[tuple[Path, ...]] = []
 
-    def follow(self, places: Sequence[Path], without: Path | None) -> None:  # noqa: ARG002 - as others have it
-        self.followed.append(tuple(places))
-
-    def wait(self, timeout_s: float | None = None) -> frozenset[str]:
+    def wait(self, timeout_s: float) -> frozenset[str]:
         if timeout_s == WAIT_S:
             if not self.steps:
                 raise KeyboardInterrupt
@@ -59,37 +54,31 @@ class MadeUpSaves:
 
 
 class MadeUpGrading:
-    """`ran` are the scenarios of each grading that came to its end, `begun` those of all. Of `during`, one is called
-    while it runs, of `after` one when it has ended."""
+    """`begun` counts the gradings, `ended` those that came to their end. Of `during`, one is called while it runs, of
+    `after` one when it has ended."""
 
-    def __init__(self, rubric: Rubric, out: Path) -> None:
-        self.rubric, self.out = rubric, out
-        self.begun: list[set[str]] = []
-        self.ran: list[set[str]] = []
+    def __init__(self, rubric: Rubric) -> None:
+        self.rubric = rubric
+        self.begun = self.ended = 0
         self.during: list[Step] = []
         self.after: list[Step] = []
         self.verdicts: dict[str, Status] = {}
         self.error: ErrorInfo | None = None
 
-    def __call__(self, recorded: Mapping[str, Path], stop: Stop) -> Outcome:
-        assert all(path.is_file() for path in recorded.values())
-        names = set(self.rubric.scenarios) - set(recorded)
-        self.begun.append(names)
+    def __call__(self, stop: Stop) -> Outcome:
+        self.begun += 1
         if self.during:
             self.during.pop(0)()
         if stop.asked:
             raise Stopped
-        self.ran.append(names)
+        self.ended += 1
         if self.after:
             self.after.pop(0)()
         if self.error is not None:
-            return Outcome(result=self._result(error=self.error), code=ExitCode.NOT_GRADED, evidence=None)
-        self.out.mkdir(exist_ok=True)
-        for name in names:
-            (self.out / f"{name}.mcap").write_text(str(len(self.ran)))
-        failed = any(status is not Status.PASS for status in self.verdicts.values())
-        code = ExitCode.BELOW_PASS_MARK if failed else ExitCode.PASSED
-        return Outcome(result=self._result(), code=code, evidence=self.out)
+            return Outcome(result=self._result(error=self.error), code=ExitCode.NOT_GRADED, undecided=True)
+        statuses = set(self.verdicts.values())
+        code = ExitCode.BELOW_PASS_MARK if statuses - {Status.PASS} else ExitCode.PASSED
+        return Outcome(result=self._result(), code=code, undecided=bool(statuses & UNDECIDED))
 
     def _result(self, **changes: object) -> GradingResult:
         criteria = tuple(self._criterion(name) for name in self.rubric.scenarios)
@@ -100,46 +89,43 @@ class MadeUpGrading:
         return criterion(scenario, status, 5.0 if status is Status.PASS else 0.0, 5.0, scenario=scenario)
 
 
-class Remembered:
+class Remembered(Screen):
     """What was shown, in words."""
 
     def __init__(self) -> None:
         self.words: list[str] = []
-        self.ends: list[tuple[Outcome, frozenset[str], tuple[str, ...]]] = []
+        self.ends: list[Outcome] = []
 
-    def begin(self, saved: tuple[str, ...], running: tuple[str, ...] | None) -> None:
-        what = "everything" if running is None else " ".join(running) or "nothing"
-        self.words.append(f"{' '.join(saved)}: {what}" if saved else what)
+    def begin(self, saved: tuple[str, ...]) -> None:
+        self.words.append(" ".join(("begin", *saved)))
 
-    def again(self) -> None:
-        self.words.append("again")
+    def restart(self) -> None:
+        self.words.append("restart")
 
-    def same(self, saved: tuple[str, ...]) -> None:
-        self.words.append(f"{' '.join(saved)}: same")
+    def unchanged(self, saved: tuple[str, ...]) -> None:
+        self.words.append(" ".join(("unchanged", *saved)))
 
-    def end(self, outcome: Outcome, unchanged: frozenset[str], saved: tuple[str, ...]) -> None:
-        self.words.append("end")
-        self.ends.append((outcome, unchanged, saved))
+    def end(self, outcome: Outcome, saved: tuple[str, ...]) -> None:
+        self.words.append(" ".join(("end", *saved)))
+        self.ends.append(outcome)
 
 
 class Course:
     """A loop over a real package with made-up saves and gradings."""
 
-    def __init__(self, package: Path, rubric: Rubric, folder: Path, *steps: Step) -> None:
-        (folder / "kept").mkdir()
+    def __init__(self, package: Path, rubric: Rubric, *steps: Step) -> None:
         self.package, self.rubric = package, rubric
         self.saves = MadeUpSaves(*steps)
-        self.grading = MadeUpGrading(rubric, folder / "evidence")
-        self.shown = Remembered()
-        self.kept = Kept(folder / "kept", rubric)
+        self.grading = MadeUpGrading(rubric)
+        self.screen = Remembered()
         self.look: Callable[[], object] = lambda: None
-        self.runs = True
 
     def run(self) -> ExitCode:
         """Until all steps are gone, and Ctrl-C ends it."""
-        watched = Watched(folder=self.package, look=self._picture, grade=self.grading, runs=self.runs)
-        return watch(watched, self.saves, self.kept, self.shown)
+        return Watch(
+            self.package, look=self._snapshot, grade=self.grading, saves=self.saves, screen=self.screen
+        ).run()
 
-    def _picture(self):
+    def _snapshot(self):
         self.look()
-        return take_picture(str(self.package), self.rubric.package)
+        return take_snapshot(str(self.package), self.rubric.package)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,8 +15,9 @@ from grader.arena.asynchronous import Stop, Stopped, run_until_signal
 from grader.cli.parsing import build_parser
 from grader.errors import Busy, ExitCode, HostError, OutputError, SandboxMissing, SubmissionError
 from grader.model.progress import Silence
-from grader.student.watching.grading import Grading
-from tests.report.hostile import result
+from grader.model.verdict import Status
+from grader.student.watching import Grading
+from tests.report.hostile import criterion, result
 from tests.watching.labs import rubric
 
 
@@ -46,18 +48,26 @@ def outcomes(monkeypatch, *outcomes_: object) -> list[pipeline.GradeOptions]:
     return asked
 
 
-def test_evidence_and_the_stop_reach_the_pipeline(grading, monkeypatch, tmp_path) -> None:
+def test_the_stop_reaches_the_pipeline(grading, monkeypatch) -> None:
     asked = outcomes(monkeypatch, result(status="graded"))
-    stop, recorded = Stop(), {"talker": tmp_path / "talker.mcap"}
-    outcome = grading(recorded, stop)
-    assert (asked[0].recorded, asked[0].stop, asked[0].keep_hidden) == (recorded, stop, False)
-    assert outcome.evidence == tmp_path / "out" / result().submission.id / "evidence"
+    stop = Stop()
+    outcome = grading(stop)
+    assert (asked[0].stop, asked[0].keep_hidden) == (stop, False)
+    assert outcome.code is ExitCode.BELOW_PASS_MARK
+
+
+@pytest.mark.parametrize("static", [True, False])
+def test_what_was_not_judged_is_undecided_unless_nothing_was_to_run(static, grading, monkeypatch) -> None:
+    grading.options = replace(grading.options, static_only=static)
+    criteria = (criterion("rate", Status.INCONCLUSIVE, 0.0, 10.0),)
+    outcomes(monkeypatch, result(status="graded", criteria=criteria))
+    assert grading(Stop()).undecided is not static
 
 
 def test_a_submission_that_cannot_be_graded_is_a_result(grading, monkeypatch) -> None:
     outcomes(monkeypatch, SubmissionError("too much", hint="less"))
-    outcome = grading({}, Stop())
-    assert (outcome.code, outcome.evidence) == (ExitCode.NOT_GRADED, None)
+    outcome = grading(Stop())
+    assert (outcome.code, outcome.undecided) == (ExitCode.NOT_GRADED, True)
     assert outcome.result.error is not None
     assert (outcome.result.submission.id, outcome.result.error.hint) == ("lab1", "less")
 
@@ -65,15 +75,15 @@ def test_a_submission_that_cannot_be_graded_is_a_result(grading, monkeypatch) ->
 @pytest.mark.parametrize(
     "error", [SandboxMissing("no bwrap"), HostError("no memory"), OutputError("read-only")]
 )
-def test_what_no_save_can_mend_ends_it_at_the_start(error, grading, monkeypatch) -> None:
+def test_what_no_save_can_fix_ends_it_at_the_start(error, grading, monkeypatch) -> None:
     outcomes(monkeypatch, error)
     with pytest.raises(type(error)):
-        grading({}, Stop())
+        grading(Stop())
 
 
 def test_a_fault_of_the_machine_later_on_is_shown_and_tried_again(grading, monkeypatch) -> None:
     outcomes(monkeypatch, result(status="graded"), Busy("another grader"), result(status="graded"))
-    codes = [grading({}, Stop()).code for _ in range(3)]
+    codes = [grading(Stop()).code for _ in range(3)]
     assert codes[1] is ExitCode.NOT_GRADED
     assert codes[0] == codes[2]
 

@@ -1,21 +1,19 @@
-"""What the system tells of, in real folders."""
+"""Which saved files are found, in real folders, and which of them matter."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import subprocess
+import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from grader.arena.asynchronous import Stop
-from grader.student.watching.ignored import ignored
-from grader.student.watching.saves import WatchedFolders
-from grader.student.watching.snapshot import differing, folders_in, take_picture
-from tests.watching.labs import copy_of, write
+from grader.student.watching import Saves, changed_files, is_ignored, take_snapshot
+from tests.watching.labs import append, copy_of, write
 
 LEEDS = "leeds-comp3631-lab1"
 LONG_S = 30.0
@@ -26,127 +24,111 @@ def package(tmp_path: Path) -> Path:
     return copy_of(LEEDS, tmp_path)
 
 
-@pytest.fixture(params=["told", "polling"])
-def saves(request, package: Path, monkeypatch) -> Iterator[WatchedFolders]:
-    """Of the package, ready: it has told of a first save."""
-    if request.param == "polling":
-        monkeypatch.setenv("WATCHFILES_FORCE_POLLING", "1")
-    with WatchedFolders() as found:
-        follow(found, package)
-        yield found
-
-
-def follow(saves: WatchedFolders, package: Path, without: Path | None = None) -> None:
-    saves.follow(tuple(folders_in(package, without)), without)
-    until_s = time.monotonic() + LONG_S
-    while str(package / "ready") not in saves.wait(0.2):
-        write(package / "ready", str(time.monotonic()))
-        assert time.monotonic() < until_s
-
-
-def heard(saves: WatchedFolders, path: Path) -> set[str]:
-    """Everything that is told of until `path` is."""
-    found: set[str] = set()
-    until_s = time.monotonic() + LONG_S
-    while str(path) not in found:
-        found |= saves.wait(1.0)
-        assert time.monotonic() < until_s, found
+@pytest.fixture
+def saves(package: Path) -> Saves:
+    found = Saves()
+    found.follow((package,))
     return found
 
 
-def test_a_saved_file_is_told_of_in_whatever_way_it_is_saved(saves, package, request) -> None:
+def snapshot(package: Path, **options: Path):
+    return take_snapshot(str(package), "lab1", **options)
+
+
+def test_a_saved_file_is_found_in_whatever_way_it_is_saved(saves, package) -> None:
     talker = package / "src/talker.py"
     write(talker, "plainly")
-    heard(saves, talker)
-    if (
-        request.node.callspec.params["saves"] == "polling"
-    ):  # by times in whole seconds: the loop's own look sees more
-        return
+    assert saves.wait(0) == {str(talker)}
     write(talker.with_name("talker.py.tmp"), "by a rename, as many editors do").rename(talker)
-    assert str(talker.with_name("talker.py.tmp")) not in heard(saves, talker)
+    assert saves.wait(0) == {str(talker)}
+    talker.chmod(0o600)
+    assert saves.wait(0) == {str(talker)}
     talker.unlink()
-    heard(saves, talker)
+    assert saves.wait(0) == {str(talker)}
+    assert saves.wait(0) == frozenset()
 
 
-def test_what_editors_builds_and_git_leave_is_not_told_of(saves, package) -> None:
-    leftovers = [
+def test_what_editors_builds_and_git_leave_is_not_found(saves, package) -> None:
+    for name in (
         "src/.talker.py.swp",
         "src/talker.py~",
         "src/4913",
         "src/#talker.py#",
         "src/a.pyc",
-        "src/run.log",
-    ]
-    for name in leftovers:
+        "run.log",
+    ):
         write(package / name, "x")
-    last = write(package / "src/last.py", "x")
-    assert heard(saves, last) & {str(package / name) for name in leftovers} == set()
+    for name in ("build", "devel", "install", "logs", ".git", "src/__pycache__", "grader-results"):
+        write(package / name / "file.py", "x")
+    assert saves.wait(0) == frozenset()
+
+
+def test_a_new_folder_is_looked_at(saves, package) -> None:
+    new = write(package / "nodes/deep/new.py", "x = 1\n")
+    assert saves.wait(0) == {str(new)}
 
 
 def test_several_files_at_once_come_together(saves, package) -> None:
-    heard(saves, write(package / "src/begin.py", "x"))
-    saves.wait(0)
-    names = {str(write(package / f"src/file{number}.py", "x")) for number in range(20)}
-    assert names <= heard(saves, package / "src/file19.py")
+    def save() -> None:
+        for number in range(10):
+            write(package / f"src/file{number}.py", "x")
+            time.sleep(0.02)
+
+    thread = threading.Thread(target=save)
+    thread.start()
+    found = saves.wait(LONG_S)
+    thread.join()
+    assert {Path(name).name for name in found} == {f"file{number}.py" for number in range(10)}
 
 
-def test_a_save_asks_what_runs_to_stop(saves, package) -> None:
+@pytest.mark.parametrize("when", ["before", "during"])
+def test_a_save_asks_what_runs_to_stop(when, saves, package) -> None:
     stop = Stop()
-    with saves.stopping(stop):
-        assert not stop.asked
+    if when == "before":
         write(package / "src/talker.py", "x")
-        heard(saves, package / "src/talker.py")
-        assert stop.asked
+    with saves.stopping(stop):
+        if when == "during":
+            assert not stop.asked
+            write(package / "src/talker.py", "x")
+        until_s = time.monotonic() + LONG_S
+        while not stop.asked and time.monotonic() < until_s:
+            time.sleep(0.01)
+    assert stop.asked
+    assert saves.wait(0) == {str(package / "src/talker.py")}
 
 
-def test_what_was_saved_before_a_run_began_stops_it_at_once(saves, package) -> None:
-    write(package / "src/talker.py", "x")
-    until_s = time.monotonic() + LONG_S
-    asked = False
-    while not asked and time.monotonic() < until_s:
-        stop = Stop()
-        with saves.stopping(stop):
-            asked = stop.asked
-    assert asked
-
-
-def test_our_own_results_are_not_told_of(package) -> None:
+def test_our_own_results_are_not_found(package) -> None:
     results = package / "results"
     write(results / "lab1/result.json", "{}")
-    with WatchedFolders() as saves:
-        follow(saves, package, results)
-        write(results / "lab1/result.json", "{} ")
-        write(results / "new", "x")
-        last = write(package / "src/last.py", "x")
-        assert not any(name.startswith(str(results)) for name in heard(saves, last))
+    saves = Saves(results)
+    saves.follow((package,))
+    write(results / "lab1/result.json", "{} ")
+    assert saves.wait(0) == frozenset()
+    assert "results/lab1/result.json" not in snapshot(package, without=results).files
 
 
-def test_links_that_lead_out_are_not_followed(package, tmp_path) -> None:
-    outside = write(tmp_path / "outside/deep/file.py", "x").parent.parent
-    (package / "data").symlink_to(outside)
-    places = tuple(folders_in(package))
-    assert package / "data" not in places
-    assert not any(place.is_relative_to(outside) for place in places)
-    assert not any(path.startswith("data/") for path in take_picture(str(package), "lab1").files)
-
-
-def test_folders_of_builds_are_not_looked_at(package) -> None:
-    for name in ("build", "devel", "install", "logs", ".git", "src/__pycache__", "grader-results"):
-        (package / name).mkdir()
-    assert [p.relative_to(package).as_posix() for p in folders_in(package)] == [".", "launch", "src"]
+def test_links_that_lead_out_are_not_followed(saves, package, tmp_path) -> None:
+    outside = write(tmp_path / "outside/deep/file.py", "x")
+    (package / "data").symlink_to(tmp_path / "outside")
+    saves.wait(0)
+    append(outside)
+    assert saves.wait(0) == frozenset()
+    assert not any(path.startswith("data/") for path in snapshot(package).files)
 
 
 def test_a_package_below_a_folder_with_such_a_name_is_looked_at_all_the_same(tmp_path) -> None:
     package = copy_of(LEEDS, tmp_path / "build" / ".venv")
-    assert take_picture(str(package), "lab1").files.keys() >= {"package.xml", "src/talker.py"}
-    with WatchedFolders() as saves:
-        follow(saves, package)
+    assert snapshot(package).files.keys() >= {"package.xml", "src/talker.py"}
+    saves = Saves()
+    saves.follow((package,))
+    append(package / "src/talker.py")
+    assert saves.wait(0) == {str(package / "src/talker.py")}
 
 
 def test_no_folder_at_all_is_no_error() -> None:
-    with WatchedFolders() as saves:
-        saves.follow((Path("/nowhere/at/all"),), None)
-        assert saves.wait(0) == frozenset()
+    saves = Saves()
+    saves.follow((Path("/nowhere/at/all"),))
+    assert saves.wait(0) == frozenset()
 
 
 @pytest.mark.parametrize(
@@ -154,8 +136,8 @@ def test_no_folder_at_all_is_no_error() -> None:
     ["src/.talker.py.swp", "a~", "x/.git/index", "__pycache__/a.pyc", "a.pyo", "build/x", "src/.#talker.py", "4913",
      "talker.py.bak", ".goutputstream-X1Y2", "bag.bag.active", "run.log", "talker.py___jb_tmp___", "grader-results/a"],
 )  # fmt: skip
-def test_names_that_are_of_no_interest(name) -> None:
-    assert ignored(name)
+def test_names_that_are_ignored(name) -> None:
+    assert is_ignored(name)
 
 
 @pytest.mark.parametrize(
@@ -170,20 +152,30 @@ def test_names_that_are_of_no_interest(name) -> None:
         "CMakeLists.txt",
     ],
 )
-def test_names_that_are(name) -> None:
-    assert not ignored(name)
+def test_names_that_are_not(name) -> None:
+    assert not is_ignored(name)
 
 
 def test_a_first_commit_changes_no_file(package) -> None:
-    before = take_picture(str(package), "lab1")
+    before = snapshot(package)
     for words in (["init", "-q"], ["add", "."]):
         subprocess.run([shutil.which("git") or "git", *words], cwd=package, check=True)
-    assert differing(before, take_picture(str(package), "lab1")) == ()
+    assert changed_files(before, snapshot(package)) == ()
 
 
-def test_permissions_are_part_of_the_picture_and_times_are_not(package) -> None:
-    before = take_picture(str(package), "lab1")
+def test_permissions_are_part_of_a_snapshot_and_times_are_not(package) -> None:
+    before = snapshot(package)
     os.utime(package / "src/talker.py")
-    assert take_picture(str(package), "lab1").same_as(before)
+    assert snapshot(package) == before
     (package / "src/talker.py").chmod(0o600)
-    assert not take_picture(str(package), "lab1").same_as(before)
+    assert snapshot(package) != before
+
+
+def test_packages_that_are_built_with_it_are_part_of_a_snapshot(package, tmp_path) -> None:
+    other = copy_of("mcr2-basic-comms", tmp_path)
+    manifest = package / "package.xml"
+    manifest.write_text(manifest.read_text().replace("</package>", "<depend>basic_comms</depend></package>"))
+    before = snapshot(tmp_path)
+    assert set(before.folders) == {package, other}
+    append(other / "scripts/talker.py")
+    assert changed_files(before, snapshot(tmp_path)) == ("../basic_comms/scripts/talker.py",)

@@ -11,9 +11,8 @@ from rich.console import Console
 from grader.errors import ExitCode
 from grader.model.result import ErrorInfo, GradingResult
 from grader.model.verdict import Status
-from grader.student.watching.loop import Outcome
-from grader.student.watching.shown import DASH, JsonShown, ScreenShown
-from grader.student.watching.turns import turns
+from grader.student.watch_screen import DASH, JsonLines, TerminalScreen, compare
+from grader.student.watching import Outcome
 from tests.report.hostile import ESCAPES, MARKDOWN, RICH, XML, criterion, result, rubric
 
 NOON = datetime(2026, 3, 2, 12, 3, 4, tzinfo=timezone.utc)
@@ -50,23 +49,23 @@ TWO = criterion("wrap", Status.FAIL, 0.0, 15.0, scenario="wraps", message="127 c
 HALF = criterion("wrap", Status.PARTIAL, 7.5, 15.0, scenario="wraps", message="once")
 
 
-def shown(stream, *results: GradingResult, unchanged: frozenset[str] = frozenset(), **options) -> str:
-    screen = ScreenShown("lab1", lab(ONE, TWO), stream, clock=lambda: NOON, **options)
-    screen.begin((), None)
+def shown(stream, *results: GradingResult, **options) -> str:
+    screen = TerminalScreen("lab1", lab(ONE, TWO), stream, clock=lambda: NOON, **options)
+    screen.begin(())
     for number, one in enumerate(results):
         if number:
-            screen.begin(("src/talker.py",), ("talker", "wraps"))
+            screen.begin(("src/talker.py",))
         saved = ("src/talker.py",) if number else ()
-        screen.end(Outcome(result=one, code=ExitCode.PASSED, evidence=None), unchanged, saved)
+        screen.end(Outcome(result=one, code=ExitCode.PASSED), saved)
     return stream.getvalue()
 
 
 def test_the_first_result_is_whole_and_later_ones_say_what_changed() -> None:
     text = shown(StringIO(), graded(ONE, TWO), graded(LOST, TWO))
-    first, later = text.split(f"watching lab1 {DASH} Ctrl-C ends\n")
+    first, later = text.split(f"Watching lab1 {DASH} Ctrl-C ends it\n")
     assert "All criteria" in first
     assert later.splitlines() == [
-        f"watching lab1 {DASH} saved src/talker.py at 12:03:04: running talker, wraps … Ctrl-C ends",
+        f"Watching lab1 {DASH} saved src/talker.py at 12:03:04: running everything … Ctrl-C ends it",
         "0 of 25 points, 25 lost",
         "now lost: rate 0/10",
         "",
@@ -74,14 +73,8 @@ def test_the_first_result_is_whole_and_later_ones_say_what_changed() -> None:
         "✗ wrap  0/15  127 came twice",
         "✗ rate  0/10  5 Hz, not 10 Hz",
         "    hint: Rate(10)",
-        f"watching lab1 {DASH} saved src/talker.py at 12:03:04 … Ctrl-C ends",
+        f"Watching lab1 {DASH} saved src/talker.py at 12:03:04 … Ctrl-C ends it",
     ]
-
-
-def test_what_was_not_run_again_is_marked() -> None:
-    text = shown(StringIO(), graded(ONE, TWO), graded(LOST, TWO), unchanged=frozenset({"wraps"}))
-    assert "127 came twice  (unchanged)\n" in text
-    assert "5 Hz, not 10 Hz\n" in text
 
 
 def test_a_terminal_is_cleared_between_runs_without_its_scrollback() -> None:
@@ -89,29 +82,29 @@ def test_a_terminal_is_cleared_between_runs_without_its_scrollback() -> None:
     assert text.count(CLEARED) == 1
     assert "\x1b[3J" not in text
     before, after = text.split(CLEARED)
-    assert "running talker, wraps" in before
+    assert "running everything" in before
     assert "now lost: rate" in after
 
 
 def test_a_log_has_no_escapes_and_each_message_on_one_line() -> None:
-    screen = ScreenShown("lab1", lab(ONE), stream := StringIO(), clock=lambda: NOON)
+    screen = TerminalScreen("lab1", lab(ONE), stream := StringIO(), clock=lambda: NOON)
     names = tuple(f"src/a_rather_long_name_of_a_script_{number}.py" for number in range(9))
-    screen.begin(names, ("talker",))
-    screen.same(names)
-    screen.again()
+    screen.begin(names)
+    screen.unchanged(names)
+    screen.restart()
     assert "\x1b" not in stream.getvalue()
     begin, same, again = stream.getvalue().splitlines()
-    assert begin.endswith("_2.py and 6 more at 12:03:04: running talker … Ctrl-C ends")
-    assert same.endswith("12:03:04: the package is what it was … Ctrl-C ends")
-    assert again == f"watching lab1 {DASH} saved again: what ran was stopped"
+    assert begin.endswith("_2.py and 6 more at 12:03:04: running everything … Ctrl-C ends it")
+    assert same.endswith("12:03:04: nothing has changed … Ctrl-C ends it")
+    assert again == f"Watching lab1 {DASH} saved again: starting over"
 
 
 def test_an_error_is_shown_and_the_next_result_is_compared_with_the_last_one_before_it() -> None:
     wrong = graded(
-        ONE, TWO, status="error", error=ErrorInfo(kind="submission", message="no package", hint="mend")
+        ONE, TWO, status="error", error=ErrorInfo(kind="submission", message="no package", hint="fix it")
     )
     text = shown(StringIO(), graded(ONE, TWO), wrong, graded(ONE, HALF))
-    assert "could not be graded: no package\n    hint: mend\n" in text
+    assert "Could not be graded: no package\n    hint: fix it\n" in text
     assert "better: wrap 7.5/15\n" in text
 
 
@@ -136,10 +129,10 @@ def test_hostile_text_steers_nothing() -> None:
     bad = criterion("rate", Status.FAIL, 0.0, 10.0, message=words, hint=words)
     wrong = graded(bad, error=ErrorInfo(kind="submission", message=words, hint=words))
     for stream in (StringIO(), Terminal()):
-        screen = ScreenShown("lab\x1b[31m", lab(bad), stream, clock=lambda: NOON)
+        screen = TerminalScreen("lab\x1b[31m", lab(bad), stream, clock=lambda: NOON)
         for saved, one in (((), graded(bad)), ((words,), graded(bad)), ((words,), wrong)):
-            screen.begin(saved, ("talker",))
-            screen.end(Outcome(result=one, code=ExitCode.PASSED, evidence=None), frozenset(), saved)
+            screen.begin(saved)
+            screen.end(Outcome(result=one, code=ExitCode.PASSED), saved)
         text = stream.getvalue()
         assert "\x1b]0;" not in text
         assert "\x1b[31mred" not in text
@@ -150,35 +143,39 @@ def test_hostile_text_steers_nothing() -> None:
 
 def test_an_encoding_without_dashes_gets_plain_ones() -> None:
     stream = TextIOWrapper(buffer := BytesIO(), encoding="ascii")
-    ScreenShown("lab1", lab(ONE), stream, clock=lambda: NOON).begin((), None)
+    TerminalScreen("lab1", lab(ONE), stream, clock=lambda: NOON).begin(())
     stream.flush()
-    assert buffer.getvalue() == b"watching lab1 - running everything ... Ctrl-C ends\n"
+    assert buffer.getvalue() == b"Watching lab1 - running everything ... Ctrl-C ends it\n"
 
 
 def test_json_is_one_document_a_line_for_each_run() -> None:
     stream = TextIOWrapper(buffer := BytesIO(), encoding="utf-8")
-    screen = JsonShown(stream)
+    screen = JsonLines(stream)
     words = f"{ESCAPES}\n\u2028 ##[error]"
-    screen.begin((), None)
+    screen.begin(())
     for message in ("fine", words):
         one = graded(criterion("rate", Status.FAIL, 0.0, 10.0, message=message))
-        screen.end(Outcome(result=one, code=ExitCode.PASSED, evidence=None), frozenset(), ())
-    screen.again()
+        screen.end(Outcome(result=one, code=ExitCode.PASSED), ())
+    screen.restart()
     rows = buffer.getvalue().decode().split("\n")
     assert [json.loads(row)["criteria"][0]["message"] for row in rows[:-1]] == ["fine", words]
     assert rows[-1] == ""
 
 
-def test_what_turned() -> None:
+def test_what_is_better_and_what_is_worse() -> None:
     open_ = criterion("rate", Status.INCONCLUSIVE, 0.0, 10.0)
     advice = criterion("advice", Status.FAIL, 0.0, 0.0)
-    assert [c.id for c in turns(graded(LOST), graded(ONE)).reached] == ["rate"]
-    assert [c.id for c in turns(graded(ONE), graded(LOST)).lost] == ["rate"]
-    assert [c.id for c in turns(graded(TWO), graded(HALF)).more] == ["wrap"]
-    assert [c.id for c in turns(graded(HALF), graded(TWO)).less] == ["wrap"]
-    assert [c.id for c in turns(graded(ONE), graded(open_)).open] == ["rate"]
-    assert not turns(graded(ONE, TWO, advice), graded(ONE, TWO))
-    assert not turns(None, graded(ONE))
+
+    def words(before, after) -> dict[str, list[str]]:
+        return {name: [c.id for c in found] for name, found in compare(graded(before), graded(after)).items()}
+
+    assert words(LOST, ONE) == {"now reached": ["rate"]}
+    assert words(ONE, LOST) == {"now lost": ["rate"]}
+    assert words(TWO, HALF) == {"better": ["wrap"]}
+    assert words(HALF, TWO) == {"worse": ["wrap"]}
+    assert words(ONE, open_) == {"no longer judged": ["rate"]}
+    assert words(open_, open_) == {}
+    assert compare(graded(ONE, TWO, advice), graded(ONE, TWO)) == {}
 
 
 def test_rich_clears_as_we_say() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from contextlib import ExitStack, nullcontext
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,18 +22,17 @@ from grader.errors import ExitCode, UsageError
 from grader.files import check_writable
 from grader.intake import safe_name
 from grader.model.git_status import Standing
-from grader.model.progress import Silence
+from grader.model.progress import Progress, Silence
 from grader.model.result import GradingResult
 from grader.report.hidden import hidden_ids, without_hidden
 from grader.report.terminal import open_console
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_ros
-from grader.student.git_status import write_staged
+from grader.student.git_view import write_staged
 from grader.temporary import temporary_folder
 
 if TYPE_CHECKING:
     from grader.arena.sandbox import Mode
-    from grader.student.watching.loop import Shown
 
 
 def run(
@@ -69,7 +68,7 @@ def run(
         submission_id=None,
         static_only=static,
         keep_hidden=False,
-        files=watch or out is not None,
+        files=out is not None,
     )
     running = [one.rubric for one in chosen if not static and needs_ros(one.rubric)]
     if running:
@@ -147,45 +146,27 @@ def _package(chosen: Chosen) -> Path:
 def _watch(
     source: str, rubric: LoadedRubric, options: pipeline.GradeOptions, *, out: Path | None, as_json: bool
 ) -> ExitCode:
-    from grader.student.watching.grading import Grading  # noqa: PLC0415 - nobody else needs what this loads
-    from grader.student.watching.kept import Kept  # noqa: PLC0415
-    from grader.student.watching.loop import Watched, watch  # noqa: PLC0415
-    from grader.student.watching.saves import WatchedFolders  # noqa: PLC0415
-    from grader.student.watching.snapshot import take_picture  # noqa: PLC0415
+    from grader.student.watch_screen import JsonLines, TerminalScreen  # noqa: PLC0415 - slow to load
+    from grader.student.watching import Grading, watch  # noqa: PLC0415
 
-    static = options.static_only
+    static, hidden = options.static_only, len(hidden_ids(rubric.rubric))
 
     def code(result: GradingResult) -> ExitCode:
         return exit_code(settled(result.criteria) if static else result.criteria, rubric.rubric)
 
+    def progress(first: bool) -> AbstractContextManager[Progress]:
+        return nullcontext(Silence()) if static else open_progress(early=first and not as_json)
+
     without = out.resolve() if out is not None else None
+    name = Path(source).name
+    screen = (
+        JsonLines(sys.stdout)
+        if as_json
+        else TerminalScreen(name, rubric.rubric, sys.stdout, hidden=hidden, static=static)
+    )
     with ExitStack() as stack:
+        folder = without or stack.enter_context(temporary_folder("check"))
         grading = Grading(
-            source=source,
-            rubric=rubric,
-            out=without or stack.enter_context(temporary_folder("check")),
-            options=options,
-            progress=lambda first: (
-                nullcontext(Silence()) if static else open_progress(early=first and not as_json)
-            ),
-            code=code,
+            source=source, rubric=rubric, out=folder, options=options, progress=progress, code=code
         )
-        watched = Watched(
-            folder=Path(source),
-            look=lambda: take_picture(source, rubric.rubric.package, without=without),
-            grade=grading,
-            without=without,
-            runs=not static,
-        )
-        kept = Kept(stack.enter_context(temporary_folder("check")), rubric.rubric)
-        saves = stack.enter_context(WatchedFolders())
-        return watch(watched, saves, kept, _shown(Path(source), rubric, static=static, as_json=as_json))
-
-
-def _shown(folder: Path, rubric: LoadedRubric, *, static: bool, as_json: bool) -> Shown:
-    from grader.student.watching.shown import JsonShown, ScreenShown  # noqa: PLC0415 - as above
-
-    if as_json:
-        return JsonShown(sys.stdout)
-    hidden = len(hidden_ids(rubric.rubric))
-    return ScreenShown(folder.name, rubric.rubric, sys.stdout, hidden=hidden, static=static)
+        return watch(grading, screen, without=without)

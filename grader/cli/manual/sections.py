@@ -17,7 +17,6 @@ ENVIRONMENT = {
     "/opt/ros, then for Debian's packages, then in the active conda environment.",
     "GITHUB_TOKEN, GITLAB_TOKEN": "credentials for submissions that are fetched from there. Stored nowhere.",
     "GRADER_GIT_HOST, GRADER_GIT_TOKEN, GRADER_GIT_USER": "the same for another host.",
-    "WATCHFILES_FORCE_POLLING": "set to 1, grader check --watch looks for saved files itself, as network folders need.",
     "XDG_CACHE_HOME": "where the folder grader of things kept for later lies, instead of ~/.cache.",
     "XDG_RUNTIME_DIR": "where gradings that run at the same time take turns.",
 }

@@ -26,7 +26,7 @@ def add_grading(add: Adder) -> None:
         help="with --static: look at what git has staged, for a pre-commit hook; only what fails fails it",
     )
     check.add_argument(
-        "--watch", action="store_true", help="stay, and run again what a saved file concerns, until Ctrl-C"
+        "--watch", action="store_true", help="stay, and check again whenever a file is saved, until Ctrl-C"
     )
     out_option(check, "keep the results in DIR/<submission id>/ (default: they are only shown)")
     sandbox_option(check)

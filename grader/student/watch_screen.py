@@ -1,0 +1,192 @@
+"""What `grader check --watch` prints: on a terminal a screen that is cleared between runs, else line after line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from datetime import datetime
+from typing import IO, TextIO
+
+from rich.console import RenderableType
+from rich.padding import Padding
+from rich.text import Text
+
+from grader.model.result import CriterionResult, GradingResult
+from grader.model.verdict import Status
+from grader.report.result_json import result_text
+from grader.report.terminal import STYLES, emit, mark, open_console, print_report
+from grader.report.text import line, number
+from grader.report.view import Loss, arrange, places, points_of
+from grader.rubric.model import Rubric
+from grader.student.watching import UNDECIDED, Outcome, Screen
+
+NAME_CHARS, TEXT_CHARS = 60, 300
+NAMES_SHOWN = 3
+ENDS = "Ctrl-C ends it"
+DASH = "\N{EN DASH}"
+INDENT = 4
+CHANGES = {
+    "now reached": "green",
+    "better": "green",
+    "now lost": "red",
+    "worse": "red",
+    "no longer judged": "yellow",
+}
+
+
+class TerminalScreen(Screen):
+    """Prints the first result in full, as `grader check` does, and later ones shortened.
+
+    On a terminal, a result stays while the next one is worked out. `hidden` is how many criteria are left out.
+    """
+
+    def __init__(
+        self,
+        package: str,
+        rubric: Rubric,
+        stream: IO[str],
+        *,
+        hidden: int = 0,
+        static: bool = False,
+        clock: Callable[[], datetime] = lambda: datetime.now().astimezone(),
+    ) -> None:
+        self._package, self._rubric, self._hidden, self._static = package, rubric, hidden, static
+        self._console = open_console(stream)
+        self._clock = clock
+        self._at = clock()
+        self._last: GradingResult | None = None
+        self._ended = False
+
+    def begin(self, saved: tuple[str, ...]) -> None:
+        """See `Screen`."""
+        self._at = self._clock()
+        doing = "looking at the files" if self._static else "running everything"
+        self._say(f"{self._saved(saved)}: {doing} … {ENDS}" if saved else f"{doing} … {ENDS}")
+
+    def restart(self) -> None:
+        """See `Screen`."""
+        self._say("saved again: starting over")
+
+    def unchanged(self, saved: tuple[str, ...]) -> None:
+        """See `Screen`."""
+        self._at = self._clock()
+        self._say(f"{self._saved(saved)}: nothing has changed … {ENDS}")
+
+    def end(self, outcome: Outcome, saved: tuple[str, ...]) -> None:
+        """See `Screen`."""
+        result = outcome.result
+        if self._console.is_terminal and self._ended:
+            self._console.clear()
+        self._ended = True
+        if result.error is not None:
+            self._emit([Text(f"Could not be graded: {self._show(result.error.message)}", "red")])
+            self._emit(self._details([("hint", result.error.hint)]))
+        elif self._last is None:
+            print_report(result, self._rubric, self._console, hidden=self._hidden, static=self._static)
+        else:
+            self._emit(self._short(result, self._last))
+        self._last = result if result.error is None else self._last
+        self._say(f"{self._saved(saved)} … {ENDS}" if saved else ENDS)
+
+    def _short(self, result: GradingResult, before: GradingResult) -> Iterable[RenderableType]:
+        view = arrange(result, self._rubric)
+        lost = number(sum(loss.points for loss in view.lost))
+        yield Text.assemble(
+            (f"{number(result.points)} of {number(result.max_points)} points", "bold"),
+            f", {lost} lost" if view.lost else ", nothing lost",
+        )
+        changed = compare(before, result)
+        for words, criteria in changed.items():
+            names = ", ".join(f"{self._show(c.id, NAME_CHARS)} {points_of(c)}" for c in criteria)
+            yield Text(f"{words}: {names}", CHANGES[words])
+        if not changed:
+            yield Text("as before", "dim")
+        yield from self._losses("Lost", view.lost)
+        if not self._static:
+            yield from self._losses("Still open: no points are lost for good", view.open)
+        elif view.open:
+            points = number(sum(loss.points for loss in view.open))
+            yield Text(f"\nNothing was run (--static): criteria worth {points} points are still open.")
+
+    def _losses(self, title: str, losses: Sequence[Loss]) -> Iterable[RenderableType]:
+        if losses:
+            yield Text(f"\n{title}", "bold")
+        for loss in losses:
+            criterion = loss.criterion
+            style = STYLES[criterion.status]
+            text = Text(f"{mark(criterion.status, self._console.encoding)} ", style)
+            text.append(f"{self._show(criterion.id, NAME_CHARS)}  {points_of(criterion)}  ", style)
+            yield text.append(self._show(criterion.message or criterion.title))
+            yield from self._details(
+                [
+                    ("hint", criterion.hint),
+                    ("where", ", ".join(places(criterion))),
+                    ("also", ", ".join(f"{c.id} {points_of(c)}" for c in loss.alike)),
+                    ("blocks", ", ".join(f"{c.id} {points_of(c)}" for c in loss.blocked)),
+                ]
+            )
+
+    def _details(self, rows: Iterable[tuple[str, str]]) -> Iterable[RenderableType]:
+        for name, words in rows:
+            if words:
+                yield Padding(Text(f"{name}: {self._show(words)}", "dim"), (0, 0, 0, INDENT))
+
+    def _saved(self, saved: tuple[str, ...]) -> str:
+        """`saved src/talker.py at 12:03:04`."""
+        names = ", ".join(self._show(name, NAME_CHARS) for name in saved[:NAMES_SHOWN])
+        more = f" and {len(saved) - NAMES_SHOWN} more" if len(saved) > NAMES_SHOWN else ""
+        return f"saved {names}{more} at {self._at:%H:%M:%S}"
+
+    def _say(self, words: str) -> None:
+        text = self._show(f"Watching {self._package} {DASH} {words}", 3 * TEXT_CHARS)
+        if self._console.is_terminal:
+            self._emit([Text(f"\n{text}", "cyan")])
+        else:
+            self._console.file.write(f"{text}\n")
+            self._console.file.flush()
+
+    def _emit(self, parts: Iterable[RenderableType]) -> None:
+        emit(self._console, parts)
+        self._console.file.flush()
+
+    def _show(self, text: str, limit: int = TEXT_CHARS) -> str:
+        text, encoding = line(text, limit), self._console.encoding
+        if text.encode(encoding, "ignore").decode(encoding) != text:
+            text = text.replace(DASH, "-").replace("…", "...")
+        return text.encode(encoding, "backslashreplace").decode(encoding)
+
+
+class JsonLines(Screen):
+    """Prints each result as a JSON document on a line of its own, and nothing else."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def end(self, outcome: Outcome, _saved: tuple[str, ...]) -> None:
+        """See `Screen`."""
+        ascii_only = (self._stream.encoding or "ascii").lower().replace("-", "") != "utf8"
+        rows = result_text(outcome.result, ascii_only=ascii_only).split("\n")
+        self._stream.write(f"{' '.join(row.strip() for row in rows).strip()}\n")
+        self._stream.flush()
+
+
+def compare(before: GradingResult, after: GradingResult) -> dict[str, list[CriterionResult]]:
+    """Return the criteria worth points that are better or worse than before, under the words of `CHANGES`."""
+    earlier = {c.id: c for c in before.criteria}
+    found: dict[str, list[CriterionResult]] = {words: [] for words in CHANGES}
+    for criterion in after.criteria:
+        if criterion.id in earlier and criterion.max_points > 0:
+            words = _change(earlier[criterion.id], criterion)
+            if words:
+                found[words].append(criterion)
+    return {words: criteria for words, criteria in found.items() if criteria}
+
+
+def _change(before: CriterionResult, after: CriterionResult) -> str:
+    if after.status in UNDECIDED:
+        return "" if before.status in UNDECIDED else "no longer judged"
+    had, has = before.status is Status.PASS, after.status is Status.PASS
+    if has != had:
+        return "now reached" if has else "now lost"
+    if after.points == before.points:
+        return ""
+    return "better" if after.points > before.points else "worse"

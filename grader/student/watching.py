@@ -1,0 +1,368 @@
+"""`grader check --watch`: grade a package again whenever one of its files is saved, until Ctrl-C.
+
+A package's folder and the options of `grader check` come in; results go to a screen (`watch_screen`). Each run grades
+everything anew: how one file of a package affects another cannot be foreseen, and a stale result would mislead.
+
+Saves are found by polling, which works on network folders and virtual machines' shares too. A save only says when to
+look; whether the package has changed is decided by its contents.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path, PurePosixPath
+
+from grader import pipeline
+from grader.arena.asynchronous import Stop, Stopped
+from grader.arena.workspace import needed_packages
+from grader.errors import ExitCode, GraderError, SubmissionError, UsageError
+from grader.faults import Attempt, error_result
+from grader.intake import open_submission
+from grader.intake.identity import identify
+from grader.model.package import SourceFile
+from grader.model.progress import Progress
+from grader.model.result import GradingResult, SubmissionInfo, TimingInfo
+from grader.model.verdict import Status
+from grader.package.files import read_files
+from grader.package.reading import LEFT_OUT
+from grader.report.hidden import without_hidden
+from grader.rubric.load import LoadedRubric
+from grader.temporary import temporary_folder
+
+POLL_S = 0.25
+AGAIN_S = 0.4
+GONE_S = 1.0
+WAIT_S = 5.0
+LOOKS = 3
+NO_TIME = TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0)
+UNDECIDED = frozenset({Status.INCONCLUSIVE, Status.ERROR})
+IGNORED_FOLDERS = LEFT_OUT | {
+    ".tox", ".venv", ".idea", ".vscode", "node_modules", ".mypy_cache", ".pytest_cache", ".ruff_cache",
+    ".hypothesis", "logs", "grader-results",
+}  # fmt: skip
+IGNORED_NAMES = re.compile(
+    r"""
+      \.py[cod]$ | \.log$ | \.active$                       # Python's, and what ROS is still writing
+    | ~$ | \.sw[a-z]$ | ^4913$ | \.(bak|orig|tmp|part)$     # vim, and many others
+    | ^\.?\# | ^flycheck_ | ^flymake_                       # Emacs
+    | \.kate-swp$ | ^\.goutputstream- | ^\.~lock | ___jb_\w+___$
+    | ^\.DS_Store$ | ^\.nfs | ^\.fuse_hidden
+    """,
+    re.VERBOSE,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Snapshot:
+    """The files of a package, and of those built with it, at one moment.
+
+    Two are equal if the grader would say the same of both: `hints` has git's view of the modes. `folders` are those
+    of all the packages.
+    """
+
+    folder: Path
+    files: dict[str, SourceFile]
+    hints: tuple[str, ...]
+    folders: tuple[Path, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """One result. While it is `undecided`, a save is reason enough to try again, even if no file has changed."""
+
+    result: GradingResult
+    code: ExitCode
+    undecided: bool = False
+
+
+class Screen:
+    """Shows the user what happens. This one shows nothing."""
+
+    def begin(self, saved: tuple[str, ...]) -> None:
+        """Show that a run begins because these files were saved; none for the first run."""
+
+    def restart(self) -> None:
+        """Show that a run was stopped because something was saved meanwhile."""
+
+    def end(self, outcome: Outcome, saved: tuple[str, ...]) -> None:
+        """Show a result."""
+
+    def unchanged(self, saved: tuple[str, ...]) -> None:
+        """Show that something was saved that changes nothing."""
+
+
+@dataclass(kw_only=True)
+class Grading:
+    """Grades `source` into `out`, as often as it is called. `code` gives the exit code of a result; `progress` opens a
+    display and is told whether it is the first one."""
+
+    source: str
+    rubric: LoadedRubric
+    out: Path
+    options: pipeline.GradeOptions
+    progress: Callable[[bool], AbstractContextManager[Progress]]
+    code: Callable[[GradingResult], ExitCode]
+    _begun: bool = field(default=False, init=False)
+
+    def __call__(self, stop: Stop) -> Outcome:
+        """Return the outcome. Raises Stopped, and GraderError where no save can help: a wrong use, or a fault of the
+        machine at the very start."""
+        try:
+            with self.progress(not self._begun) as progress:
+                options = replace(self.options, stop=stop)
+                result = pipeline.grade(self.source, self.rubric, self.out, options, progress)
+        except GraderError as error:
+            if isinstance(error, UsageError) or (error.blame != "submission" and not self._begun):
+                raise
+            result = self._error_result(error)
+        self._begun = True
+        undecided = not self.options.static_only and any(c.status in UNDECIDED for c in result.criteria)
+        shown = without_hidden(result, self.rubric.rubric)
+        if shown.status == "error":
+            return Outcome(result=shown, code=ExitCode.NOT_GRADED, undecided=True)
+        return Outcome(result=shown, code=self.code(shown), undecided=undecided)
+
+    def _error_result(self, error: GraderError) -> GradingResult:
+        name, source = identify(self.source) or (Path(self.source).name, self.source)
+        about = SubmissionInfo(id=name, source=source, commit=None, digest="", package="")
+        attempt = Attempt(
+            source=self.source,
+            submission_id=None,
+            rubric=self.rubric,
+            out=self.out,
+            keep_hidden=False,
+            timing=lambda: NO_TIME,
+        )
+        return error_result(error, about, attempt)
+
+
+class Watch:
+    """The loop. `folder` is the absolute path that the command line named.
+
+    `look` takes a snapshot of the package; `grade` grades it, and raises no SubmissionError.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        look: Callable[[], Snapshot],
+        grade: Callable[[Stop], Outcome],
+        saves: Saves,
+        screen: Screen,
+    ) -> None:
+        self._folder = folder
+        self._take, self._grade, self._saves, self._screen = look, grade, saves, screen
+        self._graded: Snapshot | None = None
+        self._last: Outcome | None = None
+        self._saved: set[str] = set()
+
+    def run(self) -> ExitCode:
+        """Run until Ctrl-C, then return the exit code of the last result; KeyboardInterrupt where there is none yet.
+
+        Raises SubmissionError where the package's folder is gone, and what `grade` raises.
+        """
+        try:
+            while True:
+                while not self._run_once():
+                    self._screen.restart()
+                self._saved.clear()
+                while not self._wait_for_change():
+                    pass
+        except KeyboardInterrupt:
+            if self._last is None:
+                raise
+            return self._last.code
+
+    def _run_once(self) -> bool:
+        """Grade and show the result; false where files were saved meanwhile, so that it no longer holds."""
+        snapshot = self._look()
+        saved = self._names_to_show(snapshot)
+        self._screen.begin(saved)
+        stop = Stop()
+        try:
+            with self._saves.stopping(stop):
+                outcome = self._grade(stop)
+        except Stopped:
+            self._saved |= self._saves.wait(0)
+            return False
+        meanwhile = self._saves.wait(AGAIN_S if outcome.result.error is not None else 0)
+        if meanwhile and self._look() != snapshot:
+            self._saved |= meanwhile
+            return False
+        self._graded, self._last = snapshot, outcome
+        self._screen.end(outcome, saved)
+        return True
+
+    def _wait_for_change(self) -> bool:
+        """Wait a while for a save; return whether to grade again.
+
+        Without a save, the package may have changed all the same: git's view of the modes is kept elsewhere.
+        """
+        self._saved |= self._saves.wait(WAIT_S)
+        snapshot = self._look()
+        if snapshot != self._graded:
+            return True
+        if not self._saved:
+            return False
+        if snapshot is None or (self._last is not None and self._last.undecided):
+            return True
+        self._screen.unchanged(self._relative(self._saved))
+        self._saved.clear()
+        return False
+
+    def _look(self) -> Snapshot | None:
+        """The package now; None where it cannot be read, even after a second look: an editor may be replacing it."""
+        for _ in range(LOOKS):
+            self._check_folder()
+            try:
+                snapshot = self._take()
+            except (SubmissionError, OSError):
+                self._saved |= self._saves.wait(AGAIN_S)
+                continue
+            self._folder = snapshot.folder
+            self._saves.follow(snapshot.folders)
+            return snapshot
+        self._saves.follow((self._folder,))
+        return None
+
+    def _check_folder(self) -> None:
+        until_s = time.monotonic() + GONE_S
+        while not self._folder.is_dir():
+            if time.monotonic() > until_s:
+                raise SubmissionError(f"{self._folder} was deleted or renamed while it was watched")
+            self._saves.wait(GONE_S / 10)
+
+    def _names_to_show(self, snapshot: Snapshot | None) -> tuple[str, ...]:
+        """The files that differ from the last graded ones; else those that were saved."""
+        changed = changed_files(self._graded, snapshot) if snapshot and self._graded else ()
+        return changed or self._relative(self._saved)
+
+    def _relative(self, saved: Iterable[str]) -> tuple[str, ...]:
+        return tuple(
+            sorted(name.removeprefix(f"{self._folder}{os.sep}").replace(os.sep, "/") for name in saved)
+        )
+
+
+class Saves:
+    """Finds saved files by polling, in the folders to `follow`, but not what is below `without`."""
+
+    def __init__(self, without: Path | None = None) -> None:
+        self._without = without
+        self._folders: tuple[Path, ...] = ()
+        self._seen: dict[str, tuple[int, ...]] = {}
+        self._saved: set[str] = set()
+
+    def follow(self, folders: tuple[Path, ...]) -> None:
+        """Poll these folders from now on."""
+        if folders != self._folders:
+            self._folders = folders
+            self._seen = dict(self._stamps())
+
+    def wait(self, timeout_s: float) -> frozenset[str]:
+        """Return the paths saved since the last call, as soon as there are any; none after `timeout_s`.
+
+        Files that are saved right after one another come together.
+        """
+        until_s = time.monotonic() + timeout_s
+        while not self._poll() and (left_s := until_s - time.monotonic()) > 0:
+            time.sleep(min(POLL_S, left_s))
+        while timeout_s and self._saved:
+            known = len(self._saved)
+            time.sleep(POLL_S / 2)
+            self._poll()
+            if len(self._saved) == known:
+                break
+        found, self._saved = frozenset(self._saved), set()
+        return found
+
+    @contextmanager
+    def stopping(self, stop: Stop) -> Iterator[None]:
+        """A context in which any save asks `stop`."""
+        end = threading.Event()
+
+        def poll() -> None:
+            while not self._poll() and not end.wait(POLL_S):
+                pass
+            if self._saved:
+                stop.ask()
+
+        thread = threading.Thread(target=poll, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            end.set()
+            thread.join()
+
+    def _poll(self) -> bool:
+        """Note what was saved; return whether there is any."""
+        now = dict(self._stamps())
+        self._saved |= {name for name, _ in now.items() ^ self._seen.items()}
+        self._seen = now
+        return bool(self._saved)
+
+    def _stamps(self) -> Iterator[tuple[str, tuple[int, ...]]]:
+        for folder in self._folders:
+            for place, folders, names in os.walk(folder):
+                here = Path(place)
+                folders[:] = [n for n in folders if not is_ignored(n) and here / n != self._without]
+                for name in names:
+                    with suppress(OSError):
+                        if not is_ignored(name):
+                            yield str(here / name), _stamp(here / name)
+
+
+def _stamp(path: Path) -> tuple[int, ...]:
+    about = path.lstat()
+    return about.st_mtime_ns, about.st_size, about.st_mode, about.st_ino
+
+
+def watch(grading: Grading, screen: Screen, *, without: Path | None = None) -> ExitCode:
+    """Grade again at each save until Ctrl-C; see `Watch.run`. `without` is a folder of our own results."""
+    return Watch(
+        Path(grading.source),
+        look=lambda: take_snapshot(grading.source, grading.rubric.rubric.package, without=without),
+        grade=grading,
+        saves=Saves(without),
+        screen=screen,
+    ).run()
+
+
+def is_ignored(path: str) -> bool:
+    """Whether a path relative to the package's folder is a leftover of a build, an editor, git or the grader."""
+    parts = PurePosixPath(path).parts
+    return any(part in IGNORED_FOLDERS for part in parts) or bool(parts and IGNORED_NAMES.search(parts[-1]))
+
+
+def changed_files(before: Snapshot, after: Snapshot) -> tuple[str, ...]:
+    """Return the paths of files that came, went or changed (contents, mode, link), the package's own first."""
+    paths = before.files.keys() | after.files.keys()
+    changed = (path for path in paths if before.files.get(path) != after.files.get(path))
+    return tuple(sorted(changed, key=lambda path: (path.startswith("../"), path)))
+
+
+def take_snapshot(source: str, package: str, *, without: Path | None = None) -> Snapshot:
+    """Return the package as `grader check SOURCE` sees it now, without what is in the folder `without`.
+
+    Raises SubmissionError where there is no such package or a file cannot be read, OSError where one vanishes.
+    """
+    with temporary_folder("source") as workdir:
+        submission = open_submission(source, package=package, workdir=workdir)
+    home = submission.package.folder
+    files: dict[str, SourceFile] = {}
+    needed = needed_packages(submission)
+    for one in needed:
+        prefix = "" if one.folder == home else f"../{one.name}/"
+        for file, path in read_files(one):
+            if not is_ignored(path) and not (without and (one.folder / path).is_relative_to(without)):
+                # where a mode was read changes with the first commit, and the file does not
+                files[prefix + path] = file.model_copy(update={"mode_source": "disk"})
+    hints = tuple(h for h in submission.hints if not any(is_ignored(word.rstrip(",")) for word in h.split()))
+    return Snapshot(folder=home, files=files, hints=hints, folders=tuple(one.folder for one in needed))
