@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 import grader
-from grader.authoring.mutation.model import LostCriterion, MutantResult, ReferenceResult, RubricTest
+from grader.model.mutants import LostCriterion, MutantResult, ReferenceResult, RubricTest
 from grader.cli.commands import inspect as inspect_command
 from grader.cli.display import LiveSteps, PlainSteps
 from grader.cli.errors import guarded, report

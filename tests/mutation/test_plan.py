@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from grader.authoring.mutation.load import LoadedMutants
-from grader.authoring.mutation.model import Mutant
+from grader.model.mutants import Mutant
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.plan import chosen, plan_all, plan_declared, refuse_unfit
 from grader.authoring.mutation.solution import Solution

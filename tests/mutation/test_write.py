@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from grader.authoring.mutation.load import load_mutants
-from grader.authoring.mutation.model import LostCriterion, MutantResult
+from grader.model.mutants import LostCriterion, MutantResult
 from grader.authoring.mutation.plan import plan_all
 from grader.authoring.mutation.write import mutants_text
 from grader.rubric.load import load_rubric

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from grader.authoring.mutation.model import Mutant, MutantsFile
+from grader.model.mutants import Mutant, MutantsFile
 from grader.authoring.mutation.operators import OPERATORS
 from grader.errors import RubricError
 from grader.model.record import Record

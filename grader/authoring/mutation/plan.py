@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from grader.authoring.mutation.load import LoadedMutants, parameters_of
-from grader.authoring.mutation.model import Cost, Mutant, Step, label
+from grader.model.mutants import Cost, Mutant, Step, label
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.solution import Site, Solution
 from grader.authoring.mutation.tree import Tree

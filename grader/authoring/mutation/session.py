@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.authoring.mutation.compare import DOUBTFUL, Comparison, compare, lost_criteria
-from grader.authoring.mutation.model import MutantResult, ReferenceResult, RubricTest
+from grader.model.mutants import MutantResult, ReferenceResult, RubricTest
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.plan import Planned
 from grader.authoring.mutation.solution import Solution

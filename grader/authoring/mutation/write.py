@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import yaml
 
-from grader.authoring.mutation.model import MutantResult, Step
+from grader.model.mutants import MutantResult, Step
 from grader.authoring.mutation.plan import Planned
 from grader.shown import visible
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from grader.arena.sandbox import Mode
 from grader.authoring.mutation.find import find_reference, given_reference, load_solution, mutants_file
 from grader.authoring.mutation.load import load_mutants
-from grader.authoring.mutation.model import RubricTest
+from grader.model.mutants import RubricTest
 from grader.authoring.mutation.plan import Planned, chosen, plan_all, plan_declared, refuse_unfit
 from grader.authoring.mutation.session import Plan, run_test
 from grader.authoring.mutation.solution import Solution
