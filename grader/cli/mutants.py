@@ -9,7 +9,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from grader.authoring.mutation.model import LostCriterion, MutantResult, RubricTest
+from grader.model.mutants import LostCriterion, MutantResult, RubricTest
 from grader.report.terminal import emit, open_console
 from grader.report.text import line, number, visible
 

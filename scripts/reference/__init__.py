@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from grader.authoring.mutation.docs import operators_page
 from grader.checks.docs import checks_page
-from grader.report.formats.page import pages as format_pages
 from scripts.reference.commands import commands_page, exit_codes_page
+from scripts.reference.formats import format_pages
 from scripts.reference.labs import labs_page
+from scripts.reference.operators import operators_page
 from scripts.reference.records import rubric_page
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "reference"

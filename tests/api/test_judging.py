@@ -23,7 +23,7 @@ from grader import (
 )
 
 ROOT = Path(__file__).resolve().parents[2]
-KEPT = ROOT / "fixtures" / "formats" / "2026-11-21-1908"
+KEPT = ROOT / "fixtures" / "formats"
 LAB = "leeds-comp3631-lab1"
 
 

@@ -6,10 +6,10 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.authoring.mutation.model import LostCriterion, MutantResult, Step
 from grader.authoring.mutation.plan import Planned
 from grader.authoring.mutation.write import mutants_text
 from grader.authoring.text import rubric_text
+from grader.model.mutants import LostCriterion, MutantResult, Step
 from tests.report.nasty import STEERING, TEXTS
 from tests.report.test_shown import TO_A_CI
 

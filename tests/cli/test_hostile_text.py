@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 import grader
-from grader.authoring.mutation.model import LostCriterion, MutantResult, ReferenceResult, RubricTest
 from grader.cli.commands import inspect as inspect_command
 from grader.cli.display import LiveSteps, PlainSteps
 from grader.cli.errors import guarded, report
@@ -24,6 +23,7 @@ from grader.errors import RubricError, SubmissionError
 from grader.evidence.events import ActorEvent
 from grader.evidence.inspect import inspect_run
 from grader.evidence.run import Channel, Message, Run
+from grader.model.mutants import LostCriterion, MutantResult, ReferenceResult, RubricTest
 from grader.model.result import RubricInfo
 from tests.report.nasty import STEERING, TEXTS
 from tests.report.test_shown import TO_A_CI
@@ -37,7 +37,6 @@ MAY_PRINT = {
     "checks/docs.py",
     "ci/github.py",  # annotations; tests/ci
     "deliver/grading.py",  # a report as in a terminal; tests/deliver
-    "mutation/docs.py",
     "similarity/job.py",  # JSON for the process that started it
 }
 NASTY = "\x1b[2J\u202e\n::error::owned\n##[error]x\x9b31m\ud800" + "y" * 10**6

@@ -19,9 +19,9 @@ from grader.evidence.writer import EvidenceWriter
 from grader.model import version
 from grader.model.result import FileCitation
 from grader.report.result_json import result_text
-from tests.formats.old import FOLDER, ROOT
+from tests.formats.kept import FOLDER, ROOT
 
-COURSE = FOLDER / "2026-11-21-1908"
+COURSE = FOLDER
 LAB = "leeds-comp3631-lab1"
 
 

@@ -3,12 +3,12 @@ from __future__ import annotations
 import pytest
 
 from grader.authoring.mutation.load import LoadedMutants
-from grader.authoring.mutation.model import Mutant
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.plan import chosen, plan_all, plan_declared, refuse_unfit
 from grader.authoring.mutation.solution import Solution
 from grader.authoring.mutation.tree import unified_diff
 from grader.errors import RubricError, UsageError
+from grader.model.mutants import Mutant
 from grader.rubric.source import Source
 from tests.mutation.samples import other_solution, tree_of
 

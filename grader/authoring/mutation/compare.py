@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from grader.authoring.mutation.model import Cost, LostCriterion, State
+from grader.model.mutants import Cost, LostCriterion, State
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status
 

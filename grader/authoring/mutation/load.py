@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from grader.authoring.mutation.model import Mutant, MutantsFile
 from grader.authoring.mutation.operators import OPERATORS
 from grader.errors import RubricError
+from grader.model.mutants import Mutant, MutantsFile
 from grader.model.record import Record
 from grader.model.version import MUTANTS
 from grader.rubric.faults import did_you_mean, model_faults

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from grader.authoring.mutation.load import LoadedMutants, parameters_of
-from grader.authoring.mutation.model import Cost, Mutant, Step, label
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.solution import Site, Solution
 from grader.authoring.mutation.tree import Tree
 from grader.errors import RubricError, UsageError
+from grader.model.mutants import Cost, Mutant, Step, label
 from grader.rubric.faults import did_you_mean
 
 SHOWN_PLACES = 6

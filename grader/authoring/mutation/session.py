@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.authoring.mutation.compare import DOUBTFUL, Comparison, compare, lost_criteria
-from grader.authoring.mutation.model import MutantResult, ReferenceResult, RubricTest
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.plan import Planned
 from grader.authoring.mutation.solution import Solution
 from grader.authoring.mutation.tree import Tree, unified_diff, write_tree
 from grader.classes.batch.workers import Graded, Job, Sandbox, grade_all
 from grader.errors import HostError
+from grader.model.mutants import MutantResult, ReferenceResult, RubricTest
 from grader.model.progress import Progress
 from grader.model.result import GradingResult, RubricInfo
 from grader.model.verdict import Status

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import yaml
 
-from grader.authoring.mutation.model import MutantResult, Step
 from grader.authoring.mutation.plan import Planned
+from grader.model.mutants import MutantResult, Step
 from grader.shown import visible
 
 HEADER = """\

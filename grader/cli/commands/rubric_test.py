@@ -11,7 +11,6 @@ from pathlib import Path
 from grader.arena.sandbox import Mode
 from grader.authoring.mutation.find import find_reference, given_reference, load_solution, mutants_file
 from grader.authoring.mutation.load import load_mutants
-from grader.authoring.mutation.model import RubricTest
 from grader.authoring.mutation.plan import Planned, chosen, plan_all, plan_declared, refuse_unfit
 from grader.authoring.mutation.session import Plan, run_test
 from grader.authoring.mutation.solution import Solution
@@ -23,6 +22,7 @@ from grader.cli.output import say_json
 from grader.cli.sandbox_report import say_unwalled
 from grader.errors import ExitCode
 from grader.files import atomic_write, check_writable
+from grader.model.mutants import RubricTest
 from grader.rubric.load import LoadedRubric, load_rubric
 
 SIDE_BY_SIDE = 4  # they wait most of the time; fits two cores

@@ -1,9 +1,9 @@
-"""Every format that the grader writes or reads: its version, what changed, its JSON Schema.
+"""The files that the grader writes or reads: `FORMATS` with their versions, `schema_of` for their JSON Schemas.
 
-`known.FORMATS` is the list, `schemas.schema_of` gives a schema, `page.formats_page` is docs/reference/formats.md.
+The reference page on them is made by `scripts/reference/formats.py`.
 """
 
-from grader.report.formats.known import FORMATS, Addition, Change, Format
+from grader.report.formats.known import FORMATS, Addition, Format
 from grader.report.formats.schemas import schema_of
 
-__all__ = ["FORMATS", "Addition", "Change", "Format", "schema_of"]
+__all__ = ["FORMATS", "Addition", "Format", "schema_of"]

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from grader.authoring.mutation.model import MutantsFile, RubricTest
 from grader.evidence.events import PACKAGE_TOPIC, TOPICS
 from grader.model.batch import BatchRun
+from grader.model.mutants import MutantsFile, RubricTest
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.result import GradingResult
