@@ -12,7 +12,7 @@ from grader.model.result import CriterionResult, ErrorInfo, GradingResult, Note
 from grader.model.submission_time import AppliedOverride
 from grader.model.verdict import FileCitation, Status
 from grader.report.findings import repository_path
-from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
+from grader.report.noticed import COSTS_NOTHING, NOTICED_TITLE, note_place, note_text
 from grader.report.settled import automatic_words, decision, look_again
 from grader.report.text import line, number, text_limit, visible
 from grader.report.view import places, points_of
@@ -108,8 +108,8 @@ class _Writer:
         return "\n".join(f"{name}: {self._text(value)}" for name, value in rows.items() if value)
 
     def _noticed(self, notes: tuple[Note, ...]) -> str:
-        lines = [f"{self._text(place(note))}: {self._text(words(note))}" for note in notes]
-        return "\n".join([f"{TITLE}. {COSTS_NOTHING}", *lines])
+        lines = [f"{self._text(note_place(note))}: {self._text(note_text(note))}" for note in notes]
+        return "\n".join([f"{NOTICED_TITLE}. {COSTS_NOTHING}", *lines])
 
     def _outcome(self, case: etree._Element, tag: str, kind: str, message: str, details: str) -> None:
         if tag == "skipped":

@@ -11,7 +11,7 @@ from grader.model.result import CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
 from grader.report import noticed
 from grader.report.mermaid import mermaid
-from grader.report.settled import TITLE, automatic_words, decided, decision, late_words, look_again
+from grader.report.settled import DECIDED_TITLE, automatic_words, decided, decision, late_words, look_again
 from grader.report.summary import NOT_SETTLED, verdict_words, visible_words
 from grader.report.text import line, markdown, markdown_code, number
 from grader.report.unwalled import without_sandbox
@@ -94,7 +94,7 @@ class _Writer:
             told = [row for loss in (*lost, *still) for row in self._told(loss)]
             lines += self._folded("Details, and how to mend it", told)
             lines += self._folded(_counted("Advice, costs nothing", view.advice), self._advice(view.advice))
-            lines += self._folded(_counted(noticed.TITLE, result.notes), self._noticed(result.notes))
+            lines += self._folded(_counted(noticed.NOTICED_TITLE, result.notes), self._noticed(result.notes))
             lines += self._folded("Nodes and topics", self._graphs(graphs) if self._detail.graphs else ())
             lines += self._folded(_counted("All criteria", result.criteria), self._table(result.criteria))
         else:
@@ -131,7 +131,7 @@ class _Writer:
         found = decided(result)
         if not found:
             return
-        yield from (f"## {TITLE}", "")
+        yield from (f"## {DECIDED_TITLE}", "")
         for override, criterion in self._first(found):
             yield f"- {self._code(criterion.id)}: {points_of(criterion)} {self._text(decision(override))}"
             yield f"  - The check says: {self._text(automatic_words(override, criterion))}"
@@ -189,7 +189,7 @@ class _Writer:
             return
         yield from (noticed.COSTS_NOTHING, "")
         for note in self._first(notes):
-            yield f"- {self._code(noticed.place(note))}: {self._text(noticed.words(note))}"
+            yield f"- {self._code(noticed.note_place(note))}: {self._text(noticed.note_text(note))}"
         yield from self._more(notes)
         yield ""
 

@@ -8,7 +8,7 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.submission_time import AppliedOverride, Automatic, HandedIn
 from grader.report.text import number
 
-TITLE = "Decided by a person"
+DECIDED_TITLE = "Decided by a person"
 BY = {"roster": "as the roster says", "commit": "the commit's date", "nobody": "nobody says it"}
 
 

@@ -16,7 +16,7 @@ from grader.model.result import CriterionResult, GradingResult, Note
 from grader.model.submission_time import AppliedOverride
 from grader.model.verdict import Status
 from grader.report import settled
-from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
+from grader.report.noticed import COSTS_NOTHING, NOTICED_TITLE, note_place, note_text
 from grader.report.summary import visible_words
 from grader.report.text import line, number, uncommanded
 from grader.report.unwalled import without_sandbox
@@ -102,14 +102,16 @@ class Terminal:
         unwalled = without_sandbox(result.environment.sandbox)
         parts += [Text(self._show(unwalled), "yellow")] if unwalled else []
         parts += [Text(self._show(words)) for words in settled.late_words(result)]
-        parts += self._section(settled.TITLE, [self._decision(o, c) for o, c in settled.decided(result)])
+        parts += self._section(
+            settled.DECIDED_TITLE, [self._decision(o, c) for o, c in settled.decided(result)]
+        )
         parts += self._losses("Lost", view.lost)
         if unrun:
             parts += self._unrun(view.open, unrun)
         else:
             parts += self._losses("Still open: no points are lost for good", view.open)
         parts += self._section("Advice, costs nothing", [self._advice(c) for c in view.advice])
-        parts += self._section(TITLE, self._noticed(result.notes))
+        parts += self._section(NOTICED_TITLE, self._noticed(result.notes))
         judged = [c for c in result.criteria if not unrun or c.status not in OPEN]
         title = "All criteria that could be judged" if unrun else "All criteria"
         parts += self._section(title, [self._table(judged)] if judged else [])
@@ -161,7 +163,10 @@ class Terminal:
     def _noticed(self, notes: tuple[Note, ...]) -> list[RenderableType]:
         if not notes:
             return []
-        return [self._rows([(place(note), words(note)) for note in notes]), Text(COSTS_NOTHING, "dim")]
+        return [
+            self._rows([(note_place(note), note_text(note)) for note in notes]),
+            Text(COSTS_NOTHING, "dim"),
+        ]
 
     def _line(self, criterion: CriterionResult, words: str, width: int = 0) -> RenderableType:
         """`✗ chatter-rate  0/10  fail  /chatter came at 5.02 Hz, not 10 Hz`, wrapped in its column.

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
-from urllib.parse import quote
 
 from markupsafe import Markup
 
 from grader.model.batch import CriterionInfo
-from grader.report.class_page.lines import CHARS, Line
+from grader.report.class_page.lines import CHARS, REPORT, Line, link_to
 from grader.shown import line
 
-REPORT = "report.html"
 COLUMNS = ("id", "name", "group", "link", "state", "points", "letters", "earned", "late", "decided", "time")
 
 
@@ -37,11 +35,6 @@ def in_script(text: str) -> Markup:
     for sign in "<>&\u2028\u2029":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return Markup(text)  # noqa: S704 - what HTML looks for is written out
-
-
-def link_to(one: Line) -> str:
-    """The submission's report; empty where it has none."""
-    return f"{quote(one.folder, safe='', errors='replace')}/{REPORT}" if one.folder else ""
 
 
 def _row(one: Line) -> list[object]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
+from urllib.parse import quote
 
 from grader.model.batch import MISSING, ROSTER, CriterionInfo
 from grader.model.result import CriterionResult, GradingResult
@@ -13,6 +14,7 @@ from grader.model.verdict import Status
 from grader.report.unwalled import without_sandbox
 from grader.shown import line
 
+REPORT = "report.html"
 CHARS = 160
 MESSAGE_CHARS = 300
 LETTERS: Mapping[Status, str] = {
@@ -100,6 +102,11 @@ def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInf
         why=_why(result.criteria),
         problem=_problem(result),
     )
+
+
+def link_to(one: Line) -> str:
+    """The submission's report; empty where it has none."""
+    return f"{quote(one.folder, safe='', errors='replace')}/{REPORT}" if one.folder else ""
 
 
 def _has_reports(result: GradingResult) -> bool:

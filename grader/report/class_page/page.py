@@ -20,10 +20,10 @@ from grader.model.result import GradingResult
 from grader.model.roster import Entry
 from grader.report.class_page.anonymous import SALT_BYTES
 from grader.report.class_page.costs import costs, most_first
-from grader.report.class_page.data import link_to, page_data
+from grader.report.class_page.data import page_data
 from grader.report.class_page.gathered import Gathered, Shared, gather, gather_anonymous
 from grader.report.class_page.heat import heat_map
-from grader.report.class_page.lines import LETTERS, Line
+from grader.report.class_page.lines import LETTERS, Line, link_to
 from grader.report.class_page.points import histogram, spread
 from grader.report.class_page.timing import span, timing
 from grader.report.class_page.todo import todos

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
-from grader.report import noticed, settled
+from grader.report import settled
 from grader.report.html import words
 from grader.report.html.page import Detail, Docs, Maker, Page
 from grader.report.html.shell import environment, policy, script, style
@@ -89,8 +89,7 @@ def _rendered(result: GradingResult, rubric: Rubric, head: Head, page: Page, lim
             page=page,
             sections=list(_sections(result, page)),
             decided=settled.decided(result),
-            noticed=noticed,
-            settled=settled,
+            sentences=settled,
             limit=limit,
             policy=Markup(policy(ours)),  # noqa: S704 - no text of anybody's
             script=ours,
@@ -102,7 +101,7 @@ def _rendered(result: GradingResult, rubric: Rubric, head: Head, page: Page, lim
 def _head(result: GradingResult, rubric: Rubric, view: ReportView, hidden: int) -> Head:
     graded = not not_graded(result)
     status, verdict = words.verdict(result, rubric, hidden)
-    score = f"{number(result.points)} of {words.points(result.max_points)}" if graded else "Not graded"
+    score = f"{number(result.points)} of {words.count_points(result.max_points)}" if graded else "Not graded"
     mark = rubric.pass_mark
     return Head(
         score=score,

@@ -52,7 +52,7 @@ def _kinds(error: type[GraderError]) -> Iterator[type[GraderError]]:
         yield from _kinds(below)
 
 
-def points(value: float) -> str:
+def count_points(value: float) -> str:
     """`1 point`, `2.5 points`."""
     return f"{number(value)} {'point' if value == 1 else 'points'}"
 
@@ -80,14 +80,16 @@ def pass_mark(result: GradingResult, rubric: Rubric, hidden: int) -> str:
     """What it takes to pass."""
     if rubric.pass_mark is None:
         return f"To pass, every {'visible ' if hidden else ''}criterion that counts has to be reached."
-    mark = f"To pass, it takes {points(rubric.pass_mark)} of {number(rubric.max_points)}"
+    mark = f"To pass, it takes {count_points(rubric.pass_mark)} of {number(rubric.max_points)}"
     if not_graded(result):
         return f"{mark}."
     if hidden:
         return f"{mark}, those of criteria that run at grading included."
     missing = rubric.pass_mark - result.points
     return (
-        f"{mark}: {points(missing)} {'is' if missing == 1 else 'are'} missing." if missing > 0 else f"{mark}."
+        f"{mark}: {count_points(missing)} {'is' if missing == 1 else 'are'} missing."
+        if missing > 0
+        else f"{mark}."
     )
 
 
@@ -102,14 +104,14 @@ def in_short(result: GradingResult, view: ReportView) -> str:
     said = [] if late > 0 else ["Nothing was lost."]
     if lost > 0:
         costs = "costs" if len(view.lost) == 1 else "cost"
-        said = [f"{count(len(view.lost), 'thing')} {costs} you {points(lost)}."]
+        said = [f"{count(len(view.lost), 'thing')} {costs} you {count_points(lost)}."]
     if len(view.lost) > 1:
-        said.append(f"The first one alone is worth {points(view.lost[0].points)}.")
+        said.append(f"The first one alone is worth {count_points(view.lost[0].points)}.")
     if late > 0:
-        said.append(f"Being late costs you {points(late)}.")
+        said.append(f"Being late costs you {count_points(late)}.")
     if view.open:
         still = sum(loss.points for loss in view.open)
-        said.append(f"{points(still)} {'is' if still == 1 else 'are'} still open.")
+        said.append(f"{count_points(still)} {'is' if still == 1 else 'are'} still open.")
     return " ".join(said)
 
 
@@ -117,5 +119,5 @@ def lost_words(criterion: CriterionResult, blocked: float) -> str:
     """`10 points lost, and 25 more in what it holds back`; points that are open are not lost."""
     own = criterion.max_points - criterion.points
     state = "still open" if criterion.status in OPEN else "lost"
-    said = f"{points(own)} {state}" if own else "costs nothing itself"
+    said = f"{count_points(own)} {state}" if own else "costs nothing itself"
     return f"{said}, and {number(blocked)} more in what it holds back" if blocked else said

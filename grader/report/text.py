@@ -1,15 +1,65 @@
-"""Markdown as GitHub, GitLab and others render it, and what they do to the text afterwards.
+"""Text that others wrote, made harmless: shown, never obeyed. One function for each place where it is shown.
 
-A backslash keeps markup from being read. It does not keep a forge from finding names, numbers of issues, addresses or
-emoji in the rendered text; in code they do not look, so a word with any of these becomes code.
+| place | function |
+|---|---|
+| terminal, XML, a log | `line` (one line of bounded length), `visible` (`lines=True` keeps line ends) |
+| Markdown | `markdown`, `markdown_code` |
+| HTML | `html` for text and quoted attributes, `html_address` for `href` |
+| CSV | `csv_text` for whole tables |
+| JSON | `json_text` |
+| a file's name | `grader.intake.safe_name` |
 """
 
 from __future__ import annotations
 
+import csv
+import io
+import math
 import re
+from collections.abc import Iterable, Sequence
+from html import escape
 
-from grader.shown import visible
+from grader.shown import clip, json_text, line, text_limit, uncommanded, visible
 
+__all__ = [
+    "clip",
+    "csv_text",
+    "html",
+    "html_address",
+    "json_text",
+    "line",
+    "markdown",
+    "markdown_code",
+    "number",
+    "text_limit",
+    "uncommanded",
+    "visible",
+]
+
+
+def number(value: float, digits: int = 3) -> str:
+    """`10`, `87.5`: no zeros that say nothing."""
+    return f"{value:.{digits}f}".rstrip("0").rstrip(".") or "0"
+
+
+_ADDRESS = re.compile(r"https?://[!-~]+", re.IGNORECASE)
+
+
+def html(text: str, *, lines: bool = False) -> str:
+    """`text` for an element's content or for an attribute in quotes; `lines` is for `<pre>`.
+
+    Not for `<script>` and `<style>`, whose content HTML reads otherwise.
+    """
+    return escape(visible(text, lines=lines), quote=True).replace("`", "&#96;")
+
+
+def html_address(address: str) -> str:
+    """`address` for `href` and `src`; empty for all but http and https, `javascript:` among them."""
+    return html(address) if _ADDRESS.fullmatch(address) else ""
+
+
+# A backslash keeps markup from being read. It does not keep a forge from finding names, numbers of issues, addresses or
+# emoji in the rendered text; in code they do not look, so a word with any of these becomes code.
 _LINKED = re.compile(
     r"""
       @[\w-]                                # a mention, an e-mail address
@@ -83,3 +133,26 @@ def _begun(shown: str) -> str:
     if _FIRST.match(shown):
         return f"\\{shown}"
     return _NUMBERED.sub(r"\1\\\2", shown, count=1) if _NUMBERED.match(shown) else shown
+
+
+CELL_CHARS = 2000
+Cell = str | float | None
+
+# Spreadsheets skip blanks and quotes before the sign, know it in full width, and split at `;` in half of Europe.
+_FORMULA = re.compile(r"(^|;)([\s\"'`]*[=+\-@\uff1d\uff0b\uff0d\uff20\u2212\ufe62\ufe63\ufe66\ufe6b])")
+
+
+def csv_text(rows: Iterable[Sequence[Cell]]) -> str:
+    """The rows as RFC 4180 has them. Numbers stay numbers; text that could be a formula begins with `'`."""
+    out = io.StringIO()
+    writer = csv.writer(out, quoting=csv.QUOTE_MINIMAL, lineterminator="\r\n")
+    writer.writerows([_cell(value) for value in row] for row in rows)
+    return out.getvalue()
+
+
+def _cell(value: Cell) -> str:
+    if value is None:
+        return ""
+    if not isinstance(value, str):
+        return str(value) if math.isfinite(value) else ""
+    return _FORMULA.sub(r"\1'\2", line(value, CELL_CHARS))
