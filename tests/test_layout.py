@@ -20,7 +20,7 @@ ALLOWED = {
     "model": set[str](),
     "errors": set[str](),
     "shown": set[str](),
-    "portable": set[str](),
+    "portable": {"errors"},
     "outside": set[str](),
     "files": {"errors", "portable"},
     "temporary": {"errors", "files", "portable"},
@@ -35,16 +35,12 @@ ALLOWED = {
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},
     "arena": BASE | {"evidence", "files", "package", "rubric.model", "temporary"},
     "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
-    "steps": {
-        *BASE, "arena", "evidence", "faults", "intake", "judging", "package", "recordings", "report", "rubric",
-        "temporary"
-    },
     "pipeline": {
-        *BASE, "steps", "arena", "evidence", "faults", "files", "intake", "judging", "package", "recordings",
+        *BASE, "arena", "evidence", "faults", "files", "intake", "judging", "package", "recordings",
         "report", "results", "rubric", "temporary"
     },
     "api": {
-        *BASE, "arena.asynchronous", "evidence", "faults", "files", "judging", "pipeline", "results", "rubric", "steps"
+        *BASE, "arena.asynchronous", "evidence", "faults", "files", "judging", "pipeline", "results", "rubric"
     },
     "authoring": {
         *BASE, "checks", "classes.batch", "evidence", "intake", "package", "pipeline", "rubric", "temporary"

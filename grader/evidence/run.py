@@ -168,3 +168,17 @@ class Run:
     def outcome(self) -> ScenarioEvent | None:
         """How the run ended; None for a file that was cut short."""
         return next((e for _, e in reversed(self.course) if e.event == "end"), None)
+
+
+def console_log(runs: Mapping[str, Run]) -> str:
+    """Return what the build and the student's processes printed, by scenario, with seconds since the run began."""
+    lines = []
+    for name, run in runs.items():
+        lines += [f"== {name}"] if run.console else []
+        own = {event.name for _, event in run.processes if event.role == "grader"}
+        for time_ns, line in run.console:
+            if line.process in own:
+                continue
+            text = line.line.replace("\n", "\\n")  # a line is one, whatever a recording says
+            lines.append(f"{(time_ns - run.start_ns) / 1e9:8.3f} {line.process} {line.stream}: {text}")
+    return "".join(f"{line}\n" for line in lines)

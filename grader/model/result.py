@@ -68,6 +68,9 @@ class TimingInfo(Record):
     student_cpu_s: float
 
 
+NO_TIME = TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0)
+
+
 class Note(Record):
     """What a student's process was not allowed (`refused`), or had too much of (`limit`). It costs no points.
 

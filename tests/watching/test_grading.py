@@ -50,7 +50,7 @@ def test_evidence_and_the_stop_reach_the_pipeline(grading, monkeypatch, tmp_path
     asked = outcomes(monkeypatch, result(status="graded"))
     stop, recorded = Stop(), {"talker": tmp_path / "talker.mcap"}
     outcome = grading(recorded, stop)
-    assert (asked[0].recorded, asked[0].stop, asked[0].keep_hidden) == (recorded, stop, False)
+    assert (asked[0].reused, asked[0].stop, asked[0].keep_hidden) == (recorded, stop, False)
     assert outcome.evidence == tmp_path / "out" / result().submission.id / "evidence"
 
 

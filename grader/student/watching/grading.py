@@ -10,16 +10,14 @@ from pathlib import Path
 from grader import pipeline
 from grader.arena.asynchronous import Stop
 from grader.errors import ExitCode, GraderError, UsageError
-from grader.faults import Attempt, error_result
+from grader.faults import error_result
 from grader.intake.identity import identify
 from grader.model.progress import Progress
-from grader.model.result import GradingResult, SubmissionInfo, TimingInfo
+from grader.model.result import GradingResult, SubmissionInfo
 from grader.report.hidden import without_hidden
 from grader.results import EVIDENCE
 from grader.rubric.load import LoadedRubric
 from grader.student.watching.loop import Outcome
-
-NO_TIME = TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0)
 
 
 @dataclass(kw_only=True)
@@ -37,7 +35,7 @@ class Grading:
 
     def __call__(self, recorded: Mapping[str, Path], stop: Stop) -> Outcome:
         """See `loop.Watched`. Raises GraderError where no save can mend it: UsageError, the machine at the start."""
-        options = replace(self.options, recorded=recorded, stop=stop)
+        options = replace(self.options, reused=recorded, stop=stop)
         try:
             with self.progress(not self._begun) as progress:
                 result = pipeline.grade(self.source, self.rubric, self.out, options, progress)
@@ -59,12 +57,4 @@ class Grading:
     def _error(self, error: GraderError) -> GradingResult:
         known = identify(self.source) or (Path(self.source).name, self.source)
         about = SubmissionInfo(id=known[0], source=known[1], commit=None, digest="", package="")
-        attempt = Attempt(
-            source=self.source,
-            submission_id=None,
-            rubric=self.rubric,
-            out=self.out,
-            keep_hidden=False,
-            timing=lambda: NO_TIME,
-        )
-        return error_result(error, about, attempt)
+        return error_result(error, about, self.rubric)
