@@ -11,7 +11,7 @@ import yaml
 from grader.evidence.reader import load_evidence, package_facts
 from grader.evidence.run import Channel
 from grader.evidence.stats import rate_stats
-from grader.evidence.timeline import EPOCH_NS, build_runs, write_runs
+from tests.support.timeline import EPOCH_NS, build_runs, write_runs
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "evidence-timelines.md"
 S = 1_000_000_000
