@@ -30,6 +30,7 @@ from grader import __version__
 from grader.errors import EvidenceError, GraderError, SubmissionError, UsageError
 from grader.evidence.run import Run, console_log
 from grader.faults import NOTHING_RUN, GradingContext, classify_errors
+from grader.files import temporary_folder
 from grader.intake import open_recorded, open_recording, open_submission
 from grader.intake.source import Source
 from grader.judging import judge
@@ -58,7 +59,6 @@ from grader.results import EVIDENCE, Results, finish_killed
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_package, needs_ros, started
 from grader.rubric.rates import rates_of
-from grader.temporary import temporary_folder
 
 if TYPE_CHECKING:
     from grader.arena.asynchronous import Stop

@@ -30,7 +30,7 @@ from grader.arena.session import ArenaSession
 from grader.arena.workspace import Workspace
 from grader.errors import ArenaError
 from grader.evidence.writer import EvidenceWriter
-from grader.temporary import temporary_folder
+from grader.files import temporary_folder
 
 NAME = "base workspace"
 MAKE_S = 60.0

@@ -16,10 +16,9 @@ from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.rosbag1.reader import ChunkInfo, Header, RecordType, read_bytes, read_uint32
 
 from grader.errors import EvidenceError
-from grader.evidence.channels import merged
 from grader.evidence.container import MAX_CHUNK_BYTES, MAX_UNPACKED_BYTES
 from grader.evidence.memory_budget import LESS, NoRoom, Room
-from grader.evidence.run import Channel, Message, Run
+from grader.evidence.run import Channel, Message, Run, merged
 
 BZ2 = b"BZh"
 LZ4 = b"\x04\x22\x4d\x18"

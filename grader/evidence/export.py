@@ -16,10 +16,9 @@ from rosbags.typesys.base import TypesysError
 
 from grader.errors import EvidenceError, OutputError
 from grader.evidence import decode
-from grader.evidence.channels import merged
 from grader.evidence.definitions import DefinitionError, parse
-from grader.evidence.loading import FIELDS
-from grader.evidence.run import Channel, Message, Run
+from grader.evidence.reader import FIELDS
+from grader.evidence.run import Channel, Message, Run, merged
 
 TEXT = "std_msgs/String"
 GRADER = "/grader"

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,6 +23,7 @@ from grader.evidence.memory_budget import NoRoom, Room
 
 if TYPE_CHECKING:
     from grader.evidence.decode import Decoder
+
 
 OWN_NODE = re.compile(r"/grader_(recorder|actor|calibration)_[0-9a-f]{8}(_knock)?")
 BARE_NAME = "/grader"
@@ -182,3 +183,25 @@ def console_log(runs: Mapping[str, Run]) -> str:
             text = line.line.replace("\n", "\\n")  # a line is one, whatever a recording says
             lines.append(f"{(time_ns - run.start_ns) / 1e9:8.3f} {line.process} {line.stream}: {text}")
     return "".join(f"{line}\n" for line in lines)
+
+
+# [evidence.channels] Channels of another tool's recording, as the checks know them: one a publisher on a topic.
+
+
+def merged(channels: Iterable[Channel], *, renumber: bool) -> tuple[Channel, ...]:
+    """Channels that differ in nothing but their messages (a publisher that connected twice) become one.
+
+    `renumber` counts each channel's messages anew: other tools number them across channels, or not at all.
+    """
+    groups: dict[tuple[str, str, str, str, str], list[Channel]] = {}
+    for one in channels:
+        key = (one.topic, one.callerid, one.type, one.md5sum, one.definition)
+        groups.setdefault(key, []).append(one)
+    return tuple(_merged(groups.pop(key), renumber=renumber) for key in list(groups))
+
+
+def _merged(group: list[Channel], *, renumber: bool) -> Channel:
+    messages = sorted((m for one in group for m in one.messages), key=lambda message: message.log_time_ns)
+    if renumber and any(m.sequence != number for number, m in enumerate(messages)):
+        messages = [Message(m.log_time_ns, number, m.data) for number, m in enumerate(messages)]
+    return replace(group[0], latching=any(one.latching for one in group), messages=tuple(messages))

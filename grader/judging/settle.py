@@ -8,8 +8,7 @@ from typing import Literal
 from grader.judging.late import lateness
 from grader.judging.points import round_half_up
 from grader.judging.summary import overall_status, total_points
-from grader.model.result import CriterionResult, GradingResult
-from grader.model.submission_time import AppliedOverride, Automatic, HandedIn, Override
+from grader.model.result import AppliedOverride, Automatic, CriterionResult, GradingResult, HandedIn, Override
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
 

@@ -1,7 +1,8 @@
-"""`run.json`: what a batch was asked to do and how far it came. Schema `grader.run/1`."""
+"""What a roster says."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import datetime
 from typing import Literal
 
@@ -9,7 +10,50 @@ from pydantic import Field
 
 from grader.model.record import Record
 from grader.model.result import RubricInfo
-from grader.model.roster import Entry, RosterFault
+
+
+class Entry(Record):
+    """One submission. `source` is what `grader grade` takes, an absolute path where it is one; `ref` is a repository's.
+
+    `submitted_at` has a time zone. `where` says where the entry comes from (`roster.csv:7`), for messages; `extra`
+    holds the columns that mean nothing to the grader, as they were.
+    """
+
+    id: str
+    source: str
+    ref: str | None = None
+    name: str = ""
+    group: str = ""
+    submitted_at: datetime | None = None
+    extension_days: float = 0.0
+    where: str = ""
+    extra: Mapping[str, str] = Field(default_factory=dict)
+
+
+class RosterFault(Record):
+    """An entry that cannot be graded: where it stands (`roster.csv:7`), its id where it has one of its own, and why."""
+
+    where: str
+    id: str | None = None
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.text}"
+
+
+class Roster(Record):
+    """The submissions of a class, in the order of the roster; `columns` are the names of the further columns.
+
+    `faults` are entries that cannot be graded: the others can.
+    """
+
+    file: str
+    entries: tuple[Entry, ...]
+    columns: tuple[str, ...] = ()
+    faults: tuple[RosterFault, ...] = ()
+
+
+# [model.batch] `run.json`: what a batch was asked to do and how far it came. Schema `grader.run/1`.
 
 MISSING, ROSTER = "not-graded-yet", "roster"
 """Kinds of errors that only a class has: nothing was graded so far, and the roster keeps it from that."""

@@ -12,8 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from grader.judging.summary import OPEN
-from grader.model.result import CriterionResult, GradingResult, Note
-from grader.model.submission_time import AppliedOverride
+from grader.model.result import AppliedOverride, CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
 from grader.report import settled
 from grader.report.noticed import COSTS_NOTHING, TITLE, place, words

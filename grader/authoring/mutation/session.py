@@ -17,11 +17,11 @@ from grader.authoring.mutation.solution import Solution
 from grader.authoring.mutation.tree import Tree, unified_diff, write_tree
 from grader.classes.batch.workers import Graded, Job, Sandbox, grade_all
 from grader.errors import HostError
+from grader.files import temporary_folder
 from grader.model.progress import Progress
 from grader.model.result import GradingResult, RubricInfo
 from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric
-from grader.temporary import temporary_folder
 
 REFERENCE = "reference"
 SOURCE = "source"

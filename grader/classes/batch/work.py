@@ -11,15 +11,14 @@ from grader.classes.batch.job import Job, Outcome
 from grader.classes.fetching import NothingInTime, Obtained, Rule, obtain
 from grader.errors import GraderError, SubmissionError, UsageError
 from grader.faults import NOTHING_RUN, GradingContext, classify_errors, fault_of
+from grader.files import temporary_folder
 from grader.intake import safe_name, without_password
 from grader.judging.settle import settle
 from grader.judging.summary import passed
 from grader.model.progress import Silence
-from grader.model.result import NO_TIME, GradingResult, SubmissionInfo
-from grader.model.submission_time import HandedIn
+from grader.model.result import NO_TIME, GradingResult, HandedIn, SubmissionInfo
 from grader.pipeline import GradeOptions, grade
 from grader.rubric.model import Rubric
-from grader.temporary import temporary_folder
 
 
 def work(job: Job) -> Outcome:

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 from grader.classes.gradebook.cells import Cell
 from grader.classes.gradebook.model import Book, Row
-from grader.model.result import GradingResult
-from grader.model.submission_time import AppliedOverride
+from grader.model.result import AppliedOverride, GradingResult
 from grader.model.verdict import Status
 
 BEFORE = ("id", "name", "group", "status", "points", "max_points", "points_before_late", "late")

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from grader.classes.gradebook import Row
 from grader.classes.review.edit_conflicts import mark
-from grader.model.result import CriterionResult
-from grader.model.submission_time import AppliedOverride, Override
+from grader.model.result import AppliedOverride, CriterionResult, Override
 from grader.model.verdict import Status
 from grader.report.html.words import SIGNS
 from grader.report.text import number

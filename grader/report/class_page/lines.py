@@ -6,9 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from grader.model.batch import MISSING, ROSTER, CriterionInfo
+from grader.model.batch import MISSING, ROSTER, CriterionInfo, Entry
 from grader.model.result import CriterionResult, GradingResult
-from grader.model.roster import Entry
 from grader.model.verdict import Status
 from grader.report.unwalled import without_sandbox
 from grader.shown import line

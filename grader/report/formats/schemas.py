@@ -10,9 +10,8 @@ from grader.evidence.events import PACKAGE_TOPIC, TOPICS
 from grader.model.batch import BatchRun
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.result import GradingResult
+from grader.model.result import GradingResult, Override
 from grader.model.similarity import Similarity
-from grader.model.submission_time import Override
 from grader.report.formats.keys import KEYS
 from grader.report.formats.known import FORMATS, Format
 from grader.rubric.model import Rubric

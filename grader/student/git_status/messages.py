@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from grader.intake.names import listing, printable
-from grader.model.git_status import Point, Standing
+from grader.model.result import Point, Standing
 from grader.student.git_status.ask import Asked
 from grader.student.git_status.commands import Commands
 from grader.student.git_status.environment import Surroundings

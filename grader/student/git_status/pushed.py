@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from grader.intake.names import listing, printable
-from grader.model.git_status import Point
+from grader.model.result import Point
 from grader.student.git_status.commands import Commands
 from grader.student.git_status.state import State
 

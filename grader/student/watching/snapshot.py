@@ -8,13 +8,13 @@ from itertools import islice
 from pathlib import Path
 
 from grader.arena.workspace import needed_packages
+from grader.files import temporary_folder
 from grader.intake import open_submission
 from grader.model.package import SourceFile
 from grader.model.submission import SourcePackage, Submission
 from grader.package.files import read_files
 from grader.package.reading import LEFT_OUT, Unreadable, regular_file
 from grader.student.watching.ignored import ignored
-from grader.temporary import temporary_folder
 
 TEXT_BYTES_MAX = 1 << 20
 FOLDERS_MAX = 2000
