@@ -1,4 +1,4 @@
-"""Message bytes to plain values and back, by rosbags, from the recorded definition.
+"""Decode and encode messages and service calls with rosbags, from their recorded definitions.
 
 Nothing that ROS or a student generated is ever imported.
 """
@@ -245,8 +245,6 @@ def _checked(base: str, value: Value) -> Value:
     return value
 
 
-# [evidence.services] Service types: requests to bytes and responses back, from the text of a `.srv` file (wiki.ros.org/srv).
-
 FindText = Callable[[str], str | None]
 """From a message type to the text of its `.msg` file, None where there is none."""
 
@@ -258,7 +256,9 @@ _PARTS_MAX = 100
 
 
 class ServiceType:
-    """One service type. `find_text` gives messages that ROS Noetic's own packages do not have.
+    """Encodes requests and decodes responses of one service type, from the text of its `.srv` file (wiki.ros.org/srv).
+
+    `find_text` returns the text of messages that ROS Noetic's own packages do not have.
 
     Raises ValueError for a text that is no service definition.
     """

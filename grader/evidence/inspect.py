@@ -1,4 +1,4 @@
-"""Rates as `rostopic hz` computes them, from arrival times in ns."""
+"""Summarise an evidence file or bag: rates as `rostopic hz` computes them, nodes, processes, outcome."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from statistics import median, pstdev, stdev
 from typing import Literal
 
-from grader.evidence.memory_budget import NoRoom, Room
+from grader.evidence.memory_budget import BudgetExceeded, MemoryBudget
 from grader.evidence.reader import load_run
 from grader.evidence.run import Channel, Run, is_grader_node
 from grader.model.record import Record
@@ -46,7 +46,7 @@ class RateStats(Record):
 
 
 def rate_stats(times_ns: Sequence[int], *, nominal_hz: float | None = None) -> RateStats:
-    """The rate of messages that arrived at `times_ns`, in any order. ValueError for a rate of 0 or below."""
+    """Return the rate of messages that arrived at `times_ns`, in any order. Raises ValueError where `nominal_hz` <= 0."""
     if nominal_hz is not None and not nominal_hz > 0:
         raise ValueError("the nominal rate must be above 0 Hz")
     times = sorted(times_ns)
@@ -91,8 +91,6 @@ def _interval(times: Sequence[int]) -> tuple[float | None, float | None]:
     half = _T95[batches - 2] * stdev(periods) / sqrt(batches)
     return max(0.0, mean - half) / 1e9, (mean + half) / 1e9
 
-
-# [evidence.inspect] What is in an evidence file or bag: rates, nodes, processes, outcome.
 
 LOOKED_INTO_BYTES = 64 << 20
 
@@ -154,7 +152,7 @@ class Inspection(Record):
 
 
 def inspect_file(path: Path) -> Inspection:
-    """Reads an `.mcap` file (ours or another tool's) or a ROS 1 `.bag`. Raises EvidenceError."""
+    """Summarise an `.mcap` file (ours or another tool's) or a ROS 1 `.bag`. Raises EvidenceError."""
     run = load_run(path)
     kind: Literal["grader", "mcap", "bag"] = "mcap"
     if run.metadata:
@@ -165,9 +163,9 @@ def inspect_file(path: Path) -> Inspection:
 
 
 def inspect_run(run: Run, *, kind: Literal["grader", "mcap", "bag"] = "grader") -> Inspection:
-    """The same of a run that has been read already."""
+    """Summarise a run that has been read already."""
     end = run.outcome
-    room = Room(decoded_bytes=LOOKED_INTO_BYTES)
+    budget = MemoryBudget(decoded_bytes=LOOKED_INTO_BYTES)
     channels = sorted(run.channels, key=lambda channel: (channel.topic, channel.callerid))
     return Inspection(
         file=run.evidence,
@@ -179,7 +177,7 @@ def inspect_run(run: Run, *, kind: Literal["grader", "mcap", "bag"] = "grader") 
         start_ns=run.start_ns,
         duration_s=(run.end_ns - run.start_ns) / 1e9,
         messages=sum(len(channel.messages) for channel in channels),
-        channels=tuple(_channel(channel, room) for channel in channels),
+        channels=tuple(_channel(channel, budget) for channel in channels),
         nodes=_nodes(run),
         processes=_processes(run),
         console_lines=len(run.console),
@@ -195,7 +193,7 @@ def inspect_run(run: Run, *, kind: Literal["grader", "mcap", "bag"] = "grader") 
     )
 
 
-def _channel(channel: Channel, room: Room) -> ChannelSummary:
+def _channel(channel: Channel, budget: MemoryBudget) -> ChannelSummary:
     return ChannelSummary(
         topic=channel.topic,
         type=channel.type,
@@ -203,27 +201,27 @@ def _channel(channel: Channel, room: Room) -> ChannelSummary:
         md5sum=channel.md5sum,
         latching=channel.latching,
         by_grader=channel.by_grader,
-        readable=_readable(channel, room),
+        readable=_readable(channel, budget),
         bytes=sum(len(message.data) for message in channel.messages),
         rate=rate_stats(channel.times_ns),
     )
 
 
-def _readable(channel: Channel, room: Room) -> bool:
-    """Whether the definition fits every message, as far as that is known within seconds."""
+def _readable(channel: Channel, budget: MemoryBudget) -> bool:
+    """Return whether the definition fits every message, as far as a few seconds tell."""
     try:
-        decoder = channel.decoder(room)
+        decoder = channel.decoder(budget)
         for message in channel.messages:
-            room.decode(decoder.decoded_bytes(len(message.data)))
+            budget.decode(decoder.decoded_bytes(len(message.data)))
             if decoder.decode(message.data) is None:
                 return False
-    except NoRoom:
+    except BudgetExceeded:
         return True
     return True
 
 
 def _nodes(run: Run) -> tuple[str, ...]:
-    """All nodes ever seen but the grader's, publishers first where the graph was not recorded."""
+    """Return all nodes ever seen but the grader's; the publishers where the graph was not recorded."""
     seen = dict.fromkeys(run.student_nodes())
     seen.update(
         dict.fromkeys(c.callerid for c in run.channels if c.callerid and not is_grader_node(c.callerid))
@@ -232,7 +230,7 @@ def _nodes(run: Run) -> tuple[str, ...]:
 
 
 def _processes(run: Run) -> tuple[ProcessSummary, ...]:
-    """Starts and exits of one name are paired in order."""
+    """Pair starts and exits of one name in their order."""
     found: list[ProcessSummary] = []
     running: dict[str, deque[int]] = defaultdict(deque)
     for time_ns, event in run.processes:

@@ -1,4 +1,4 @@
-"""One pass over a container's records that gives a `Run`."""
+"""Read evidence files into `Run`s: the grader's own, and MCAP or bag files that other tools recorded from ROS 1."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from zstandard import ZstdError
 
 from grader.errors import EvidenceError
 from grader.evidence.container import MAX_FILE_BYTES, ContainerError, records
-from grader.evidence.events import METADATA_NAME, PACKAGE_TOPIC, TOPICS
-from grader.evidence.memory_budget import LESS, NoRoom, Room
-from grader.evidence.run import Channel, Message, Run, merged
+from grader.evidence.events import FIELDS, METADATA_NAME, PACKAGE_TOPIC, TOPICS
+from grader.evidence.memory_budget import LESS, BudgetExceeded, MemoryBudget
+from grader.evidence.run import Channel, Message, Run, merge_channels
 from grader.model.package import PackageFacts
 from grader.model.version import EVIDENCE, UPDATE
 
@@ -28,28 +28,176 @@ MAX_CHANNELS = 4_096
 NAMES_SHOWN = 5
 NAME_CHARS_SHOWN = 80
 READ = {str(number) for number in range(1, EVIDENCE.version + 1)}
+SUFFIXES = {".mcap", ".bag"}
+MAGIC = b"\x89MCAP0\r\n"
+BAG_MAGIC = b"#ROSBAG V"
+_DAMAGE = (
+    McapError,
+    ZstdError,
+    struct.error,
+    ValueError,
+    RuntimeError,
+    EOFError,
+    KeyError,
+    OverflowError,
+    MemoryError,
+)
 
-FIELDS = {
-    "processes": "/grader/process",
-    "console": "/grader/console",
-    "graph": "/grader/graph",
-    "params": "/grader/param",
-    "host": "/grader/host",
-    "actors": "/grader/actor",
-    "recorder": "/grader/recorder",
-    "course": "/grader/scenario",
-}
+
+def load_run(source: Path | BinaryIO, budget: MemoryBudget | None = None) -> Run:
+    """Read one recorded run. A file without the grader's metadata is a real-time run named after the file.
+
+    `budget` is shared with what is loaded beside it. Raises EvidenceError, in one line that names the file, for
+    whatever cannot be read to its end.
+    """
+    budget = budget or MemoryBudget()
+    if not isinstance(source, Path):
+        name = Path(str(getattr(source, "name", "evidence.mcap"))).name
+        return _load(name, BytesIO(source.read(MAX_FILE_BYTES + 1)), budget)
+    with _readable(source), source.open("rb") as file:
+        head = file.read(len(BAG_MAGIC))
+        file.seek(0)
+        if head == BAG_MAGIC:
+            from grader.evidence.bag import load_bag  # noqa: PLC0415 - few submissions hold a bag
+
+            return load_bag(source, budget)
+        return _load(source.name, file, budget, shown=str(source))
 
 
-class Loading:
-    """Collects by channel and decodes nothing; only the grader's own JSON channels are read into records.
+def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
+    """Read the runs of these files by scenario; a folder stands for its recordings and those of `evidence/` in it.
 
-    `room` is what all that is loaded together may take, `shown` what messages call the file.
+    Recordings are `*.mcap` and `*.bag`. Raises EvidenceError where nothing is found, a file cannot be read,
+    another tool's recording is empty, or two files hold the same scenario.
+    """
+    runs: dict[str, Run] = {}
+    origin: dict[str, Path] = {}
+    budget = MemoryBudget()
+    for path in _files(paths):
+        run = load_run(path, budget)
+        if run.foreign and not any(channel.messages for channel in run.channels):
+            raise EvidenceError(f"{path}: holds no messages", hint="record while the nodes run")
+        if run.scenario in runs:
+            raise EvidenceError(
+                f"{origin[run.scenario]} and {path} both hold the scenario {run.scenario!r}",
+                hint="give the evidence of one submission at a time",
+            )
+        runs[run.scenario], origin[run.scenario] = run, path
+    return runs
+
+
+def package_facts(run: Run) -> PackageFacts:
+    """Return the package facts that the run carries (`package.mcap` does). Raises EvidenceError without any."""
+    if run.package_json is None:
+        raise EvidenceError(
+            f"{run.evidence}: holds no package facts", hint="give package.mcap of the same recording"
+        )
+    try:
+        return PackageFacts.read_json(run.package_json)
+    except ValidationError as error:
+        raise EvidenceError(f"{run.evidence}: the package facts cannot be read: {_first(error)}") from error
+
+
+def _load(name: str, stream: BinaryIO, budget: MemoryBudget, *, shown: str = "") -> Run:
+    shown = shown or name
+    size_bytes = stream.seek(0, os.SEEK_END)
+    stream.seek(0)
+    if size_bytes > MAX_FILE_BYTES:
+        raise EvidenceError(f"{shown}: larger than {MAX_FILE_BYTES >> 20} MiB")
+    if not size_bytes:
+        raise EvidenceError(f"{shown}: the file is empty")
+    try:
+        return _RunBuilder(name, budget, shown).read(stream)
+    except ValidationError as error:
+        raise EvidenceError(
+            f"{shown}: a record of the grader's own cannot be read: {_first(error)}"
+        ) from error
+    except BudgetExceeded as error:
+        raise EvidenceError(f"{shown}: {error}", hint=LESS) from error
+    except ContainerError as error:
+        raise EvidenceError(f"{shown}: not sound MCAP: {error}") from error
+    except _DAMAGE as error:
+        wrong, hint = _damage(stream)
+        raise EvidenceError(f"{shown}: {wrong}", hint=hint) from error
+
+
+def _damage(stream: BinaryIO) -> tuple[str, str]:
+    """What is wrong, and what to do."""
+    stream.seek(0)
+    head = stream.read(32)
+    stream.seek(-min(stream.seek(0, os.SEEK_END), len(MAGIC)), os.SEEK_END)
+    tail = stream.read()
+    if head.startswith(b"version https://git-lfs"):
+        return "only a pointer of Git LFS, the recording itself is not here", "`git lfs pull` fetches it"
+    if head.startswith(b"SQLite format 3"):
+        return "a bag of ROS 2, and this grader reads those of ROS 1", "record with ROS 1: `rosbag record`"
+    again = "record it again, or copy it again"
+    if not head.startswith(MAGIC[:5]):
+        return "not an MCAP file and not a bag", again
+    return ("damaged" if tail == MAGIC else "cut short: it has no end"), again
+
+
+def _first(error: ValidationError) -> str:
+    """Return the first of pydantic's errors in one line."""
+    fault = error.errors(include_url=False, include_input=False)[0]
+    place = ".".join(str(part) for part in fault["loc"])
+    return f"{error.title}{'.' + place if place else ''}: {fault['msg']}"
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    try:
+        if path.exists() and not path.is_file():
+            raise EvidenceError(f"{path}: not a file")
+        if path.exists() and path.stat().st_size > MAX_FILE_BYTES:
+            raise EvidenceError(f"{path}: larger than {MAX_FILE_BYTES >> 20} MiB")
+        yield
+    except OSError as error:
+        raise EvidenceError(f"{path}: {error.strerror or type(error).__name__}") from error
+
+
+def _files(paths: Iterable[Path]) -> list[Path]:
+    found: dict[Path, Path] = {}
+    for path in paths:
+        inside = _recordings(path) if path.is_dir() else [path]
+        if not inside:
+            raise EvidenceError(
+                f"{path}: no evidence (*.mcap, *.bag) in this folder or in evidence/ below it"
+            )
+        for file in inside:
+            found.setdefault(file.resolve(), file)
+    if not found:
+        raise EvidenceError(
+            "no evidence given", hint="name evidence files or a folder of a graded submission"
+        )
+    return list(found.values())
+
+
+def _recordings(folder: Path) -> list[Path]:
+    with _listable(folder):
+        places = (folder, folder / "evidence")
+        found = [f for p in places for f in sorted(p.glob("*")) if f.suffix in SUFFIXES]
+        return [f for f in found if f.is_file() and not f.name.startswith(".")]
+
+
+@contextmanager
+def _listable(folder: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise EvidenceError(f"{folder}: {error.strerror or type(error).__name__}") from error
+
+
+class _RunBuilder:
+    """Builds a run in one pass over a file's records. Messages are collected by channel and not decoded; only the
+    grader's own JSON channels are read into records.
+
+    `budget` limits the memory of all that is loaded together, `shown` is what error messages call the file.
     """
 
-    def __init__(self, name: str, room: Room, shown: str) -> None:
+    def __init__(self, name: str, budget: MemoryBudget, shown: str) -> None:
         self._name, self._shown = name, shown
-        self._room = room
+        self._budget = budget
         self._schemas: dict[int, mcap.Schema] = {}
         self._channels: dict[int, mcap.Channel] = {}
         self._messages: dict[int, list[Message]] = defaultdict(list)
@@ -58,7 +206,7 @@ class Loading:
         self._profile = ""
 
     def read(self, stream: BinaryIO) -> Run:
-        """Raises EvidenceError for another format, NoRoom, and what `container.records` and pydantic raise."""
+        """Raises EvidenceError for another format, BudgetExceeded, and what `container.records` and pydantic raise."""
         for record in records(stream):
             if isinstance(record, mcap.Message):
                 self._hold_message(record)
@@ -76,7 +224,7 @@ class Loading:
     def _describe(self, record: mcap.McapRecord) -> None:
         if isinstance(record, mcap.Schema):
             if record.id not in self._schemas:
-                self._room.hold(len(record.data), foreign=self._metadata is None)
+                self._budget.hold(len(record.data), foreign=self._metadata is None)
                 self._schemas[record.id] = record
         elif isinstance(record, mcap.Channel):
             self._channels.setdefault(record.id, record)
@@ -93,12 +241,12 @@ class Loading:
         """The arena has limits of its own for its events."""
         channel, foreign = self._channels.get(message.channel_id), self._metadata is None
         if foreign or channel is None or channel.message_encoding != "json":
-            self._room.hold(len(message.data), foreign=foreign)
+            self._budget.hold(len(message.data), foreign=foreign)
 
     def _attach(self, record: mcap.Attachment) -> None:
         """Another tool's attachments are of no use; the grader's own come behind its metadata."""
         if self._metadata is not None:
-            self._room.hold(len(record.data), foreign=False)
+            self._budget.hold(len(record.data), foreign=False)
             self._attachments[record.name] = record.data
 
     def _run(self) -> Run:
@@ -162,7 +310,7 @@ class Loading:
             for number, channel in self._channels.items()
             if channel.message_encoding == "ros1"
         )
-        return merged(found, renumber=self._metadata is None)
+        return merge_channels(found, renumber=self._metadata is None)
 
     def _ros_channel(self, number: int, channel: mcap.Channel) -> Channel:
         schema, about = self._schemas.get(channel.schema_id), channel.metadata
@@ -174,7 +322,7 @@ class Loading:
             definition=schema.data.decode(errors="replace") if schema else "",
             latching=about.get("latching") in {"1", "true", "True"},
             messages=tuple(self._messages.pop(number, ())),
-            room=self._room,
+            budget=self._budget,
         )
 
     def _json(self, topic: str) -> list[Message]:
@@ -201,168 +349,6 @@ class Loading:
 
 
 def _shown(name: str) -> str:
-    """A name out of a foreign file, on one line."""
+    """Return a name from a foreign file so that it can be shown on one line."""
     text = name[:NAME_CHARS_SHOWN] + ("…" if len(name) > NAME_CHARS_SHOWN else "")
     return text if text.isprintable() else repr(text)
-
-
-# [evidence.reader] Reads evidence files: our own, and MCAP or bag files that other tools recorded from ROS 1.
-
-SUFFIXES = {".mcap", ".bag"}
-MAGIC = b"\x89MCAP0\r\n"
-BAG_MAGIC = b"#ROSBAG V"
-_DAMAGE = (
-    McapError,
-    ZstdError,
-    struct.error,
-    ValueError,
-    RuntimeError,
-    EOFError,
-    KeyError,
-    OverflowError,
-    MemoryError,
-)
-
-
-def load_run(source: Path | BinaryIO, room: Room | None = None) -> Run:
-    """One recorded run. A file without the grader's metadata is a real-time run named after the file.
-
-    `room` is shared with what is loaded beside it. Raises EvidenceError, in one line that names the file, for
-    whatever cannot be read to its end.
-    """
-    room = room or Room()
-    if not isinstance(source, Path):
-        name = Path(str(getattr(source, "name", "evidence.mcap"))).name
-        return _load(name, BytesIO(source.read(MAX_FILE_BYTES + 1)), room)
-    with _readable(source), source.open("rb") as file:
-        head = file.read(len(BAG_MAGIC))
-        file.seek(0)
-        if head == BAG_MAGIC:
-            from grader.evidence.bag import load_bag  # noqa: PLC0415 - few submissions hold a bag
-
-            return load_bag(source, room)
-        return _load(source.name, file, room, shown=str(source))
-
-
-def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
-    """The runs of these files by scenario; a folder stands for its recordings and those of `evidence/` in it.
-
-    Recordings are `*.mcap` and `*.bag`. Raises EvidenceError where nothing is found, a file cannot be read,
-    another tool's recording is empty, or two files hold the same scenario.
-    """
-    runs: dict[str, Run] = {}
-    origin: dict[str, Path] = {}
-    room = Room()
-    for path in _files(paths):
-        run = load_run(path, room)
-        if run.foreign and not any(channel.messages for channel in run.channels):
-            raise EvidenceError(f"{path}: holds no messages", hint="record while the nodes run")
-        if run.scenario in runs:
-            raise EvidenceError(
-                f"{origin[run.scenario]} and {path} both hold the scenario {run.scenario!r}",
-                hint="give the evidence of one submission at a time",
-            )
-        runs[run.scenario], origin[run.scenario] = run, path
-    return runs
-
-
-def package_facts(run: Run) -> PackageFacts:
-    """The package facts that the run carries (`package.mcap` does). Raises EvidenceError without any."""
-    if run.package_json is None:
-        raise EvidenceError(
-            f"{run.evidence}: holds no package facts", hint="give package.mcap of the same recording"
-        )
-    try:
-        return PackageFacts.read_json(run.package_json)
-    except ValidationError as error:
-        raise EvidenceError(f"{run.evidence}: the package facts cannot be read: {_first(error)}") from error
-
-
-def _load(name: str, stream: BinaryIO, room: Room, *, shown: str = "") -> Run:
-    shown = shown or name
-    size_bytes = stream.seek(0, os.SEEK_END)
-    stream.seek(0)
-    if size_bytes > MAX_FILE_BYTES:
-        raise EvidenceError(f"{shown}: larger than {MAX_FILE_BYTES >> 20} MiB")
-    if not size_bytes:
-        raise EvidenceError(f"{shown}: the file is empty")
-    try:
-        return Loading(name, room, shown).read(stream)
-    except ValidationError as error:
-        raise EvidenceError(
-            f"{shown}: a record of the grader's own cannot be read: {_first(error)}"
-        ) from error
-    except NoRoom as error:
-        raise EvidenceError(f"{shown}: {error}", hint=LESS) from error
-    except ContainerError as error:
-        raise EvidenceError(f"{shown}: not sound MCAP: {error}") from error
-    except _DAMAGE as error:
-        wrong, hint = _damage(stream)
-        raise EvidenceError(f"{shown}: {wrong}", hint=hint) from error
-
-
-def _damage(stream: BinaryIO) -> tuple[str, str]:
-    """What is wrong, and what to do."""
-    stream.seek(0)
-    head = stream.read(32)
-    stream.seek(-min(stream.seek(0, os.SEEK_END), len(MAGIC)), os.SEEK_END)
-    tail = stream.read()
-    if head.startswith(b"version https://git-lfs"):
-        return "only a pointer of Git LFS, the recording itself is not here", "`git lfs pull` fetches it"
-    if head.startswith(b"SQLite format 3"):
-        return "a bag of ROS 2, and this grader reads those of ROS 1", "record with ROS 1: `rosbag record`"
-    again = "record it again, or copy it again"
-    if not head.startswith(MAGIC[:5]):
-        return "not an MCAP file and not a bag", again
-    return ("damaged" if tail == MAGIC else "cut short: it has no end"), again
-
-
-def _first(error: ValidationError) -> str:
-    """The first of pydantic's complaints in one line."""
-    fault = error.errors(include_url=False, include_input=False)[0]
-    place = ".".join(str(part) for part in fault["loc"])
-    return f"{error.title}{'.' + place if place else ''}: {fault['msg']}"
-
-
-@contextmanager
-def _readable(path: Path) -> Iterator[None]:
-    try:
-        if path.exists() and not path.is_file():
-            raise EvidenceError(f"{path}: not a file")
-        if path.exists() and path.stat().st_size > MAX_FILE_BYTES:
-            raise EvidenceError(f"{path}: larger than {MAX_FILE_BYTES >> 20} MiB")
-        yield
-    except OSError as error:
-        raise EvidenceError(f"{path}: {error.strerror or type(error).__name__}") from error
-
-
-def _files(paths: Iterable[Path]) -> list[Path]:
-    found: dict[Path, Path] = {}
-    for path in paths:
-        inside = _recordings(path) if path.is_dir() else [path]
-        if not inside:
-            raise EvidenceError(
-                f"{path}: no evidence (*.mcap, *.bag) in this folder or in evidence/ below it"
-            )
-        for file in inside:
-            found.setdefault(file.resolve(), file)
-    if not found:
-        raise EvidenceError(
-            "no evidence given", hint="name evidence files or a folder of a graded submission"
-        )
-    return list(found.values())
-
-
-def _recordings(folder: Path) -> list[Path]:
-    with _listable(folder):
-        places = (folder, folder / "evidence")
-        found = [f for p in places for f in sorted(p.glob("*")) if f.suffix in SUFFIXES]
-        return [f for f in found if f.is_file() and not f.name.startswith(".")]
-
-
-@contextmanager
-def _listable(folder: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise EvidenceError(f"{folder}: {error.strerror or type(error).__name__}") from error

@@ -23,16 +23,22 @@ class FileCitation(Record):
     """A line of the student's own files; `file` is relative to the package's root, `line` counts from 1."""
 
     file: str
+    """A file of the submission, from the package's root."""
     line: int | None = None
+    """Counted from 1; null for the whole file."""
 
 
 class EvidenceCitation(Record):
     """A stretch of an evidence file: `from_ns` to `to_ns` are its `log_time`s, both included."""
 
     evidence: str
+    """An evidence file's name."""
     topic: str
+    """A topic in it."""
     from_ns: int | None = None
+    """`log_time` of the first message (ns); null for the whole."""
     to_ns: int | None = None
+    """`log_time` of the last message (ns), included; null for the whole."""
 
 
 Citation = FileCitation | EvidenceCitation
