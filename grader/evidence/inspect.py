@@ -46,7 +46,7 @@ class RateStats(Record):
 
 
 def rate_stats(times_ns: Sequence[int], *, nominal_hz: float | None = None) -> RateStats:
-    """Return the rate of messages that arrived at `times_ns`, in any order. Raises ValueError where `nominal_hz` <= 0."""
+    """Return the rate of messages that arrived at `times_ns`, in any order. Raises ValueError for a rate of 0 Hz."""
     if nominal_hz is not None and not nominal_hz > 0:
         raise ValueError("the nominal rate must be above 0 Hz")
     times = sorted(times_ns)
