@@ -18,6 +18,21 @@ class Status(str, Enum):
     ERROR = "error"
     MANUAL = "manual"
 
+    @property
+    def is_open(self) -> bool:
+        """Whether the points are neither earned nor lost: a person or another grading decides."""
+        return self is Status.MANUAL or self.is_retryable
+
+    @property
+    def is_retryable(self) -> bool:
+        """Whether grading again may decide it: the machine or the grader kept it from being judged."""
+        return self in {Status.INCONCLUSIVE, Status.ERROR}
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether points are lost, here or because another criterion was not reached."""
+        return self in {Status.FAIL, Status.PARTIAL, Status.BLOCKED}
+
 
 class FileCitation(Record):
     """A line of the student's own files; `file` is relative to the package's root, `line` counts from 1."""

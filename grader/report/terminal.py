@@ -11,7 +11,6 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from grader.judging.summary import OPEN
 from grader.model.result import AppliedOverride, CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
 from grader.report import settled
@@ -109,7 +108,7 @@ class Terminal:
             parts += self._losses("Still open: no points are lost for good", view.open)
         parts += self._section("Advice, costs nothing", [self._advice(c) for c in view.advice])
         parts += self._section(TITLE, self._noticed(result.notes))
-        judged = [c for c in result.criteria if not unrun or c.status not in OPEN]
+        judged = [c for c in result.criteria if not unrun or not c.status.is_open]
         title = "All criteria that could be judged" if unrun else "All criteria"
         parts += self._section(title, [self._table(judged)] if judged else [])
         if hidden:

@@ -9,7 +9,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.authoring.mutation.compare import DOUBTFUL, Comparison, compare, lost_criteria
+from grader.authoring.mutation.compare import Comparison, compare, lost_criteria
 from grader.authoring.mutation.model import MutantResult, ReferenceResult, RubricTest
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.plan import Planned
@@ -78,7 +78,7 @@ def _reference(plan: Plan, progress: Progress) -> GradingResult:
     )
     if graded.result is None:
         raise HostError(f"the reference solution could not be graded: {graded.error}")
-    doubtful = [c for c in graded.result.criteria if c.status in DOUBTFUL]
+    doubtful = [c for c in graded.result.criteria if c.status.is_retryable]
     if doubtful:
         raise HostError(
             f"the reference solution could not be judged: {doubtful[0].id}: {doubtful[0].message}",

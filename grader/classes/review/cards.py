@@ -14,7 +14,6 @@ from grader.report.text import number
 from grader.rubric.model import Rubric
 
 MANUAL = "manual"
-OPEN = {Status.MANUAL, Status.INCONCLUSIVE, Status.ERROR}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,7 +122,7 @@ def card(
 def _waits(card: Card, *, whole: bool) -> bool:
     """Of what could not be graded at all, only what people decide anyway waits for one."""
     status = card.criterion.status
-    return card.criterion.max_points > 0 and ((status in OPEN and whole) or (card.manual and status in OPEN))
+    return card.criterion.max_points > 0 and ((status.is_open and whole) or (card.manual and status.is_open))
 
 
 def _nothing_lost(card: Card) -> bool:

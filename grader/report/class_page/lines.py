@@ -115,8 +115,7 @@ def _state(result: GradingResult) -> State:
 
 def _still_open(criteria: Iterable[CriterionResult]) -> list[CriterionResult]:
     """What another run could decide."""
-    again = {Status.INCONCLUSIVE, Status.ERROR}
-    return [c for c in criteria if c.status in again and c.max_points > 0]
+    return [c for c in criteria if c.status.is_retryable and c.max_points > 0]
 
 
 def _why(criteria: Iterable[CriterionResult]) -> str:

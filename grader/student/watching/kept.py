@@ -7,7 +7,6 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 
 from grader.model.result import GradingResult
-from grader.model.verdict import Status
 from grader.rubric.model import Rubric
 from grader.student.watching.affected import stale
 from grader.student.watching.snapshot import Picture
@@ -40,7 +39,7 @@ class Kept:
         self, evidence: Path, picture: Picture | None, used: Mapping[str, Path], result: GradingResult
     ) -> None:
         """Take over what was recorded of the package in the picture; not what could not be judged."""
-        doubtful = {c.scenario for c in result.criteria if c.status in {Status.INCONCLUSIVE, Status.ERROR}}
+        doubtful = {c.scenario for c in result.criteria if c.status.is_retryable}
         for name in self._scenarios:
             recorded = evidence / f"{name}.mcap"
             if picture is None or name in doubtful or not recorded.is_file():

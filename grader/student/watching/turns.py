@@ -23,7 +23,6 @@ class Turns:
         return any((self.reached, self.more, self.less, self.lost, self.open))
 
 
-UNDECIDED = frozenset({Status.INCONCLUSIVE, Status.ERROR})
 FIELDS = ("reached", "more", "less", "lost", "open")
 
 
@@ -41,8 +40,8 @@ def turns(before: GradingResult | None, after: GradingResult) -> Turns:
 
 
 def _turn(before: CriterionResult, after: CriterionResult) -> str:
-    if after.status in UNDECIDED:
-        return "" if before.status in UNDECIDED else "open"
+    if after.status.is_retryable:
+        return "" if before.status.is_retryable else "open"
     had, has = before.status is Status.PASS, after.status is Status.PASS
     if has != had:
         return "reached" if has else "lost"
