@@ -18,10 +18,15 @@ on the machine do.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path, PurePath
 from platform import python_version
-from typing import Literal, TypeAlias, get_args
+from typing import TYPE_CHECKING, Literal, TypeAlias, TypeVar, get_args
 
 from grader import __version__
 from grader.errors import EvidenceError, UsageError
@@ -29,25 +34,29 @@ from grader.evidence.run import Run
 from grader.faults import NOTHING_RUN
 from grader.files import check_writable
 from grader.judging.recordings import PACKAGE_RUN
-from grader.model.progress import Silence, StepState
-from grader.model.result import EnvironmentInfo, GradingResult, SubmissionInfo
+from grader.model.progress import Progress, Silence, StepState
+from grader.model.result import NO_TIME, EnvironmentInfo, GradingResult, SubmissionInfo
+from grader.portable import wait_for_children
 from grader.results import RESULT, read_result_file
 from grader.rubric.load import LoadedRubric
 from grader.rubric.load import load_rubric as load_file
-from grader.steps import NOTHING_TOOK, outcome, run_aside, waited_for
+
+if TYPE_CHECKING:
+    from grader.arena.asynchronous import Stop
 
 StrPath: TypeAlias = "str | os.PathLike[str]"
 Sandbox = Literal["auto", "require", "none"]
 SANDBOXES = get_args(Sandbox)
-Told: TypeAlias = Callable[[str, str, str], None]
+T = TypeVar("T")
+OnStep: TypeAlias = Callable[[str, str, str], None]
 """Of a step: its name, its state (`waiting`, `running`, `done`, `failed`, `skipped`), and what it does or waits for."""
 
 
 def load_rubric(id_or_path: StrPath) -> LoadedRubric:
-    """The rubric of that id, of those that come with the grader, or in that YAML file.
+    """Load the rubric with that id, one of those that come with the grader, or the one in that YAML file.
 
-    A `Path` is always a file; a text is an id if there is such a rubric. `.rubric` has what the file says, `.digest`
-    its sha256. Raises RubricError, whose `faults` name each fault with file, line and key.
+    A `Path` is always a file; a string is an id if there is such a rubric. `.rubric` holds what the file says,
+    `.digest` its sha256. Raises RubricError, whose `faults` name each fault with file, line and key.
 
     >>> from grader import load_rubric
     >>> lab = load_rubric("leeds-comp3631-lab1")
@@ -67,65 +76,59 @@ def grade(
     sandbox: Sandbox = "auto",
     static_only: bool = False,
     keep_hidden: bool = True,
-    progress: Told | None = None,
+    progress: OnStep | None = None,
 ) -> GradingResult:
     """Grade one submission, as `grader grade` does: build it, run it, record it, judge the recording, write reports.
 
     `source` is a folder, an archive (`.zip`, `.tar.*`), a recording (`.bag`, `.mcap`) or a git URL with an optional
-    `@ref`. `rubric` is what `load_rubric` takes or gives. Results go to `out/<submission id>/` and take the place of
-    older ones; the folders are made. `submission_id` is by default made from `source`.
+    `@ref`. `rubric` is what `load_rubric` takes or returns. Results go to `out/<submission id>/` and replace older
+    ones; missing folders are made. `submission_id` is by default made from `source`.
 
-    `sandbox`: `auto` shuts students' code in where this machine can, `require` raises SandboxMissing (a HostError)
+    `sandbox`: `auto` confines students' code where this machine can, `require` raises SandboxMissing (a HostError)
     where it cannot, `none` never does. `static_only` runs nothing: what only a run can show is `inconclusive`. Without
-    `keep_hidden`, hidden criteria are left out of the files; the record that is returned has them all.
+    `keep_hidden`, hidden criteria are left out of the files; the returned result has them all.
 
-    It takes as long as the rubric's scenarios (half a minute, usually), and may be called where an event loop runs, as
-    in a notebook: that waits meanwhile. `await asyncio.to_thread(grade, …)` lets it go on. Ctrl-C ends what runs in
-    order and raises KeyboardInterrupt. `progress` is called with a step (`intake`, `build`, a scenario's name), its
-    state and a detail, from whatever thread is at it; what it raises ends what runs in order, and is raised from here.
+    It takes as long as the rubric's scenarios (usually half a minute). Where an event loop runs, as in a notebook, the
+    loop waits meanwhile; `await asyncio.to_thread(grade, …)` lets it go on. Ctrl-C ends the runs in order and raises
+    KeyboardInterrupt. `progress` is called, from any thread, with a step (`intake`, `build`, a scenario's name), its
+    state and a detail; an exception from it ends the runs in order and is raised from here.
 
-    Points are those of the rubric, times seconds. Raises GraderError where it cannot be graded: SubmissionError where
-    the submission is at fault, HostError where this machine is, RubricError and UsageError for wrong arguments. All but
-    the last two leave a `result.json` of status `error`, as long as there is no complete one from before.
+    Points are those of the rubric, times seconds. Raises GraderError: SubmissionError where the submission is at fault,
+    HostError where this machine is, RubricError and UsageError for wrong arguments. All but the last two leave a
+    `result.json` with the status `error`, unless there is a complete one from before.
     """
-    from grader import pipeline  # noqa: PLC0415 - judging needs nothing of it
-    from grader.arena.asynchronous import Stop, Stopped  # noqa: PLC0415 - as above
+    from grader import pipeline  # noqa: PLC0415 - loading a rubric needs nothing of it
 
     if sandbox not in SANDBOXES:
         raise UsageError(f"sandbox is {sandbox!r}", hint=f"it is one of {', '.join(SANDBOXES)}")
     given, loaded, folder = _text(source), _loaded(rubric), Path(out)
     check_writable(folder)
-    stop = Stop()
-    telling = _Telling(progress, stop.ask)
-    options = pipeline.GradeOptions(
-        sandbox=sandbox,
-        submission_id=submission_id,
-        static_only=static_only,
-        keep_hidden=keep_hidden,
-        stop=stop,
-    )
-    try:
-        with waited_for():
-            result = run_aside(lambda: pipeline.grade(given, loaded, folder, options, telling), stop.ask)
-    except Stopped:
-        if telling.error is None:
-            raise
-    if telling.error is not None:
-        raise telling.error
-    return result
+
+    def work(stop: Stop, steps: Progress) -> GradingResult:
+        options = pipeline.GradeOptions(
+            sandbox=sandbox,
+            submission_id=submission_id,
+            static_only=static_only,
+            keep_hidden=keep_hidden,
+            stop=stop,
+        )
+        return pipeline.grade(given, loaded, folder, options, steps)
+
+    return _run_stoppable(work, progress)
 
 
 def judge(evidence: StrPath | Sequence[StrPath], rubric: StrPath | LoadedRubric) -> GradingResult:
-    """Judge what was recorded before, as `grader judge` does: nothing is run and nothing written, no ROS is needed.
+    """Judge what was recorded before, as `grader judge` does: nothing is run or written, and no ROS is needed.
 
     `evidence` is a folder of results, its `evidence/`, or files (`.mcap`, `.bag`) of one submission. The same evidence
     and rubric always give an equal result, apart from `environment`, which names this grader and Python; its `criteria`
-    are those that `grade` gives. What people decided and what being late costs is not in it, and all times are 0.
+    are those that `grade` returns. It holds no overrides and no late penalty, and all its times are 0.
 
-    `submission` is what the evidence says of it: of another tool's recording, the file's name.
+    `submission` is what the evidence says of it; for another tool's recording, the file's name.
 
-    Raises EvidenceError where the evidence cannot be read (by a newer grader's, it says so), RubricError.
+    Raises EvidenceError where the evidence cannot be read (or a newer grader wrote it), RubricError.
     """
+    from grader import pipeline  # noqa: PLC0415 - loading a rubric needs nothing of it
     from grader.evidence.reader import load_evidence  # noqa: PLC0415 - slow to load
     from grader.judging import judge as criteria_of  # noqa: PLC0415 - as above
 
@@ -133,12 +136,12 @@ def judge(evidence: StrPath | Sequence[StrPath], rubric: StrPath | LoadedRubric)
     loaded = _loaded(rubric)
     runs = load_evidence([Path(path) for path in paths])
     criteria = criteria_of(loaded.rubric, runs, loaded.checks)
-    result = outcome(_submission(runs), loaded, runs, criteria, timing=NOTHING_TOOK)
+    result = pipeline.assemble_result(_submission(runs), loaded, runs, criteria, timing=NO_TIME)
     return result.model_copy(update={"environment": _environment(runs)})
 
 
 def load_result(path: StrPath) -> GradingResult:
-    """A `result.json` of any version that a grader wrote, or the one in that folder of results.
+    """Read a `result.json`, of any version up to this grader's, or the one in that folder of results.
 
     Raises EvidenceError where there is none, where it is damaged, and where a newer grader wrote it.
     """
@@ -152,21 +155,78 @@ def load_result(path: StrPath) -> GradingResult:
     return result
 
 
-class _Telling(Silence):
-    """Tells a caller of each step. What the caller raises ends the run, and is kept in `error`."""
+def _run_stoppable(work: Callable[[Stop, Progress], T], on_step: OnStep | None) -> T:
+    """Return what `work` returns. Whatever `on_step` raises stops it, and is raised when it has ended in order."""
+    from grader.arena.asynchronous import Stop, Stopped  # noqa: PLC0415 - loading a rubric needs nothing of it
 
-    def __init__(self, told: Told | None, stop: Callable[[], None]) -> None:
-        self._told = told
+    stop = Stop()
+    listener = _StepListener(on_step, stop.ask)
+    try:
+        with wait_for_children():
+            result = _run_beside_loop(lambda: work(stop, listener), stop.ask)
+    except Stopped:
+        if listener.error is None:
+            raise
+    if listener.error is not None:
+        raise listener.error
+    return result
+
+
+def _run_beside_loop(work: Callable[[], T], stop: Callable[[], None]) -> T:
+    """Return what `work` returns. It starts an event loop: where one runs in this thread, it gets a thread of its own,
+    and Ctrl-C asks `stop` to end it, and is raised when it has ended.
+    """
+    if not _loop_runs_here():
+        return work()
+    with ThreadPoolExecutor(1, thread_name_prefix="grader") as executor:
+        future = executor.submit(work)
+        try:
+            with _interruptible():
+                return future.result()
+        except KeyboardInterrupt:
+            stop()
+            raise
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let Ctrl-C interrupt at once: asyncio's own handler takes effect when its loop goes on, which is too late."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before or signal.default_int_handler)
+
+
+def _loop_runs_here() -> bool:
+    if "asyncio" not in sys.modules:  # slow to import, and there is no loop without it
+        return False
+    import asyncio  # noqa: PLC0415
+
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return False
+    return True
+
+
+class _StepListener(Silence):
+    """Calls `on_step` with each step. An exception from it ends the run, and is kept in `error`."""
+
+    def __init__(self, on_step: OnStep | None, stop: Callable[[], None]) -> None:
+        self._on_step = on_step
         self._stop = stop
         self.error: BaseException | None = None
 
     def step(self, name: str, state: StepState, detail: str = "", expected_s: float | None = None) -> None:  # noqa: ARG002
-        """One step is now in that state."""
-        if self._told is None or self.error is not None:
+        if self._on_step is None or self.error is not None:
             return
         try:
-            self._told(name, state, detail)
-        except BaseException as error:  # noqa: BLE001 - it is raised again when the run has ended in order
+            self._on_step(name, state, detail)
+        except BaseException as error:  # noqa: BLE001 - raised again when the run has ended in order
             self.error = error
             self._stop()
 
@@ -182,8 +242,8 @@ def _loaded(rubric: StrPath | LoadedRubric) -> LoadedRubric:
     return rubric if isinstance(rubric, LoadedRubric) else load_rubric(rubric)
 
 
-def _said(runs: Mapping[str, Run], key: str) -> str:
-    """What the evidence says of itself; the package's own file comes first in it."""
+def _metadata(runs: Mapping[str, Run], key: str) -> str:
+    """Return what the evidence says of itself: the package's own file first, then those of the runs."""
     ordered = sorted(runs.values(), key=lambda run: run.scenario != PACKAGE_RUN)
     return next((run.metadata[key] for run in ordered if run.metadata.get(key)), "")
 
@@ -191,18 +251,18 @@ def _said(runs: Mapping[str, Run], key: str) -> str:
 def _submission(runs: Mapping[str, Run]) -> SubmissionInfo:
     name = next(iter(runs.values())).evidence
     return SubmissionInfo(
-        id=_said(runs, "submission.id") or PurePath(name).stem,
-        source=_said(runs, "submission.source") or name,
-        commit=_said(runs, "submission.commit") or None,
-        digest=_said(runs, "submission.digest"),
-        package=_said(runs, "submission.package"),
+        id=_metadata(runs, "submission.id") or PurePath(name).stem,
+        source=_metadata(runs, "submission.source") or name,
+        commit=_metadata(runs, "submission.commit") or None,
+        digest=_metadata(runs, "submission.digest"),
+        package=_metadata(runs, "submission.package"),
     )
 
 
 def _environment(runs: Mapping[str, Run]) -> EnvironmentInfo:
     return EnvironmentInfo(
         grader=__version__,
-        ros=_said(runs, "ros"),
+        ros=_metadata(runs, "ros"),
         python=python_version(),
-        sandbox=_said(runs, "sandbox") or NOTHING_RUN,
+        sandbox=_metadata(runs, "sandbox") or NOTHING_RUN,
     )

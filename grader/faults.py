@@ -1,4 +1,4 @@
-"""Whose fault it is that a submission could not be graded, and the result that says so."""
+"""Classify what ended a grading: the fault of the submission, the machine or the grader, and a result that says so."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from grader.files import FULL
 from grader.intake.identity import identify
 from grader.intake.source import Source
 from grader.model.result import (
+    NO_TIME,
     CriterionResult,
     EnvironmentInfo,
     ErrorInfo,
@@ -50,7 +51,7 @@ MACHINE = FULL | {
     errno.EROFS: "the disk became read-only",
     errno.ESTALE: "the network disk is gone",
 }
-AGAIN = "mend that (`grader doctor` looks at this machine), then grade again"
+AGAIN = "fix that (`grader doctor` checks this machine), then grade again"
 NUMBER = re.compile(r"\[Errno (\d+)\]")
 UNEXPECTED = {EvidenceError.kind, GraderError.kind}
 NOTHING_RUN = "nothing was run"
@@ -62,8 +63,8 @@ REPORT = "run with --debug for the traceback, and report it; the submission can 
 
 
 @dataclass(kw_only=True)
-class Attempt:
-    """What is known of a grading while it runs: enough to say in the end that it failed. `about` is None until the
+class GradingContext:
+    """What is known of a grading while it runs, for the result that says that it failed. `submission` is None until the
     submission is open."""
 
     source: str | Source
@@ -72,29 +73,29 @@ class Attempt:
     out: Path
     keep_hidden: bool
     timing: Callable[[], TimingInfo]
-    about: SubmissionInfo | None = None
+    submission: SubmissionInfo | None = None
 
 
 @contextmanager
-def told_apart(attempt: Attempt) -> Iterator[None]:
-    """Whatever ends the grading becomes an error that says whose fault it is, and a result that says the same.
+def classify_errors(context: GradingContext) -> Iterator[None]:
+    """Turn whatever ends the grading into an error that says whose fault it is, and write a result that says the same.
 
     Errors of the command line and of the rubric leave no result, and neither does a submission that another grader
     is working on.
     """
     try:
         yield
-    except (Exception, SystemExit) as error:  # whatever it is, it must not look as if nobody had been graded
+    except (Exception, SystemExit) as error:  # whatever it is, a submission must not go missing
         fault = fault_of(error)
         if not isinstance(fault, (UsageError, Busy)):
-            fault.note = _keep(fault, attempt)
+            fault.note = _write_error_result(fault, context)
         if fault is error:
             raise
         raise fault from error
 
 
 def fault_of(error: BaseException) -> GraderError:
-    """The error with its kind: the student's, the machine's or the grader's own."""
+    """Return the error as one of the student's, the machine's or the grader's own."""
     if isinstance(error, MemoryError) or (isinstance(error, RuntimeError) and str(error) == NO_THREAD):
         return HostError("the grader ran out of memory", hint=MEMORY)
     if isinstance(error, GraderError) and not isinstance(error, (OutputError, SubmissionError)):
@@ -106,7 +107,7 @@ def fault_of(error: BaseException) -> GraderError:
 
 
 def _machine_fault(error: BaseException) -> HostError | None:
-    """The machine's fault behind an error, whoever met it first; None where it is not at fault."""
+    """Return the machine's fault behind an error, at whatever depth; None where the machine is not at fault."""
     cause = error if isinstance(error, OSError) else error.__cause__
     reason = MACHINE.get(_number(cause)) if isinstance(cause, OSError) else None
     if reason and isinstance(error, GraderError):
@@ -122,32 +123,33 @@ def _machine_fault(error: BaseException) -> HostError | None:
 
 
 def _number(error: OSError) -> int:
-    """Its errno; shutil has only the text of many."""
-    told = NUMBER.search(str(error)) if isinstance(error, shutil.Error) else None
-    return int(told[1]) if told else error.errno or 0
+    """Return its errno; shutil's error has only the texts of several."""
+    found = NUMBER.search(str(error)) if isinstance(error, shutil.Error) else None
+    return int(found[1]) if found else error.errno or 0
 
 
 def _internal(error: BaseException) -> InternalError:
     return InternalError(f"internal error: {type(error).__name__}: {error}", hint=REPORT)
 
 
-def error_result(fault: GraderError, about: SubmissionInfo, attempt: Attempt) -> GradingResult:
-    """The result that says that nothing was graded: every criterion open, no point given."""
-    rubric = attempt.rubric
+def error_result(
+    fault: GraderError, submission: SubmissionInfo, rubric: LoadedRubric, timing: TimingInfo = NO_TIME
+) -> GradingResult:
+    """Return the result that says why nothing was graded: every criterion is open, and no points are awarded."""
     return GradingResult(
-        submission=about,
+        submission=submission,
         rubric=RubricInfo(id=rubric.rubric.id, version=rubric.rubric.version, digest=rubric.digest),
         status="error",
         points=0.0,
         max_points=rubric.rubric.max_points,
-        criteria=tuple(_open(criterion, fault) for criterion in rubric.rubric.criteria),
+        criteria=tuple(_not_judged(criterion, fault) for criterion in rubric.rubric.criteria),
         environment=EnvironmentInfo(grader=__version__, ros="", python=python_version(), sandbox=NOTHING_RUN),
-        timing=attempt.timing(),
+        timing=timing,
         error=ErrorInfo(kind=fault.kind, message=fault.message, hint=fault.hint),
     )
 
 
-def _open(criterion: Criterion, fault: GraderError) -> CriterionResult:
+def _not_judged(criterion: Criterion, fault: GraderError) -> CriterionResult:
     own = fault.blame == "submission"
     lost = "not judged" if own else "not judged, which is not the submission's fault, so no mark is lost"
     return CriterionResult(
@@ -167,32 +169,32 @@ def _open(criterion: Criterion, fault: GraderError) -> CriterionResult:
     )
 
 
-def _keep(fault: GraderError, attempt: Attempt) -> str:
-    """Write the result that says what went wrong, and give a remark where there is none.
+def _write_error_result(fault: GraderError, context: GradingContext) -> str:
+    """Write the result that says what went wrong; where it is not written, return a note that says why.
 
-    What an earlier run found out stays, unless the submission itself is at fault now.
+    An earlier complete result stays, unless the submission itself is at fault now.
     """
-    about = attempt.about or _about(attempt)
-    if about is None:
+    submission = context.submission or _identified(context)
+    if submission is None:
         return ""
-    folder = attempt.out / about.id
+    folder = context.out / submission.id
     try:
         with Results(folder) as results:
             if fault.blame != "submission" and results.complete:
                 return f"the result of an earlier run stays as it is: {folder / RESULT}"
-            result = error_result(fault, about, attempt)
+            result = error_result(fault, submission, context.rubric, context.timing())
             results.evidence.rmdir()
-            rubric, hidden = attempt.rubric.rubric, attempt.keep_hidden
+            rubric, hidden = context.rubric.rubric, context.keep_hidden
             write_reports(result, results.new, console="", rubric=rubric, keep_hidden=hidden)
             (results.new / "console.log").unlink()
             results.commit()
-    except Exception as second:  # noqa: BLE001 - what went wrong first is what has to be told
+    except Exception as second:  # noqa: BLE001 - the first error is the one to report
         return f"no result could be written: {getattr(second, 'message', '') or type(second).__name__}"
     return ""
 
 
-def _about(attempt: Attempt) -> SubmissionInfo | None:
-    known = identify(attempt.source, attempt.submission_id)
+def _identified(context: GradingContext) -> SubmissionInfo | None:
+    known = identify(context.source, context.submission_id)
     if known is None:
         return None
     return SubmissionInfo(id=known[0], source=known[1], commit=None, digest="", package="")

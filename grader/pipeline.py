@@ -1,52 +1,104 @@
-"""The whole data flow: begin reading here.
+"""The whole data flow of one grading, open → record → judge → write: begin reading here.
 
-intake → package facts → arena → evidence → judge → report
+    intake            the source (folder, archive, git URL, recording) becomes a folder on this disk
+    package           its files become package facts; nothing of them is executed
+    arena             its nodes run in a sandbox, and everything they do is recorded
+    evidence          what was recorded, as files: nothing after this needs ROS
+    judging           the evidence and the rubric become statuses and points
+    report            the result is written in every form that students and programs read
 
-A recording that is handed in is evidence already: it skips the package and the arena. `grader/steps/` has the steps.
+A submission that is a recording, or holds recordings only, is evidence already: it skips the package and the arena.
+
+`grade` does all of it, `record` stops before judging, and `grader judge` (`judging/`) begins with the evidence. Many
+submissions at once are `classes/batch/`, the repeated gradings of `grader check --watch` are `student/watching/`: both
+call `grade`.
 """
 
 from __future__ import annotations
 
-from contextlib import suppress
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from functools import partial
+from importlib import import_module
 from pathlib import Path
+from platform import python_version
+from typing import TYPE_CHECKING, TypeAlias
 
-from grader.errors import GraderError, UsageError
-from grader.faults import Attempt, told_apart
+from grader import __version__
+from grader.errors import EvidenceError, GraderError, SubmissionError, UsageError
+from grader.evidence.run import Run, console_log
+from grader.faults import NOTHING_RUN, GradingContext, classify_errors
+from grader.files import temporary_folder
+from grader.intake import open_recorded, open_recording, open_submission
 from grader.intake.source import Source
+from grader.judging import judge
+from grader.judging.early import judge_files
+from grader.judging.notes import notes_of
+from grader.judging.summary import overall_status, total_points
+from grader.model.figure import Figures
+from grader.model.package import PackageFacts
 from grader.model.progress import Progress
-from grader.model.result import GradingResult
-from grader.model.submission import RecordedSubmission
+from grader.model.result import (
+    CriterionResult,
+    EarlyVerdict,
+    EnvironmentInfo,
+    GradingResult,
+    RubricInfo,
+    SubmissionInfo,
+    TimingInfo,
+)
+from grader.model.submission import RecordedSubmission, Submission
+from grader.model.verdict import Status
+from grader.package import read_package
+from grader.portable import wait_for_children
 from grader.report.files import write_reports
+from grader.report.hidden import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
 from grader.rubric.load import LoadedRubric
-from grader.steps import (
-    Clock,
-    GradeOptions,
-    about,
-    console_log,
-    figures_of,
-    judged_recording,
-    keep_scenarios,
-    loaded_meanwhile,
-    opened,
-    outcome,
-    read_facts,
-    recorded_and_judged,
-    recorder,
-    waited_for,
-)
+from grader.rubric.needs import needs_package, needs_ros, started
+from grader.rubric.rates import rates_of
 
-__all__ = ["GradeOptions", "console_log", "grade", "prepare", "record"]
+if TYPE_CHECKING:
+    from grader.arena.asynchronous import Stop
+    from grader.arena.recording import Recorder
+    from grader.arena.sandbox import Mode
+    from grader.arena.static_recorder import Recording, StaticRecorder
+
+LATER = ("grader.evidence.decode", "grader.evidence.reader")
+"""Slow to import, and needed by no verdict that the files alone decide: imported while the build runs. The arena is
+imported when it begins, and what judges or reports recordings when it is called."""
+ROS_TYPES = "rosbags.typesys.stores.ros1_noetic"
+
+Judged: TypeAlias = tuple[dict[str, Run], tuple[CriterionResult, ...]]
+"""The runs by scenario, and the criteria judged by them, in the rubric's order."""
 
 
-def prepare(options: GradeOptions) -> None:
-    """Before many gradings: make what they share. What keeps it from being made, each of them says for itself."""
-    from grader.arena.base_workspace import provide_base  # noqa: PLC0415 - see steps.recorded.LATER
+@dataclass(frozen=True, kw_only=True)
+class GradeOptions:
+    """What a grading may be asked for. The last four are for batches, watching and the Python API.
 
-    if not options.static_only:
-        with suppress(GraderError), waited_for():
-            provide_base(options.sandbox)
+    `static_only` judges the files alone. Without `keep_hidden`, the reports leave hidden criteria out. Without `files`,
+    only the result is wanted: neither evidence nor reports stay in the output folder.
+
+    `tidy` first finishes what killed graders left beside the submission's folder; a batch does that once for all.
+    `find_earlier` is called when the submission is open: a result that it returns stays, and nothing is run. `settle`
+    turns the automatic result into the one that counts: overrides and deadlines. `reused` is evidence by scenario that
+    still holds: these scenarios are not run again. `stop` ends the runs in order, from another thread; then
+    `arena.asynchronous.Stopped` is raised.
+    """
+
+    sandbox: Mode = "auto"
+    submission_id: str | None = None
+    static_only: bool = False
+    keep_hidden: bool = True
+    tidy: bool = True
+    files: bool = True
+    find_earlier: Callable[[SubmissionInfo], GradingResult | None] = lambda _: None
+    settle: Callable[[GradingResult], GradingResult] = lambda result: result
+    reused: Mapping[str, Path] = field(default_factory=dict)
+    stop: Stop | None = None
 
 
 def grade(
@@ -54,37 +106,41 @@ def grade(
 ) -> GradingResult:
     """Grade one submission into `out/<its id>/`: evidence and reports, which replace older ones together.
 
-    Without `options.files`, `out` is only where it is worked, and nothing stays there.
-
-    Raises GraderError where it cannot; the result then says why, with the status `error`.
+    Raises GraderError where it cannot be graded; the result then says why, with the status `error`.
     """
     clock = Clock()
-    attempt = Attempt(
+    context = GradingContext(
         source=source,
         submission_id=options.submission_id,
         rubric=rubric,
         out=out,
         keep_hidden=options.keep_hidden,
-        timing=lambda: clock.timing(None),
+        timing=clock.timing,
     )
     if options.tidy:
         finish_killed(out)
-    with told_apart(attempt), waited_for(), opened(source, rubric, options, progress) as submission:
-        attempt.about = about(submission)
-        kept = options.kept(attempt.about)
-        if kept is not None:
-            return kept
+    with (
+        classify_errors(context),
+        wait_for_children(),
+        open_source(source, rubric, options, progress) as submission,
+    ):
+        context.submission = submission_info(submission)
+        earlier = options.find_earlier(context.submission)
+        if earlier is not None:
+            return earlier
         with Results(out / submission.id) as results:
             recording = None
             if isinstance(submission, RecordedSubmission):
-                runs, criteria = judged_recording(submission, rubric, results.evidence, progress)
+                runs, criteria = keep_and_judge(submission, rubric, results.evidence, progress)
             else:
-                recording, runs, criteria = recorded_and_judged(
+                recording, runs, criteria = record_and_judge(
                     submission, rubric, results.evidence, options, progress
                 )
             timing = clock.timing(recording)
-            graded = outcome(attempt.about, rubric, runs, criteria, recording=recording, timing=timing)
-            result = options.settled(graded)
+            automatic = assemble_result(
+                context.submission, rubric, runs, criteria, recording=recording, timing=timing
+            )
+            result = options.settle(automatic)
             if not options.files:
                 return result
             write_reports(
@@ -93,7 +149,7 @@ def grade(
                 console=console_log(runs),
                 rubric=rubric.rubric,
                 keep_hidden=options.keep_hidden,
-                figures=figures_of(rubric, runs, result),
+                figures=draw_figures(rubric, runs, result),
                 docs=rubric.docs,
             )
             results.commit()
@@ -103,20 +159,257 @@ def grade(
 def record(
     source: str, rubric: LoadedRubric, out: Path, options: GradeOptions, progress: Progress
 ) -> list[Path]:
-    """Record the rubric's scenarios into `out/<its id>/evidence/` and judge nothing."""
+    """Record the rubric's scenarios into `out/<its id>/evidence/`, judge nothing, and return the files."""
     finish_killed(out)
-    with waited_for(), opened(source, rubric, options, progress) as submission:
+    with wait_for_children(), open_source(source, rubric, options, progress) as submission:
         if isinstance(submission, RecordedSubmission):
             raise UsageError(
                 f"{submission.source}: there is nothing to run in it", hint="grade it, or judge it"
             )
         facts = read_facts(submission, progress)
         with Results(out / submission.id) as results:
-            with recorder(
-                submission, facts, rubric, results.evidence, options=options, progress=progress
-            ) as at_work:
-                at_work.record_all(partial(loaded_meanwhile, rubric))
-                keep_scenarios(rubric, submission, results.evidence, progress)
-                names = [path.name for path in at_work.recording.files]
+            evidence = results.evidence
+            with make_recorder(
+                submission, facts, rubric, evidence, options=options, progress=progress
+            ) as recorder:
+                recorder.record_all(partial(import_later, rubric))
+                keep_recordings(submission, rubric, evidence, progress)
+                names = [path.name for path in recorder.recording.files]
             results.commit()
     return [out / submission.id / EVIDENCE / name for name in names]
+
+
+def prepare(options: GradeOptions) -> None:
+    """Make what many gradings share, before the first. If it cannot be made, each of them reports why."""
+    from grader.arena.base_workspace import provide_base  # noqa: PLC0415 - see LATER
+
+    if not options.static_only:
+        with suppress(GraderError), wait_for_children():
+            provide_base(options.sandbox)
+
+
+# --- Open -------------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def open_source(
+    source: str | Source, rubric: LoadedRubric, options: GradeOptions, progress: Progress
+) -> Iterator[Submission | RecordedSubmission]:
+    """Open the submission for as long as the block runs. Raises SubmissionError, UsageError."""
+    progress.step("intake", "running", source if isinstance(source, str) else source.given)
+    with temporary_folder("source") as folder:
+        submission_id = options.submission_id
+        submission: Submission | RecordedSubmission | None
+        submission = open_recording(source, submission_id=submission_id)
+        if submission is None and needs_package(rubric):
+            package = rubric.rubric.package
+            submission = open_submission(source, package=package, workdir=folder, submission_id=submission_id)
+        elif submission is None:
+            submission = open_recorded(source, workdir=folder, submission_id=submission_id)
+        progress.step("intake", "done", submission.id)
+        yield submission
+
+
+def submission_info(submission: Submission | RecordedSubmission) -> SubmissionInfo:
+    """Return whose work it is, as the result says it."""
+    return SubmissionInfo(
+        id=submission.id,
+        source=submission.source,
+        commit=submission.commit,
+        digest=submission.digest,
+        package=submission.package.name if isinstance(submission, Submission) else "",
+    )
+
+
+# --- Record -----------------------------------------------------------------------------------------------------------
+
+
+def record_and_judge(
+    submission: Submission, rubric: LoadedRubric, evidence: Path, options: GradeOptions, progress: Progress
+) -> tuple[Recording, dict[str, Run], tuple[CriterionResult, ...]]:
+    """Record every scenario into the folder `evidence`, and judge it.
+
+    What cannot be judged because the machine was late is recorded again, alone, at most `RETRIES` times.
+    """
+    facts = read_facts(submission, progress)
+    progress.early(lambda: judge_early(facts, rubric, options))
+    from grader.arena.static_recorder import RETRIES  # noqa: PLC0415 - see LATER
+
+    with make_recorder(submission, facts, rubric, evidence, options=options, progress=progress) as recorder:
+        recorder.record_all(partial(import_later, rubric))
+        keep_recordings(submission, rubric, evidence, progress)
+        runs, criteria = judge_folder(evidence, rubric)
+        for _ in range(RETRIES):
+            again = inconclusive_scenarios(criteria, recorder.recording)
+            if not again:
+                break
+            recorder.record_again(again)
+            runs, criteria = judge_folder(evidence, rubric)
+    return recorder.recording, runs, criteria
+
+
+def read_facts(submission: Submission, progress: Progress) -> PackageFacts:
+    """Return what the files say; nothing of them is executed."""
+    progress.step("package", "running", "reading its files")
+    facts = read_package(submission.package, hints=submission.hints)
+    progress.step("package", "done")
+    return facts
+
+
+def make_recorder(
+    submission: Submission,
+    facts: PackageFacts,
+    rubric: LoadedRubric,
+    evidence: Path,
+    *,
+    options: GradeOptions,
+    progress: Progress,
+) -> Recorder | StaticRecorder:
+    """Return what records the rubric's scenarios into the folder `evidence`, to be used as a context: the arena, or a
+    recorder of files alone where nothing is to be run, or can be."""
+    from grader.arena.static_recorder import (  # noqa: PLC0415 - see LATER
+        STATIC_ONLY,
+        StaticRecorder,
+        why_unrun,
+    )
+
+    scenarios = started(rubric.rubric)
+    reason = STATIC_ONLY if options.static_only or not needs_ros(rubric) else why_unrun()
+    if reason:
+        return StaticRecorder(
+            submission,
+            facts,
+            scenarios,
+            evidence,
+            reason=reason,
+            progress=progress,
+            recorded=options.reused,
+        )
+    from grader.arena.recording import Recorder  # noqa: PLC0415 - see LATER
+
+    return Recorder(
+        submission,
+        facts,
+        scenarios,
+        evidence,
+        rates=rates_of(rubric.rubric),
+        mode=options.sandbox,
+        progress=progress,
+        recorded=options.reused,
+        stop=options.stop,
+    )
+
+
+def keep_recordings(
+    submission: Submission | RecordedSubmission, rubric: LoadedRubric, evidence: Path, progress: Progress
+) -> None:
+    """Copy the recordings that scenarios name in the submission into the folder `evidence`."""
+    from grader import recordings  # noqa: PLC0415 - see LATER
+
+    recordings.keep_scenarios(rubric.rubric, submission, evidence, progress)
+
+
+def import_later(rubric: LoadedRubric) -> None:
+    """Import modules before they are needed. Only probes need ROS's own message types, hundreds of them."""
+    probes = any(scenario.probes for scenario in rubric.rubric.scenarios.values())
+    for name in (*LATER, *([ROS_TYPES] if probes else [])):
+        import_module(name)
+
+
+def inconclusive_scenarios(criteria: tuple[CriterionResult, ...], recording: Recording) -> list[str]:
+    """Return the scenarios that were run and left a criterion inconclusive."""
+    recorded = {path.stem for path in recording.files}
+    doubtful = {c.scenario for c in criteria if c.status is Status.INCONCLUSIVE and c.scenario is not None}
+    return sorted(doubtful & recorded)
+
+
+# --- Judge ------------------------------------------------------------------------------------------------------------
+
+
+def judge_folder(evidence: Path, rubric: LoadedRubric) -> Judged:
+    """Read and judge what is in the folder. Raises EvidenceError."""
+    from grader.evidence.reader import load_evidence  # noqa: PLC0415 - see LATER
+
+    runs = load_evidence([evidence])
+    return runs, judge(rubric.rubric, runs, rubric.checks)
+
+
+def keep_and_judge(
+    submission: RecordedSubmission, rubric: LoadedRubric, evidence: Path, progress: Progress
+) -> Judged:
+    """Copy a submission's recordings into the folder `evidence`, and judge them. Raises SubmissionError where the one
+    that is the whole submission cannot be read."""
+    if submission.file is None:
+        keep_recordings(submission, rubric, evidence, progress)
+        return judge_folder(evidence, rubric)
+    from grader.recordings import keep_recording  # noqa: PLC0415 - see LATER
+
+    try:
+        keep_recording(submission.file, evidence)
+    except EvidenceError as error:
+        raise SubmissionError(error.message, hint=error.hint) from error
+    return judge_folder(evidence, rubric)
+
+
+def judge_early(facts: PackageFacts, rubric: LoadedRubric, options: GradeOptions) -> tuple[EarlyVerdict, ...]:
+    """Return the verdicts that the files alone decide, without hidden ones where `options` leave them out."""
+    hidden = frozenset[str]() if options.keep_hidden else hidden_ids(rubric.rubric)
+    found = judge_files(rubric.rubric, facts, rubric.checks)
+    return tuple(verdict for verdict in found if verdict.criterion.id not in hidden)
+
+
+# --- Write ------------------------------------------------------------------------------------------------------------
+
+
+class Clock:
+    """Measures a grading from its beginning: wall-clock time, and CPU time of this process."""
+
+    def __init__(self) -> None:
+        self._wall, self._cpu = time.monotonic(), time.process_time()
+
+    def timing(self, recording: Recording | None = None) -> TimingInfo:
+        """Return the seconds until now, with those that the recording took in other processes."""
+        cpu_s, student_cpu_s = (recording.cpu_s, recording.student_cpu_s) if recording else (0.0, 0.0)
+        return TimingInfo(
+            wall_s=round(time.monotonic() - self._wall, 3),
+            cpu_s=round(time.process_time() - self._cpu + cpu_s, 3),
+            student_cpu_s=round(student_cpu_s, 3),
+        )
+
+
+def assemble_result(
+    submission: SubmissionInfo,
+    rubric: LoadedRubric,
+    runs: dict[str, Run],
+    criteria: tuple[CriterionResult, ...],
+    *,
+    recording: Recording | None = None,
+    timing: TimingInfo,
+) -> GradingResult:
+    """Return the automatic result. Without a `recording`, nothing was run."""
+    ros, sandbox = (recording.ros, recording.sandbox) if recording else (None, None)
+    return GradingResult(
+        submission=submission,
+        rubric=RubricInfo(id=rubric.rubric.id, version=rubric.rubric.version, digest=rubric.digest),
+        status=overall_status(criteria),
+        points=total_points(rubric.rubric, criteria),
+        max_points=rubric.rubric.max_points,
+        criteria=criteria,
+        environment=EnvironmentInfo(
+            grader=__version__,
+            ros=ros.label if ros else "",
+            python=python_version(),
+            sandbox=sandbox.label if sandbox else NOTHING_RUN,
+        ),
+        timing=timing,
+        notes=notes_of(runs),
+    )
+
+
+def draw_figures(rubric: LoadedRubric, runs: dict[str, Run], result: GradingResult) -> Figures | None:
+    """Return what the reports show beside the verdicts. A result without figures is better than none."""
+    with suppress(Exception):
+        from grader.report import figures  # noqa: PLC0415 - see LATER
+
+        return figures.figures_of(rubric.rubric, runs, result.criteria)
+    return None

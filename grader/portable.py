@@ -9,7 +9,11 @@ import os
 import signal
 import subprocess
 import sys
-from contextlib import suppress
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+from grader.errors import HostError
 
 NONBLOCK: int = getattr(os, "O_NONBLOCK", 0)
 NOFOLLOW: int = getattr(os, "O_NOFOLLOW", 0)
@@ -65,3 +69,25 @@ def end_group(process: subprocess.Popen[bytes]) -> None:
         else:
             os.killpg(process.pid, signal.SIGKILL)
     process.wait()
+
+
+@contextmanager
+def wait_for_children() -> Iterator[None]:
+    """Make sure that processes which end inside can be waited for, also where this process ignores SIGCHLD.
+
+    Where it is ignored, exit codes get lost, and bubblewrap, which inherits that, waits for ever. Afterwards it is
+    ignored again. Raises HostError in a thread that cannot change it.
+    """
+    if sys.platform == "win32" or signal.getsignal(signal.SIGCHLD) is not signal.SIG_IGN:
+        yield
+        return
+    if threading.current_thread() is not threading.main_thread():
+        raise HostError(
+            "this program ignores SIGCHLD, so nothing that it starts can be waited for",
+            hint="call signal.signal(signal.SIGCHLD, signal.SIG_DFL) in the program's main thread before it grades",
+        )
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGCHLD, signal.SIG_IGN)

@@ -60,7 +60,7 @@ def breaking(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
     def raises(*_args: object) -> None:
         raise error
 
-    monkeypatch.setattr(pipeline, "recorded_and_judged", raises)
+    monkeypatch.setattr(pipeline, "record_and_judge", raises)
 
 
 def result_in(folder: Path) -> GradingResult:

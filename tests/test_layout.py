@@ -20,47 +20,42 @@ ALLOWED = {
     "model": set[str](),
     "errors": set[str](),
     "shown": set[str](),
-    "portable": set[str](),
+    "portable": {"errors"},
     "outside": set[str](),
     "files": {"errors", "portable"},
-    "temporary": {"errors", "files", "portable"},
     "results": BASE | {"files"},
     "faults": BASE | {"files", "intake", "report", "results", "rubric"},
     "evidence": BASE | {"files"},
     "package": BASE | {"outside"},
     "intake": BASE | {"files", "outside"},
     "checks": BASE | {"evidence"},
-    "rubric": BASE | {"checks", "evidence", "temporary"},
+    "rubric": BASE | {"checks", "evidence", "files"},
     "judging": BASE | {"checks", "evidence", "rubric"},
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},
-    "arena": BASE | {"evidence", "files", "package", "rubric.model", "temporary"},
+    "arena": BASE | {"evidence", "files", "package", "rubric.model"},
     "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
-    "steps": {
-        *BASE, "arena", "evidence", "faults", "intake", "judging", "package", "recordings", "report", "rubric",
-        "temporary"
-    },
     "pipeline": {
-        *BASE, "steps", "arena", "evidence", "faults", "files", "intake", "judging", "package", "recordings",
-        "report", "results", "rubric", "temporary"
+        *BASE, "arena", "evidence", "faults", "files", "intake", "judging", "package", "recordings",
+        "report", "results", "rubric"
     },
     "api": {
-        *BASE, "arena.asynchronous", "evidence", "faults", "files", "judging", "pipeline", "results", "rubric", "steps"
+        *BASE, "arena.asynchronous", "evidence", "faults", "files", "judging", "pipeline", "results", "rubric"
     },
     "authoring": {
-        *BASE, "checks", "classes.batch", "evidence", "intake", "package", "pipeline", "rubric", "temporary"
+        *BASE, "checks", "classes.batch", "evidence", "files", "intake", "package", "pipeline", "rubric"
     },
     "classes": {
         *BASE, "arena.ros_env", "checks", "evidence", "faults", "files", "intake", "judging", "outside", "pipeline",
-        "report", "results", "rubric", "temporary"
+        "report", "results", "rubric"
     },
     "student": {
-        *BASE, "arena.asynchronous", "arena.workspace", "faults", "intake", "package", "pipeline", "report",
-        "results", "rubric", "temporary"
+        *BASE, "arena.asynchronous", "arena.workspace", "faults", "files", "intake", "package", "pipeline", "report",
+        "results", "rubric"
     },
     "integrations": BASE | {"faults", "files", "intake", "pipeline", "report", "results", "rubric"},
     "cli": {
         *BASE, "arena", "authoring", "checks", "classes", "evidence", "faults", "files", "integrations", "intake",
-        "judging", "outside", "package", "pipeline", "report", "rubric", "student", "temporary"
+        "judging", "outside", "package", "pipeline", "report", "rubric", "student"
     },
     "__main__": {"cli"},
 }  # fmt: skip

@@ -14,7 +14,7 @@ from grader.arena.limits import SUBMISSION_MESSAGE_BYTES
 from grader.arena.limits import Limits as RunLimits
 from grader.arena.ros_env import DUMP_BYTES, NAMES_MAX, VALUE_BYTES
 from grader.checks.support import text
-from grader.evidence import container, definitions, memory_budget, services
+from grader.evidence import container, decode, definitions, memory_budget
 from grader.intake import git, gitdir
 from grader.intake.limits import Limits as IntakeLimits
 from grader.package import cmake_parse, cmake_written, launch, launch_loader, python, reading
@@ -131,7 +131,7 @@ BOUNDS = {
         scenario_inputs.FILE_BYTES_MAX // KB, scenario_inputs.EVENTS_MAX, scenario_inputs.VALUES_MAX,
         scenario_inputs.DEPTH_MAX, scenario_inputs.ALIASES_MAX,
     ),
-    "texts of services": (scenario_inputs.TEXT_BYTES_MAX // KB, services._PARTS_MAX),
+    "texts of services": (scenario_inputs.TEXT_BYTES_MAX // KB, decode._PARTS_MAX),
     "what git says": (git._ANSWER_BYTES // MB, git._FILE_BYTES // MB, git._MEMORY_BYTES >> 30, gitdir._MAX_FILES),
 }  # fmt: skip
 """By how a reading begins: the numbers in its bound, each a constant of the code, of ROS's side as `file:NAME`."""

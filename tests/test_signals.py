@@ -20,7 +20,7 @@ from grader import grade
 from grader.arena import arena_process
 from grader.arena.sandbox_probe import why_not
 from grader.errors import HostError
-from grader.steps import waited_for
+from grader.portable import wait_for_children
 from tests.arena.support import printed, run_script
 from tests.faulty import ROOT, RUBRIC, VICTIM, result_in
 
@@ -114,7 +114,7 @@ def test_a_thread_that_cannot_change_it_says_so() -> None:
 
     def work() -> None:
         try:
-            with waited_for():
+            with wait_for_children():
                 pass
         except HostError as error:
             caught.append(error)
@@ -131,7 +131,7 @@ def test_a_handler_of_the_program_stays() -> None:
     heard: list[int] = []
     before = signal.signal(signal.SIGCHLD, lambda number, _: heard.append(number))
     try:
-        with waited_for():
+        with wait_for_children():
             subprocess.run(["/bin/true"], check=True)
         assert heard
     finally:

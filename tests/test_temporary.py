@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from grader.errors import HostError
-from grader.temporary import MARK, sweep, temporary_folder
+from grader.files import MARK, sweep, temporary_folder
 
 HOLD = """
 import sys
 from pathlib import Path
-from grader.temporary import temporary_folder
+from grader.files import temporary_folder
 with temporary_folder("run", Path(sys.argv[1])) as folder:
     (folder / "closed" / "deep").mkdir(parents=True)
     (folder / "closed" / "deep" / "file").write_text("x")

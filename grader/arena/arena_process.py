@@ -178,7 +178,7 @@ def _fields(payload: bytes) -> dict[str, Any]:
     return dict(fields)
 
 
-# [arena.template] Starts arenas as copies of one process that has imported ROS already: one for each grader, as long as it lives.
+# Starts arenas as copies of one process that has imported ROS already: one per grader.
 
 ANSWER = struct.Struct("<id")
 ANSWER_S = 15.0

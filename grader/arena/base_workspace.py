@@ -31,8 +31,7 @@ from grader.arena.session import ArenaSession
 from grader.arena.workspace import Workspace, read_member
 from grader.errors import ArenaError, GraderError
 from grader.evidence.writer import EvidenceWriter
-from grader.files import atomic_write, open_untrusted
-from grader.temporary import temporary_folder
+from grader.files import atomic_write, open_untrusted, temporary_folder
 
 NAME = "base workspace"
 MAKE_S = 60.0

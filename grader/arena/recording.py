@@ -41,7 +41,7 @@ from grader.arena.workspace import make_workspace
 from grader.errors import ArenaError, RosMissing
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
-from grader.files import read_untrusted
+from grader.files import read_untrusted, temporary_folder
 from grader.model.message_rate import RateBounds
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
@@ -49,7 +49,6 @@ from grader.model.submission import Submission
 from grader.package import SyntaxReport, python_paths, read_syntax_report, with_build_facts
 from grader.package.python import REPORT_BYTES_MAX
 from grader.rubric.model import Rubric
-from grader.temporary import temporary_folder
 
 WAITING = "for its turn"
 WAITING_ALONE = "to be run again, alone"

@@ -216,7 +216,7 @@ def _rates_are_clear(live: Live, topics: tuple[str, ...]) -> bool:
     """Whether each topic is there to show a rate, and its rate is known well enough."""
     return bool(topics) and all(
         topic in live.rates
-        and all(bounds.settled_by(live.arrivals_ns[topic]) for bounds in live.rates[topic])
+        and all(bounds.decided_by(live.arrivals_ns[topic]) for bounds in live.rates[topic])
         for topic in topics
     )
 

@@ -297,7 +297,7 @@ async def _offered(service: str, arena: ArenaSession, patience_s: float) -> bool
 
 
 async def _call(call: Call, arena: ArenaSession) -> None:
-    from grader.evidence.services import ServiceType  # noqa: PLC0415 - numpy, which not every run needs
+    from grader.evidence.decode import ServiceType  # noqa: PLC0415 - numpy, which not every run needs
 
     try:
         type_ = ServiceType(

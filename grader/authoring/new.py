@@ -12,12 +12,12 @@ from grader.authoring.text import rubric_text
 from grader.errors import RosMissing, SubmissionError
 from grader.evidence.reader import load_evidence, package_facts
 from grader.evidence.run import Run
+from grader.files import temporary_folder
 from grader.intake import open_submission
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
 from grader.package import read_package
 from grader.rubric.load import LoadedRubric
-from grader.temporary import temporary_folder
 
 
 def propose_rubric(

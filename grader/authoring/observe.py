@@ -9,8 +9,8 @@ from statistics import median
 
 from grader.checks.support.printed import printed_lines, probes_on
 from grader.checks.support.process import lives
+from grader.evidence.inspect import periodic_share, rate_stats
 from grader.evidence.run import Channel, Run
-from grader.evidence.stats import periodic_share, rate_stats
 from grader.model.record import Record
 
 SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})

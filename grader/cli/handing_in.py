@@ -12,7 +12,7 @@ from rich.padding import Padding
 from rich.text import Text
 
 from grader.cli.output import say_beside
-from grader.model.git_status import Point, Standing
+from grader.model.result import Point, Standing
 from grader.report.terminal import emit
 from grader.report.text import line
 from grader.student.git_status import advise, read_environment

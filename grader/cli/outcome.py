@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from grader.errors import ExitCode
-from grader.judging.summary import OPEN, overall_status, reached_pass_mark
+from grader.judging.summary import overall_status, reached_pass_mark
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
@@ -43,7 +43,7 @@ def staged_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode
 
 def settled(criteria: Iterable[CriterionResult]) -> tuple[CriterionResult, ...]:
     """Those that could be judged."""
-    return tuple(c for c in criteria if c.status not in OPEN)
+    return tuple(c for c in criteria if not c.status.is_open)
 
 
 def _in_proportion(rubric: Rubric, shown: tuple[CriterionResult, ...]) -> Rubric:

@@ -16,10 +16,9 @@ from rosbags.rosbag1 import Reader, ReaderError
 from rosbags.rosbag1.reader import ChunkInfo, Header, RecordType, read_bytes, read_uint32
 
 from grader.errors import EvidenceError
-from grader.evidence.channels import merged
 from grader.evidence.container import MAX_CHUNK_BYTES, MAX_UNPACKED_BYTES
-from grader.evidence.memory_budget import LESS, NoRoom, Room
-from grader.evidence.run import Channel, Message, Run
+from grader.evidence.memory_budget import LESS, BudgetExceeded, MemoryBudget
+from grader.evidence.run import Channel, Message, Run, merge_channels
 
 BZ2 = b"BZh"
 LZ4 = b"\x04\x22\x4d\x18"
@@ -49,17 +48,17 @@ class BagLimitError(ValueError):
     """The bag breaks a limit."""
 
 
-def load_bag(path: Path, room: Room | None = None) -> Run:
+def load_bag(path: Path, budget: MemoryBudget | None = None) -> Run:
     """A bag as a real-time run named after the file; it says nothing of processes. Raises EvidenceError."""
-    room = room or Room()
+    budget = budget or MemoryBudget()
     try:
         with _Reader(path) as reader:
-            channels = _channels(reader, room)
+            channels = _channels(reader, budget)
     except ReaderError as error:
         raise _refusal(path, str(error)) from error
     except BagLimitError as error:
         raise EvidenceError(f"{path}: {error}") from error
-    except NoRoom as error:
+    except BudgetExceeded as error:
         raise EvidenceError(f"{path}: {error}", hint=LESS) from error
     except (*_DAMAGE, struct.error, OSError) as error:
         raise EvidenceError(f"{path}: damaged", hint=_AGAIN) from error
@@ -182,7 +181,7 @@ class _File:
         return data
 
 
-def _channels(reader: _Reader, room: Room) -> tuple[Channel, ...]:
+def _channels(reader: _Reader, budget: MemoryBudget) -> tuple[Channel, ...]:
     messages: dict[int, list[Message]] = {connection.id: [] for connection in reader.connections}
     count = 0
     for chunk in reader.read_chunks():
@@ -191,11 +190,11 @@ def _channels(reader: _Reader, room: Room) -> tuple[Channel, ...]:
             if count > MAX_RECORDS:
                 raise BagLimitError(f"more than {MAX_RECORDS} records")
             if header.get_uint8("op") == RecordType.MSGDATA:
-                room.hold(len(data), foreign=True)
+                budget.hold(len(data), foreign=True)
                 kept = messages[header.get_uint32("conn")]
                 kept.append(Message(header.get_time("time"), len(kept), data))
-    found = (_channel(connection, messages.pop(connection.id), room) for connection in reader.connections)
-    return merged(found, renumber=True)
+    found = (_channel(connection, messages.pop(connection.id), budget) for connection in reader.connections)
+    return merge_channels(found, renumber=True)
 
 
 def _records(chunk: bytes) -> Iterator[tuple[Header, bytes]]:
@@ -234,7 +233,7 @@ class _Unpacker:
         return plain
 
 
-def _channel(connection: Connection, messages: list[Message], room: Room) -> Channel:
+def _channel(connection: Connection, messages: list[Message], budget: MemoryBudget) -> Channel:
     ext = connection.ext
     recorded = ext if isinstance(ext, ConnectionExtRosbag1) else ConnectionExtRosbag1(None, None)
     package, _, name = connection.msgtype.partition("/msg/")
@@ -246,5 +245,5 @@ def _channel(connection: Connection, messages: list[Message], room: Room) -> Cha
         definition=connection.msgdef.data,
         latching=bool(recorded.latching),
         messages=tuple(messages),
-        room=room,
+        budget=budget,
     )

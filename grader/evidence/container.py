@@ -1,4 +1,8 @@
-"""The records of an MCAP file in file order, within limits that a hostile file cannot pass."""
+"""The records of an MCAP file in file order, within limits that a hostile file cannot pass.
+
+mcap's own `StreamReader` limits the length of a whole record, but believes the lengths inside it: a metadata record of
+20 bytes that claims a map of 4 GiB makes it read the rest of the file into memory. Here each record is cut out first.
+"""
 
 from __future__ import annotations
 

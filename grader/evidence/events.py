@@ -23,33 +23,51 @@ class ProcessEvent(Record):
     """
 
     event: Literal["start", "exit"]
+    """It started or ended."""
     name: str
+    """What the scenario calls it."""
     role: Literal["student", "build", "grader"]
+    """`student`, `build`, or `grader` for programs that a scenario starts beside the student's."""
     argv: tuple[str, ...] = ()
+    """Its arguments."""
     script: str | None = None
+    """The package's script that runs, from the package's root."""
     repairs: tuple[str, ...] = ()
+    """What was fixed on the copy that ran."""
     exit_code: int | None = None
+    """Its exit code, at the end."""
     signal: int | None = None
+    """The signal that ended it."""
     stopped_by: str | None = None
+    """The last signal that the arena sent it; null if it ended on its own."""
     cpu_s: float | None = None
+    """CPU seconds of its process tree."""
     max_rss_bytes: int | None = None
+    """The most memory of its process tree, in bytes."""
 
 
 class ConsoleLine(Record):
     """`/grader/console`: one line without its end. Bytes that are not UTF-8 appear as U+FFFD."""
 
     process: str
+    """Whose output it is."""
     stream: Literal["stdout", "stderr"]
+    """Where it was printed."""
     line: str
+    """The line, without its end."""
     truncated: bool = False
+    """Whether the line was longer."""
 
 
 class Connection(Record):
     """A live topic connection: both nodes report it (`getBusInfo`), and the kernel knows of one between them."""
 
     topic: str
+    """The topic."""
     publisher: str
+    """The publishing node."""
     subscriber: str
+    """The subscribing node."""
 
 
 class GraphEvent(Record):
@@ -59,22 +77,34 @@ class GraphEvent(Record):
     """
 
     nodes: tuple[str, ...]
+    """All nodes."""
     topic_types: dict[str, str]
+    """Types by topic."""
     publishers: dict[str, tuple[str, ...]]
+    """Nodes by topic."""
     subscribers: dict[str, tuple[str, ...]]
+    """Nodes by topic."""
     services: dict[str, tuple[str, ...]]
+    """Nodes by service."""
     connections: tuple[Connection, ...] = ()
+    """What is connected."""
     processes: dict[str, str] = Field(default_factory=dict)
+    """The process that each node belongs to."""
     service_types: dict[str, str] = Field(default_factory=dict)
+    """Types by service, as the services themselves say."""
 
 
 class ParamEvent(Record):
     """`/grader/param`: one change of the parameter server."""
 
     action: Literal["set", "delete"]
+    """It was set, or deleted."""
     name: str
+    """The parameter."""
     caller_id: str
+    """The node that did it."""
     value: Any = None
+    """What it was set to."""
 
 
 class HostEvent(Record):
@@ -83,12 +113,19 @@ class HostEvent(Record):
     took."""
 
     samples: int
+    """How often the timer woke since the last such event."""
     mean_ms: float
+    """How late, on average."""
     p95_ms: float
+    """How late, at most, in 95 of 100 cases."""
     max_ms: float
+    """How late, at most."""
     load_1min: float
+    """The load average."""
     busy: float | None = None
+    """The share of the processors' time that was busy, 0 to 1; null where not known."""
     own_busy: float | None = None
+    """The part of `busy` that this run's student processes took, 0 to 1; null where not known."""
 
 
 class ActorEvent(Record):
@@ -104,11 +141,17 @@ class ActorEvent(Record):
     action: Literal[
         "publish", "clock", "interrupt", "param", "call", "answer", "open", "note", "refused", "limit"
     ]
+    """What was done."""
     actor: str
+    """Who did it."""
     topic: str | None = None
+    """The topic, parameter or service."""
     type: str | None = None
+    """The message's or service's type."""
     value: Any = None
+    """What was sent, set, asked or answered."""
     detail: str = ""
+    """Further details."""
 
 
 class RecorderEvent(Record):
@@ -117,11 +160,17 @@ class RecorderEvent(Record):
     keep up, and from then on the publisher may have dropped messages."""
 
     event: Literal["connected", "refused", "closed", "limit", "behind", "invalid"]
+    """What happened to the connection."""
     topic: str
+    """The topic."""
     callerid: str
+    """The publisher."""
     messages: int = 0
+    """How many messages were recorded."""
     dropped: int = 0
+    """How many were not, past the limits."""
     detail: str = ""
+    """Further details."""
 
 
 class ScenarioEvent(Record):
@@ -134,8 +183,11 @@ class ScenarioEvent(Record):
     """
 
     event: Literal["begin", "ready", "end"]
+    """The run began, was ready, ended."""
     outcome: Literal["complete", "ended", "silent", "timeout", "host"] | None = None
+    """How it ended; only at the end."""
     detail: str = ""
+    """Further details."""
 
 
 TOPICS: dict[str, type[Record]] = {
@@ -149,3 +201,14 @@ TOPICS: dict[str, type[Record]] = {
     "/grader/scenario": ScenarioEvent,
 }
 PACKAGE_TOPIC = "/grader/package"
+FIELDS = {
+    "processes": "/grader/process",
+    "console": "/grader/console",
+    "graph": "/grader/graph",
+    "params": "/grader/param",
+    "host": "/grader/host",
+    "actors": "/grader/actor",
+    "recorder": "/grader/recorder",
+    "course": "/grader/scenario",
+}
+"""Where a `Run` keeps each topic's records."""

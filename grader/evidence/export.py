@@ -16,10 +16,9 @@ from rosbags.typesys.base import TypesysError
 
 from grader.errors import EvidenceError, OutputError
 from grader.evidence import decode
-from grader.evidence.channels import merged
 from grader.evidence.definitions import DefinitionError, parse
-from grader.evidence.loading import FIELDS
-from grader.evidence.run import Channel, Message, Run
+from grader.evidence.events import FIELDS
+from grader.evidence.run import Channel, Message, Run, merge_channels
 
 TEXT = "std_msgs/String"
 GRADER = "/grader"
@@ -43,7 +42,7 @@ def export_bag(run: Run, path: Path, *, everything: bool = False) -> int:
     message that no bag can hold, OutputError where the bag cannot be written.
     """
     found = [*run.channels, *(_records(run) if everything else ())]
-    channels = merged((c for c in found if c.messages), renumber=False)
+    channels = merge_channels((c for c in found if c.messages), renumber=False)
     if not channels:
         raise EvidenceError(
             f"{run.evidence}: holds no messages to export", hint="--all exports its records too"

@@ -1,16 +1,96 @@
-"""What is in an evidence file or bag: rates, nodes, processes, outcome."""
+"""Summarise an evidence file or bag: rates as `rostopic hz` computes them, nodes, processes, outcome."""
 
 from __future__ import annotations
 
 from collections import defaultdict, deque
+from collections.abc import Sequence
+from itertools import pairwise
+from math import ceil, sqrt
 from pathlib import Path
+from statistics import median, pstdev, stdev
 from typing import Literal
 
-from grader.evidence.memory_budget import NoRoom, Room
+from grader.evidence.memory_budget import BudgetExceeded, MemoryBudget
 from grader.evidence.reader import load_run
 from grader.evidence.run import Channel, Run, is_grader_node
-from grader.evidence.stats import RateStats, rate_stats
 from grader.model.record import Record
+
+BATCHES = 10
+# Student's t, two-sided 95 %, for 1 to BATCHES - 1 degrees of freedom.
+_T95 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262)
+
+
+class RateStats(Record):
+    """`mean_hz` is (count - 1) / (last - first), None without two messages at two times.
+
+    `period_low_s` to `period_high_s` is the 95 % confidence interval of the mean period, by batch means: the
+    gaps are cut into up to 10 consecutive batches, and Student's t is applied to the batches' mean periods.
+    That stays honest where gaps depend on each other, as they do with `rospy.Rate`, whose long gap is
+    followed by a short one. `gap_std_s` is the population's, as in `rostopic hz`; `gap_p95_s` is the smallest
+    gap that 95 % do not exceed. `periodic_share` is the share of gaps within ±50 % (ends included) of the
+    nominal period, if one was given.
+    """
+
+    count: int
+    duration_s: float
+    mean_hz: float | None = None
+    mean_period_s: float | None = None
+    period_low_s: float | None = None
+    period_high_s: float | None = None
+    gap_min_s: float | None = None
+    gap_median_s: float | None = None
+    gap_p95_s: float | None = None
+    gap_max_s: float | None = None
+    gap_std_s: float | None = None
+    periodic_share: float | None = None
+
+
+def rate_stats(times_ns: Sequence[int], *, nominal_hz: float | None = None) -> RateStats:
+    """Return the rate of messages that arrived at `times_ns`, in any order. Raises ValueError for a rate of 0 Hz."""
+    if nominal_hz is not None and not nominal_hz > 0:
+        raise ValueError("the nominal rate must be above 0 Hz")
+    times = sorted(times_ns)
+    if len(times) < 2:
+        return RateStats(count=len(times), duration_s=0.0)
+    gaps = [later - earlier for earlier, later in pairwise(times)]
+    duration_ns = times[-1] - times[0]
+    ordered = sorted(gaps)
+    low_s, high_s = _interval(times)
+    return RateStats(
+        count=len(times),
+        duration_s=duration_ns / 1e9,
+        mean_hz=len(gaps) * 1e9 / duration_ns if duration_ns else None,
+        mean_period_s=duration_ns / len(gaps) / 1e9,
+        period_low_s=low_s,
+        period_high_s=high_s,
+        gap_min_s=ordered[0] / 1e9,
+        gap_median_s=median(ordered) / 1e9,
+        gap_p95_s=ordered[ceil(0.95 * len(ordered)) - 1] / 1e9,
+        gap_max_s=ordered[-1] / 1e9,
+        gap_std_s=pstdev(gaps) / 1e9,
+        periodic_share=None if nominal_hz is None else periodic_share(gaps, nominal_hz=nominal_hz),
+    )
+
+
+def periodic_share(gaps_ns: Sequence[int], *, nominal_hz: float, spread: float = 0.5) -> float:
+    """The share (0 to 1) of gaps within ±`spread` of the nominal period, ends included; 0 without gaps."""
+    period_ns = 1e9 / nominal_hz
+    low, high = round(period_ns * (1 - spread)), round(period_ns * (1 + spread))
+    return sum(low <= gap <= high for gap in gaps_ns) / len(gaps_ns) if gaps_ns else 0.0
+
+
+def _interval(times: Sequence[int]) -> tuple[float | None, float | None]:
+    """Bounds (s) of the mean period; None with fewer than two gaps."""
+    gaps = len(times) - 1
+    batches = min(BATCHES, gaps)
+    if batches < 2:
+        return None, None
+    cuts = [round(batch * gaps / batches) for batch in range(batches + 1)]
+    periods = [(times[end] - times[begin]) / (end - begin) for begin, end in pairwise(cuts)]
+    mean = (times[-1] - times[0]) / gaps
+    half = _T95[batches - 2] * stdev(periods) / sqrt(batches)
+    return max(0.0, mean - half) / 1e9, (mean + half) / 1e9
+
 
 LOOKED_INTO_BYTES = 64 << 20
 
@@ -72,7 +152,7 @@ class Inspection(Record):
 
 
 def inspect_file(path: Path) -> Inspection:
-    """Reads an `.mcap` file (ours or another tool's) or a ROS 1 `.bag`. Raises EvidenceError."""
+    """Summarise an `.mcap` file (ours or another tool's) or a ROS 1 `.bag`. Raises EvidenceError."""
     run = load_run(path)
     kind: Literal["grader", "mcap", "bag"] = "mcap"
     if run.metadata:
@@ -83,9 +163,9 @@ def inspect_file(path: Path) -> Inspection:
 
 
 def inspect_run(run: Run, *, kind: Literal["grader", "mcap", "bag"] = "grader") -> Inspection:
-    """The same of a run that has been read already."""
+    """Summarise a run that has been read already."""
     end = run.outcome
-    room = Room(decoded_bytes=LOOKED_INTO_BYTES)
+    budget = MemoryBudget(decoded_bytes=LOOKED_INTO_BYTES)
     channels = sorted(run.channels, key=lambda channel: (channel.topic, channel.callerid))
     return Inspection(
         file=run.evidence,
@@ -97,7 +177,7 @@ def inspect_run(run: Run, *, kind: Literal["grader", "mcap", "bag"] = "grader") 
         start_ns=run.start_ns,
         duration_s=(run.end_ns - run.start_ns) / 1e9,
         messages=sum(len(channel.messages) for channel in channels),
-        channels=tuple(_channel(channel, room) for channel in channels),
+        channels=tuple(_channel(channel, budget) for channel in channels),
         nodes=_nodes(run),
         processes=_processes(run),
         console_lines=len(run.console),
@@ -113,7 +193,7 @@ def inspect_run(run: Run, *, kind: Literal["grader", "mcap", "bag"] = "grader") 
     )
 
 
-def _channel(channel: Channel, room: Room) -> ChannelSummary:
+def _channel(channel: Channel, budget: MemoryBudget) -> ChannelSummary:
     return ChannelSummary(
         topic=channel.topic,
         type=channel.type,
@@ -121,27 +201,27 @@ def _channel(channel: Channel, room: Room) -> ChannelSummary:
         md5sum=channel.md5sum,
         latching=channel.latching,
         by_grader=channel.by_grader,
-        readable=_readable(channel, room),
+        readable=_readable(channel, budget),
         bytes=sum(len(message.data) for message in channel.messages),
         rate=rate_stats(channel.times_ns),
     )
 
 
-def _readable(channel: Channel, room: Room) -> bool:
-    """Whether the definition fits every message, as far as that is known within seconds."""
+def _readable(channel: Channel, budget: MemoryBudget) -> bool:
+    """Return whether the definition fits every message, as far as a few seconds tell."""
     try:
-        decoder = channel.decoder(room)
+        decoder = channel.decoder(budget)
         for message in channel.messages:
-            room.decode(decoder.decoded_bytes(len(message.data)))
+            budget.decode(decoder.decoded_bytes(len(message.data)))
             if decoder.decode(message.data) is None:
                 return False
-    except NoRoom:
+    except BudgetExceeded:
         return True
     return True
 
 
 def _nodes(run: Run) -> tuple[str, ...]:
-    """All nodes ever seen but the grader's, publishers first where the graph was not recorded."""
+    """Return all nodes ever seen but the grader's; the publishers where the graph was not recorded."""
     seen = dict.fromkeys(run.student_nodes())
     seen.update(
         dict.fromkeys(c.callerid for c in run.channels if c.callerid and not is_grader_node(c.callerid))
@@ -150,7 +230,7 @@ def _nodes(run: Run) -> tuple[str, ...]:
 
 
 def _processes(run: Run) -> tuple[ProcessSummary, ...]:
-    """Starts and exits of one name are paired in order."""
+    """Pair starts and exits of one name in their order."""
     found: list[ProcessSummary] = []
     running: dict[str, deque[int]] = defaultdict(deque)
     for time_ns, event in run.processes:

@@ -1,26 +1,33 @@
-"""Reads evidence files: our own, and MCAP or bag files that other tools recorded from ROS 1."""
+"""Read evidence files into `Run`s: the grader's own, and MCAP or bag files that other tools recorded from ROS 1."""
 
 from __future__ import annotations
 
 import os
 import struct
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
-from pathlib import Path
-from typing import BinaryIO
+from pathlib import Path, PurePath
+from typing import Any, BinaryIO
 
+from mcap import records as mcap
 from mcap.exceptions import McapError
 from pydantic import ValidationError
 from zstandard import ZstdError
 
 from grader.errors import EvidenceError
-from grader.evidence.container import MAX_FILE_BYTES, ContainerError
-from grader.evidence.loading import Loading
-from grader.evidence.memory_budget import LESS, NoRoom, Room
-from grader.evidence.run import Run
+from grader.evidence.container import MAX_FILE_BYTES, ContainerError, records
+from grader.evidence.events import FIELDS, METADATA_NAME, PACKAGE_TOPIC, TOPICS
+from grader.evidence.memory_budget import LESS, BudgetExceeded, MemoryBudget
+from grader.evidence.run import Channel, Message, Run, merge_channels
 from grader.model.package import PackageFacts
+from grader.model.version import EVIDENCE, UPDATE
 
+MAX_CHANNELS = 4_096
+NAMES_SHOWN = 5
+NAME_CHARS_SHOWN = 80
+READ = {str(number) for number in range(1, EVIDENCE.version + 1)}
 SUFFIXES = {".mcap", ".bag"}
 MAGIC = b"\x89MCAP0\r\n"
 BAG_MAGIC = b"#ROSBAG V"
@@ -37,37 +44,37 @@ _DAMAGE = (
 )
 
 
-def load_run(source: Path | BinaryIO, room: Room | None = None) -> Run:
-    """One recorded run. A file without the grader's metadata is a real-time run named after the file.
+def load_run(source: Path | BinaryIO, budget: MemoryBudget | None = None) -> Run:
+    """Read one recorded run. A file without the grader's metadata is a real-time run named after the file.
 
-    `room` is shared with what is loaded beside it. Raises EvidenceError, in one line that names the file, for
+    `budget` is shared with what is loaded beside it. Raises EvidenceError, in one line that names the file, for
     whatever cannot be read to its end.
     """
-    room = room or Room()
+    budget = budget or MemoryBudget()
     if not isinstance(source, Path):
         name = Path(str(getattr(source, "name", "evidence.mcap"))).name
-        return _load(name, BytesIO(source.read(MAX_FILE_BYTES + 1)), room)
+        return _load(name, BytesIO(source.read(MAX_FILE_BYTES + 1)), budget)
     with _readable(source), source.open("rb") as file:
         head = file.read(len(BAG_MAGIC))
         file.seek(0)
         if head == BAG_MAGIC:
             from grader.evidence.bag import load_bag  # noqa: PLC0415 - few submissions hold a bag
 
-            return load_bag(source, room)
-        return _load(source.name, file, room, shown=str(source))
+            return load_bag(source, budget)
+        return _load(source.name, file, budget, shown=str(source))
 
 
 def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
-    """The runs of these files by scenario; a folder stands for its recordings and those of `evidence/` in it.
+    """Read the runs of these files by scenario; a folder stands for its recordings and those of `evidence/` in it.
 
     Recordings are `*.mcap` and `*.bag`. Raises EvidenceError where nothing is found, a file cannot be read,
     another tool's recording is empty, or two files hold the same scenario.
     """
     runs: dict[str, Run] = {}
     origin: dict[str, Path] = {}
-    room = Room()
+    budget = MemoryBudget()
     for path in _files(paths):
-        run = load_run(path, room)
+        run = load_run(path, budget)
         if run.foreign and not any(channel.messages for channel in run.channels):
             raise EvidenceError(f"{path}: holds no messages", hint="record while the nodes run")
         if run.scenario in runs:
@@ -80,7 +87,7 @@ def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
 
 
 def package_facts(run: Run) -> PackageFacts:
-    """The package facts that the run carries (`package.mcap` does). Raises EvidenceError without any."""
+    """Return the package facts that the run carries (`package.mcap` does). Raises EvidenceError without any."""
     if run.package_json is None:
         raise EvidenceError(
             f"{run.evidence}: holds no package facts", hint="give package.mcap of the same recording"
@@ -91,7 +98,7 @@ def package_facts(run: Run) -> PackageFacts:
         raise EvidenceError(f"{run.evidence}: the package facts cannot be read: {_first(error)}") from error
 
 
-def _load(name: str, stream: BinaryIO, room: Room, *, shown: str = "") -> Run:
+def _load(name: str, stream: BinaryIO, budget: MemoryBudget, *, shown: str = "") -> Run:
     shown = shown or name
     size_bytes = stream.seek(0, os.SEEK_END)
     stream.seek(0)
@@ -100,12 +107,12 @@ def _load(name: str, stream: BinaryIO, room: Room, *, shown: str = "") -> Run:
     if not size_bytes:
         raise EvidenceError(f"{shown}: the file is empty")
     try:
-        return Loading(name, room, shown).read(stream)
+        return _RunBuilder(name, budget, shown).read(stream)
     except ValidationError as error:
         raise EvidenceError(
             f"{shown}: a record of the grader's own cannot be read: {_first(error)}"
         ) from error
-    except NoRoom as error:
+    except BudgetExceeded as error:
         raise EvidenceError(f"{shown}: {error}", hint=LESS) from error
     except ContainerError as error:
         raise EvidenceError(f"{shown}: not sound MCAP: {error}") from error
@@ -131,7 +138,7 @@ def _damage(stream: BinaryIO) -> tuple[str, str]:
 
 
 def _first(error: ValidationError) -> str:
-    """The first of pydantic's complaints in one line."""
+    """Return the first of pydantic's errors in one line."""
     fault = error.errors(include_url=False, include_input=False)[0]
     place = ".".join(str(part) for part in fault["loc"])
     return f"{error.title}{'.' + place if place else ''}: {fault['msg']}"
@@ -179,3 +186,169 @@ def _listable(folder: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise EvidenceError(f"{folder}: {error.strerror or type(error).__name__}") from error
+
+
+class _RunBuilder:
+    """Builds a run in one pass over a file's records. Messages are collected by channel and not decoded; only the
+    grader's own JSON channels are read into records.
+
+    `budget` limits the memory of all that is loaded together, `shown` is what error messages call the file.
+    """
+
+    def __init__(self, name: str, budget: MemoryBudget, shown: str) -> None:
+        self._name, self._shown = name, shown
+        self._budget = budget
+        self._schemas: dict[int, mcap.Schema] = {}
+        self._channels: dict[int, mcap.Channel] = {}
+        self._messages: dict[int, list[Message]] = defaultdict(list)
+        self._attachments: dict[str, bytes] = {}
+        self._metadata: dict[str, str] | None = None
+        self._profile = ""
+
+    def read(self, stream: BinaryIO) -> Run:
+        """Raises EvidenceError for another format, BudgetExceeded, and what `container.records` and pydantic raise."""
+        for record in records(stream):
+            if isinstance(record, mcap.Message):
+                self._hold_message(record)
+                self._messages[record.channel_id].append(
+                    Message(record.log_time, record.sequence, record.data)
+                )
+            else:
+                self._describe(record)
+        if unknown := self._messages.keys() - self._channels.keys():
+            raise ContainerError(f"messages on {len(unknown)} channels that are not there")
+        for messages in self._messages.values():
+            messages.sort(key=lambda message: message.log_time_ns)
+        return self._run()
+
+    def _describe(self, record: mcap.McapRecord) -> None:
+        if isinstance(record, mcap.Schema):
+            if record.id not in self._schemas:
+                self._budget.hold(len(record.data), foreign=self._metadata is None)
+                self._schemas[record.id] = record
+        elif isinstance(record, mcap.Channel):
+            self._channels.setdefault(record.id, record)
+            if len(self._channels) > MAX_CHANNELS:
+                raise ContainerError(f"more than {MAX_CHANNELS} channels")
+        elif isinstance(record, mcap.Attachment):
+            self._attach(record)
+        elif isinstance(record, mcap.Header):
+            self._profile = record.profile
+        elif isinstance(record, mcap.Metadata) and record.name == METADATA_NAME and self._metadata is None:
+            self._metadata = record.metadata
+
+    def _hold_message(self, message: mcap.Message) -> None:
+        """The arena has limits of its own for its events."""
+        channel, foreign = self._channels.get(message.channel_id), self._metadata is None
+        if foreign or channel is None or channel.message_encoding != "json":
+            self._budget.hold(len(message.data), foreign=foreign)
+
+    def _attach(self, record: mcap.Attachment) -> None:
+        """Another tool's attachments are of no use; the grader's own come behind its metadata."""
+        if self._metadata is not None:
+            self._budget.hold(len(record.data), foreign=False)
+            self._attachments[record.name] = record.data
+
+    def _run(self) -> Run:
+        about = self._about()
+        times = [t for m in self._messages.values() for t in (m[0].log_time_ns, m[-1].log_time_ns)]
+        own: dict[str, Any] = {}
+        if self._metadata is None:
+            self._refuse_what_is_not_ros1()
+        else:
+            own = {name: self._events(topic) for name, topic in FIELDS.items()}
+            own["package_json"] = self._package()
+        return Run(
+            evidence=self._name,
+            metadata=self._metadata or {},
+            start_ns=min(times, default=0),
+            end_ns=max(times, default=0),
+            channels=self._ros_channels(),
+            attachments=self._attachments,
+            **about,
+            **own,
+        )
+
+    def _about(self) -> dict[str, Any]:
+        if self._metadata is None:
+            return {"scenario": PurePath(self._name).stem, "clock": "real", "warp": 1.0}
+        version = self._metadata.get("format", "")[:NAME_CHARS_SHOWN]
+        if newer := EVIDENCE.newer(f"{EVIDENCE.name}/{version}"):
+            raise EvidenceError(f"{self._shown}: {newer}", hint=UPDATE)
+        if version not in READ:
+            raise EvidenceError(
+                f"{self._shown}: evidence of format {version!r}, which no grader wrote",
+                hint="record it again, or copy it again",
+            )
+        try:
+            scenario, clock = self._metadata["scenario"], self._metadata["clock"]
+            return {"scenario": scenario, "clock": clock, "warp": float(self._metadata["warp"])}
+        except (KeyError, ValueError) as error:
+            raise ContainerError("its metadata does not say scenario, clock and warp") from error
+
+    def _refuse_what_is_not_ros1(self) -> None:
+        """Of another tool's recording; channels of other encodings beside ROS 1's are left alone."""
+        encodings = {channel.message_encoding for channel in self._channels.values()}
+        if self._profile == "ros2" or "cdr" in encodings:
+            raise EvidenceError(
+                f"{self._shown}: a recording of ROS 2, and this grader reads those of ROS 1",
+                hint="record again with ROS 1: `rosbag record`",
+            )
+        if encodings and "ros1" not in encodings:
+            names = ", ".join(map(_shown, sorted(encodings)[:NAMES_SHOWN]))
+            raise EvidenceError(f"{self._shown}: no message of ROS 1 in it, only {names}")
+        for channel in self._channels.values():
+            schema = self._schemas.get(channel.schema_id)
+            if channel.message_encoding == "ros1" and (schema is None or schema.encoding != "ros1msg"):
+                raise EvidenceError(
+                    f"{self._shown}: {_shown(channel.topic)} has no message definition (ros1msg)"
+                )
+
+    def _ros_channels(self) -> tuple[Channel, ...]:
+        found = (
+            self._ros_channel(number, channel)
+            for number, channel in self._channels.items()
+            if channel.message_encoding == "ros1"
+        )
+        return merge_channels(found, renumber=self._metadata is None)
+
+    def _ros_channel(self, number: int, channel: mcap.Channel) -> Channel:
+        schema, about = self._schemas.get(channel.schema_id), channel.metadata
+        return Channel(
+            topic=channel.topic,
+            callerid=about.get("callerid", ""),
+            type=schema.name.replace("/msg/", "/") if schema else "",
+            md5sum=about.get("md5sum", ""),
+            definition=schema.data.decode(errors="replace") if schema else "",
+            latching=about.get("latching") in {"1", "true", "True"},
+            messages=tuple(self._messages.pop(number, ())),
+            budget=self._budget,
+        )
+
+    def _json(self, topic: str) -> list[Message]:
+        """Messages on the grader's own channel; one of that name that a node published is no JSON channel."""
+        found = [
+            message
+            for number, channel in self._channels.items()
+            if channel.topic == topic and channel.message_encoding == "json" and self._described(channel)
+            for message in self._messages.get(number, ())
+        ]
+        return sorted(found, key=lambda message: message.log_time_ns)
+
+    def _described(self, channel: mcap.Channel) -> bool:
+        schema = self._schemas.get(channel.schema_id)
+        return schema is not None and schema.encoding == "jsonschema"
+
+    def _events(self, topic: str) -> tuple[tuple[int, Any], ...]:
+        read = TOPICS[topic].read_json
+        return tuple((message.log_time_ns, read(message.data)) for message in self._json(topic))
+
+    def _package(self) -> bytes | None:
+        messages = self._json(PACKAGE_TOPIC)
+        return messages[-1].data if messages else None
+
+
+def _shown(name: str) -> str:
+    """Return a name from a foreign file so that it can be shown on one line."""
+    text = name[:NAME_CHARS_SHOWN] + ("…" if len(name) > NAME_CHARS_SHOWN else "")
+    return text if text.isprintable() else repr(text)

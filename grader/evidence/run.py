@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,10 +19,11 @@ from grader.evidence.events import (
     RecorderEvent,
     ScenarioEvent,
 )
-from grader.evidence.memory_budget import NoRoom, Room
+from grader.evidence.memory_budget import BudgetExceeded, MemoryBudget
 
 if TYPE_CHECKING:
     from grader.evidence.decode import Decoder
+
 
 OWN_NODE = re.compile(r"/grader_(recorder|actor|calibration)_[0-9a-f]{8}(_knock)?")
 BARE_NAME = "/grader"
@@ -41,7 +42,7 @@ class Message(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Channel:
-    """All messages of one publisher on one topic. `room` is what their decoded values may take."""
+    """All messages of one publisher on one topic. `budget` limits the memory of their decoded values."""
 
     topic: str
     callerid: str
@@ -50,7 +51,7 @@ class Channel:
     definition: str
     latching: bool
     messages: tuple[Message, ...]
-    room: Room = field(default_factory=Room, repr=False, compare=False)
+    budget: MemoryBudget = field(default_factory=MemoryBudget, repr=False, compare=False)
 
     @property
     def by_grader(self) -> bool:
@@ -59,7 +60,7 @@ class Channel:
 
     @property
     def publisher(self) -> str:
-        """Its node's name, for messages: another tool's recording need not know it."""
+        """The name of its node, to be shown: another tool's recording may lack it."""
         return self.callerid or "an unnamed node"
 
     @cached_property
@@ -70,21 +71,21 @@ class Channel:
     def values(self) -> tuple[Any, ...]:
         """Each message decoded to a dict of its fields; None where its definition does not fit.
 
-        Raises EvidenceError where that would take more memory than there is for it.
+        Raises EvidenceError where that would take more memory than it may.
         """
         try:
-            decoder = self.decoder(self.room)
+            decoder = self.decoder(self.budget)
             for message in self.messages:
-                self.room.decode(decoder.decoded_bytes(len(message.data)))
-        except NoRoom as error:
+                self.budget.decode(decoder.decoded_bytes(len(message.data)))
+        except BudgetExceeded as error:
             raise EvidenceError(f"{self.topic}: {error}", hint="publish less on it") from error
         return tuple(decoder.decode(m.data) for m in self.messages)
 
-    def decoder(self, room: Room) -> Decoder:
-        """What decodes its messages; that takes room too. Raises NoRoom."""
+    def decoder(self, budget: MemoryBudget) -> Decoder:
+        """Return a decoder of its messages, which counts as memory too. Raises BudgetExceeded."""
         from grader.evidence.decode import Decoder  # noqa: PLC0415 - numpy, which no file but a message needs
 
-        room.decode(DECODER_BYTES + LETTER_BYTES * len(self.definition))
+        budget.decode(DECODER_BYTES + LETTER_BYTES * len(self.definition))
         return Decoder(self.type, self.definition)
 
     @property
@@ -94,7 +95,7 @@ class Channel:
 
 
 def is_grader_node(name: str) -> bool:
-    """Whether it is one of the grader's own nodes, whose names no other node can have, or ROS's own `/rosout`."""
+    """Return whether it is one of the grader's own nodes, whose names no other node can have, or ROS's `/rosout`."""
     return OWN_NODE.fullmatch(name) is not None or name == "/rosout"
 
 
@@ -146,13 +147,13 @@ class Run:
         return not is_grader_node(name) and name not in self.grader_nodes
 
     def student_channels(self, topic: str | None = None) -> tuple[Channel, ...]:
-        """Channels of the student's publishers, on one topic or on all."""
+        """Return the channels of the student's publishers, on one topic or on all."""
         return tuple(
             c for c in self.channels if self.is_student_node(c.callerid) and topic in {None, c.topic}
         )
 
     def student_nodes(self, process: str | None = None) -> tuple[str, ...]:
-        """Every node of the student's, or of one process, that was ever registered, in order of appearance."""
+        """Return all student nodes that were ever registered, or those of one process, in order of appearance."""
         seen: dict[str, None] = {}
         for _, event in self.graph:
             for node in event.nodes:
@@ -161,10 +162,43 @@ class Run:
         return tuple(seen)
 
     def lines(self, process: str) -> Iterator[tuple[int, ConsoleLine]]:
-        """What one process printed."""
+        """Yield what one process printed, with its time (ns)."""
         return ((t, line) for t, line in self.console if line.process == process)
 
     @property
     def outcome(self) -> ScenarioEvent | None:
         """How the run ended; None for a file that was cut short."""
         return next((e for _, e in reversed(self.course) if e.event == "end"), None)
+
+
+def console_log(runs: Mapping[str, Run]) -> str:
+    """Return what the build and the student's processes printed, by scenario, with seconds since the run began."""
+    lines = []
+    for name, run in runs.items():
+        lines += [f"== {name}"] if run.console else []
+        own = {event.name for _, event in run.processes if event.role == "grader"}
+        for time_ns, line in run.console:
+            if line.process in own:
+                continue
+            text = line.line.replace("\n", "\\n")  # a line is one, whatever a recording says
+            lines.append(f"{(time_ns - run.start_ns) / 1e9:8.3f} {line.process} {line.stream}: {text}")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def merge_channels(channels: Iterable[Channel], *, renumber: bool) -> tuple[Channel, ...]:
+    """Join channels that differ in nothing but their messages: a publisher that connected twice.
+
+    `renumber` counts each channel's messages from 0: other tools number them across channels, or not at all.
+    """
+    groups: dict[tuple[str, str, str, str, str], list[Channel]] = {}
+    for one in channels:
+        key = (one.topic, one.callerid, one.type, one.md5sum, one.definition)
+        groups.setdefault(key, []).append(one)
+    return tuple(_merge_group(groups.pop(key), renumber=renumber) for key in list(groups))
+
+
+def _merge_group(group: list[Channel], *, renumber: bool) -> Channel:
+    messages = sorted((m for one in group for m in one.messages), key=lambda message: message.log_time_ns)
+    if renumber and any(m.sequence != number for number, m in enumerate(messages)):
+        messages = [Message(m.log_time_ns, number, m.data) for number, m in enumerate(messages)]
+    return replace(group[0], latching=any(one.latching for one in group), messages=tuple(messages))

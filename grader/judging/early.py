@@ -9,7 +9,7 @@ from typing import Any, cast
 from grader.checks import CHECKS, Check
 from grader.evidence.run import Run
 from grader.judging.facts import NOT_RUN, Facts
-from grader.judging.judge import OPEN, result_of, settled, verdict_of
+from grader.judging.judge import apply_requirements, result_of, verdict_of
 from grader.judging.recordings import PACKAGE_RUN
 from grader.model.package import PackageFacts
 from grader.model.result import EarlyVerdict
@@ -69,8 +69,8 @@ class _Judging:
             if not self.results.keys() >= set(criterion.requires):
                 return
             final = final and all(self.results[r].final for r in criterion.requires)
-            verdict = settled(criterion, verdict, self._verdicts, self._roots)
-        if verdict.status not in OPEN:
+            verdict = apply_requirements(criterion, verdict, self._verdicts, self._roots)
+        if not verdict.status.is_open:
             self._verdicts[name] = verdict
             result = result_of(criterion, verdict, self._rubric.digits)
             self.results[name] = EarlyVerdict(criterion=result, final=final)

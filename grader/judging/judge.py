@@ -1,4 +1,4 @@
-"""From evidence and rubric to criteria: runs the checks, settles what blocks what, gives the points."""
+"""From evidence and rubric to criteria: runs the checks, applies what blocks what, gives the points."""
 
 from __future__ import annotations
 
@@ -19,9 +19,6 @@ from grader.model.verdict import Status, Verdict, inconclusive
 from grader.rubric.model import Criterion, Rubric
 
 MANUAL = "manual"
-EXPLAINS = {Status.FAIL, Status.PARTIAL, Status.BLOCKED}
-OPEN = {Status.INCONCLUSIVE, Status.ERROR, Status.MANUAL}
-WITH_HINT = {Status.FAIL, Status.PARTIAL, Status.BLOCKED, Status.INCONCLUSIVE}
 
 
 def judge(
@@ -38,7 +35,7 @@ def judge(
     roots: dict[str, str] = {}
     for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():
         verdict = verdict_of(criteria[name], facts, checks)
-        verdicts[name] = settled(criteria[name], verdict, verdicts, roots)
+        verdicts[name] = apply_requirements(criteria[name], verdict, verdicts, roots)
     return tuple(result_of(c, verdicts[c.id], rubric.digits) for c in rubric.criteria)
 
 
@@ -87,28 +84,28 @@ def _broken(check: Check, error: Exception) -> Verdict:
     return Verdict(status=Status.ERROR, score=0.0, message=message, hint=hint)
 
 
-def settled(
+def apply_requirements(
     criterion: Criterion, verdict: Verdict, verdicts: Mapping[str, Verdict], roots: dict[str, str]
 ) -> Verdict:
     """`blocked` where there was nothing to judge and a required criterion explains it, named by its root."""
     if not verdict.unjudged:
         return verdict
-    blocking = next((r for r in criterion.requires if verdicts[r].status in EXPLAINS), None)
+    blocking = next((r for r in criterion.requires if verdicts[r].status.is_lost), None)
     if blocking is not None:
         root = roots[criterion.id] = roots.get(blocking, blocking)
         message = f"blocked by {root}: {verdicts[root].message}"
         update = {"status": Status.BLOCKED, "message": message, "hint": f"mend {root} first"}
         return verdict.model_copy(update=update)
-    unsettled = next((r for r in criterion.requires if verdicts[r].status in OPEN), None)
-    if unsettled is not None:
-        message = f"{verdict.message}; and {unsettled} could not be judged"
+    undecided = next((r for r in criterion.requires if verdicts[r].status.is_open), None)
+    if undecided is not None:
+        message = f"{verdict.message}; and {undecided} could not be judged"
         return inconclusive(message, expected=verdict.expected, measured=verdict.measured, hint=verdict.hint)
     return verdict
 
 
 def result_of(criterion: Criterion, verdict: Verdict, digits: int) -> CriterionResult:
     """The report's line of a criterion, with the points of its verdict."""
-    lost = verdict.status in WITH_HINT
+    lost = verdict.status.is_lost or verdict.status is Status.INCONCLUSIVE
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,

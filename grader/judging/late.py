@@ -6,7 +6,7 @@ from datetime import datetime, timedelta, timezone
 from decimal import Decimal
 
 from grader.judging.points import round_half_up
-from grader.model.submission_time import HandedIn, Lateness
+from grader.model.result import HandedIn, Lateness
 from grader.rubric.model import Late, Rubric
 
 UNITS = {"day": timedelta(days=1), "hour": timedelta(hours=1)}

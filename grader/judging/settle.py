@@ -8,8 +8,7 @@ from typing import Literal
 from grader.judging.late import lateness
 from grader.judging.points import round_half_up
 from grader.judging.summary import overall_status, total_points
-from grader.model.result import CriterionResult, GradingResult
-from grader.model.submission_time import AppliedOverride, Automatic, HandedIn, Override
+from grader.model.result import AppliedOverride, Automatic, CriterionResult, GradingResult, HandedIn, Override
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
 
@@ -39,7 +38,7 @@ def settle(
     points = total_points(rubric, criteria)
     late = lateness(points, rubric, handed_in)
     update = {
-        "status": _status(result, criteria, decided.keys()),
+        "status": status_after_overrides(result, criteria, decided.keys()),
         "points": late.points if late else points,
         "criteria": criteria,
         "overrides": applied,
@@ -56,7 +55,7 @@ def unsettled(result: GradingResult, rubric: Rubric) -> GradingResult:
     said = {override.criterion: override.automatic for override in result.overrides}
     criteria = tuple(c.model_copy(update=dict(said[c.id])) if c.id in said else c for c in result.criteria)
     update = {
-        "status": _status(result, criteria, ()),
+        "status": status_after_overrides(result, criteria, ()),
         "points": total_points(rubric, criteria),
         "criteria": criteria,
         "overrides": (),
@@ -66,10 +65,13 @@ def unsettled(result: GradingResult, rubric: Rubric) -> GradingResult:
     return result.model_copy(update=update)
 
 
-def _status(
+def status_after_overrides(
     result: GradingResult, criteria: tuple[CriterionResult, ...], decided: Collection[str]
 ) -> Literal["graded", "inconclusive", "error"]:
-    """What could not be graded at all stays an error until a person has decided all that counts."""
+    """Return the status of a result with these criteria, of which people decided some.
+
+    What could not be graded at all stays an error until a person has decided all that counts.
+    """
     if result.error is not None and any(c.max_points > 0 and c.id not in decided for c in criteria):
         return "error"
     return overall_status(criteria)

@@ -13,7 +13,6 @@ from grader.rubric.model import Rubric
 from grader.shown import clipped, json_text, text_limit
 
 LIMIT = 2000
-OPEN = {Status.INCONCLUSIVE, Status.MANUAL, Status.ERROR}
 
 
 def total_points(rubric: Rubric, results: Sequence[CriterionResult]) -> float:
@@ -30,7 +29,7 @@ def overall_status(results: Sequence[CriterionResult]) -> Literal["graded", "inc
     counting = [r for r in results if r.max_points > 0]
     if not counting or any(r.status is Status.ERROR for r in counting):
         return "error"
-    return "inconclusive" if any(r.status in OPEN for r in counting) else "graded"
+    return "inconclusive" if any(r.status.is_open for r in counting) else "graded"
 
 
 def reached_pass_mark(rubric: Rubric, results: Sequence[CriterionResult]) -> bool:

@@ -96,7 +96,7 @@ class RateBounds(Record):
     high_gap_ns: float
     min_window_s: float
 
-    def settled_by(self, times_ns: Sequence[int]) -> bool:
+    def decided_by(self, times_ns: Sequence[int]) -> bool:
         """Whether a longer look would change nothing: the mean's confidence interval lies inside of the bounds and so
         does every gap, or it lies outside of them."""
         if len(times_ns) <= CLEAR_GAPS or times_ns[-1] - times_ns[0] < self.min_window_s * 1e9:

@@ -1,33 +1,143 @@
-"""The result of one submission: `result.json`, schema `grader.result/1`. Its keys are an interface."""
+"""The result of one submission: `result.json`, schema `grader.result/1`. Its keys are an interface.
+
+The docstring of a field says what its key means: the reference and the JSON schemas are made of them.
+"""
 
 from __future__ import annotations
 
-from typing import Literal
+from datetime import date, datetime
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AwareDatetime, Field
 
-from grader.model.git_status import Standing
 from grader.model.record import Record
-from grader.model.submission_time import AppliedOverride, HandedIn, Lateness
 from grader.model.verdict import EvidenceCitation, FileCitation, Status
+
+Day = date | datetime
+COMMENT_CHARS = 2000
+AUTHOR_CHARS = 200
+SaidBy = Literal["roster", "commit", "nobody"]
+
+
+class HandedIn(Record):
+    """When a submission was handed in, and the deadline. All times have a time zone."""
+
+    at: AwareDatetime | None = None
+    """When it was submitted; null where neither roster nor commit says so."""
+    by: SaidBy = "nobody"
+    """Which of them says so: the `roster` (`submitted_at`), the `commit` (its date), or `nobody`."""
+    deadline: AwareDatetime | None = None
+    """The deadline, with the extension; null without one."""
+    extension_days: float = 0.0
+    """The extension in days."""
+    before: AwareDatetime | None = None
+    """The time before which the commit to grade was looked for; null where the last one is graded."""
+    note: str = ""
+    """How that commit was chosen."""
+
+
+class Lateness(HandedIn):
+    """How late a submission is, and the penalty."""
+
+    late_s: float = 0.0
+    """Seconds after the deadline; 0 if it was in time."""
+    points_before: float
+    """The points before the penalty."""
+    points: float
+    """The points after it."""
+    text: str
+    """The reason, in one sentence."""
+
+
+class Override(Record):
+    """Points that a person awards for one criterion of one submission (`overrides.yaml`)."""
+
+    points: Annotated[float, Field(ge=0)]
+    """The points that count, at most the criterion's."""
+    comment: Annotated[str, Field(max_length=COMMENT_CHARS)] = ""
+    """What the student reads."""
+    author: Annotated[str, Field(max_length=AUTHOR_CHARS)] = ""
+    """Who awarded them."""
+    date: Day | None = None
+    """When: a day, or a time."""
+
+
+class Automatic(Record):
+    """The verdict of the check, without the override."""
+
+    status: Status
+    """The status that the check gave."""
+    points: float
+    """Its points."""
+    message: str
+    """Its sentence."""
+
+
+class AppliedOverride(Override):
+    """An override in a result, beside the verdict that it replaces."""
+
+    criterion: str
+    """The criterion's `id`."""
+    automatic: Automatic
+    """What the check says now."""
+    was: Automatic
+    """What it said when the override was first applied."""
+    changed: bool = False
+    """Whether these differ: then the person did not know what the check says now."""
+
+
+class Point(Record):
+    """One way in which what will be marked differs from what was checked, and the command that fixes it."""
+
+    kind: str
+    """A word for programs: `uncommitted`, `untracked`, `ignored`, `mode`, `unpushed`, …"""
+    text: str
+    """One line for people."""
+    mend: str = ""
+    """A command that fixes it, or nothing."""
+    remark: bool = False
+    """Whether it is only a remark: nothing is known to differ."""
+
+
+class Standing(Record):
+    """How the files on the disk compare with what git has, for `grader check`. It changes no verdict."""
+
+    points: tuple[Point, ...] = ()
+    """Ways in which what will be marked differs from what was checked."""
+    summary: str = ""
+    """What git has, in one line, where nothing differs."""
 
 
 class CriterionResult(Record):
-    """One line of the report. `points` are those earned, rounded as the rubric says."""
+    """One criterion: a line of the report."""
 
     id: str
+    """The criterion's `id` in the rubric."""
     title: str
+    """Its title."""
     check: str
+    """The check that judged it, or `manual`."""
     scenario: str | None
+    """The run that it was judged by, null for one that the files decide."""
     status: Status
+    """`pass`, `partial`, `fail`; `blocked`: another criterion keeps it from being judged; `inconclusive`: not the
+    submission's fault; `error`: the check failed; `manual`: a person decides."""
     points: float
+    """The points earned, rounded as the rubric says."""
     max_points: float
+    """The most points that can be reached."""
     message: str
+    """What was found, in one sentence."""
     expected: str
+    """What the lab asks for, with unit."""
     measured: str
+    """What was there, with unit."""
     hint: str
+    """What to do about it."""
     reproduce: str
+    """A command that shows the same."""
     citations: tuple[FileCitation | EvidenceCitation, ...]
+    """The lines of files and the parts of the evidence that the verdict rests on."""
 
 
 class EarlyVerdict(Record):
@@ -38,72 +148,110 @@ class EarlyVerdict(Record):
 
 
 class SubmissionInfo(Record):
-    """Whose work it is: `commit` for a repository, `digest` (sha256 of the package's tree) always."""
+    """Whose work it is."""
 
     id: str
+    """Its name, which is that of its folder."""
     source: str
+    """Where it came from, as it was given, without passwords."""
     commit: str | None
+    """The commit of a repository, else null."""
     digest: str
+    """sha256 of the package's files; empty where no package was found."""
     package: str
+    """The package's name; empty where none was found or needed."""
 
 
 class RubricInfo(Record):
     id: str
+    """The rubric's `id`."""
     version: str
+    """The rubric's own `version`, which its author chooses."""
     digest: str
+    """sha256 of the rubric's file and of the instructor's files that belong to it."""
 
 
 class EnvironmentInfo(Record):
     grader: str
+    """The grader's version."""
     ros: str
+    """The ROS that ran it; empty where nothing was run."""
     python: str
+    """The Python that the grader ran under."""
     sandbox: str
+    """What confined the student's code, or `nothing was run`."""
 
 
 class TimingInfo(Record):
-    """Seconds. `cpu_s` is the grader's own, `student_cpu_s` that of the student's processes and build."""
+    """How long the grading took."""
 
     wall_s: float
+    """Seconds from start to end."""
     cpu_s: float
+    """CPU seconds of the grader."""
     student_cpu_s: float
+    """CPU seconds of the student's processes and build."""
+
+
+NO_TIME = TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0)
 
 
 class Note(Record):
-    """What a student's process was not allowed (`refused`), or had too much of (`limit`). It costs no points.
-
-    `scenario` is the run that it was noticed in (`package`: the build), `actor` the process or node.
-    """
+    """Something that a student's process was not allowed, or a limit that it reached. It costs no points."""
 
     scenario: str
+    """The run that it was noticed in; `package` is the build."""
     actor: str
+    """The process or node."""
     kind: Literal["refused", "limit"]
+    """`refused`: it was not allowed. `limit`: it reached a limit."""
     text: str
+    """What it was."""
 
 
 class ErrorInfo(Record):
     kind: str
+    """Whose fault: `submission`, `package-not-found` (the submission's); `host`, `arena`, `output`, `ros-missing`,
+    `sandbox-missing` (the machine's); `internal` (the grader's); `roster`, `not-graded-yet` (of a class). Readers
+    must accept others."""
     message: str
+    """What is wrong."""
     hint: str
+    """What to do about it."""
 
 
 class GradingResult(Record):
-    """`points` are those that count in the end: with what a person decided, and without what being late cost.
-
-    `standing` is what `grader check --json` says of git; no file of results has it.
-    """
+    """The whole result of one submission."""
 
     schema_: Literal["grader.result/1"] = Field(default="grader.result/1", alias="schema")
+    """Which format this is, and its version."""
     submission: SubmissionInfo
+    """Whose work it is."""
     rubric: RubricInfo
+    """What it was judged by."""
     status: Literal["graded", "inconclusive", "error"]
+    """`graded`: every criterion worth points is decided. `inconclusive`: some are open. `error`: it could not be
+    graded, and `error` says why."""
     points: float
+    """The points that count: after overrides and the late penalty."""
     max_points: float
+    """The most points that can be reached."""
     criteria: tuple[CriterionResult, ...]
+    """The rubric's criteria, in its order."""
     environment: EnvironmentInfo
+    """What graded it."""
     timing: TimingInfo
+    """What that took."""
     notes: tuple[Note, ...] = ()
+    """What was noticed while it ran; it costs no points. Only there if there is anything."""
     overrides: tuple[AppliedOverride, ...] = ()
+    """The overrides: points that a person awarded in place of a check. Only there if there are any."""
     handed_in: HandedIn | None = None
+    """When it was submitted. Only there if a roster or a deadline says so."""
     late: Lateness | None = None
+    """The late penalty. Only there if the rubric has a deadline."""
     standing: Standing | None = None
+    """What of the work is not committed or not pushed. Only in the output of `grader check`, and if there is
+    anything; it costs no points."""
     error: ErrorInfo | None = None
+    """Why it could not be graded. Only there for the status `error`."""

@@ -18,21 +18,42 @@ class Status(str, Enum):
     ERROR = "error"
     MANUAL = "manual"
 
+    @property
+    def is_open(self) -> bool:
+        """Whether the points are neither earned nor lost: a person or another grading decides."""
+        return self is Status.MANUAL or self.is_retryable
+
+    @property
+    def is_retryable(self) -> bool:
+        """Whether grading again may decide it: the machine or the grader kept it from being judged."""
+        return self in {Status.INCONCLUSIVE, Status.ERROR}
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether points are lost, here or because another criterion was not reached."""
+        return self in {Status.FAIL, Status.PARTIAL, Status.BLOCKED}
+
 
 class FileCitation(Record):
     """A line of the student's own files; `file` is relative to the package's root, `line` counts from 1."""
 
     file: str
+    """A file of the submission, from the package's root."""
     line: int | None = None
+    """Counted from 1; null for the whole file."""
 
 
 class EvidenceCitation(Record):
     """A stretch of an evidence file: `from_ns` to `to_ns` are its `log_time`s, both included."""
 
     evidence: str
+    """An evidence file's name."""
     topic: str
+    """A topic in it."""
     from_ns: int | None = None
+    """`log_time` of the first message (ns); null for the whole."""
     to_ns: int | None = None
+    """`log_time` of the last message (ns), included; null for the whole."""
 
 
 Citation = FileCitation | EvidenceCitation

@@ -20,7 +20,7 @@ from grader.model.verdict import FileCitation, Status
 from grader.report.findings import repository_path
 from grader.report.settled import late_words
 from grader.report.text import line, number
-from grader.report.view import OPEN, not_graded
+from grader.report.view import not_graded
 from grader.rubric.model import Rubric
 
 VERSION = 1
@@ -29,8 +29,7 @@ LIMITS = (600, 200, 80, 30, 0)
 """How long a text may be: the first with which all has room."""
 NAME_CHARS = 200
 FINE = 2**30
-RUN_AGAIN = OPEN - {Status.MANUAL}
-STATUSES = {Status.PASS: "pass", **dict.fromkeys(OPEN, "error")}
+STATUSES = {Status.PASS: "pass", **{status: "error" for status in Status if status.is_open}}
 
 
 def classroom(result: GradingResult, rubric: Rubric, *, passed: bool, prefix: str = "") -> str:
@@ -64,9 +63,9 @@ def _max(result: GradingResult) -> float:
             PackageNotFound.kind,
         }
         return result.max_points if students else 0
-    if any(c.status in RUN_AGAIN and c.max_points > 0 for c in result.criteria):
+    if any(c.status.is_retryable and c.max_points > 0 for c in result.criteria):
         return 0
-    return round(sum(c.max_points for c in result.criteria if c.status not in OPEN), 3)
+    return round(sum(c.max_points for c in result.criteria if not c.status.is_open), 3)
 
 
 def _refused(result: GradingResult, limit: int) -> dict[str, Any]:
@@ -89,7 +88,7 @@ def _tests(result: GradingResult, rubric: Rubric, prefix: str, limit: int) -> It
 def _criterion(criterion: CriterionResult, prefix: str, limit: int) -> dict[str, Any]:
     cited = next((c for c in criterion.citations if isinstance(c, FileCitation) and c.line), None)
     where = repository_path(prefix, cited.file) if cited else ""
-    waits = criterion.status in OPEN
+    waits = criterion.status.is_open
     return _test(
         line(f"{criterion.id}: {criterion.title}", NAME_CHARS),
         status=STATUSES.get(criterion.status, "fail"),
@@ -104,7 +103,7 @@ def _criterion(criterion: CriterionResult, prefix: str, limit: int) -> dict[str,
 def _message(criterion: CriterionResult, limit: int) -> str:
     """The reporter prints it for errors alone, without the name."""
     words = line(criterion.message, limit) if limit else ""
-    if criterion.status not in OPEN:
+    if not criterion.status.is_open:
         return words
     points = f"{number(criterion.max_points)} points are not settled"
     return f"A PERSON MUST LOOK: {line(criterion.id, NAME_CHARS)}: {points}{': ' if words else ''}{words}"

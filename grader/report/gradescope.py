@@ -17,7 +17,7 @@ from grader.report.hidden import hidden_ids
 from grader.report.settled import decided, decision, late_words, look_again
 from grader.report.summary import missing_hidden, visible_words
 from grader.report.text import json_text, line, number, text_limit
-from grader.report.view import OPEN, places, points_of
+from grader.report.view import places, points_of
 from grader.rubric.model import Rubric
 
 LIMIT = 1000
@@ -29,7 +29,7 @@ LOOK = "A PERSON MUST LOOK"
 def gradescope(result: GradingResult, rubric: Rubric) -> str:
     """JSON. Raises GraderError (exit code 3) where nothing could be judged: there must be no file then."""
     counting = [c for c in result.criteria if c.max_points > 0]
-    if all(c.status in OPEN for c in counting) and not _students_fault(result):
+    if all(c.status.is_open for c in counting) and not _students_fault(result):
         why = result.error.message if result.error else "no criterion could be judged"
         raise GraderError(
             f"no results.json is written, for nothing was graded: {why}",
@@ -73,8 +73,8 @@ class _Writer:
             yield f"NOT GRADED, {LOOK}: {self._text(result.error.message)}"
             yield self._text(result.error.hint)
             return
-        waiting = [c for c in shown if c.status in OPEN and c.max_points > 0]
-        if any(c.status in OPEN and c.max_points > 0 for c in result.criteria):
+        waiting = [c for c in shown if c.status.is_open and c.max_points > 0]
+        if any(c.status.is_open and c.max_points > 0 for c in result.criteria):
             points = number(sum(c.max_points for c in waiting))
             what = f": {points} points are not settled yet" if waiting else ""
             yield f"{LOOK}{what}; no points are lost for good."
@@ -86,7 +86,7 @@ class _Writer:
             yield from map(self._text, late_words(result))
 
     def _test(self, place: str, criterion: CriterionResult) -> dict[str, object]:
-        waits = criterion.status in OPEN
+        waits = criterion.status.is_open
         name = f"{criterion.id}: {criterion.title}"
         return {
             **({} if waits else {"score": criterion.points, "max_score": criterion.max_points}),

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from grader.judging.late import lateness
-from grader.model.result import CriterionResult, GradingResult
-from grader.model.verdict import Status
+from grader.judging.settle import status_after_overrides
+from grader.model.result import GradingResult
 from grader.rubric.model import Rubric
 
 
@@ -30,15 +30,6 @@ def without_hidden(result: GradingResult, rubric: Rubric) -> GradingResult:
         "late": late,
         "points": late.points if late else points,
         "max_points": sum(c.max_points for c in shown),
-        "status": _status(result, shown, {o.criterion for o in decided}),
+        "status": status_after_overrides(result, shown, {o.criterion for o in decided}),
     }
     return result.model_copy(update=update)
-
-
-def _status(result: GradingResult, shown: tuple[CriterionResult, ...], decided: set[str]) -> str:
-    if result.error and any(c.max_points > 0 and c.id not in decided for c in shown):
-        return "error"
-    statuses = {c.status for c in shown if c.max_points > 0}
-    if not statuses or Status.ERROR in statuses:
-        return "error"
-    return "inconclusive" if statuses & {Status.INCONCLUSIVE, Status.MANUAL} else "graded"

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from lxml import etree
 
-from grader.model.result import CriterionResult, ErrorInfo, GradingResult, Note
-from grader.model.submission_time import AppliedOverride
+from grader.model.result import AppliedOverride, CriterionResult, ErrorInfo, GradingResult, Note
 from grader.model.verdict import FileCitation, Status
 from grader.report.findings import repository_path
 from grader.report.noticed import COSTS_NOTHING, NOTICED_TITLE, note_place, note_text

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from grader.model.result import CriterionResult, GradingResult
-from grader.model.submission_time import AppliedOverride, Automatic, HandedIn
+from grader.model.result import AppliedOverride, Automatic, CriterionResult, GradingResult, HandedIn
 from grader.report.text import number
 
 DECIDED_TITLE = "Decided by a person"

@@ -11,9 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from grader.judging.summary import OPEN
-from grader.model.result import CriterionResult, GradingResult, Note
-from grader.model.submission_time import AppliedOverride
+from grader.model.result import AppliedOverride, CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
 from grader.report import settled
 from grader.report.noticed import COSTS_NOTHING, NOTICED_TITLE, note_place, note_text
@@ -112,7 +110,7 @@ class Terminal:
             parts += self._losses("Still open: no points are lost for good", view.open)
         parts += self._section("Advice, costs nothing", [self._advice(c) for c in view.advice])
         parts += self._section(NOTICED_TITLE, self._noticed(result.notes))
-        judged = [c for c in result.criteria if not unrun or c.status not in OPEN]
+        judged = [c for c in result.criteria if not unrun or not c.status.is_open]
         title = "All criteria that could be judged" if unrun else "All criteria"
         parts += self._section(title, [self._table(judged)] if judged else [])
         if hidden:

@@ -39,10 +39,6 @@ class ReportView:
     advice: tuple[CriterionResult, ...]
 
 
-EXPLAINS = frozenset({Status.FAIL, Status.PARTIAL, Status.BLOCKED})
-OPEN = frozenset({Status.INCONCLUSIVE, Status.ERROR, Status.MANUAL})
-
-
 def arrange(result: GradingResult, rubric: Rubric) -> ReportView:
     """Losses by their cost, the rubric's order where they cost the same."""
     unreached = [c for c in result.criteria if c.status is not Status.PASS]
@@ -57,15 +53,15 @@ def arrange(result: GradingResult, rubric: Rubric) -> ReportView:
     told = {c.id for loss in losses for c in (loss.criterion, *loss.blocked)}
     told |= {override.criterion for override in result.overrides}
     return ReportView(
-        lost=tuple(loss for loss in losses if loss.criterion.status not in OPEN),
-        open=_folded([loss for loss in losses if loss.criterion.status in OPEN]),
+        lost=tuple(loss for loss in losses if not loss.criterion.status.is_open),
+        open=_folded([loss for loss in losses if loss.criterion.status.is_open]),
         advice=tuple(c for c in result.criteria if c.id not in told and _advises(c)),
     )
 
 
 def _advises(criterion: CriterionResult) -> bool:
     """What costs nothing and could not be judged is no advice."""
-    return criterion.status not in OPEN and bool(criterion.hint or criterion.status is not Status.PASS)
+    return not criterion.status.is_open and bool(criterion.hint or criterion.status is not Status.PASS)
 
 
 def _folded(losses: list[Loss]) -> tuple[Loss, ...]:
@@ -95,7 +91,7 @@ def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric) -
     seen = {criterion.id}
     while criterion.status is Status.BLOCKED:
         unmet = [by_id[i] for i in requires.get(criterion.id, ()) if i in by_id and i not in seen]
-        cause = next((c for c in unmet if c.status in EXPLAINS), None)
+        cause = next((c for c in unmet if c.status.is_lost), None)
         if cause is None:
             break
         seen.add(cause.id)

@@ -22,7 +22,7 @@ from grader.intake.gitdir import Unfit, repository_around
 from grader.intake.modes import is_script
 from grader.intake.names import brief, encodable, listing, printable
 from grader.intake.tree import list_entries
-from grader.model.git_status import Point, Standing
+from grader.model.result import Point, Standing
 from grader.portable import MODES_ON_DISK
 from grader.student.git_view import View, open_view
 

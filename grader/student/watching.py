@@ -22,25 +22,24 @@ from grader import pipeline
 from grader.arena.asynchronous import Stop, Stopped
 from grader.arena.workspace import needed_packages
 from grader.errors import ExitCode, GraderError, SubmissionError, UsageError
-from grader.faults import Attempt, error_result
+from grader.faults import error_result
+from grader.files import temporary_folder
 from grader.intake import open_submission
 from grader.intake.identity import identify
 from grader.model.package import SourceFile
 from grader.model.progress import Progress
-from grader.model.result import GradingResult, SubmissionInfo, TimingInfo
+from grader.model.result import GradingResult, SubmissionInfo
 from grader.model.verdict import Status
 from grader.package.files import read_files
 from grader.package.reading import LEFT_OUT
 from grader.report.hidden import without_hidden
 from grader.rubric.load import LoadedRubric
-from grader.temporary import temporary_folder
 
 POLL_S = 0.25
 AGAIN_S = 0.4
 GONE_S = 1.0
 WAIT_S = 5.0
 LOOKS = 3
-NO_TIME = TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0)
 UNDECIDED = frozenset({Status.INCONCLUSIVE, Status.ERROR})
 IGNORED_FOLDERS = LEFT_OUT | {
     ".tox", ".venv", ".idea", ".vscode", "node_modules", ".mypy_cache", ".pytest_cache", ".ruff_cache",
@@ -131,15 +130,7 @@ class Grading:
     def _error_result(self, error: GraderError) -> GradingResult:
         name, source = identify(self.source) or (Path(self.source).name, self.source)
         about = SubmissionInfo(id=name, source=source, commit=None, digest="", package="")
-        attempt = Attempt(
-            source=self.source,
-            submission_id=None,
-            rubric=self.rubric,
-            out=self.out,
-            keep_hidden=False,
-            timing=lambda: NO_TIME,
-        )
-        return error_result(error, about, attempt)
+        return error_result(error, about, self.rubric)
 
 
 class Watch:

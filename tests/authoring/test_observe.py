@@ -15,8 +15,8 @@ from grader.authoring.sheet import share_out
 from grader.authoring.text import rubric_text
 from grader.evidence.reader import package_facts
 from grader.evidence.run import Run
-from grader.evidence.timeline import build_runs
 from grader.rubric.load import load_rubric
+from tests.support.timeline import build_runs
 
 NS = 10**9
 LIVES = {"name": "node", "script": "src/node.py", "stopped_by": "INT", "exit_code": 0}

@@ -19,9 +19,8 @@ from grader.cli.main import run
 from grader.evidence.reader import load_evidence
 from grader.judging import judge
 from grader.judging.summary import overall_status, total_points
-from grader.model.batch import BatchRun
+from grader.model.batch import BatchRun, Entry
 from grader.model.result import EnvironmentInfo, GradingResult, RubricInfo, SubmissionInfo, TimingInfo
-from grader.model.roster import Entry
 from grader.report.files import write_reports
 from grader.rubric.load import LoadedRubric, load_rubric
 from tests.batch.a_class import CORRECT, RUBRIC, WRONG_NAME, batch, handed_in, lines_of, roster_of, run_of

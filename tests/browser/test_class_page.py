@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.model.roster import Entry
+from grader.model.batch import Entry
 from grader.report.class_page import write_class_page
 from tests.browser.conftest import DESKTOP, PHONE
 from tests.report.class_page.made_up import CRITERIA, FAULTS, made_up_rows, made_up_run

@@ -12,10 +12,10 @@ import yaml
 from grader.checks import CHECKS
 from grader.checks.support.losses import heed_losses
 from grader.evidence.run import Run
-from grader.evidence.timeline import build_runs
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status, Verdict
 from grader.package.launch import parse_launch_files
+from tests.support.timeline import build_runs
 
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 TIMELINES = Path(__file__).parent / "timelines"

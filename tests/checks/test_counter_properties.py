@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.checks.support.counting import Count
-from grader.evidence.timeline import build_runs
 from grader.model.verdict import Status, Verdict
 from tests.checks.examples import judge_runs
+from tests.support.timeline import build_runs
 
 TOPIC = "/numeric_chatter"
 

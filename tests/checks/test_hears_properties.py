@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.checks.support.printed import in_order, numbers_in
-from grader.evidence.timeline import build_runs
 from grader.model.verdict import Status
 from tests.checks.examples import judge_runs
+from tests.support.timeline import build_runs
 
 INT8 = st.integers(-128, 127)
 FORMS = [

@@ -9,9 +9,9 @@ from grader.checks.executable import ExecutableParams, executable
 from grader.checks.manifest import ManifestParams, manifest
 from grader.evidence.reader import package_facts
 from grader.evidence.run import Run
-from grader.evidence.timeline import build_runs
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status
+from tests.support.timeline import build_runs
 
 NOT_IN_GIT = "src/a.py is executable on this disk but not in git: git update-index --chmod=+x src/a.py"
 SPELLED = "the package is spelled Lab1 here, the lab calls it lab1"

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.evidence.timeline import build_runs
 from grader.model.verdict import Status, Verdict
 from tests.checks.examples import judge_runs
+from tests.support.timeline import build_runs
 
 TEMPLATE = "The time is {seconds}"
 RATES_HZ = st.sampled_from([1, 2, 10, 50])

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from grader.checks import CHECKS
-from grader.evidence.timeline import build_runs
 from grader.model.verdict import Status, Verdict
 from tests.checks.examples import judge_runs
+from tests.support.timeline import build_runs
 
 TWIST = {"topic": "/cmd_vel", "type": "geometry_msgs/Twist", "values": [{"linear": {"x": 1.0}}]}
 

@@ -21,9 +21,9 @@ from grader.checks.support.geometry import (
     off_m,
     relative,
 )
-from grader.evidence.timeline import build_runs
 from grader.model.verdict import Status, Verdict
 from tests.checks.examples import judge_runs
+from tests.support.timeline import build_runs
 
 SPEED = st.floats(-3, 3)
 TURN = st.floats(-7, 7)

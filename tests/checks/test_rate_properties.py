@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.evidence.timeline import build_runs
 from grader.model.message_rate import Rhythm
 from grader.model.verdict import Status
 from tests.checks.examples import judge_runs
+from tests.support.timeline import build_runs
 
 PARAMS = {"topic": "/chatter", "rate_hz": 10}
 

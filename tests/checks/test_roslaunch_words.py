@@ -7,8 +7,8 @@ import pytest
 from grader.checks.support.roslaunch import died, finished, is_exact, name_pattern, refusal
 from grader.checks.support.yaml_words import explain_yaml
 from grader.evidence.run import Run
-from grader.evidence.timeline import build_runs
 from grader.model.package import LaunchNode
+from tests.support.timeline import build_runs
 
 RED = "\x1b[31m{}\x1b[0m"
 

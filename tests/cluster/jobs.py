@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from grader.classes.batch.job import Job, Outcome
-from grader.model.roster import Entry
+from grader.model.batch import Entry
 from grader.results import RESULT
 from grader.rubric.load import load_rubric
 

@@ -7,8 +7,8 @@ from typing import Any
 
 from grader.evidence import decode
 from grader.evidence.events import ConsoleLine, GraphEvent, ProcessEvent, ScenarioEvent
-from grader.evidence.timeline_facts import complete_facts
 from grader.evidence.writer import EvidenceStream
+from tests.support.timeline_facts import complete_facts
 
 T0 = 1_700_000_000_000_000_000
 MS = 1_000_000

@@ -166,7 +166,7 @@ def test_a_topic_that_is_too_much_to_decode_costs_no_mark_and_earns_none(tmp_pat
     (tmp_path / "lab.mcap").write_bytes(recording("float32[] x\n", *many, topic="/chatter").getvalue())
     run = load_run(tmp_path / "lab.mcap")
     assert len(run.channels[0].values) == 2000
-    tight = load_run(tmp_path / "lab.mcap", memory_budget.Room(decoded_bytes=1 << 20))
+    tight = load_run(tmp_path / "lab.mcap", memory_budget.MemoryBudget(decoded_bytes=1 << 20))
     with pytest.raises(EvidenceError, match=r"/chatter: its messages come to more than 1 MiB"):
         _ = tight.channels[0].values
     loaded = load_rubric(LAB)
@@ -182,10 +182,10 @@ def test_zeros_that_pack_well_do_not_fill_the_memory():
 
 def test_what_the_arena_may_record_of_one_submission_can_be_read_again():
     assert memory_budget.HELD_BYTES_MAX > SUBMISSION_MESSAGE_BYTES
-    shared = memory_budget.Room()
+    shared = memory_budget.MemoryBudget()
     for _ in range(10):
         shared.hold(SUBMISSION_MESSAGE_BYTES // 10, foreign=False)
-    with pytest.raises(memory_budget.NoRoom):
+    with pytest.raises(memory_budget.BudgetExceeded):
         shared.hold(SUBMISSION_MESSAGE_BYTES // 10, foreign=True)
 
 

@@ -11,8 +11,8 @@ from grader.errors import EvidenceError
 from grader.evidence import decode
 from grader.evidence.inspect import inspect_file
 from grader.evidence.reader import load_run
-from grader.evidence.timeline import write_runs
 from tests.evidence.samples import T0, sample
+from tests.support.timeline import write_runs
 
 MS = 1_000_000
 

@@ -12,7 +12,7 @@ from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
 from grader.errors import EvidenceError
-from grader.evidence import container, loading
+from grader.evidence import container, reader
 from grader.evidence.events import ConsoleLine
 from grader.evidence.reader import load_evidence, load_run, package_facts
 from grader.evidence.writer import EvidenceStream
@@ -198,7 +198,7 @@ def test_too_many_messages_or_channels_are_refused(monkeypatch):
     monkeypatch.setattr(container, "MAX_RECORDS", 10)
     assert "more than 10 records" in refused(BytesIO(sample()))
     monkeypatch.undo()
-    monkeypatch.setattr(loading, "MAX_CHANNELS", 2)
+    monkeypatch.setattr(reader, "MAX_CHANNELS", 2)
     assert "more than 2 channels" in refused(BytesIO(sample()))
 
 

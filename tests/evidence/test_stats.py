@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.evidence.stats import periodic_share, rate_stats
+from grader.evidence.inspect import periodic_share, rate_stats
 
 MS = 1_000_000
 

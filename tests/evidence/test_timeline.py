@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 import yaml
 
+from grader.evidence.inspect import rate_stats
 from grader.evidence.reader import load_evidence, package_facts
 from grader.evidence.run import Channel
-from grader.evidence.stats import rate_stats
-from grader.evidence.timeline import EPOCH_NS, build_runs, write_runs
+from tests.support.timeline import EPOCH_NS, build_runs, write_runs
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "evidence-timelines.md"
 S = 1_000_000_000

@@ -11,7 +11,7 @@ from unittest.mock import patch
 
 from grader.classes.fetching import Obtained, Patience, Rule, obtain
 from grader.intake import open_submission
-from grader.model.roster import Entry
+from grader.model.batch import Entry
 from grader.model.submission import Submission
 from tests.intake.samples import git, lab, write
 

@@ -172,7 +172,7 @@ def test_two_processes_fetch_once(server, monkeypatch):
     log = fetches(server, monkeypatch)
     code = (
         "import sys; from pathlib import Path; from grader.classes.fetching import Rule, obtain; "
-        "from grader.model.roster import Entry; print('ready', flush=True); sys.stdin.readline(); "
+        "from grader.model.batch import Entry; print('ready', flush=True); sys.stdin.readline(); "
         f"print(obtain(Entry(id='a', source='{HOST}/student'), Rule(), workdir=Path(sys.argv[1]), "
         "fetched_since=float(sys.argv[2])).source.ref)"
     )

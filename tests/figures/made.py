@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any, TypeVar
 
 from grader.evidence.run import Run
-from grader.evidence.timeline import build_runs
 from grader.judging import judge
 from grader.model.figure import Figures
 from grader.model.result import CriterionResult
 from grader.report.figures import figures_of
 from tests.judging.rubrics import rubric
+from tests.support.timeline import build_runs
 
 Kind = TypeVar("Kind")
 SCENARIO = "talker"

@@ -24,13 +24,11 @@ from grader.classes.gradebook import write_gradebook
 from grader.classes.gradebook.sheet import read_sheet
 from grader.classes.roster import read_roster
 from grader.errors import EvidenceError, GraderError, OutputError, RubricError, SubmissionError, UsageError
-from grader.evidence.decode import Decoder
+from grader.evidence.decode import Decoder, ServiceType
 from grader.evidence.export import export_bag
 from grader.evidence.inspect import inspect_run
 from grader.evidence.reader import load_run, package_facts
 from grader.evidence.run import Run
-from grader.evidence.services import ServiceType
-from grader.evidence.timeline import build_runs
 from grader.evidence.writer import EvidenceStream
 from grader.intake import Limits, open_submission, safe_name
 from grader.intake.manifest import manifest_name
@@ -48,6 +46,7 @@ from grader.rubric.load import load_rubric
 from grader.rubric.model import Param, Rubric
 from grader.rubric.source import read_source
 from tests.gradebook.made import BOOK, row
+from tests.support.timeline import build_runs
 
 Read = Callable[[bytes], None]
 Promised = tuple[type[Exception], ...]

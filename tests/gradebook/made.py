@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from grader.classes.gradebook import Book, Row
+from grader.model.batch import Entry
 from grader.model.result import (
+    AppliedOverride,
+    Automatic,
     CriterionResult,
     EnvironmentInfo,
     ErrorInfo,
     GradingResult,
+    Lateness,
     RubricInfo,
     SubmissionInfo,
     TimingInfo,
 )
-from grader.model.roster import Entry
-from grader.model.submission_time import AppliedOverride, Automatic, Lateness
 from grader.model.verdict import Status
 
 BOOK = Book(

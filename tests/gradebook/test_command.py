@@ -14,8 +14,7 @@ from grader.classes.gradebook import FORMS, Row
 from grader.classes.gradebook.table import header
 from grader.cli.main import run
 from grader.cli.parsing import build_parser
-from grader.model.batch import BatchRun
-from grader.model.roster import RosterFault
+from grader.model.batch import BatchRun, RosterFault
 from grader.report.result_json import result_bytes
 from tests.gradebook.made import BOOK, row
 

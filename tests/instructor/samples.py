@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from grader.evidence.run import Run
-from grader.evidence.timeline import build_runs
 from grader.judging import judge
 from grader.model.result import CriterionResult
 from grader.rubric.load import LoadedRubric, load_rubric
+from tests.support.timeline import build_runs
 
 HEAD = """\
 schema: grader.rubric/1

@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 import yaml
 
-from grader.evidence.timeline import build_runs
 from grader.judging import judge
 from grader.package.launch import parse_launch_files
 from grader.rubric.model import Rubric
 from tests.judging.two_nodes import SHEBANG, STOPPED, assert_sound
+from tests.support.timeline import build_runs
 
 POINTS = {
     "manifest": 5,

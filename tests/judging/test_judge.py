@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from grader.checks import CHECKS
-from grader.evidence.timeline import build_runs
 from grader.judging import judge
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status, Verdict, partial
 from tests.judging.rubrics import ALL, CHATTER, EXECUTABLE, GOOD_RUN, NODE, PACKAGE, RATE, rubric
+from tests.support.timeline import build_runs
 
 DIED = {"processes": [{"name": "talker", "exit_s": 0.3, "exit_code": 1}], "outcome": "ended"}
 

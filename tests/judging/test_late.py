@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.judging.late import deadline_of, lateness
-from grader.model.submission_time import HandedIn
+from grader.model.result import HandedIn
 from grader.rubric.model import Rubric
 
 DEADLINE = datetime(2026, 11, 20, 23, 59, tzinfo=timezone(timedelta(hours=1)))

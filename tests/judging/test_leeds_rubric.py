@@ -9,9 +9,9 @@ import pytest
 import yaml
 
 from grader.checks import CHECKS
-from grader.evidence.timeline import build_runs
 from grader.judging import judge, reached_pass_mark, total_points
 from grader.rubric.model import Rubric
+from tests.support.timeline import build_runs
 
 POINTS = {
     "manifest": 5,

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from grader.judging.settle import settle, unsettled
 from grader.judging.summary import overall_status, passed, total_points
-from grader.model.result import CriterionResult, ErrorInfo, GradingResult
-from grader.model.submission_time import HandedIn, Override
+from grader.model.result import CriterionResult, ErrorInfo, GradingResult, HandedIn, Override
 from grader.model.verdict import Status
 from grader.report.hidden import without_hidden
 from grader.report.result_json import result_bytes

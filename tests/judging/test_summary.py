@@ -6,12 +6,12 @@ import json
 
 import pytest
 
-from grader.evidence.timeline import build_runs
 from grader.judging import criteria_bytes, judge, overall_status, reached_pass_mark, total_points
 from grader.judging.points import round_half_up
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status
 from tests.judging.rubrics import ALL, GOOD_RUN, PACKAGE, rubric
+from tests.support.timeline import build_runs
 
 
 def result(

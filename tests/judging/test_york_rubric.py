@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 import yaml
 
-from grader.evidence.timeline import build_runs
 from grader.judging import judge, total_points
 from grader.rubric.model import Rubric
 from tests.judging.two_nodes import SHEBANG, STOPPED, WORDS, assert_sound
+from tests.support.timeline import build_runs
 
 POINTS = {
     "manifest": 5,

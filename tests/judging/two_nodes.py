@@ -9,10 +9,10 @@ from typing import Any
 import yaml
 
 from grader.checks import CHECKS
-from grader.evidence.timeline import build_runs
 from grader.judging import judge, total_points
 from grader.package.launch import parse_launch_files
 from grader.rubric.model import Rubric
+from tests.support.timeline import build_runs
 
 ROOT = Path(__file__).parents[2]
 STOPPED = {"stopped_by": "INT", "exit_code": 0}

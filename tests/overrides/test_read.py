@@ -10,7 +10,7 @@ import pytest
 from grader.classes.overrides import FILE, Overrides, read_overrides
 from grader.errors import RubricError
 from grader.intake import safe_name
-from grader.model.submission_time import Override
+from grader.model.result import Override
 from tests.overrides.samples import IDS, rubric
 
 TIME = "must be a time with its zone, such as 2026-11-20T23:59:00+01:00"

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from grader.classes.overrides import FILE, read_overrides, write, write_override
 from grader.errors import Busy, OutputError, RubricError, UsageError
-from grader.model.submission_time import Override
+from grader.model.result import Override
 from tests.overrides.samples import IDS, rubric
 
 MILLER = Override(points=3, comment='it\'s "good": ü #x', author="A. Miller", date=date(2026, 11, 3))

@@ -18,8 +18,18 @@ from lxml import html as parser
 from rich.console import Console
 
 from grader.judging import criteria_bytes
-from grader.model.result import CriterionResult, ErrorInfo, GradingResult, Note, SubmissionInfo
-from grader.model.submission_time import AUTHOR_CHARS, COMMENT_CHARS, AppliedOverride, Automatic, Lateness
+from grader.model.result import (
+    AUTHOR_CHARS,
+    COMMENT_CHARS,
+    AppliedOverride,
+    Automatic,
+    CriterionResult,
+    ErrorInfo,
+    GradingResult,
+    Lateness,
+    Note,
+    SubmissionInfo,
+)
 from grader.model.verdict import EvidenceCitation, FileCitation, Status
 from grader.report.files import write_reports
 from grader.report.junit import junit

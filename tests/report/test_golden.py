@@ -13,8 +13,8 @@ from rich.console import Console
 
 from grader.classes.gradebook import Book, Row, write_gradebook
 from grader.classes.gradebook.model import Form
+from grader.model.batch import Entry
 from grader.model.result import GradingResult
-from grader.model.roster import Entry
 from grader.report.annotations import github_annotations
 from grader.report.code_quality import code_quality
 from grader.report.gradescope import gradescope

@@ -9,8 +9,7 @@ from datetime import date, datetime, timedelta, timezone
 import pytest
 from lxml import etree
 
-from grader.model.result import ErrorInfo, GradingResult
-from grader.model.submission_time import AppliedOverride, Automatic, HandedIn, Lateness
+from grader.model.result import AppliedOverride, Automatic, ErrorInfo, GradingResult, HandedIn, Lateness
 from grader.model.verdict import Status
 from grader.report.junit import junit
 from grader.report.markdown import markdown_report

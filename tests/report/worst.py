@@ -5,8 +5,7 @@ from __future__ import annotations
 from datetime import date, datetime, timezone
 
 from grader.model.figure import Edge, Figures, GraphFigure
-from grader.model.result import GradingResult, Note, SubmissionInfo
-from grader.model.submission_time import AppliedOverride, Automatic, Lateness
+from grader.model.result import AppliedOverride, Automatic, GradingResult, Lateness, Note, SubmissionInfo
 from grader.model.verdict import FileCitation, Status
 from grader.rubric.model import Rubric
 from tests.report import hostile

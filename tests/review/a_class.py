@@ -18,7 +18,7 @@ from grader.evidence.reader import load_evidence
 from grader.intake import safe_name
 from grader.judging import judge
 from grader.judging.summary import overall_status, total_points
-from grader.model.batch import BatchRun
+from grader.model.batch import BatchRun, Entry, RosterFault
 from grader.model.result import (
     CriterionResult,
     EnvironmentInfo,
@@ -28,7 +28,6 @@ from grader.model.result import (
     SubmissionInfo,
     TimingInfo,
 )
-from grader.model.roster import Entry, RosterFault
 from grader.model.verdict import Status
 from grader.report.figures import figures_of
 from grader.report.files import write_reports

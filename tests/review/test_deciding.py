@@ -11,7 +11,7 @@ import pytest
 from grader.classes.batch.flow import alone
 from grader.classes.review.follower import Pace
 from grader.classes.review.session import open_desk
-from grader.model.submission_time import Override
+from grader.model.result import Override
 from tests.review.a_class import overrides_of, points_of, result_of
 from tests.review.conftest import QUICK
 

@@ -12,8 +12,8 @@ from grader.classes.review.app import create_app
 from grader.classes.review.form import author_of
 from grader.classes.review.navigation import place_of
 from grader.classes.review.session import open_desk
-from grader.model.roster import RosterFault
-from grader.model.submission_time import Override
+from grader.model.batch import RosterFault
+from grader.model.result import Override
 from tests.review.a_class import INCONCLUSIVE, Who, a_class, overrides_of, result_of
 from tests.review.conftest import PORT, QUICK, TOKEN, Page
 

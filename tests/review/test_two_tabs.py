@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from grader.classes.overrides import write_override
 from grader.classes.review.app import create_app
 from grader.classes.review.session import open_desk
-from grader.model.submission_time import Override
+from grader.model.result import Override
 from tests.review.a_class import overrides_of
 from tests.review.conftest import PORT, QUICK, TOKEN, Page
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from grader.classes.roster import Local, read_roster
 from grader.classes.roster.local import OWN_FOLDER
-from grader.model.roster import Roster
+from grader.model.batch import Roster
 
 
 def roster_file(folder: Path, text: str | bytes, encoding: str = "utf-8") -> Path:

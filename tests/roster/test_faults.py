@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.roster.local import OUT
-from grader.model.roster import RosterFault
+from grader.model.batch import RosterFault
 from tests.roster.helpers import ids, read, said
 
 

@@ -10,7 +10,7 @@ import pytest
 from grader.classes.roster import read_roster
 from grader.classes.roster.platforms import Named, platform_name
 from grader.errors import UsageError
-from grader.model.roster import RosterFault
+from grader.model.batch import RosterFault
 from tests.roster.helpers import ids, said
 
 

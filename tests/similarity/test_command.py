@@ -12,9 +12,8 @@ import pytest
 
 from grader.classes.similarity import comparing
 from grader.cli.main import run as grader
-from grader.model.batch import BatchRun
+from grader.model.batch import BatchRun, Entry
 from grader.model.result import RubricInfo
-from grader.model.roster import Entry
 from grader.model.similarity import Similarity
 from tests.similarity.classes import class_of, renamed, solution
 

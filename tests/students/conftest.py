@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.model.git_status import Standing
+from grader.model.result import Standing
 from grader.student.git_status import advise, read_environment
 
 MANIFEST = """<package format="2"><name>{name}</name><version>0.0.1</version><description>d</description>

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.model.git_status import Point, Standing
+from grader.model.result import Point, Standing
 from tests.students.conftest import SCRIPT, Clone
 
 ROOT = Path(__file__).resolve().parents[2]

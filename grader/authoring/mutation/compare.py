@@ -9,9 +9,6 @@ from grader.model.mutants import Cost, LostCriterion, State
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status
 
-LOST = {Status.FAIL, Status.PARTIAL, Status.BLOCKED}
-DOUBTFUL = {Status.INCONCLUSIVE, Status.ERROR}
-
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
@@ -40,9 +37,9 @@ def compare(
     """Without declared costs, a mutant is killed by whatever it costs. `ignored` are criteria that the reference
     solution does not reach either: advice, where it has some."""
     found = {c.id: c.status for c in criteria if c.id not in ignored}
-    if any(status in DOUBTFUL for status in found.values()):
+    if any(status.is_retryable for status in found.values()):
         return Comparison(state="inconclusive")
-    lost = {name: status.value for name, status in found.items() if status in LOST}
+    lost = {name: status.value for name, status in found.items() if status.is_lost}
     if expected is None:
         return Comparison(state="killed" if lost else "survived")
     known = {c.id for c in criteria}

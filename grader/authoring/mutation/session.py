@@ -9,19 +9,19 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.authoring.mutation.compare import DOUBTFUL, Comparison, compare, lost_criteria
+from grader.authoring.mutation.compare import Comparison, compare, lost_criteria
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.plan import Planned
 from grader.authoring.mutation.solution import Solution
 from grader.authoring.mutation.tree import Tree, unified_diff, write_tree
 from grader.classes.batch.workers import Graded, Job, Sandbox, grade_all
 from grader.errors import HostError
+from grader.files import temporary_folder
 from grader.model.mutants import MutantResult, ReferenceResult, RubricTest
 from grader.model.progress import Progress
 from grader.model.result import GradingResult, RubricInfo
 from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric
-from grader.temporary import temporary_folder
 
 REFERENCE = "reference"
 SOURCE = "source"
@@ -78,7 +78,7 @@ def _reference(plan: Plan, progress: Progress) -> GradingResult:
     )
     if graded.result is None:
         raise HostError(f"the reference solution could not be graded: {graded.error}")
-    doubtful = [c for c in graded.result.criteria if c.status in DOUBTFUL]
+    doubtful = [c for c in graded.result.criteria if c.status.is_retryable]
     if doubtful:
         raise HostError(
             f"the reference solution could not be judged: {doubtful[0].id}: {doubtful[0].message}",

@@ -26,9 +26,8 @@ from grader.errors import Busy, GraderError, UsageError
 from grader.files import check_writable, keep_private, lock, make_folder
 from grader.intake import safe_name, without_password
 from grader.judging.summary import passed
-from grader.model.batch import MISSING, BatchRun, Counts, CriterionInfo, State
+from grader.model.batch import MISSING, BatchRun, Counts, CriterionInfo, Entry, Roster, RosterFault, State
 from grader.model.result import RubricInfo
-from grader.model.roster import Entry, Roster, RosterFault
 from grader.pipeline import GradeOptions, prepare
 from grader.report.class_page import write_class_page
 from grader.results import finish_killed

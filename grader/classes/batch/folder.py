@@ -11,7 +11,7 @@ from grader.classes.gradebook import Book, Row
 from grader.errors import UsageError
 from grader.files import atomic_write
 from grader.intake import safe_name
-from grader.model.batch import MISSING, ROSTER, BatchRun
+from grader.model.batch import MISSING, ROSTER, BatchRun, Entry
 from grader.model.result import (
     CriterionResult,
     EnvironmentInfo,
@@ -20,7 +20,6 @@ from grader.model.result import (
     SubmissionInfo,
     TimingInfo,
 )
-from grader.model.roster import Entry
 from grader.model.verdict import Status
 from grader.model.version import RUN as RUN_FORMAT
 from grader.model.version import UPDATE

@@ -9,10 +9,9 @@ from typing import Literal
 
 from pydantic import Field
 
+from grader.model.batch import Entry
 from grader.model.record import Record
-from grader.model.result import GradingResult
-from grader.model.roster import Entry
-from grader.model.submission_time import HandedIn, Override
+from grader.model.result import GradingResult, HandedIn, Override
 from grader.rubric.load import LoadedRubric
 
 Sandbox = Literal["auto", "require", "none"]

@@ -12,7 +12,7 @@ from grader.model.batch import MISSING, ROSTER
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status
 
-OPEN = {
+WHY_OPEN = {
     Status.INCONCLUSIVE: "could not be judged",
     Status.MANUAL: "waits for a person",
     Status.ERROR: "failed",
@@ -63,10 +63,10 @@ def _state(row: Row) -> str:
 
 
 def _waiting(row: Row) -> tuple[CriterionResult, ...]:
-    return tuple(c for c in row.result.criteria if c.status in OPEN and c.max_points > 0)
+    return tuple(c for c in row.result.criteria if c.status.is_open and c.max_points > 0)
 
 
 def _open(row: Row) -> str:
-    names = [f"{c.id} ({OPEN[c.status]})" for c in _waiting(row)]
+    names = [f"{c.id} ({WHY_OPEN[c.status]})" for c in _waiting(row)]
     more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
     return ", ".join(names[:NAMES_SHOWN]) + more

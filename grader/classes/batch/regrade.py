@@ -21,8 +21,8 @@ from grader.classes.overrides import read_overrides
 from grader.errors import GraderError
 from grader.files import atomic_write
 from grader.judging.summary import overall_status, total_points
+from grader.model.batch import Entry, Roster
 from grader.model.result import CriterionResult, GradingResult
-from grader.model.roster import Entry, Roster
 from grader.report.text import csv_text
 from grader.results import EVIDENCE
 from grader.rubric.load import LoadedRubric

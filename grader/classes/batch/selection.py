@@ -7,8 +7,8 @@ from difflib import get_close_matches
 
 from grader.errors import UsageError
 from grader.intake import safe_name
+from grader.model.batch import Entry
 from grader.model.result import GradingResult
-from grader.model.roster import Entry
 from grader.shown import line
 
 FAILED, INCONCLUSIVE, CHANGED = "failed", "inconclusive", "changed"

@@ -12,8 +12,7 @@ from grader.classes.batch.judging import fitting_runs
 from grader.evidence.reader import load_evidence
 from grader.judging.settle import settle, unsettled
 from grader.model.figure import Figures
-from grader.model.result import GradingResult
-from grader.model.submission_time import HandedIn, Override
+from grader.model.result import GradingResult, HandedIn, Override
 from grader.report.figures import figures_of
 from grader.report.files import write_reports
 from grader.results import EVIDENCE, Results

@@ -10,16 +10,15 @@ from grader import __version__
 from grader.classes.batch.job import Job, Outcome
 from grader.classes.fetching import NothingInTime, Obtained, Rule, obtain
 from grader.errors import GraderError, SubmissionError, UsageError
-from grader.faults import NOTHING_RUN, Attempt, fault_of, told_apart
+from grader.faults import NOTHING_RUN, GradingContext, classify_errors, fault_of
+from grader.files import temporary_folder
 from grader.intake import safe_name, without_password
 from grader.judging.settle import settle
 from grader.judging.summary import passed
 from grader.model.progress import Silence
-from grader.model.result import GradingResult, SubmissionInfo, TimingInfo
-from grader.model.submission_time import HandedIn
+from grader.model.result import NO_TIME, GradingResult, HandedIn, SubmissionInfo
 from grader.pipeline import GradeOptions, grade
 from grader.rubric.model import Rubric
-from grader.temporary import temporary_folder
 
 
 def work(job: Job) -> Outcome:
@@ -40,37 +39,37 @@ def _graded(job: Job, folder: Path) -> Outcome:
         fault = fault_of(error)
         if job.earlier is not None and job.earlier.status != "error" and not isinstance(fault, NothingInTime):
             return _outcome(job, job.earlier, kept=True, because=fault)
-        with told_apart(_attempt(job)):
+        with classify_errors(_context(job)):
             raise
     options = GradeOptions(
         sandbox=job.sandbox,
         submission_id=safe_name(job.entry.id),
         static_only=job.static_only,
         tidy=False,
-        kept=partial(_kept, job),
-        settled=partial(_settled, job, obtained.handed_in),
+        find_earlier=partial(_find_earlier, job),
+        settle=partial(_settle, job, obtained.handed_in),
     )
     result = grade(obtained.source, job.rubric, job.out, options, Silence())
     return _outcome(job, result, kept=result is job.earlier, handed_in=obtained.handed_in)
 
 
-def _attempt(job: Job) -> Attempt:
+def _context(job: Job) -> GradingContext:
     """For the result of what could not be fetched."""
-    about = SubmissionInfo(
+    submission = SubmissionInfo(
         id=safe_name(job.entry.id),
         source=without_password(job.entry.source),
         commit=None,
         digest="",
         package="",
     )
-    return Attempt(
-        source=about.source,
-        submission_id=about.id,
+    return GradingContext(
+        source=submission.source,
+        submission_id=submission.id,
         rubric=job.rubric,
         out=job.out,
         keep_hidden=True,
-        timing=lambda: TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0),
-        about=about,
+        timing=lambda: NO_TIME,
+        submission=submission,
     )
 
 
@@ -93,7 +92,7 @@ def rule_of(rubric: Rubric, job: Job) -> Rule:
     )
 
 
-def _kept(job: Job, about: SubmissionInfo) -> GradingResult | None:
+def _find_earlier(job: Job, about: SubmissionInfo) -> GradingResult | None:
     return job.earlier if job.earlier is not None and not job.again and is_done(job, about) else None
 
 
@@ -112,7 +111,7 @@ def is_done(job: Job, about: SubmissionInfo) -> bool:
     )
 
 
-def _settled(job: Job, handed_in: HandedIn, result: GradingResult) -> GradingResult:
+def _settle(job: Job, handed_in: HandedIn, result: GradingResult) -> GradingResult:
     before = job.earlier.overrides if job.earlier else ()
     return settle(result, job.rubric.rubric, overrides=job.overrides, handed_in=handed_in, before=before)
 

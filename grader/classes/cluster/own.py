@@ -18,7 +18,7 @@ import dask.config
 import distributed
 from distributed.security import Security
 
-from grader.temporary import temporary_folder
+from grader.files import temporary_folder
 
 THREADS_A_CORE = 4  # a grading waits most of the time
 HOST, PROTOCOL = "127.0.0.1", "tls://"

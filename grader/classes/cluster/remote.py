@@ -121,7 +121,7 @@ def _answer(exchange: str, word: str) -> dict[str, str]:
 def _report(sent: Errand, wanted: Callable[[], bool]) -> Report:
     from grader.classes.cluster.errands import Report, failed, is_machines  # noqa: PLC0415 - the module loads little
     from grader.errors import GraderError  # noqa: PLC0415 - the module loads little
-    from grader.temporary import temporary_folder  # noqa: PLC0415 - the module loads little
+    from grader.files import temporary_folder  # noqa: PLC0415 - the module loads little
 
     host, parcel = socket.gethostname(), None
     source = sent.job.entry.source

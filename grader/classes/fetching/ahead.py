@@ -14,9 +14,9 @@ from grader.classes.fetching.obtain import source_of
 from grader.classes.fetching.retry import GivenUp, Patience
 from grader.classes.fetching.update import Errand, bring_up_to_date, place_name
 from grader.errors import GraderError
+from grader.files import temporary_folder
 from grader.intake.git import GitFailed
-from grader.model.roster import Entry
-from grader.temporary import temporary_folder
+from grader.model.batch import Entry
 
 STOP_S = 0.5
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from grader.errors import SubmissionError
 from grader.intake.names import printable
-from grader.model.roster import Entry
-from grader.model.submission_time import HandedIn
+from grader.model.batch import Entry
+from grader.model.result import HandedIn
 
 _RECORD = re.compile(r"(?P<hash>[0-9a-f]{40,64}) (?P<seconds>-?\d+)?(?: (?P<zone>[+-]\d{4}))?")
 _EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)

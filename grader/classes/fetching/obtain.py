@@ -23,8 +23,8 @@ from grader.intake.refs import Wanted, choose_ref, no_such_ref
 from grader.intake.repository import served
 from grader.intake.source import Source, as_repository, parse_source, with_ref
 from grader.intake.tree import is_there
-from grader.model.roster import Entry
-from grader.model.submission_time import HandedIn
+from grader.model.batch import Entry
+from grader.model.result import HandedIn
 
 
 @dataclass(frozen=True, kw_only=True)

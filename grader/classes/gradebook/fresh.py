@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from grader.classes.gradebook.cells import csv_line, number_text
 from grader.classes.gradebook.identity import Kind, Platform, kinds
 from grader.classes.gradebook.marks import Mark, Wanted
-from grader.model.roster import Entry
+from grader.model.batch import Entry
 from grader.report.text import html
 
 Made = tuple[Iterator[str], list[str]]

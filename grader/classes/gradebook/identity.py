@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from grader.model.roster import Entry
+from grader.model.batch import Entry
 
 Platform = Literal["canvas", "moodle", "blackboard"]
 Kind = Literal["platform", "number", "login", "email", "name", "first", "last", "section"]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from grader.classes.gradebook.model import Book, Row
 from grader.classes.gradebook.table import comment, criterion_points, error_text, late_text
+from grader.model.batch import Entry
 from grader.model.result import GradingResult
-from grader.model.roster import Entry
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
+from grader.model.batch import Entry
 from grader.model.record import Record
 from grader.model.result import GradingResult
-from grader.model.roster import Entry
 
 Form = Literal["csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"]
 FORMS: tuple[Form, ...] = ("csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard")

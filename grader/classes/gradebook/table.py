@@ -6,13 +6,10 @@ from collections.abc import Iterator
 
 from grader.classes.gradebook.cells import Cell
 from grader.classes.gradebook.model import Book, Row
-from grader.model.result import GradingResult
-from grader.model.submission_time import AppliedOverride
-from grader.model.verdict import Status
+from grader.model.result import AppliedOverride, GradingResult
 
 BEFORE = ("id", "name", "group", "status", "points", "max_points", "points_before_late", "late")
 AFTER = ("comment", "error")
-OPEN = {Status.INCONCLUSIVE, Status.MANUAL, Status.ERROR}
 """Of a criterion that has no points yet: a person has to look."""
 
 
@@ -45,7 +42,7 @@ def cells(book: Book, row: Row) -> Iterator[Cell]:
 
 def criterion_points(result: GradingResult) -> dict[str, float | None]:
     """Points by the criterion's id; None where they are still open."""
-    return {c.id: None if c.status in OPEN else c.points for c in result.criteria}
+    return {c.id: None if c.status.is_open else c.points for c in result.criteria}
 
 
 def late_text(result: GradingResult) -> str:
@@ -62,7 +59,7 @@ def error_text(result: GradingResult) -> str:
     """Why it could not be graded, or what a person has to look at."""
     if result.error:
         return result.error.message
-    waiting = [c.id for c in result.criteria if c.status in OPEN and c.max_points > 0]
+    waiting = [c.id for c in result.criteria if c.status.is_open and c.max_points > 0]
     return f"open: {', '.join(waiting)}" if waiting else ""
 
 

@@ -19,7 +19,7 @@ from grader.classes.overrides.splice import (
     set_value,
     spliced,
 )
-from grader.model.submission_time import Override
+from grader.model.result import Override
 from grader.rubric.source import as_map
 
 PLAIN_KEY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.@-]*")

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from grader.errors import RubricError
 from grader.intake.names import safe_name
-from grader.model.submission_time import Override
+from grader.model.result import Override
 from grader.model.version import OVERRIDES
 from grader.rubric.faults import did_you_mean, model_faults, shown
 from grader.rubric.load import refuse_newer

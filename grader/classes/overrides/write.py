@@ -14,7 +14,7 @@ from grader.classes.overrides.edit import Fields, edited
 from grader.classes.overrides.read import FORM, SCHEMA_KEY, folder_key
 from grader.errors import Busy, RubricError, UsageError
 from grader.files import atomic_write, lock, unwritable
-from grader.model.submission_time import Override
+from grader.model.result import Override
 from grader.portable import CLOEXEC, NOFOLLOW
 from grader.rubric.source import as_map, source_of
 

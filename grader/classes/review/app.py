@@ -33,7 +33,7 @@ from grader.classes.review.served import REPORTS, evidence_of, open_evidence, op
 from grader.classes.review.session import Desk
 from grader.classes.review.submissions import FILTERS, Item
 from grader.errors import GraderError, RubricError
-from grader.model.submission_time import Override
+from grader.model.result import Override
 from grader.report.html.shell import environment, style
 from grader.report.html.words import SIGNS
 from grader.report.text import number

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 
 from grader.classes.gradebook import Row
 from grader.classes.review.edit_conflicts import mark
-from grader.model.result import CriterionResult
-from grader.model.submission_time import AppliedOverride, Override
+from grader.model.result import AppliedOverride, CriterionResult, Override
 from grader.model.verdict import Status
 from grader.report.html.words import SIGNS
 from grader.report.text import number
 from grader.rubric.model import Rubric
 
 MANUAL = "manual"
-OPEN = {Status.MANUAL, Status.INCONCLUSIVE, Status.ERROR}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +122,7 @@ def card(
 def _waits(card: Card, *, whole: bool) -> bool:
     """Of what could not be graded at all, only what people decide anyway waits for one."""
     status = card.criterion.status
-    return card.criterion.max_points > 0 and ((status in OPEN and whole) or (card.manual and status in OPEN))
+    return card.criterion.max_points > 0 and ((status.is_open and whole) or (card.manual and status.is_open))
 
 
 def _nothing_lost(card: Card) -> bool:

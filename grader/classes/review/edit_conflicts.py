@@ -10,7 +10,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from grader.files import unwritable
-from grader.model.submission_time import Override
+from grader.model.result import Override
 
 LOCK = ".review.lock"
 

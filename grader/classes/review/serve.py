@@ -21,8 +21,8 @@ from grader.classes.review.app import create_app
 from grader.classes.review.guard import BODY_BYTES, TOKEN_BYTES
 from grader.classes.review.session import Desk
 from grader.errors import HostError, UsageError
+from grader.files import temporary_folder
 from grader.host_programs import anywhere, program
-from grader.temporary import temporary_folder
 
 HOST = "127.0.0.1"
 THREADS = 6

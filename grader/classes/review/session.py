@@ -15,8 +15,7 @@ from grader.classes.review.follower import Follower, Pace
 from grader.classes.review.submissions import Item, Stamp, Submissions, stamp_of
 from grader.errors import Busy, GraderError, UsageError
 from grader.model.batch import State
-from grader.model.result import GradingResult
-from grader.model.submission_time import Override
+from grader.model.result import GradingResult, Override
 from grader.results import RESULT, read_result
 from grader.rubric.load import LoadedRubric, load_rubric
 

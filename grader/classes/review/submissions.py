@@ -11,9 +11,8 @@ from typing import Any
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch
 from grader.classes.gradebook import Row
 from grader.intake import safe_name
-from grader.model.batch import MISSING, ROSTER
+from grader.model.batch import MISSING, ROSTER, Entry
 from grader.model.result import GradingResult
-from grader.model.roster import Entry
 from grader.model.verdict import Status
 from grader.results import RESULT
 

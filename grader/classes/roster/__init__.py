@@ -2,6 +2,6 @@
 
 from grader.classes.roster.local import Local
 from grader.classes.roster.read import read_roster
-from grader.model.roster import Entry, Roster
+from grader.model.batch import Entry, Roster
 
 __all__ = ["Entry", "Local", "Roster", "read_roster"]

@@ -12,7 +12,7 @@ from grader.classes.roster.sources import ref_fault, source_fault, whole_source
 from grader.classes.roster.table import Row, Table
 from grader.classes.roster.times import parse_days, parse_time, time_fault
 from grader.intake.names import brief
-from grader.model.roster import Entry, Roster
+from grader.model.batch import Entry, Roster
 
 
 def entries_of(table: Table, path: Path, local: Local) -> Roster:

@@ -10,7 +10,7 @@ from grader.classes.roster.local import REFUSED, Local, local_fault
 from grader.classes.roster.platforms import Named, platform_name
 from grader.errors import UsageError
 from grader.intake.names import archive_stem, encodable, is_archive_name, listing, printable
-from grader.model.roster import Entry, Roster
+from grader.model.batch import Entry, Roster
 
 IGNORED = {"__MACOSX", "Thumbs.db", "desktop.ini"}
 RECORDINGS = (".bag", ".mcap")

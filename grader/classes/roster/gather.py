@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.intake.names import brief, encodable, safe_name
-from grader.model.roster import Entry, Roster, RosterFault
+from grader.model.batch import Entry, Roster, RosterFault
 
 ID_BYTES_MAX = 255
 

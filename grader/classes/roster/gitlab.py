@@ -14,7 +14,7 @@ from grader.classes.roster.local import Local
 from grader.classes.roster.sources import source_fault, whole_source
 from grader.errors import UsageError
 from grader.intake.names import encodable, printable
-from grader.model.roster import Entry, Roster
+from grader.model.batch import Entry, Roster
 
 BYTES_MAX = 64 << 20
 ADDRESSES = ("http_url_to_repo", "ssh_url_to_repo")

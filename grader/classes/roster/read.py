@@ -11,7 +11,7 @@ from grader.classes.roster.gitlab import from_gitlab
 from grader.classes.roster.local import OWN_FOLDER, Local
 from grader.classes.roster.table import read_table
 from grader.errors import UsageError
-from grader.model.roster import Roster
+from grader.model.batch import Roster
 
 
 def read_roster(path: Path, local: Local = OWN_FOLDER) -> Roster:

@@ -15,11 +15,11 @@ from pydantic import ValidationError
 import grader
 from grader.classes.similarity.request import Request
 from grader.errors import HostError, SubmissionError, UsageError
+from grader.files import temporary_folder
 from grader.host_programs import anywhere, own_module
 from grader.intake import Limits
 from grader.intake.archive import unpack
 from grader.model.similarity import Similarity
-from grader.temporary import temporary_folder
 
 THRESHOLD = 0.8
 INSTALL = "pip install 'ros-lab-grader[similarity]'"

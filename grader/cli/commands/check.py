@@ -19,17 +19,15 @@ from grader.cli.sandbox_report import say_unwalled
 from grader.cli.select_rubric import Chosen, choose_all, only
 from grader.cli.show import show
 from grader.errors import ExitCode, UsageError
-from grader.files import check_writable
+from grader.files import check_writable, temporary_folder
 from grader.intake import safe_name
-from grader.model.git_status import Standing
 from grader.model.progress import Progress, Silence
-from grader.model.result import GradingResult
+from grader.model.result import GradingResult, Standing
 from grader.report.hidden import hidden_ids, without_hidden
 from grader.report.terminal import open_console
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_ros
 from grader.student.git_view import write_staged
-from grader.temporary import temporary_folder
 
 if TYPE_CHECKING:
     from grader.arena.sandbox import Mode

@@ -17,6 +17,7 @@ from grader.cli.sandbox_report import say_unwalled
 from grader.cli.select_rubric import Chosen, choose_all, only
 from grader.errors import ExitCode, GraderError, RubricError, UsageError
 from grader.faults import fault_of
+from grader.files import temporary_folder
 from grader.integrations.ci.files import add_forms, clear, keep
 from grader.integrations.ci.github import GitHub
 from grader.integrations.ci.gitlab import GitLab
@@ -31,7 +32,6 @@ from grader.report.terminal import open_console, print_report
 from grader.report.unwalled import without_sandbox
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
-from grader.temporary import temporary_folder
 
 WHICH = "say where the package is by path (GRADER_PATH), and which lab it is by lab (GRADER_LAB)"
 RESULT = "result.json"

@@ -19,7 +19,6 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.report.hidden import hidden_ids
 from grader.report.settled import late_words
 from grader.report.text import html, line, number, text_limit
-from grader.report.view import OPEN
 from grader.rubric.load import LoadedRubric
 
 DEFAULT_MINUTES, MOST_MINUTES = 10, 10
@@ -82,7 +81,7 @@ def graded(result: GradingResult, rubric: LoadedRubric) -> dict[str, Any]:
     if result.error is not None:
         return _invalid(result.error.message, result.error.hint)
     counting = [c for c in result.criteria if c.max_points > 0]
-    if all(c.status in OPEN for c in counting):
+    if all(c.status.is_open for c in counting):
         return _invalid("no criterion could be judged", "hand it in again")
     hidden = hidden_ids(rubric.rubric)
     shown = [c for c in result.criteria if c.id not in hidden]
@@ -112,7 +111,7 @@ def _invalid(message: str, hint: str) -> dict[str, Any]:
 
 
 def _message(result: GradingResult, shown: list[CriterionResult]) -> Iterator[str]:
-    waiting = sum(c.max_points for c in shown if c.status in OPEN)
+    waiting = sum(c.max_points for c in shown if c.status.is_open)
     if waiting:
         yield f"{LOOK}: {number(waiting)} points are not settled yet; no points are lost for good."
     yield f"{number(result.points)} of {number(result.max_points)} points"
@@ -128,7 +127,7 @@ def _test(criterion: CriterionResult, limit: int) -> dict[str, Any]:
         "see it yourself: ": criterion.reproduce,
     }
     return {
-        "name": line(f"{LOOK}: {name}" if criterion.status in OPEN else name, limit),
+        "name": line(f"{LOOK}: {name}" if criterion.status.is_open else name, limit),
         "points": criterion.points,
         "max_points": criterion.max_points,
         "message": line(f"{criterion.status.value}: {criterion.message}", limit),

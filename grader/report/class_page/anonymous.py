@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from grader.files import atomic_write
-from grader.model.roster import Entry
+from grader.model.batch import Entry
 from grader.report.class_page.diagnoses import reduced
 
 SALT = ".anonymous-salt"

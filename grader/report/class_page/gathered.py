@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from grader.model.batch import BatchRun
+from grader.model.batch import BatchRun, Entry
 from grader.model.result import GradingResult
-from grader.model.roster import Entry
 from grader.report.class_page.anonymous import Names, order, pseudonyms, without_words
 from grader.report.class_page.diagnoses import Diagnoses
 from grader.report.class_page.lines import Line, line_of

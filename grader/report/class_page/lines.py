@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 from urllib.parse import quote
 
-from grader.model.batch import MISSING, ROSTER, CriterionInfo
+from grader.model.batch import MISSING, ROSTER, CriterionInfo, Entry
 from grader.model.result import CriterionResult, GradingResult
-from grader.model.roster import Entry
 from grader.model.verdict import Status
 from grader.report.unwalled import without_sandbox
 from grader.shown import line
@@ -123,8 +122,7 @@ def _state(result: GradingResult) -> State:
 
 def _still_open(criteria: Iterable[CriterionResult]) -> list[CriterionResult]:
     """What another run could decide."""
-    again = {Status.INCONCLUSIVE, Status.ERROR}
-    return [c for c in criteria if c.status in again and c.max_points > 0]
+    return [c for c in criteria if c.status.is_retryable and c.max_points > 0]
 
 
 def _why(criteria: Iterable[CriterionResult]) -> str:

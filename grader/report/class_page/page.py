@@ -15,9 +15,8 @@ from jinja2 import Template
 from markupsafe import Markup
 
 from grader.files import atomic_write
-from grader.model.batch import BatchRun
+from grader.model.batch import BatchRun, Entry
 from grader.model.result import GradingResult
-from grader.model.roster import Entry
 from grader.report.class_page.anonymous import SALT_BYTES
 from grader.report.class_page.costs import costs, most_first
 from grader.report.class_page.data import page_data

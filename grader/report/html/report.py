@@ -17,7 +17,7 @@ from grader.report.html.shell import environment, policy, script, style
 from grader.report.summary import visible_words
 from grader.report.text import number
 from grader.report.unwalled import without_sandbox
-from grader.report.view import OPEN, ReportView, arrange, not_graded
+from grader.report.view import ReportView, arrange, not_graded
 from grader.rubric.model import Rubric
 
 BYTES_MAX = 400_000
@@ -127,7 +127,7 @@ def _head(result: GradingResult, rubric: Rubric, view: ReportView, hidden: int) 
 
 def _parts(result: GradingResult) -> dict[str, float]:
     """Points that were reached, are open, and are lost (what being late cost among them)."""
-    still = sum(c.max_points - c.points for c in result.criteria if c.status in OPEN)
+    still = sum(c.max_points - c.points for c in result.criteria if c.status.is_open)
     lost = result.max_points - result.points - still
     return {"reached": result.points, "lost": max(lost, 0.0), "open": still}
 

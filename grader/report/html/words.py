@@ -9,7 +9,7 @@ from grader.judging.summary import passed
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.text import number
-from grader.report.view import OPEN, ReportView, not_graded
+from grader.report.view import ReportView, not_graded
 from grader.rubric.model import Rubric
 
 SIGNS = {
@@ -118,6 +118,6 @@ def in_short(result: GradingResult, view: ReportView) -> str:
 def lost_words(criterion: CriterionResult, blocked: float) -> str:
     """`10 points lost, and 25 more in what it holds back`; points that are open are not lost."""
     own = criterion.max_points - criterion.points
-    state = "still open" if criterion.status in OPEN else "lost"
+    state = "still open" if criterion.status.is_open else "lost"
     said = f"{count_points(own)} {state}" if own else "costs nothing itself"
     return f"{said}, and {number(blocked)} more in what it holds back" if blocked else said

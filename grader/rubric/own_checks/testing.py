@@ -17,11 +17,11 @@ import grader
 from grader.checks import Check, Evidence, Record, Verdict, failed, inconclusive, passed
 from grader.checks import partial as partial_
 from grader.checks.registry import parts
+from grader.files import temporary_folder
 from grader.model.verdict import Status
 from grader.portable import end_group
 from grader.rubric.own_checks.files import FileFault, read_beside
 from grader.rubric.own_checks.job import SessionOutcome, TestOutcome
-from grader.temporary import temporary_folder
 
 HINTS = 4
 SHOWN_TESTS = 20

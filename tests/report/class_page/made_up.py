@@ -6,18 +6,19 @@ import random
 from collections.abc import Iterator
 from datetime import datetime, timedelta, timezone
 
-from grader.model.batch import BatchRun, Counts, CriterionInfo, State
+from grader.model.batch import BatchRun, Counts, CriterionInfo, Entry, RosterFault, State
 from grader.model.result import (
+    AppliedOverride,
+    Automatic,
     CriterionResult,
     EnvironmentInfo,
     ErrorInfo,
     GradingResult,
+    Lateness,
     RubricInfo,
     SubmissionInfo,
     TimingInfo,
 )
-from grader.model.roster import Entry, RosterFault
-from grader.model.submission_time import AppliedOverride, Automatic, Lateness
 from grader.model.verdict import Status
 
 RUBRIC = RubricInfo(id="leeds-comp3631-lab1", version="1.2", digest="0" * 64)

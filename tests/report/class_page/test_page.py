@@ -14,9 +14,8 @@ from pathlib import Path
 import pytest
 
 from grader.errors import OutputError
-from grader.model.result import GradingResult
-from grader.model.roster import Entry, RosterFault
-from grader.model.submission_time import AppliedOverride, Automatic
+from grader.model.batch import Entry, RosterFault
+from grader.model.result import AppliedOverride, Automatic, GradingResult
 from grader.model.verdict import Status
 from grader.report.class_page import salt_in, write_class_page
 from grader.report.class_page.anonymous import pseudonyms

@@ -17,8 +17,7 @@ from lxml import html as parser
 from grader.checks import CHECKS
 from grader.errors import GraderError
 from grader.model.figure import Figures
-from grader.model.result import ErrorInfo, GradingResult, Note
-from grader.model.submission_time import Lateness
+from grader.model.result import ErrorInfo, GradingResult, Lateness, Note
 from grader.model.verdict import FileCitation, Status
 from grader.report.html import html_report
 from grader.report.html.report import BYTES_MAX

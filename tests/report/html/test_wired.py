@@ -28,11 +28,11 @@ def kept(folder) -> None:
 
 def test_a_failure_to_draw_is_no_failure_to_grade(monkeypatch):
     monkeypatch.setattr(grader.report.figures, "figures_of", broken)
-    assert pipeline.figures_of(load_rubric("leeds-comp3631-lab1"), {}, result()) is None
+    assert pipeline.draw_figures(load_rubric("leeds-comp3631-lab1"), {}, result()) is None
 
 
 def test_a_result_is_drawn_from_the_runs_that_it_was_judged_from():
-    assert pipeline.figures_of(load_rubric("leeds-comp3631-lab1"), {}, result()) == Figures()
+    assert pipeline.draw_figures(load_rubric("leeds-comp3631-lab1"), {}, result()) == Figures()
 
 
 def test_a_result_that_is_written_again_is_drawn_again(tmp_path, monkeypatch):

@@ -64,7 +64,7 @@ def _manifest(given: Facts | None, package: str) -> Facts | None:
     return manifest
 
 
-def _dependency(entry: Any, line: int) -> Any:  # noqa: ANN401 - YAML; the records judge it
+def _dependency(entry: Any, line: int) -> Any:
     return {"kind": entry[0], "name": entry[1], "line": line} if isinstance(entry, list) else entry
 
 
@@ -86,7 +86,7 @@ def _cmake(given: Facts | None) -> Facts | None:
     }
 
 
-def _call(entry: Any, file: str, line: int) -> Any:  # noqa: ANN401 - YAML; the records judge it
+def _call(entry: Any, file: str, line: int) -> Any:
     if isinstance(entry, list):
         return {"name": entry[0], "args": [str(word) for word in entry[1:]], "file": file, "line": line}
     return {"args": (), "file": file, "line": line, **entry}

@@ -23,11 +23,11 @@ from grader.evidence.events import (
 )
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
-from grader.evidence.timeline_facts import complete_facts
-from grader.evidence.timeline_model import Acted, Host, Printed, TimelineRun, TopicLine
-from grader.evidence.timeline_topics import Sent, messages
 from grader.evidence.writer import EvidenceStream, EvidenceWriter
 from grader.model.record import Record
+from tests.support.timeline_facts import complete_facts
+from tests.support.timeline_model import Acted, Host, Printed, TimelineRun, TopicLine
+from tests.support.timeline_topics import Sent, messages
 
 EPOCH_NS = 1_700_000_000_000_000_000
 """Where second 0 of every timeline lies: 2023-11-14 22:13:20 UTC."""

@@ -6,7 +6,7 @@ from itertools import cycle, islice
 from typing import Any, NamedTuple
 
 from grader.evidence import decode
-from grader.evidence.timeline_model import CountUp, TextPattern, TopicLine
+from tests.support.timeline_model import CountUp, TextPattern, TopicLine
 
 EPOCH_S = 1_700_000_000
 DEFAULT_TEXT = "hello world"
