@@ -103,15 +103,13 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
     spans = outside or readings
     span = {"from_ns": spans[0].time_ns, "to_ns": spans[-1].time_ns} if spans else {}
     share = f" in {params.share:.0%} of the messages" if params.share < 1 else ""
-    return verdict.model_copy(
-        update={
-            "expected": f"{params.field} of {params.topic} {params.words}{share}",
-            "measured": verdict.measured or _range(usable),
-            "citations": (
-                *verdict.citations,
-                EvidenceCitation(evidence=run.evidence, topic=params.topic, **span),
-            ),
-        }
+    return verdict.about(
+        expected=f"{params.field} of {params.topic} {params.words}{share}",
+        measured=verdict.measured or _range(usable),
+        citations=(
+            *verdict.citations,
+            EvidenceCitation(evidence=run.evidence, topic=params.topic, **span),
+        ),
     )
 
 

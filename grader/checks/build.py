@@ -86,7 +86,7 @@ def build(package: PackageFacts, build: Run, params: BuildParams) -> Verdict:
     verdict = judge_build(package, build)
     if verdict.status is Status.PASS:
         verdict = _lost_scripts(package, params.scripts) or verdict
-    return verdict.model_copy(update={"expected": f"{verdict.expected or EXPECTED}{scripts}"})
+    return verdict.about(expected=f"{verdict.expected or EXPECTED}{scripts}")
 
 
 def judge_build(package: PackageFacts, build: Run) -> Verdict:

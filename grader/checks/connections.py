@@ -57,15 +57,13 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
         else _apart(package, run, params)
     )
     over = {c.topic: None for _, e in run.graph for c in e.connections if run.is_student_node(c.publisher)}
-    return verdict.model_copy(
-        update={
-            "expected": f"{ends[0]} connected to {ends[1]} over {params.topic}",
-            "measured": verdict.measured or (f"connections over {listed(over)}" if over else "no connection"),
-            "citations": (
-                *verdict.citations,
-                EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),
-            ),
-        }
+    return verdict.about(
+        expected=f"{ends[0]} connected to {ends[1]} over {params.topic}",
+        measured=verdict.measured or (f"connections over {listed(over)}" if over else "no connection"),
+        citations=(
+            *verdict.citations,
+            EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),
+        ),
     )
 
 

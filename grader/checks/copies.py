@@ -72,7 +72,7 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
     expected = f"two copies alive under two names, and {params.listener} printing messages of both"
     trio = _trio(package, run, params)
     if isinstance(trio, Verdict):
-        return trio.model_copy(update={"expected": expected})
+        return trio.about(expected=expected)
     verdict = (
         _taken_over(run, trio, params)
         or _not_both_alive(package, run, trio)
@@ -83,7 +83,7 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
     graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
     measured = verdict.measured or f"names of the copies: {listed(names) or 'none'}"
     citations = verdict.citations or (graph,)
-    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
+    return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
 def _trio(package: PackageFacts, run: Run, params: CopiesParams) -> Trio | Verdict:

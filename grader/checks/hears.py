@@ -60,7 +60,7 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
     expected = f"each message on {params.topic} is printed{form}, in order"
     probes = probes_on(run, params.topic)
     if not probes:
-        return never_sent(package, run, params.topic).model_copy(update={"expected": expected})
+        return never_sent(package, run, params.topic).about(expected=expected)
     lines = printed_lines(run)
     places = places_of(run, probes, lines, params.template)
     missing = [] if places is None else [p for p, found in zip(probes, places, strict=True) if not found]
@@ -80,12 +80,10 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
     sent = EvidenceCitation(
         evidence=run.evidence, topic="/grader/actor", from_ns=first.at_ns, to_ns=last.at_ns
     )
-    return verdict.model_copy(
-        update={
-            "expected": expected,
-            "measured": f"{len(probes) - len(missing)} of {plural(len(probes), 'message')} printed",
-            "citations": (*verdict.citations, sent),
-        }
+    return verdict.about(
+        expected=expected,
+        measured=f"{len(probes) - len(missing)} of {plural(len(probes), 'message')} printed",
+        citations=(*verdict.citations, sent),
     )
 
 

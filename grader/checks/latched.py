@@ -51,10 +51,8 @@ def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
         verdict = passed(f"{listed(c.callerid for c in channels)} latches {params.topic}")
     kinds = listed(f"{'latched' if c.latching else 'not latched'} by {c.callerid}" for c in channels)
     topic = params.topic if channels else "/grader/graph"
-    return verdict.model_copy(
-        update={
-            "expected": f"a latched publisher on {params.topic}",
-            "measured": verdict.measured or kinds,
-            "citations": (*verdict.citations, EvidenceCitation(evidence=run.evidence, topic=topic)),
-        }
+    return verdict.about(
+        expected=f"a latched publisher on {params.topic}",
+        measured=verdict.measured or kinds,
+        citations=(*verdict.citations, EvidenceCitation(evidence=run.evidence, topic=topic)),
     )

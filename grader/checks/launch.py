@@ -69,13 +69,7 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
     if file is None or file.fault:
         measured = "no launch file that can be read"
     graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
-    return verdict.model_copy(
-        update={
-            "expected": expected,
-            "measured": measured,
-            "citations": verdict.citations or (*place, graph),
-        }
-    )
+    return verdict.about(expected=expected, measured=measured, citations=verdict.citations or (*place, graph))
 
 
 def connections(run: Run, topic: str) -> Iterator[tuple[str, str]]:

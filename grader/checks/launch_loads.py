@@ -60,9 +60,7 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
     file = find_launch(package, params.launch)
     if file is None or file.fault is not None:
         verdict = unreadable(package, file, params.launch) or failed(f"{params.launch} cannot be read")
-        return verdict.model_copy(
-            update={"expected": expected, "measured": "no launch file that can be read"}
-        )
+        return verdict.about(expected=expected, measured="no launch file that can be read")
     verdict = (
         not_run(run)
         or missing_node(package, file, params.script)
@@ -71,13 +69,11 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
     )
     found = own(tree(run, by=lambda caller: caller not in run.student_nodes()))
     cited: tuple[Citation, ...] = (FileCitation(file=file.path, line=_line(file, params)),)
-    return verdict.model_copy(
-        update={
-            "expected": expected,
-            "measured": f"on the server: {listed(found) or 'nothing'}",
-            "citations": verdict.citations
-            or (*cited, EvidenceCitation(evidence=run.evidence, topic="/grader/param")),
-        }
+    return verdict.about(
+        expected=expected,
+        measured=f"on the server: {listed(found) or 'nothing'}",
+        citations=verdict.citations
+        or (*cited, EvidenceCitation(evidence=run.evidence, topic="/grader/param")),
     )
 
 

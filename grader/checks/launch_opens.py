@@ -73,9 +73,7 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
     measured = f"opened: {listed(_shown(p) for p in pages)}" if pages else "nothing was opened"
     if file is None or file.fault is not None:
         verdict = unreadable(package, file, params.launch) or failed(f"{params.launch} cannot be read")
-        return verdict.model_copy(
-            update={"expected": expected, "measured": "no launch file that can be read"}
-        )
+        return verdict.about(expected=expected, measured="no launch file that can be read")
     verdict = (
         not_run(run)
         or _script(package, build, file, params)
@@ -90,9 +88,7 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
         FileCitation(file=file.path, line=1),
         EvidenceCitation(evidence=run.evidence, topic="/grader/actor"),
     )
-    return verdict.model_copy(
-        update={"expected": expected, "measured": measured, "citations": verdict.citations or cited}
-    )
+    return verdict.about(expected=expected, measured=measured, citations=verdict.citations or cited)
 
 
 def _pages(run: Run) -> tuple[Page, ...]:

@@ -38,7 +38,7 @@ def _of_node(run: Run, file: LaunchFile, node: str, wanted: Wanted) -> Verdict |
         verdict = failed(message, hint="set them with <param> inside the <node>: roslaunch does that first")
     else:
         verdict = _wrong_value(before, places, wanted) or _elsewhere(before, node, wanted)
-    return verdict.model_copy(update={"citations": (*_lines(file, wanted), _evidence(run))})
+    return verdict.about(citations=(*_lines(file, wanted), _evidence(run)))
 
 
 def _wrong_value(before: Mapping[str, Any], places: tuple[str, str], wanted: Wanted) -> Verdict | None:

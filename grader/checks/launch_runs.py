@@ -86,14 +86,12 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     if file is None or file.fault is not None:
         verdict = unreadable(package, file, params.launch) or failed(f"{params.launch} cannot be read")
         verdict = verdict.model_copy(update={"unjudged": bool(params.scripts)})
-        return verdict.model_copy(
-            update={"expected": expected, "measured": "no launch file that can be read"}
-        )
+        return verdict.about(expected=expected, measured="no launch file that can be read")
     verdict = not_run(run) or _unnamed(package, file, params) or _judged(package, file, run, params)
     place: tuple[Citation, ...] = (FileCitation(file=file.path, line=1),)
     graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
     citations = verdict.citations or (*place, graph)
-    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
+    return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
 def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams) -> Verdict:

@@ -60,9 +60,7 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
     file = find_launch(package, params.launch)
     if file is None or file.fault is not None:
         verdict = unreadable(package, file, params.launch) or failed(f"{params.launch} cannot be read")
-        return verdict.model_copy(
-            update={"expected": expected, "measured": "no launch file that can be read"}
-        )
+        return verdict.about(expected=expected, measured="no launch file that can be read")
     verdict = (
         _refused(package, file)
         or next(filter(None, (missing_node(package, file, script) for script in params.scripts)), None)
@@ -75,7 +73,7 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
         else "no <node>"
     )
     citations = verdict.citations or (FileCitation(file=file.path, line=1),)
-    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
+    return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
 def _refused(package: PackageFacts, file: LaunchFile) -> Verdict | None:

@@ -72,7 +72,7 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
     times = (right.at_ns, right.at_ns) if right else (None, None)
     cite = EvidenceCitation(evidence=run.evidence, topic="/rosout", from_ns=times[0], to_ns=times[1])
     citations = verdict.citations or (cite,)
-    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
+    return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
 def _has(text: str, params: LogsParams) -> bool:

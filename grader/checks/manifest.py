@@ -71,7 +71,7 @@ def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
             citations=(FileCitation(file=found.file, line=found.name_line),),
         )
     if lacking := _lacking(found, params.dependencies):
-        return lacking.model_copy(update={"expected": expected})
+        return lacking.about(expected=expected)
     place = (FileCitation(file=found.file, line=found.name_line),)
     declares = f", declares {listed(params.dependencies)}" if params.dependencies else ""
     return passed(
@@ -107,7 +107,7 @@ def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
         message = "package.xml cannot be read, so its dependencies are not known"
         return unjudged(message, expected=expected, hint="first mend package.xml")
     if lacking := _lacking(found, params.names):
-        return lacking.model_copy(update={"expected": expected})
+        return lacking.about(expected=expected)
     message = f"{found.file} declares {listed(params.names)}"
     return passed(message, expected=expected, measured=_declared(found))
 

@@ -59,7 +59,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
     grows = ", the seconds growing as the clock does" if SECONDS in params.template else ""
     expected = f"each message on {params.topic} is '{in_words(params.template)}'{grows}"
     if not heard or not all(isinstance(text, str) for c in heard for text in c.data):
-        return _no_text(package, run, heard, params).model_copy(update={"expected": expected})
+        return _no_text(package, run, heard, params).about(expected=expected)
     count = sum(len(c.messages) for c in heard)
     verdict = (
         _misfit(run, heard, params)
@@ -74,7 +74,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
         to_ns=max(c.times_ns[-1] for c in heard),
     )
     citations = verdict.citations or (span,)
-    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
+    return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
 def _no_text(package: PackageFacts, run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict:

@@ -104,7 +104,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
     )
     measured = f"{plural(len(nodes), 'node')} ({listed(nodes) or 'none'}), alive for {seconds(up_ns)}"
     citations = verdict.citations or (_process_citation(one, run),)
-    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
+    return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
 @check("node-name", params=NodeNameParams)
@@ -129,12 +129,12 @@ def node_name(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
     nodes = nodes_of(run, params.process)
     expected = wanted_names(params.names, params.anonymous)
     if not nodes:
-        return _nameless(package, run, params).model_copy(update={"expected": expected})
+        return _nameless(package, run, params).about(expected=expected)
     cite = (EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),)
     measured = listed(nodes)
     wrong = _misnamed(nodes, params)
     verdict = wrong or passed(f"the node is {_fitting(nodes, params)[0]}")
-    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": cite})
+    return verdict.about(expected=expected, measured=measured, citations=cite)
 
 
 def _nameless(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdict:

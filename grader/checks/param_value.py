@@ -52,12 +52,10 @@ def param_value(package: PackageFacts, run: Run, params: ParamValueParams) -> Ve
     got = _held(held, absolute(params.name))
     verdict = _not_there(package, run, own(held), params) if got is MISSING else _judged(got, params)
     cite = EvidenceCitation(evidence=run.evidence, topic="/grader/param")
-    return verdict.model_copy(
-        update={
-            "expected": f"{params.name}: {shown(text(params.value))}",
-            "measured": verdict.measured or ("not set" if got is MISSING else shown(text(got))),
-            "citations": (*verdict.citations, cite),
-        }
+    return verdict.about(
+        expected=f"{params.name}: {shown(text(params.value))}",
+        measured=verdict.measured or ("not set" if got is MISSING else shown(text(got))),
+        citations=(*verdict.citations, cite),
     )
 
 

@@ -73,8 +73,7 @@ def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -
     measured = f"on the server: {listed(found)}" if found else "nothing on the server"
     cited: tuple[Citation, ...] = (EvidenceCitation(evidence=run.evidence, topic="/grader/param"),)
     place = (FileCitation(file=source.path),) if source and not verdict.citations else ()
-    update = {"expected": expected, "measured": measured, "citations": (*verdict.citations, *place, *cited)}
-    return verdict.model_copy(update=update)
+    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, *place, *cited))
 
 
 def _no_file(package: PackageFacts, path: str) -> Verdict:

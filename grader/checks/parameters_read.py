@@ -56,8 +56,7 @@ def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadP
     )
     cite = EvidenceCitation(evidence=run.evidence, topic="/grader/console")
     measured = f"{len(params.names) - len(missing)} of {plural(len(params.names), 'value')} printed"
-    update = {"expected": expected, "measured": measured, "citations": (*verdict.citations, cite)}
-    return verdict.model_copy(update=update)
+    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cite))
 
 
 def _not_printed(

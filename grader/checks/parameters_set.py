@@ -62,8 +62,7 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
     )
     cite = EvidenceCitation(evidence=run.evidence, topic="/grader/param")
     measured = f"{params.name}: {'not there' if got is None else shown(str(got))}"
-    update = {"expected": expected, "measured": measured, "citations": (*verdict.citations, cite)}
-    return verdict.model_copy(update=update)
+    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cite))
 
 
 def _is_value(got: object, wanted: object) -> bool:

@@ -92,12 +92,10 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
     else:
         verdict = _judged(found, run, params)
     span = EvidenceCitation(evidence=run.evidence, topic=params.topic)
-    return verdict.model_copy(
-        update={
-            "expected": f"a way through {listed(map(spot, params.points))}, within {metres(params.tolerance_m)}",
-            "measured": verdict.measured or "no path",
-            "citations": (*verdict.citations, span),
-        }
+    return verdict.about(
+        expected=f"a way through {listed(map(spot, params.points))}, within {metres(params.tolerance_m)}",
+        measured=verdict.measured or "no path",
+        citations=(*verdict.citations, span),
     )
 
 

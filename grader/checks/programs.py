@@ -64,11 +64,11 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
     verdict = judge_build(package, build)
     expected = f"{verdict.expected}; each program of add_executable starts"
     if verdict.status is not Status.PASS:
-        return verdict.model_copy(update={"expected": expected})
+        return verdict.about(expected=expected)
     programs = [one for one in lives(run) if "/" in one.name]
     made = {call.args[0]: call for call in _made(package)}
     if made and not programs:
-        return _not_started(package, made).model_copy(update={"expected": expected})
+        return _not_started(package, made).about(expected=expected)
     broken = list(_broken(package, run, programs))
     measured = f"{verdict.measured}; programs: {listed(_name(p) for p in programs) or 'none'}"
     if not broken:

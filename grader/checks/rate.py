@@ -117,7 +117,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     if found is None:
         message, hint = f"no message came on {params.topic}", f"look at rostopic hz {params.topic}"
         absent = unjudged(message, measured="no message", hint=hint)
-        return (all_lost(run, params.topic) or absent).model_copy(update={"expected": expected})
+        return (all_lost(run, params.topic) or absent).about(expected=expected)
     verdict = (
         _flood(found, package, params)
         or _short(found, run, package, params)
@@ -128,9 +128,7 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         evidence=run.evidence, topic=params.topic, from_ns=found.times_ns[0], to_ns=found.times_ns[-1]
     )
     citations: tuple[Citation, ...] = (*verdict.citations, span)
-    return verdict.model_copy(
-        update={"expected": expected, "measured": _measured(found, run, params), "citations": citations}
-    )
+    return verdict.about(expected=expected, measured=_measured(found, run, params), citations=citations)
 
 
 def judged_rhythm(run: Run, params: RateParams, channels: Sequence[Channel]) -> Rhythm | None:

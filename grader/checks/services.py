@@ -72,12 +72,10 @@ def service(package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
         not_offered(package, run, params.service) if offer is None else _judged(offer, package, run, params)
     )
     cite = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
-    return verdict.model_copy(
-        update={
-            "expected": f"{params.service} of type {params.type}",
-            "measured": verdict.measured or described(found),
-            "citations": (*verdict.citations, cite),
-        }
+    return verdict.about(
+        expected=f"{params.service} of type {params.type}",
+        measured=verdict.measured or described(found),
+        citations=(*verdict.citations, cite),
     )
 
 
@@ -110,12 +108,10 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
         or passed(f"{params.service} answers {plural(len(pairs), 'call')} as it should")
     )
     shown = wrong[0] if wrong else next(reversed(made), None)
-    return verdict.model_copy(
-        update={
-            "expected": listed(f"call {n}: {fields(w)}" for n, w in enumerate(params.expect, 1)),
-            "measured": verdict.measured or _measured(shown),
-            "citations": (*verdict.citations, _citation(shown, run)),
-        }
+    return verdict.about(
+        expected=listed(f"call {n}: {fields(w)}" for n, w in enumerate(params.expect, 1)),
+        measured=verdict.measured or _measured(shown),
+        citations=(*verdict.citations, _citation(shown, run)),
     )
 
 

@@ -58,9 +58,7 @@ def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verd
         )
     expected = f"{params.type} on {params.topic}"
     measured = listed(f"{plain_type(c.type)} by {c.publisher}" for c in channels) or published_topics(run)
-    return verdict.model_copy(
-        update={"expected": expected, "measured": measured, "citations": _cite(run, channels)}
-    )
+    return verdict.about(expected=expected, measured=measured, citations=_cite(run, channels))
 
 
 def plain_type(name: str) -> str:

@@ -49,15 +49,13 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
     else:
         missing = None if published else no_node(package, run, "no topic was published")
         verdict = missing or passed("no topic beside those of the lab is published")
-    return verdict.model_copy(
-        update={
-            "expected": f"no topic beside {listed(params.topics)}" if params.topics else "no topic at all",
-            "measured": verdict.measured or listed(published) or "no topic",
-            "citations": (
-                *verdict.citations,
-                EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),
-            ),
-        }
+    return verdict.about(
+        expected=f"no topic beside {listed(params.topics)}" if params.topics else "no topic at all",
+        measured=verdict.measured or listed(published) or "no topic",
+        citations=(
+            *verdict.citations,
+            EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),
+        ),
     )
 
 

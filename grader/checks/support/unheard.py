@@ -33,7 +33,7 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     cite = (EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),)
     measured = f"subscribed to {listed(subscribed)}" if subscribed else "no subscription"
     if differs := _types_differ(run, topic):
-        return differs.model_copy(update={"measured": measured, "citations": cite})
+        return differs.about(measured=measured, citations=cite)
     if topic in subscribed:
         message = f"the node subscribed to {topic}, but the grader sent nothing"
         return inconclusive(message, hint="grade again", measured=measured, citations=cite)

@@ -159,36 +159,36 @@ def _last_words(folder: Path, code: int) -> str:
 
 def _verdict(outcome: SessionOutcome, params: PytestParams) -> Verdict:
     """The share of the points of the tests that passed, of those that count."""
+    verdict = _judged(outcome, params)
+    return verdict.about(expected=f"the tests in {params.file} pass", measured=_sub_scores(outcome.tests))
+
+
+def _judged(outcome: SessionOutcome, params: PytestParams) -> Verdict:
     counted = [t for t in outcome.tests if t.outcome in {"passed", "failed"}]
     unsettled = [t for t in outcome.tests if t.outcome == "open"]
-    fields = {"expected": f"the tests in {params.file} pass", "measured": _sub_scores(outcome.tests)}
     if unsettled:
-        return inconclusive(f"{unsettled[0].name} could not be run: {unsettled[0].message}", **fields)
+        return inconclusive(f"{unsettled[0].name} could not be run: {unsettled[0].message}")
     if not counted:
         reason = next((t.message for t in outcome.tests if t.message), "")
-        skipped = inconclusive(f"every test was skipped{f': {reason}' if reason else ''}", **fields)
+        skipped = inconclusive(f"every test was skipped{f': {reason}' if reason else ''}")
         return skipped.model_copy(update={"unjudged": True})
     total = sum(t.points for t in counted)
     reached = sum(t.points for t in counted if t.outcome == "passed")
     if total <= 0:
         raise TestsBroken(f"the tests of {params.file} that count have 0 points together")
-    return _scored(counted, reached / total, fields)
+    return _scored(counted, reached / total)
 
 
-def _scored(counted: list[TestOutcome], score: float, fields: dict[str, str]) -> Verdict:
+def _scored(counted: list[TestOutcome], score: float) -> Verdict:
     lost = [t for t in counted if t.outcome == "failed"]
     passing = f"{len(counted) - len(lost)} of {len(counted)} tests pass"
     hint = "; ".join(f"{t.name}: {t.message}" for t in lost[:HINTS])
     if len(lost) > HINTS:
         hint += f"; and {len(lost) - HINTS} more"
-    if not lost:
-        return passed(passing, **fields)
-    message = f"{passing}; failed: {lost[0].title.rstrip('.') or lost[0].name} ({lost[0].message})"
     if score >= 1:
-        return passed(passing, hint=hint, **fields)
-    return (
-        partial_(score, message, hint=hint, **fields) if score > 0 else failed(message, hint=hint, **fields)
-    )
+        return passed(passing, hint=hint)
+    message = f"{passing}; failed: {lost[0].title.rstrip('.') or lost[0].name} ({lost[0].message})"
+    return partial_(score, message, hint=hint) if score > 0 else failed(message, hint=hint)
 
 
 def _sub_scores(tests: tuple[TestOutcome, ...]) -> str:
