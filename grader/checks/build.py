@@ -8,6 +8,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import check
+from grader.checks.support.installing import is_product
 from grader.checks.support.text import listed, near_names, seconds, shown
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -149,11 +150,6 @@ def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | No
         measured=f"rosrun finds no {listed((PurePosixPath(s).name for s in lost), 'or')}",
         hint=f"add {listed(lost)} to the package, then git add, commit and push",
     )
-
-
-def is_product(path: str) -> bool:
-    """Whether a build made it: nothing of what was handed in counts there."""
-    return PurePosixPath(path).parts[0] in {"build", "devel", "install"}
 
 
 def _first_error(lines: Sequence[str]) -> BuildError | None:

@@ -6,9 +6,16 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.build import CATKIN_MAKE, is_product
+from grader.checks.build import CATKIN_MAKE
 from grader.checks.registry import check
-from grader.checks.support.installing import PYTHON, installed, is_found, names_script
+from grader.checks.support.installing import (
+    PYTHON,
+    find_script,
+    installed,
+    is_found,
+    is_product,
+    names_script,
+)
 from grader.checks.support.text import listed, near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts, SourceFile
@@ -19,7 +26,6 @@ RIGHT_SHEBANG = "#!/usr/bin/env python3"
 # a script without its first line is run by the shell, which knows no `import`
 TELLING = ("Couldn't find", "import: command not found", "No such file or directory")
 C_SOURCES = {".c", ".cc", ".cpp", ".cxx", ".h", ".hpp"}
-NODE_FOLDERS = ("scripts", "src", "nodes", "bin")
 
 
 class ExecutableParams(Record):
@@ -86,22 +92,6 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
     message = f"whether {found.path} is executable cannot be seen: what was handed in carries no file modes"
     mend = "hand in a git repository or a .tar.gz, which keep the executable bit"
     return inconclusive(message, expected=expected, measured=measured, hint=mend, citations=line)
-
-
-def find_script(package: PackageFacts, path: str) -> SourceFile | None:
-    """The file at this path, or one of the same name in another folder (those for nodes first)."""
-
-    def rank(file: SourceFile) -> tuple[bool, bool, bool, str]:
-        folder = PurePosixPath(file.path).parts[0]
-        return file.path != path, folder not in NODE_FOLDERS, file.executable is False, file.path
-
-    return min(copies_of(package, path), key=rank, default=None)
-
-
-def copies_of(package: PackageFacts, path: str) -> list[SourceFile]:
-    """All files of this name in the package, whatever their folder; what a build made is none of them."""
-    name = PurePosixPath(path).name
-    return [f for f in package.files if PurePosixPath(f.path).name == name and not is_product(f.path)]
 
 
 def has_wrapper(package: PackageFacts, build: Run, path: str) -> bool:

@@ -8,9 +8,8 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
-from grader.checks.executable import copies_of
 from grader.checks.registry import check
-from grader.checks.support.installing import PYTHON, Installed, installed, is_bin, names_script
+from grader.checks.support.installing import PYTHON, Installed, copies_of, installed, is_bin, names_script
 from grader.checks.support.text import listed, near_names, shown
 from grader.model.package import PackageFacts
 from grader.model.record import Record

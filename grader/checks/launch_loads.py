@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import PurePosixPath
 from typing import Any
 
-from grader.checks.executable import find_script
 from grader.checks.launch import not_run
 from grader.checks.launch_xml import missing_node
 from grader.checks.registry import check
+from grader.checks.support.installing import find_script
 from grader.checks.support.launching import Slip, find_launch, nodes_of_script, refusals, unreadable
 from grader.checks.support.param_given import is_printed
 from grader.checks.support.param_tree import absolute, instead, own, tree

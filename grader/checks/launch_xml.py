@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import PurePosixPath
 
-from grader.checks.executable import find_script
 from grader.checks.registry import check
+from grader.checks.support.installing import find_script
 from grader.checks.support.launching import (
     Slip,
     find_launch,

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.executable import find_script
 from grader.checks.registry import check
+from grader.checks.support.installing import find_script
 from grader.checks.support.text import listed, near_names, plural
 from grader.model.package import PackageFacts
 from grader.model.record import Record

@@ -7,8 +7,7 @@ from typing import Any
 
 from grader.checks.registry import check
 from grader.checks.support.absence import no_node
-from grader.checks.support.calls import text
-from grader.checks.support.comparing import differences
+from grader.checks.support.comparing import differences, value_text
 from grader.checks.support.names import GlobalName
 from grader.checks.support.param_tree import absolute, own, tree
 from grader.checks.support.process import lives
@@ -53,8 +52,8 @@ def param_value(package: PackageFacts, run: Run, params: ParamValueParams) -> Ve
     verdict = _not_there(package, run, own(held), params) if got is MISSING else _judged(got, params)
     cite = EvidenceCitation(evidence=run.evidence, topic="/grader/param")
     return verdict.about(
-        expected=f"{params.name}: {shown(text(params.value))}",
-        measured=verdict.measured or ("not set" if got is MISSING else shown(text(got))),
+        expected=f"{params.name}: {shown(value_text(params.value))}",
+        measured=verdict.measured or ("not set" if got is MISSING else shown(value_text(got))),
         citations=(*verdict.citations, cite),
     )
 
@@ -76,7 +75,7 @@ def _held(leaves: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401 - a para
 def _judged(got: object, params: ParamValueParams) -> Verdict:
     wrong = [str(one) for one in differences(got, params.value, EXACT)]
     if not wrong:
-        return passed(f"{params.name} is {shown(text(got))}")
+        return passed(f"{params.name} is {shown(value_text(got))}")
     hint = "numbers stand without quotes, text with them" if "(text, not" in wrong[0] else ""
     message = shown(f"{params.name} is {listed(wrong)}")
     return failed(message, hint=hint or f"rosparam get {params.name} shows it; set it to the lab's value")

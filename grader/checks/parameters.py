@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import PurePosixPath
 
-from grader.checks.executable import find_script
 from grader.checks.registry import check
+from grader.checks.support.installing import find_script
 from grader.checks.support.param_tree import absolute, instead, own, tree
 from grader.checks.support.process import Life, life
 from grader.checks.support.text import listed, near_names, shown

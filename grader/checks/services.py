@@ -13,13 +13,12 @@ from grader.checks.support.calls import (
     Offer,
     described,
     exchanges,
-    fields,
     no_answer,
     not_offered,
     offers,
     other_type,
 )
-from grader.checks.support.comparing import differences
+from grader.checks.support.comparing import differences, fields_text
 from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.names import GlobalName, TypeName
 from grader.checks.support.text import listed, plural
@@ -109,7 +108,7 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
     )
     shown = wrong[0] if wrong else next(reversed(made), None)
     return verdict.about(
-        expected=listed(f"call {n}: {fields(w)}" for n, w in enumerate(params.expect, 1)),
+        expected=listed(f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1)),
         measured=verdict.measured or _measured(shown),
         citations=(*verdict.citations, _citation(shown, run)),
     )
@@ -144,7 +143,7 @@ def _fault(
     found = list(differences(one.response, wanted, params.tolerance))
     if not found:
         return None
-    message = f"{params.service}, called with {fields(one.request)}, answers {listed(map(str, found))}"
+    message = f"{params.service}, called with {fields_text(one.request)}, answers {listed(map(str, found))}"
     return failed(message, hint=f"try it by hand: rosservice call {params.service} …")
 
 
@@ -173,7 +172,7 @@ def _not_there(package: PackageFacts, run: Run, params: ServiceAnswersParams) ->
 def _measured(one: Exchange | None) -> str:
     if one is None:
         return "not called"
-    return "no answer" if one.response is None else fields(one.response)
+    return "no answer" if one.response is None else fields_text(one.response)
 
 
 def _citation(one: Exchange | None, run: Run) -> EvidenceCitation:

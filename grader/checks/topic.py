@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from grader.checks.registry import check
+from grader.checks.support.absence import SYSTEM_TOPICS
 from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.losses import all_lost
+from grader.checks.support.names import plain_type
 from grader.checks.support.process import early_end
 from grader.checks.support.text import listed, near_names, plural
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
-
-SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
 
 
 class TopicTypeParams(Record):
@@ -59,10 +59,6 @@ def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verd
     expected = f"{params.type} on {params.topic}"
     measured = listed(f"{plain_type(c.type)} by {c.publisher}" for c in channels) or published_topics(run)
     return verdict.about(expected=expected, measured=measured, citations=_cite(run, channels))
-
-
-def plain_type(name: str) -> str:
-    return name.replace("/msg/", "/")
 
 
 def student_topics(run: Run) -> dict[str, str]:

@@ -10,8 +10,8 @@ from pydantic import ValidationError
 
 from grader.checks.build import run_hint
 from grader.checks.evidence import Evidence
-from grader.checks.executable import find_script
 from grader.checks.registry import Check
+from grader.checks.support.installing import find_script
 from grader.evidence.run import Run
 from grader.judging.recordings import PACKAGE_RUN, unread_recording, with_recordings
 from grader.model.package import PackageFacts

@@ -7,10 +7,11 @@ from grader.checks.support.losses import all_lost
 from grader.checks.support.process import Life, early_end, life, lives
 from grader.checks.support.text import listed, near_names
 from grader.checks.support.unheard import HAND_IN
-from grader.checks.topic import SYSTEM_TOPICS
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.verdict import Verdict, inconclusive, unjudged
+
+SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
 
 
 def no_node(package: PackageFacts, run: Run, what: str) -> Verdict | None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from grader.checks.support.absence import life_of, no_node
+from grader.checks.support.comparing import fields_text
 from grader.checks.support.exit_cause import explain_end, explain_traceback
 from grader.checks.support.names import plain_type
 from grader.checks.support.text import listed, near_names, shown
@@ -135,7 +136,7 @@ def _unpacked(line: str) -> list[str]:
 
 def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> Verdict:
     """Why a call brought nothing back."""
-    asked = f"{service}, called with {fields(one.request)},"
+    asked = f"{service}, called with {fields_text(one.request)},"
     found = handler_traceback(run, service, one.at_ns)
     if found is not None:
         end = explain_traceback(found, package)
@@ -162,21 +163,3 @@ def other_type(run: Run, service: str, one: Exchange) -> Verdict | None:
         return None
     message = f"{service} cannot be called as {one.type}: it is of type {kind}"
     return unjudged(message, hint=f"give rospy.Service('{service}', …) the type {one.type}")
-
-
-def fields(value: Mapping[str, Any]) -> str:
-    """A request's or an answer's fields in one line."""
-    return shown(", ".join(f"{name}: {text(one)}" for name, one in value.items())) or "nothing"
-
-
-def text(value: object) -> str:
-    """A value as `rosservice` and YAML show it."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return f"'{value}'"
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{name}: {text(one)}" for name, one in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(text, value)) + "]"
-    return f"{value:.7g}" if isinstance(value, float) else str(value)

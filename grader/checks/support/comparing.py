@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from grader.checks.support.calls import text
+from grader.checks.support.text import shown
 
 FLOAT32 = 1e-6
 
@@ -28,14 +28,14 @@ def differences(got: object, wanted: object, tolerance: float, path: str = "") -
     elif isinstance(wanted, list | tuple):
         yield from _in_items(list(got) if isinstance(got, bytes) else got, wanted, tolerance, path)
     elif not _equal(got, wanted, tolerance):
-        yield Difference(path, f"{text(got)}, not {text(wanted)}{_kinds(got, wanted)}")
+        yield Difference(path, f"{value_text(got)}, not {value_text(wanted)}{_kinds(got, wanted)}")
 
 
 def _in_fields(
     got: object, wanted: Mapping[str, object], tolerance: float, path: str
 ) -> Iterator[Difference]:
     if not isinstance(got, Mapping):
-        yield Difference(path, f"{text(got)}, not {text(wanted)}")
+        yield Difference(path, f"{value_text(got)}, not {value_text(wanted)}")
         return
     for name, value in wanted.items():
         inner = f"{path}.{name}" if path else str(name)
@@ -50,7 +50,7 @@ def _in_items(
     got: object, wanted: list[object] | tuple[object, ...], tolerance: float, path: str
 ) -> Iterator[Difference]:
     if not isinstance(got, list | tuple) or len(got) != len(wanted):
-        yield Difference(path, f"{text(got)}, not {text(wanted)}")
+        yield Difference(path, f"{value_text(got)}, not {value_text(wanted)}")
         return
     for index, (one, value) in enumerate(zip(got, wanted, strict=True)):
         yield from differences(one, value, tolerance, f"{path}[{index}]")
@@ -80,3 +80,21 @@ def _kinds(got: object, wanted: object) -> str:
     kinds = {str: "text", bool: "true or false", int: "a number", float: "a number"}
     first, second = kinds.get(type(got), ""), kinds.get(type(wanted), "")
     return f" ({first}, not {second})" if first and second and first != second else ""
+
+
+def fields_text(value: Mapping[str, Any]) -> str:
+    """A request's or an answer's fields in one line."""
+    return shown(", ".join(f"{name}: {value_text(one)}" for name, one in value.items())) or "nothing"
+
+
+def value_text(value: object) -> str:
+    """A value as `rosservice` and YAML show it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f"'{value}'"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{name}: {value_text(one)}" for name, one in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(value_text, value)) + "]"
+    return f"{value:.7g}" if isinstance(value, float) else str(value)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import posixpath
 from collections.abc import Iterator
+from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.model.package import CMakeCall, PackageFacts
+from grader.model.package import CMakeCall, PackageFacts, SourceFile
 
 PYTHON = "catkin_install_python"
+NODE_FOLDERS = ("scripts", "src", "nodes", "bin")
 _KINDS = ("PROGRAMS", "FILES", "TARGETS", "DIRECTORY", "SCRIPT", "CODE")
 _OPTIONS = (
     *("DESTINATION", "TYPE", "OPTIONAL", "PERMISSIONS", "CONFIGURATIONS", "COMPONENT", "RENAME"),
@@ -38,6 +40,27 @@ class Installed(NamedTuple):
     def known(self) -> bool:
         """False where CMake was not asked and the name is a variable that only it knows."""
         return "${" not in self.path
+
+
+def find_script(package: PackageFacts, path: str) -> SourceFile | None:
+    """The file at this path, or one of the same name in another folder (those for nodes first)."""
+
+    def rank(file: SourceFile) -> tuple[bool, bool, bool, str]:
+        folder = PurePosixPath(file.path).parts[0]
+        return file.path != path, folder not in NODE_FOLDERS, file.executable is False, file.path
+
+    return min(copies_of(package, path), key=rank, default=None)
+
+
+def copies_of(package: PackageFacts, path: str) -> list[SourceFile]:
+    """All files of this name in the package, whatever their folder; what a build made is none of them."""
+    name = PurePosixPath(path).name
+    return [f for f in package.files if PurePosixPath(f.path).name == name and not is_product(f.path)]
+
+
+def is_product(path: str) -> bool:
+    """Whether a build made it: nothing of what was handed in counts there."""
+    return PurePosixPath(path).parts[0] in {"build", "devel", "install"}
 
 
 def installed(package: PackageFacts) -> Iterator[Installed]:

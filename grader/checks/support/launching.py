@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.executable import find_script
+from grader.checks.support.installing import find_script
 from grader.checks.support.text import listed, near_names
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.verdict import FileCitation, Verdict, failed, unjudged

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.executable import find_script
 from grader.checks.support.exit_cause import CAUSES, explain_traceback, process_tracebacks
+from grader.checks.support.installing import find_script
 from grader.checks.support.process import lives, observed_until_ns
 from grader.checks.support.text import bare, listed, shown
 from grader.evidence.run import Run
