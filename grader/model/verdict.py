@@ -67,7 +67,9 @@ def passed(
     message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
 ) -> Verdict:
     """Return a verdict that earns all points."""
-    return _verdict(Status.PASS, 1.0, message, expected, measured, hint, citations)
+    return _verdict(
+        Status.PASS, 1.0, message, expected=expected, measured=measured, hint=hint, citations=citations
+    )
 
 
 def partial(
@@ -80,21 +82,27 @@ def partial(
     citations: Citations = (),
 ) -> Verdict:
     """Return a verdict that earns the share `score`, 0 to 1, of the points."""
-    return _verdict(Status.PARTIAL, score, message, expected, measured, hint, citations)
+    return _verdict(
+        Status.PARTIAL, score, message, expected=expected, measured=measured, hint=hint, citations=citations
+    )
 
 
 def failed(
     message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
 ) -> Verdict:
     """Return a verdict that earns nothing."""
-    return _verdict(Status.FAIL, 0.0, message, expected, measured, hint, citations)
+    return _verdict(
+        Status.FAIL, 0.0, message, expected=expected, measured=measured, hint=hint, citations=citations
+    )
 
 
 def unjudged(
     message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
 ) -> Verdict:
     """There is nothing to judge: a fail of its own, or `blocked` where a required criterion explains it."""
-    verdict = _verdict(Status.FAIL, 0.0, message, expected, measured, hint, citations)
+    verdict = _verdict(
+        Status.FAIL, 0.0, message, expected=expected, measured=measured, hint=hint, citations=citations
+    )
     return verdict.model_copy(update={"unjudged": True})
 
 
@@ -102,13 +110,22 @@ def inconclusive(
     message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
 ) -> Verdict:
     """Return a verdict that is still open, for no fault of the student's."""
-    return _verdict(Status.INCONCLUSIVE, 0.0, message, expected, measured, hint, citations)
+    return _verdict(
+        Status.INCONCLUSIVE,
+        0.0,
+        message,
+        expected=expected,
+        measured=measured,
+        hint=hint,
+        citations=citations,
+    )
 
 
 def _verdict(
     status: Status,
     score: float,
     message: str,
+    *,
     expected: str,
     measured: str,
     hint: str,
