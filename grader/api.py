@@ -28,7 +28,7 @@ from grader.errors import EvidenceError, UsageError
 from grader.evidence.run import Run
 from grader.faults import NOTHING_RUN
 from grader.files import check_writable
-from grader.judging.recordings import PACKAGE_RUN
+from grader.judging.facts import PACKAGE_RUN
 from grader.model.progress import Silence, StepState
 from grader.model.result import EnvironmentInfo, GradingResult, SubmissionInfo
 from grader.results import RESULT, read_result_file

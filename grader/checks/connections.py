@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from typing import Literal
 
 from grader.checks.registry import check
-from grader.checks.support.absence import no_node
-from grader.checks.support.names import GlobalName, is_called
+from grader.checks.support.nodes import GlobalName, is_called
 from grader.checks.support.text import listed, near_names
+from grader.checks.support.topics import no_node
 from grader.evidence.run import Run, is_grader_node
 from grader.model.package import PackageFacts
 from grader.model.record import Record

@@ -8,12 +8,18 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.exit_cause import ended_after, explain_end
+from grader.checks.support.console_output import (
+    LOOKED_AT,
+    Sent,
+    both_from_ns,
+    heard_of,
+    printed_times,
+    sent_by,
+)
+from grader.checks.support.exit_causes import ended_after, explain_end
 from grader.checks.support.nodes import are_noted, nodes_of
-from grader.checks.support.pairs import LOOKED_AT, Sent, both_from_ns, heard_of, printed_times, sent_by
-from grader.checks.support.process import Life, life, lives
-from grader.checks.support.text import listed, plural
-from grader.checks.support.wording import VALUE, in_words
+from grader.checks.support.processes import Life, life, lives
+from grader.checks.support.text import VALUE, in_words, listed, plural
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record

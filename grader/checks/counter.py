@@ -7,22 +7,23 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.counter_wrap import WrapParams, judge_wraps
-from grader.checks.support.counting import (
+from grader.checks.support.counters import (
     Count,
     Step,
+    WrapParams,
     Wrong,
     cite,
     counts,
     first_values,
+    judge_wraps,
     judged_steps,
     longest,
     wrong_steps,
 )
-from grader.checks.support.exit_cause import explain_end
-from grader.checks.support.losses import losses
-from grader.checks.support.process import early_end
+from grader.checks.support.exit_causes import explain_end
+from grader.checks.support.processes import early_end
 from grader.checks.support.text import listed, number, plural, seconds
+from grader.checks.support.topics import losses
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record

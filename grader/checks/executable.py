@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from grader.checks.build import CATKIN_MAKE
 from grader.checks.registry import check
-from grader.checks.support.installing import (
+from grader.checks.support.scripts import (
     PYTHON,
     find_script,
     installed,

@@ -7,12 +7,23 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.executable import RIGHT_SHEBANG, ExecutableParams, executable
-from grader.checks.launch import not_run
 from grader.checks.launch_xml import missing_node
 from grader.checks.registry import check
-from grader.checks.support.installing import find_script
-from grader.checks.support.launching import find_launch, node_slip, nodes_of_script, refusals, unreadable
-from grader.checks.support.roslaunch import died, nodes_up, quoted, refusal, why_died, why_not_up
+from grader.checks.support.launch import (
+    died,
+    find_launch,
+    node_slip,
+    nodes_of_script,
+    nodes_up,
+    not_run,
+    quoted,
+    refusal,
+    refusals,
+    unreadable,
+    why_died,
+    why_not_up,
+)
+from grader.checks.support.scripts import find_script
 from grader.checks.support.text import bare, listed, shown
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile

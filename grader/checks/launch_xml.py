@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import PurePosixPath
 
 from grader.checks.registry import check
-from grader.checks.support.installing import find_script
-from grader.checks.support.launching import (
+from grader.checks.support.launch import (
     Slip,
     find_launch,
     has_program,
@@ -17,6 +16,7 @@ from grader.checks.support.launching import (
     refusals,
     unreadable,
 )
+from grader.checks.support.scripts import find_script
 from grader.checks.support.text import listed, near_names, plural
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record

@@ -7,7 +7,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import check
-from grader.checks.support.installing import find_script
+from grader.checks.support.scripts import find_script
 from grader.checks.support.text import listed, near_names, plural
 from grader.model.package import PackageFacts
 from grader.model.record import Record

@@ -9,10 +9,10 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.exit_cause import explain_end
+from grader.checks.support.console_output import CALLS, Level, Logged, console_log, logged_by
+from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.nodes import nodes_of
-from grader.checks.support.process import early_end, life, lives
-from grader.checks.support.rosout import CALLS, Level, Logged, console_log, logged_by
+from grader.checks.support.processes import early_end, life, lives
 from grader.checks.support.text import listed, plural, shown
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts

@@ -7,14 +7,13 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.exit_cause import (
+from grader.checks.support.exit_causes import (
     ended_after,
     explain_end,
     explain_traceback,
     is_rospys_own,
     process_tracebacks,
 )
-from grader.checks.support.lockup import fell_silent, is_flood, was_talking
 from grader.checks.support.nodes import (
     Anonymous,
     are_noted,
@@ -24,7 +23,7 @@ from grader.checks.support.nodes import (
     wanted_names,
     wrong_name,
 )
-from grader.checks.support.process import Life, life, lives
+from grader.checks.support.processes import Life, fell_silent, is_flood, life, lives, was_talking
 from grader.checks.support.text import listed, plural, seconds
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts

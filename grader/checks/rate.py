@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.exit_cause import explain_end
-from grader.checks.support.gaps import described, rhythm
+from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.lateness import NO_EXCUSE, Lateness, lateness
-from grader.checks.support.losses import all_lost, whole_until_ns
-from grader.checks.support.process import early_end, observed_until_ns
+from grader.checks.support.processes import early_end, observed_until_ns
 from grader.checks.support.text import hertz, number, plural, seconds
+from grader.checks.support.topics import all_lost, whole_until_ns
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
@@ -277,3 +277,31 @@ def stalls_explain(found: Rhythm, late: Lateness, params: RateParams) -> bool:
         return False
     without_ns = found.span_ns - sum(stalls) + len(stalls) * params.period_ns
     return params.low_hz <= len(found.gaps_ns) * 1e9 / without_ns <= params.high_hz
+
+
+def described(found: Rhythm, low_ns: float, high_ns: float) -> str:
+    """`9.98 ± 0.02 Hz over 6.0 s: 60 messages, 98 % of gaps in 0.05 to 0.15 s, longest 0.162 s`."""
+    count = plural(len(found.times_ns), "message")
+    if not found.gaps_ns:
+        return count
+    share = 1 - len(found.outside(low_ns, high_ns)) / len(found.gaps_ns)
+    within = f"{math.floor(share * 100)} % of gaps in {low_ns / 1e9:.3g} to {high_ns / 1e9:.3g} s"
+    longest_s = max(found.gaps_ns) / 1e9
+    longest = f"longest {longest_s:.{3 if longest_s >= 0.01 else 6}f} s"
+    return f"{_mean(found)} over {found.span_ns / 1e9:.1f} s: {count}, {within}, {longest}"
+
+
+def _mean(found: Rhythm) -> str:
+    if not math.isfinite(found.interval_hz):
+        return hertz(found.mean_hz)
+    return f"{hertz(found.mean_hz).removesuffix(' Hz')} ± {found.interval_hz:.2f} Hz"
+
+
+def rhythm(channels: Sequence[Channel], until_ns: int | None, period_ns: float) -> Rhythm | None:
+    """All messages of these channels until `until_ns`. Silence at the end counts from 1.5 periods on."""
+    times = sorted(t for c in channels for t in c.times_ns if until_ns is None or t <= until_ns)
+    if not times:
+        return None
+    silent_ns = 0 if until_ns is None else until_ns - times[-1]
+    end_ns = times[-1] + silent_ns if silent_ns > 1.5 * period_ns else times[-1]
+    return Rhythm(times_ns=tuple(times), until_ns=end_ns)

@@ -49,10 +49,6 @@ class Check:
         """Whether it judges a scenario's run, and not only the package and its build."""
         return "run" in self.facts
 
-    @property
-    def family(self) -> str:
-        return self.function.__module__.rpartition(".")[2]
-
 
 CHECKS: dict[str, Check] = {}
 

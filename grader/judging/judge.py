@@ -9,11 +9,11 @@ from traceback import extract_tb
 
 from grader.checks import CHECKS, Check
 from grader.checks.evidence import NotRecorded
-from grader.checks.support.losses import heed_losses
+from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
 from grader.judging.facts import Facts, try_facts
-from grader.judging.points import round_half_up
+from grader.judging.summary import round_half_up
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status, Verdict, inconclusive
 from grader.rubric.model import Criterion, Rubric

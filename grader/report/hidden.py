@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.judging.late import lateness
+from grader.judging.settle import lateness
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric

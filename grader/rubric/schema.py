@@ -12,9 +12,9 @@ from pydantic import Field, create_model
 
 from grader.checks import HEADINGS, Check
 from grader.checks.registry import NoParams
-from grader.rubric.cross import MANUAL
+from grader.rubric.consistency import MANUAL
+from grader.rubric.instructor import known_checks
 from grader.rubric.model import Criterion, Rubric
-from grader.rubric.own_checks.known import known_checks
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

@@ -11,8 +11,7 @@ from grader.intake.source import Source
 from grader.model.progress import Progress
 from grader.model.result import SubmissionInfo
 from grader.model.submission import RecordedSubmission, Submission
-from grader.rubric.load import LoadedRubric
-from grader.rubric.needs import needs_package
+from grader.rubric.load import LoadedRubric, needs_package
 from grader.steps.options import GradeOptions
 from grader.temporary import temporary_folder
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 from grader import __version__
 from grader.evidence.run import Run
 from grader.faults import NOTHING_RUN
-from grader.judging.notes import notes_of
-from grader.judging.summary import overall_status, total_points
+from grader.judging.summary import notes_of, overall_status, total_points
 from grader.model.result import (
     CriterionResult,
     EnvironmentInfo,

@@ -16,8 +16,7 @@ from grader.model.submission import RecordedSubmission, Submission
 from grader.model.verdict import Status
 from grader.package import read_package
 from grader.report.hidden import hidden_ids
-from grader.rubric.load import LoadedRubric
-from grader.rubric.needs import needs_ros, started
+from grader.rubric.load import LoadedRubric, needs_ros, started
 from grader.rubric.rates import rates_of
 from grader.steps.judged import judged_again
 from grader.steps.options import GradeOptions

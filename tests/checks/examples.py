@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from grader.checks import CHECKS
-from grader.checks.support.losses import heed_losses
+from grader.checks.support.topics import heed_losses
 from grader.evidence.run import Run
 from grader.evidence.timeline import build_runs
 from grader.model.package import PackageFacts

@@ -26,8 +26,7 @@ from grader.model.progress import Silence
 from grader.model.result import GradingResult
 from grader.report.hidden import hidden_ids, without_hidden
 from grader.report.terminal import open_console
-from grader.rubric.load import LoadedRubric
-from grader.rubric.needs import needs_ros
+from grader.rubric.load import LoadedRubric, needs_ros
 from grader.student.git_status import write_staged
 from grader.temporary import temporary_folder
 

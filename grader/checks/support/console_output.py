@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
-from grader.checks.support.text import bare
-from grader.checks.support.traceback import HEADING, tracebacks
-from grader.checks.support.wording import VALUE, line_pattern
+from grader.checks.support.exit_causes import HEADING, tracebacks
+from grader.checks.support.text import VALUE, bare, line_pattern, words_pattern
 from grader.evidence.run import Run
 
 NUMBERS_PER_LINE = 6
@@ -200,3 +200,140 @@ def chosen(places: Sequence[tuple[int, ...]]) -> list[int | None]:
 def in_order(places: Sequence[tuple[int, ...]]) -> bool:
     """Whether one place can be chosen for each probe, each behind the one before."""
     return None not in chosen(places)
+
+
+_BEFORE, _BEHIND = r"(?<![\w.])", r"(?![\w]|[.,]\d)"
+_Lines = list[tuple[str, str]]
+"""Lines with their blanks squeezed, and as they are."""
+
+LOOKED_AT, LOOKED_AT_LEAST = 400, 8
+TEXT_CHARS_MAX = 200
+SEARCHED_CHARS_MAX = 100_000_000
+"""Texts are as many times fewer as what was printed is longer, and none is longer than a lab's are."""
+PUNCTUATION = ".,;:!?'\"()[]{}<>"
+
+
+class Sent(NamedTuple):
+    """The texts that one sender published from `from_ns` on, with how many times."""
+
+    texts: Counter[str]
+
+    @property
+    def total(self) -> int:
+        return self.texts.total()
+
+
+def sent_by(run: Run, topic: str, nodes: Collection[str], from_ns: int = 0) -> Sent:
+    """What these nodes published as text on the topic at `from_ns` or later."""
+    texts = (
+        text
+        for channel in run.student_channels(topic)
+        if channel.callerid in nodes
+        for t, text in zip(channel.times_ns, channel.data, strict=True)
+        if t >= from_ns and _is_text(text)
+    )
+    return Sent(Counter(texts))
+
+
+def both_from_ns(run: Run, topic: str, first: Collection[str], second: Collection[str]) -> int | None:
+    """From when on both had sent a text; None where one of them never did."""
+    begins = [
+        [
+            t
+            for channel in run.student_channels(topic)
+            if channel.callerid in nodes
+            for t, text in zip(channel.times_ns, channel.data, strict=True)
+            if _is_text(text)
+        ]
+        for nodes in (first, second)
+    ]
+    return max(min(times) for times in begins) if all(begins) else None
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str) and bool(value.strip())
+
+
+def printed_times(run: Run, process: str, texts: Collection[str], template: str) -> Counter[str]:
+    """How many times a process printed each text: by the stream, stdout, stderr or /rosout, that shows it most.
+
+    Of a flood of texts, some that seem to have been printed are enough to look at.
+    """
+    streams = [[(_squeezed(line.text), line.text) for line in lines] for lines in stream_lines(run, process)]
+    printed_chars = sum(len(line) for lines in streams for _, line in lines)
+    most = min(LOOKED_AT, max(LOOKED_AT_LEAST, SEARCHED_CHARS_MAX // (1 + printed_chars)))
+    texts = [text for text in texts if len(text) <= TEXT_CHARS_MAX]
+    if len(texts) > most:
+        texts = _worth_a_look(texts, streams, most)
+    counts = {text: max((_times(lines, text, template) for lines in streams), default=0) for text in texts}
+    return Counter({text: count for text, count in counts.items() if count})
+
+
+def _squeezed(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _worth_a_look(texts: Iterable[str], streams: Iterable[_Lines], most: int) -> list[str]:
+    """Texts whose last word was printed, evenly spread."""
+    said = {word.strip(PUNCTUATION) for lines in streams for _, line in lines for word in line.split()}
+    found = [text for text in texts if text.split()[-1].strip(PUNCTUATION) in said]
+    return found[:: max(1, len(found) // most)]
+
+
+def heard_of(sent: Sent, other: Sent, printed: Counter[str]) -> int:
+    """How many messages were printed that can only be this sender's."""
+    return sum(min(count, max(0, printed[text] - other.texts[text])) for text, count in sent.texts.items())
+
+
+def _times(lines: _Lines, text: str, template: str) -> int:
+    before, _, behind = template.partition(VALUE)
+    words = text.split()
+    whole = r"\s+".join(map(re.escape, words))
+    pattern = re.compile(
+        f"{words_pattern(before)}{_edge(_BEFORE, whole, before)}{whole}{_BEHIND}{words_pattern(behind)}"
+    )
+    plain = " ".join(words)
+    return sum(bool(pattern.search(line)) for squeezed, line in lines if plain in squeezed)
+
+
+def _edge(mark: str, whole: str, before: str) -> str:
+    """A number has to stand for itself; a word may follow on others (`I heardThe time`)."""
+    return mark if whole[:1].isdigit() and not before else ""
+
+
+Level = Literal["debug", "info", "warn", "error", "fatal"]
+LEVELS: dict[int, Level] = {1: "debug", 2: "info", 4: "warn", 8: "error", 16: "fatal"}
+CALLS = {level: f"rospy.log{'err' if level == 'error' else level}" for level in LEVELS.values()}
+_CONSOLE = re.compile(r"^\s*\[\s*(DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*\[[^\]]*\]\s*:?\s?(.*)$")
+
+
+class Logged(NamedTuple):
+    """One log message; `level` is None for a number that ROS does not know."""
+
+    at_ns: int
+    node: str
+    level: Level | None
+    text: str
+
+
+def logged_by(run: Run, nodes: Collection[str]) -> tuple[Logged, ...]:
+    """The log messages of these nodes, by time; of all nodes in another tool's recording, which knows no graph."""
+    found = [
+        Logged(
+            t,
+            channel.callerid or str(value.get("name", "")),
+            LEVELS.get(value.get("level", 0)),
+            str(value.get("msg", "")),
+        )
+        for channel in run.student_channels("/rosout")
+        if run.foreign or channel.callerid in nodes
+        for t, value in zip(channel.times_ns, channel.values, strict=True)
+        if isinstance(value, dict)
+    ]
+    return tuple(sorted(found, key=lambda one: one.at_ns))
+
+
+def console_log(line: str) -> tuple[str, str] | None:
+    """Level and text of a line as rospy and roscpp print what they log; None for any other line."""
+    match = _CONSOLE.match(bare(line))
+    return (match[1].lower(), match[2]) if match else None

@@ -8,8 +8,8 @@ import pickle
 import subprocess
 import sys
 from functools import partial
-from pathlib import Path
-from typing import Annotated
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError
 
@@ -19,8 +19,6 @@ from grader.checks import partial as partial_
 from grader.checks.registry import parts
 from grader.model.verdict import Status
 from grader.portable import end_group
-from grader.rubric.own_checks.files import FileFault, read_beside
-from grader.rubric.own_checks.job import SessionOutcome, TestOutcome
 from grader.temporary import temporary_folder
 
 HINTS = 4
@@ -107,7 +105,7 @@ def _session(path: Path, evidence: Evidence, params: PytestParams) -> SessionOut
 
 def _command(path: Path, folder: Path, params: PytestParams) -> list[str]:
     """pytest with nothing of the surrounding folders: no settings, no conftest.py, no cache, no other plugin."""
-    own = ["-p", "grader.rubric.own_checks.plugin", "--grader-evidence", str(folder / "evidence")]
+    own = ["-p", "grader.rubric.pytest_plugin", "--grader-evidence", str(folder / "evidence")]
     own += ["--grader-outcome", str(folder / "outcome"), "--basetemp", str(folder / "tmp")]
     alone = ["-c", os.devnull, "--rootdir", str(path.parent), "--noconftest", "-p", "no:cacheprovider"]
     select = ["-k", params.select] if params.select else []
@@ -202,3 +200,48 @@ def _sub_score(test: TestOutcome) -> str:
     if test.outcome in {"skipped", "open"}:
         return f"{test.name} {'skipped' if test.outcome == 'skipped' else 'not run'}"
     return f"{test.name} {test.points if test.outcome == 'passed' else 0:g}/{test.points:g}"
+
+
+Outcome = Literal["passed", "failed", "skipped", "open"]
+
+
+class TestOutcome(Record):
+    """One test. `open`: a run that it asks for was not recorded. `message` is one line, empty where it passed."""
+
+    __test__ = False
+
+    name: str
+    title: str
+    outcome: Outcome
+    message: str
+    points: float
+
+
+class SessionOutcome(Record):
+    """`faults` are the instructor's: a file that cannot be read, a marker that is wrong."""
+
+    tests: tuple[TestOutcome, ...]
+    faults: tuple[str, ...]
+
+
+MAX_BYTES = 1_000_000
+
+
+class FileFault(ValueError):
+    """The file is not there, or is none that may be used."""
+
+
+def read_beside(folder: Path, name: str) -> tuple[Path, bytes]:
+    """The file of that name in the rubric's folder, or below it. Raises FileFault."""
+    plain = PurePosixPath(name)
+    if plain.suffix != ".py" or plain.is_absolute() or ".." in plain.parts or "\0" in name:
+        raise FileFault("must name a Python file beside the rubric, like my_checks.py")
+    path = folder.resolve() / plain
+    try:
+        with path.open("rb") as file:
+            raw = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise FileFault(f"{name} cannot be read beside the rubric: {error.strerror}") from error
+    if len(raw) > MAX_BYTES:
+        raise FileFault(f"{name} is larger than 1 MB")
+    return path, raw

@@ -13,7 +13,7 @@ import pytest
 from grader.checks import Evidence, PackageFacts, Run
 from grader.checks.evidence import NoSuchScenario, NotRecorded
 from grader.model.verdict import Status
-from grader.rubric.own_checks.job import Outcome, SessionOutcome, TestOutcome
+from grader.rubric.pytest_check import Outcome, SessionOutcome, TestOutcome
 
 MESSAGE_CHARS = 200
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]{6,}\b")
