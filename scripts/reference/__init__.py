@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from grader.authoring.mutation.docs import operators_page
-from grader.checks.docs import checks_page
 from grader.report.formats.page import pages as format_pages
+from scripts.reference.checks import checks_page
 from scripts.reference.commands import commands_page, exit_codes_page
 from scripts.reference.labs import labs_page
 from scripts.reference.records import rubric_page
