@@ -10,13 +10,13 @@ from typing import NamedTuple
 from grader.checks.registry import NoParams, check
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.processes import Life, lives
-from grader.checks.support.scripts import is_product
+from grader.checks.support.scripts import cmake_calls, path_in_package, paths_by_name
 from grader.checks.support.text import bare, listed, near_names, seconds, shown
+from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import CMakeCall, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import (
-    EvidenceCitation,
     FileCitation,
     Status,
     Verdict,
@@ -27,6 +27,21 @@ from grader.model.verdict import (
 )
 
 CATKIN_MAKE = "catkin_make"
+NO_PROGRAM = {"IMPORTED", "ALIAS", "EXCLUDE_FROM_ALL"}
+CANNOT_START = {126, 127}
+LOADER = (
+    "error while loading shared libraries",
+    "symbol lookup error",
+    "cannot execute",
+    "Exec format error",
+)
+TELLING = ("[FATAL]", "what():")
+SAME_NAME = "new node registered with same name"
+ASTRAY = "run it with rosrun, and look for a pointer or an index that goes astray"
+LINK = (
+    "name every library in target_link_libraries(<program> ${catkin_LIBRARIES}), and every package in "
+    "find_package(catkin REQUIRED COMPONENTS …)"
+)
 EXPECTED = "catkin_make exits with 0"
 INSTALL_ROS = (
     "install ROS 1 with `make setup`, or `apt-get install python3-rospy python3-roslaunch rosbash catkin`, "
@@ -82,7 +97,7 @@ def build(package: PackageFacts, build: Run, params: BuildParams) -> Verdict:
         or where `rosrun` finds it in the package; whether it has its executable bit counts elsewhere.
 
     How to fix
-        Clone your repository into a new workspace, run `catkin_make`, and mend the first error: the later
+        Clone your repository into a new workspace, run `catkin_make`, and fix the first error: the later
         ones often follow from it.
     """
     scripts = f", and {listed(params.scripts)} there to run" if params.scripts else ""
@@ -128,23 +143,22 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
     error = _first_error([c.line for _, c in build.console if c.process == CATKIN_MAKE])
     place = _place(error, package)
     explained = package.manifest is None or (error is not None and error.kind == "cmake")
-    verdict = unjudged if explained else failed
-    return verdict(
+    return (unjudged if explained else failed)(
         f"catkin_make failed: {error.text}" if error else "catkin_make failed without naming an error",
         expected=EXPECTED,
         measured=f"exit code {exit_code}",
-        hint="run catkin_make in a fresh clone and mend the first error that it prints",
-        citations=(place or EvidenceCitation(evidence=build.evidence, topic="/grader/console"),),
+        hint="run catkin_make in a fresh clone and fix the first error that it prints",
+        citations=(place or cite(build, "/grader/console"),),
     )
 
 
 def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | None:
     """Scripts that are nowhere in the package: their own criteria say so first."""
-    there = {PurePosixPath(f.path).name: f for f in package.files if not is_product(f.path)}
+    there = paths_by_name(package)
     lost = [s for s in scripts if PurePosixPath(s).name not in there]
     if not lost:
         return None
-    near = [there[n].path for s in lost for n in near_names(PurePosixPath(s).name, there)]
+    near = [there[n] for s in lost for n in near_names(PurePosixPath(s).name, there)]
     seen = f"; there is {listed(dict.fromkeys(near))}" if near else ""
     return unjudged(
         f"catkin_make succeeded, but there is no {listed(lost, 'or')} to run{seen}",
@@ -180,28 +194,9 @@ def _paragraph(lines: Sequence[str]) -> str:
 
 
 def _place(error: BuildError | None, package: PackageFacts) -> FileCitation | None:
-    """The error's place if it lies in the package: the longest of the package's paths that ends it."""
-    if error is None or not error.file:
-        return None
-    fits = [f.path for f in package.files if ("/" + error.file).endswith("/" + f.path)]
-    return FileCitation(file=max(fits, key=len), line=error.line) if fits else None
-
-
-NO_PROGRAM = {"IMPORTED", "ALIAS", "EXCLUDE_FROM_ALL"}
-CANNOT_START = {126, 127}
-LOADER = (
-    "error while loading shared libraries",
-    "symbol lookup error",
-    "cannot execute",
-    "Exec format error",
-)
-TELLING = ("[FATAL]", "what():")
-ASTRAY = "run it with rosrun, and look for a pointer or an index that goes astray"
-SAME_NAME = "new node registered with same name"
-LINK = (
-    "name every library in target_link_libraries(<program> ${catkin_LIBRARIES}), and every package in "
-    "find_package(catkin REQUIRED COMPONENTS …)"
-)
+    """Return the error's place if it lies in the package."""
+    path = path_in_package(package, error.file) if error is not None and error.file else None
+    return FileCitation(file=path, line=error.line) if error is not None and path else None
 
 
 class Broken(NamedTuple):
@@ -231,7 +226,7 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
         fine, whatever its exit code, and so are two programs that use the same node name.
 
     How to fix
-        Mend the first error of `catkin_make`. For a program that does not start: `rosrun <package>
+        Fix the first error of `catkin_make`. For a program that does not start: `rosrun <package>
         <program>` shows what is missing; `target_link_libraries(<program> ${catkin_LIBRARIES})` links ROS.
     """
     verdict = judge_build(package, build)
@@ -250,9 +245,7 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
     first = broken[0]
     calls = (made[b.program] for b in broken if b.program in made)
     cited = tuple(FileCitation(file=call.file, line=call.line) for call in calls)
-    start = EvidenceCitation(
-        evidence=run.evidence, topic="/grader/process", from_ns=first.life.start_ns, to_ns=first.life.end_ns
-    )
+    start = cite(run, "/grader/process", first.life.start_ns, first.life.end_ns)
     return failed(
         f"{verdict.message}, but {'; '.join(f'{b.program} does not run: {b.why}' for b in broken)}",
         expected=expected,
@@ -263,16 +256,15 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
 
 
 def _made(package: PackageFacts) -> Iterator[CMakeCall]:
-    """The calls that make programs of sources."""
-    for call in package.cmake.calls if package.cmake else ():
-        if call.name == "add_executable" and len(call.args) > 1 and not NO_PROGRAM & set(call.args[1:3]):
+    """Yield the calls that make programs of sources."""
+    for call in cmake_calls(package, "add_executable"):
+        if len(call.args) > 1 and not NO_PROGRAM & set(call.args[1:3]):
             yield call
 
 
 def _not_started(package: PackageFacts, made: dict[str, CMakeCall]) -> Verdict:
     """No program came out where `rosrun` looks: catkin sets that place in `catkin_package()`."""
-    calls = package.cmake.calls if package.cmake else ()
-    set_at = next((c for c in calls if c.name == "catkin_package"), None)
+    set_at = next(iter(cmake_calls(package, "catkin_package")), None)
     early = [c for c in made.values() if set_at and c.file == set_at.file and c.line < set_at.line]
     if not early:
         message = f"catkin_make succeeded, but no program was started ({listed(made)})"
@@ -295,8 +287,7 @@ def _broken(package: PackageFacts, run: Run, programs: list[Life]) -> Iterator[B
         unloaded = next((mark for mark in LOADER if mark in words), None)
         if one.end.signal is not None or one.end.stopped_by is not None:
             end = explain_end(one, run, package)
-            told = any(mark in words for mark in TELLING)
-            hint = "mend what its last words say" if told else ASTRAY
+            hint = "fix what its last words say" if any(mark in words for mark in TELLING) else ASTRAY
             yield Broken(_name(one), f"{end.cause}{quoted}", hint, one)
         elif unloaded or code in CANNOT_START:
             yield Broken(_name(one), f"it cannot be started (exit code {code}){quoted}", LINK, one)
@@ -318,11 +309,8 @@ def _how_they_went(programs: list[Life]) -> str:
     if not programs:
         return "; the package makes no programs"
     codes = {_name(p): p.end.exit_code for p in programs if p.ended_early and p.end is not None}
-    ended = [
-        f"{name} ends with exit code {code}, perhaps for want of arguments"
-        for name, code in codes.items()
-        if code
-    ]
+    why = "perhaps because it needs arguments"
+    ended = [f"{name} ends with exit code {code}, {why}" for name, code in codes.items() if code]
     return "; ".join([f", and {listed(_name(p) for p in programs)} can be started", *ended])
 
 

@@ -66,7 +66,7 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
         f"{facts.file}: {'; '.join([*_fault(fault), *(message for message, _, _ in wrong)])}",
         expected=expected,
         measured=measured,
-        hint="; ".join(hint for _, hint, _ in wrong) or "mend that line, then run catkin_make",
+        hint="; ".join(hint for _, hint, _ in wrong) or "fix that line, then run catkin_make",
         citations=tuple(dict.fromkeys(lines)),
     )
 
@@ -78,7 +78,7 @@ def _fault(fault: Fault | None) -> Iterator[str]:
 
 
 def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[tuple[str, str, int | None]]:
-    """What is missing or wrong, how to mend it, and the line."""
+    """What is missing or wrong, how to fix it, and the line."""
     wanted = names[0]
     project = _first(facts, "project")
     if project is None:
@@ -114,14 +114,14 @@ class CMakeInstallParams(Record):
 
 
 class Lack(NamedTuple):
-    """Why a script is not installed, how to mend that, and the line; `{}` in both stands for the scripts.
+    """Why a script is not installed, how to fix that, and the line; `{}` in both stands for the scripts.
 
     `path` is where the script lies. `unsure` where only CMake could tell; `follows` where it follows from a missing
     `catkin_package()`, which gives the destination its value.
     """
 
     why: str
-    mend: str
+    fix: str
     line: FileCitation | None
     path: str = ""
     unsure: bool = False
@@ -172,7 +172,7 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
         f"{facts.file}: {'; '.join(_reasons(lacks))}",
         expected=expected,
         measured=measured,
-        hint="; ".join(_mends(lacks)),
+        hint="; ".join(_fixes(lacks)),
         citations=cited or (FileCitation(file=facts.file),),
     )
 
@@ -184,10 +184,10 @@ def _reasons(lacks: dict[str, Lack]) -> Iterator[str]:
         yield why.replace("{}", listed(scripts))
 
 
-def _mends(lacks: dict[str, Lack]) -> Iterator[str]:
+def _fixes(lacks: dict[str, Lack]) -> Iterator[str]:
     """Each repair once, as one line for all scripts that it is true of."""
-    for mend in dict.fromkeys(lack.mend for lack in lacks.values()):
-        yield mend.replace("{}", " ".join(lack.path for lack in lacks.values() if lack.mend == mend))
+    for fix in dict.fromkeys(lack.fix for lack in lacks.values()):
+        yield fix.replace("{}", " ".join(lack.path for lack in lacks.values() if lack.fix == fix))
 
 
 def _lack(package: PackageFacts, all_named: Sequence[Installed], script: str) -> Lack | None:
@@ -234,8 +234,8 @@ def _unnamed(all_named: Sequence[Installed], hits: Sequence[Installed], path: st
     of_python = [one for one in all_named if one.call.name == PYTHON]
     if not of_python:
         why = "no catkin_install_python(…) is called, so nothing installs {}"
-        mend = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN}), without # before it"
-        return Lack(why, mend, None, path)
+        fix = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN}), without # before it"
+        return Lack(why, fix, None, path)
     names = {PurePosixPath(one.path).name: one for one in of_python}
     wanted = PurePosixPath(script).name
     near = [wanted] if wanted in names else list(near_names(wanted, names))

@@ -8,11 +8,11 @@ from typing import Literal
 from grader.checks.registry import check
 from grader.checks.support.nodes import GlobalName, is_called
 from grader.checks.support.text import listed, near_names
-from grader.checks.support.topics import no_node
+from grader.checks.support.topics import cite, no_node
 from grader.evidence.run import Run, is_grader_node
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Verdict, failed, passed
+from grader.model.verdict import Verdict, failed, passed
 
 End = Literal["publisher", "subscriber"]
 ENDS: tuple[End, End] = ("publisher", "subscriber")
@@ -62,7 +62,7 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
         measured=verdict.measured or (f"connections over {listed(over)}" if over else "no connection"),
         citations=(
             *verdict.citations,
-            EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),
+            cite(run, "/grader/graph"),
         ),
     )
 

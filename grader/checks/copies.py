@@ -20,10 +20,11 @@ from grader.checks.support.exit_causes import ended_after, explain_end
 from grader.checks.support.nodes import are_noted, nodes_of
 from grader.checks.support.processes import Life, life, lives
 from grader.checks.support.text import VALUE, in_words, listed, plural
+from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, partial, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, partial, passed, unjudged
 
 SAME_NAME = "new node registered with same name"
 FEW = 2
@@ -86,7 +87,7 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
         or _heard(package, run, trio, params)
     )
     names = dict.fromkeys((*trio.first_nodes, *trio.second_nodes))
-    graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
+    graph = cite(run, "/grader/graph")
     measured = verdict.measured or f"names of the copies: {listed(names) or 'none'}"
     citations = verdict.citations or (graph,)
     return verdict.about(expected=expected, measured=measured, citations=citations)
@@ -146,11 +147,7 @@ def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | No
         return None
     word, one = gone[-1]
     end = explain_end(one, run, package)
-    cited = end.citations or (
-        EvidenceCitation(
-            evidence=run.evidence, topic="/grader/process", from_ns=one.start_ns, to_ns=one.end_ns
-        ),
-    )
+    cited = end.citations or (cite(run, "/grader/process", one.start_ns, one.end_ns),)
     if len(gone) > 1:
         message = f"both copies ended by themselves: {end.cause}"
         return unjudged(message, hint=end.hint, citations=cited)

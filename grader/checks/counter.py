@@ -12,7 +12,6 @@ from grader.checks.support.counters import (
     Step,
     WrapParams,
     Wrong,
-    cite,
     counts,
     first_values,
     judge_wraps,
@@ -20,10 +19,9 @@ from grader.checks.support.counters import (
     longest,
     wrong_steps,
 )
-from grader.checks.support.exit_causes import explain_end
-from grader.checks.support.processes import early_end
+from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.text import listed, number, plural, seconds
-from grader.checks.support.topics import losses
+from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -74,7 +72,7 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
     return _start(first, run, params).about(
         expected=expected,
         measured=first_values(first.values),
-        citations=cite(run, params.topic, first.times_ns[0], first.times_ns[0]),
+        citations=(cite(run, params.topic, first.times_ns[0], first.times_ns[0]),),
     )
 
 
@@ -130,7 +128,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     return verdict.about(
         expected=expected,
         measured=f"{plural(right, 'step')} of +1, {len(wrong)} others; {first_values(count.values)}",
-        citations=cite(run, params.topic, at.from_ns, at.to_ns),
+        citations=(cite(run, params.topic, at.from_ns, at.to_ns),),
     )
 
 
@@ -164,7 +162,7 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
     lowest, highest = number(min(count.values)), number(max(count.values))
     measured = f"{plural(len(count.values), 'value')}, {lowest} to {highest}, {turn}"
     at = (seen.from_ns, seen.to_ns) if seen else (count.times_ns[0], count.times_ns[-1])
-    return verdict.about(expected=expected, measured=measured, citations=cite(run, params.topic, *at))
+    return verdict.about(expected=expected, measured=measured, citations=(cite(run, params.topic, *at),))
 
 
 def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
@@ -174,10 +172,7 @@ def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
     if any(c.messages for c in run.student_channels(topic)):
         hint = "publish the counter itself, as an Int8"
         return unjudged(f"{topic} carries no numbers", measured="no number", hint=hint)
-    ended = early_end(run)
-    cause = f": the node ended ({explain_end(ended, run, package).cause})" if ended else ""
-    hint = f"look at rostopic echo {topic}"
-    return unjudged(f"no message came on {topic}{cause}", measured="no message", hint=hint)
+    return no_message(package, run, topic)
 
 
 def begins_with(first: Count, start: int) -> bool:
@@ -234,8 +229,8 @@ def _usual_fault(usual: float) -> str:
 def _too_few(steps: int, run: Run, package: PackageFacts, params: StepParams) -> Verdict | None:
     if steps >= params.min_steps:
         return None
-    ended = early_end(run)
-    cause = f": the node ended ({explain_end(ended, run, package).cause})" if ended else ""
+    end = explain_early_end(package, run)
+    cause = f": the node ended ({end.cause})" if end else ""
     message = f"only {plural(steps + 1, 'value')} came on {params.topic}{cause}"
     if losses(run, params.topic):
         return inconclusive(message, hint="grade again")

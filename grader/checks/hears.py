@@ -15,13 +15,14 @@ from grader.checks.support.console_output import (
     probes_on,
     text_places,
 )
-from grader.checks.support.exit_causes import explain_end, explain_traceback, process_tracebacks
-from grader.checks.support.processes import early_end, lives
+from grader.checks.support.exit_causes import explain_early_end, explain_error
+from grader.checks.support.processes import lives, not_started
 from grader.checks.support.text import VALUE, in_words, listed, near_names, number, plural, shown
+from grader.checks.support.topics import cite, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 
 
 class HearsParams(Record):
@@ -78,9 +79,7 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
     else:
         verdict = passed(f"prints each of the {len(probes)} messages on {params.topic}")
     first, last = (missing[0], missing[-1]) if missing else (probes[0], probes[-1])
-    sent = EvidenceCitation(
-        evidence=run.evidence, topic="/grader/actor", from_ns=first.at_ns, to_ns=last.at_ns
-    )
+    sent = cite(run, "/grader/actor", first.at_ns, last.at_ns)
     return verdict.about(
         expected=expected,
         measured=f"{len(probes) - len(missing)} of {plural(len(probes), 'message')} printed",
@@ -126,39 +125,22 @@ CALLBACK_HINT = (
 def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
     """The grader sends when the node has subscribed; it never did, or it was not there."""
     if not lives(run):
-        return unjudged(
-            "the listener was not started: there is no script to run", measured="not started", hint=HAND_IN
-        )
-    ended = early_end(run)
-    if ended is not None:
-        end = explain_end(ended, run, package)
+        return not_started("the listener").about(measured="not started")
+    if end := explain_early_end(package, run):
         message = f"the node ended before it subscribed to {topic}: {end.cause}"
-        return unjudged(message, hint=end.hint, citations=end.citations, measured="ended")
-    subscribed = student_subscriptions(run)
-    cite = (EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),)
+        return end.verdict(unjudged, message, measured="ended")
+    subscribed = topics_with(run, "subscribers")
     measured = f"subscribed to {listed(subscribed)}" if subscribed else "no subscription"
-    if differs := _types_differ(run, topic):
-        return differs.about(measured=measured, citations=cite)
-    if topic in subscribed:
+    verdict = _types_differ(run, topic)
+    if verdict is None and topic in subscribed:
         message = f"the node subscribed to {topic}, but the grader sent nothing"
-        return inconclusive(message, hint="grade again", measured=measured, citations=cite)
-    near = near_names(topic, subscribed)
-    other = f"; it subscribes to {listed(near or subscribed)}" if subscribed else ""
-    hint = f"add rospy.Subscriber('{topic}', …, callback)"
-    return failed(
-        f"the node never subscribes to {topic}{other}", hint=hint, measured=measured, citations=cite
-    )
-
-
-def student_subscriptions(run: Run) -> tuple[str, ...]:
-    """Topics that a node of the student's ever subscribed to."""
-    found = (
-        topic
-        for _, event in run.graph
-        for topic, nodes in event.subscribers.items()
-        if any(run.is_student_node(n) for n in nodes)
-    )
-    return tuple(dict.fromkeys(found))
+        verdict = inconclusive(message, hint="grade again")
+    elif verdict is None:
+        near = near_names(topic, subscribed)
+        other = f"; it subscribes to {listed(near or subscribed)}" if subscribed else ""
+        hint = f"add rospy.Subscriber('{topic}', …, callback)"
+        verdict = failed(f"the node never subscribes to {topic}{other}", hint=hint)
+    return verdict.about(measured=measured, citations=(cite(run, "/grader/graph"),))
 
 
 def not_printed(
@@ -175,17 +157,11 @@ def not_printed(
 
 def _broken(package: PackageFacts, run: Run) -> Verdict | None:
     """An error in the callback, which rospy reports and outlives, or the node's end."""
-    found = [t for one in lives(run) for t in process_tracebacks(run, one.name, before_ns=one.interrupt_ns)]
-    ended = early_end(run)
-    if ended is not None:
-        end = explain_end(ended, run, package)
-        message = f"the node ended before it had printed everything: {end.cause}"
-    elif found:
-        end = explain_traceback(found[-1], package)
-        message = f"an error stops the node from printing: {end.cause}"
-    else:
-        return None
-    return failed(message, hint=end.hint, citations=end.citations)
+    if end := explain_early_end(package, run):
+        return end.verdict(failed, f"the node ended before it had printed everything: {end.cause}")
+    if end := explain_error(package, run):
+        return end.verdict(failed, f"an error stops the node from printing: {end.cause}")
+    return None
 
 
 def _types_differ(run: Run, topic: str) -> Verdict | None:

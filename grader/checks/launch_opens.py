@@ -25,12 +25,12 @@ from grader.checks.support.launch import (
 )
 from grader.checks.support.scripts import find_script
 from grader.checks.support.text import bare, listed, shown
+from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.verdict import (
     Citation,
-    EvidenceCitation,
     FileCitation,
     Status,
     Verdict,
@@ -98,7 +98,7 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
     )
     cited: tuple[Citation, ...] = (
         FileCitation(file=file.path, line=1),
-        EvidenceCitation(evidence=run.evidence, topic="/grader/actor"),
+        cite(run, "/grader/actor"),
     )
     return verdict.about(expected=expected, measured=measured, citations=verdict.citations or cited)
 
@@ -159,9 +159,7 @@ def _page(package: PackageFacts, file: LaunchFile, run: Run, params: OpensParams
     mine = [p for p in pages if _is_program(p.program, params)]
     if _url(mine, params):
         return None
-    cited = tuple(
-        EvidenceCitation(evidence=run.evidence, topic="/grader/actor", from_ns=p.at_ns) for p in pages[:1]
-    )
+    cited = tuple(cite(run, "/grader/actor", p.at_ns) for p in pages[:1])
     hint = f"write {params.program} {params.urls[0]} in the script"
     if not mine and _url(pages, params):
         message = f"the page is opened in {listed(p.program for p in pages)}, not in {params.program}"

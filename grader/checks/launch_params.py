@@ -28,6 +28,7 @@ from grader.checks.support.launch import (
 from grader.checks.support.parameters import absolute, instead, is_printed, own, tree
 from grader.checks.support.scripts import find_script
 from grader.checks.support.text import listed, number, shown
+from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchLoad, LaunchNode, PackageFacts
 from grader.model.record import Record
@@ -83,8 +84,7 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
     return verdict.about(
         expected=expected,
         measured=f"on the server: {listed(found) or 'nothing'}",
-        citations=verdict.citations
-        or (*cited, EvidenceCitation(evidence=run.evidence, topic="/grader/param")),
+        citations=verdict.citations or (*cited, cite(run, "/grader/param")),
     )
 
 
@@ -163,7 +163,7 @@ def _loaded_otherwise(run: Run, params: LaunchLoadsParams, loads: list[LaunchLoa
         message = f"{missing} is set only after the node has started"
         return failed(message, hint=OUTSIDE.format(params.file))
     message = f"{params.file} is loaded, but {instead(found, missing)}"
-    return unjudged(message, hint=f"mend the names in {params.file}")
+    return unjudged(message, hint=f"fix the names in {params.file}")
 
 
 def _refused(file: LaunchFile, run: Run, params: LaunchLoadsParams, absence: Absence) -> Verdict:
@@ -286,4 +286,4 @@ def _lines(file: LaunchFile, wanted: Wanted) -> tuple[FileCitation, ...]:
 
 
 def _evidence(run: Run) -> EvidenceCitation:
-    return EvidenceCitation(evidence=run.evidence, topic="/grader/param")
+    return cite(run, "/grader/param")

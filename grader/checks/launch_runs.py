@@ -29,13 +29,13 @@ from grader.checks.support.launch import (
 )
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.text import listed, near_names, plural
+from grader.checks.support.topics import cite
 from grader.evidence.events import GraphEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import (
     Citation,
-    EvidenceCitation,
     FileCitation,
     Verdict,
     failed,
@@ -88,7 +88,7 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
     measured = f"{plural(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node came up"
     if file is None or file.fault:
         measured = "no launch file that can be read"
-    graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
+    graph = cite(run, "/grader/graph")
     return verdict.about(expected=expected, measured=measured, citations=verdict.citations or (*place, graph))
 
 
@@ -233,7 +233,7 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
         return verdict.about(expected=expected, measured="no launch file that can be read")
     verdict = not_run(run) or _unnamed(package, file, params) or _judged(package, file, run, params)
     place: tuple[Citation, ...] = (FileCitation(file=file.path, line=1),)
-    graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
+    graph = cite(run, "/grader/graph")
     citations = verdict.citations or (*place, graph)
     return verdict.about(expected=expected, measured=measured, citations=citations)
 

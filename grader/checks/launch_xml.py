@@ -151,7 +151,7 @@ def _advice(package: PackageFacts, file: LaunchFile) -> str:
     slip = next(filter(None, (node_slip(package, node) for node in file.brings)), None)
     if slip is None:
         slip = next(filter(None, map(illegal_name, file.brings)), None)
-    return f"{slip.file}, line {slip.line}: {slip.why}; {slip.mend}" if slip else ""
+    return f"{slip.file}, line {slip.line}: {slip.why}; {slip.fix}" if slip else ""
 
 
 def _shown(node: LaunchNode) -> str:

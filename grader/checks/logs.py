@@ -14,10 +14,11 @@ from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.nodes import nodes_of
 from grader.checks.support.processes import early_end, life, lives
 from grader.checks.support.text import listed, plural, shown
+from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 
 ALIKE = 0.7
 
@@ -70,8 +71,8 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
         f"{plural(len(lines), 'log message')}{': ' if seen else ''}{seen}{', …' if len(lines) > 3 else ''}"
     )
     times = (right.at_ns, right.at_ns) if right else (None, None)
-    cite = EvidenceCitation(evidence=run.evidence, topic="/rosout", from_ns=times[0], to_ns=times[1])
-    citations = verdict.citations or (cite,)
+    cited = cite(run, "/rosout", times[0], times[1])
+    citations = verdict.citations or (cited,)
     return verdict.about(expected=expected, measured=measured, citations=citations)
 
 

@@ -105,7 +105,7 @@ def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
     expected = f"{listed(params.names)} at run time"
     if found is None:
         message = "package.xml cannot be read, so its dependencies are not known"
-        return unjudged(message, expected=expected, hint="first mend package.xml")
+        return unjudged(message, expected=expected, hint="first fix package.xml")
     if lacking := _lacking(found, params.names):
         return lacking.about(expected=expected)
     message = f"{found.file} declares {listed(params.names)}"
@@ -134,7 +134,7 @@ def maintainer(package: PackageFacts) -> Verdict:
     found = package.manifest
     if found is None:
         message = "package.xml cannot be read, so its maintainer is not known"
-        return unjudged(message, expected=expected, measured="not known", hint="first mend package.xml")
+        return unjudged(message, expected=expected, measured="not known", hint="first fix package.xml")
     people = found.maintainers
     measured = listed(shown(p.email) for p in people) or "no maintainer"
     left = [p for p in people if p.email.strip().casefold().endswith(LEFT_AS_MADE)]

@@ -1,4 +1,4 @@
-"""Whether messages say what they should, and tell the time."""
+"""Whether messages say what they should, tell the time, and keep within bounds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from grader.checks.registry import check
 from grader.checks.support.clocks import GET_TIME, WATCHED_S, clocks_at, wrong_growth
-from grader.checks.support.exit_causes import explain_end
+from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.nodes import GlobalName, plain_type
 from grader.checks.support.processes import early_end, is_flood, observed_until_ns
 from grader.checks.support.text import (
@@ -23,11 +23,11 @@ from grader.checks.support.text import (
     plural,
     seconds,
 )
-from grader.checks.support.topics import FieldPath, NoField, all_lost, losses, no_message, values_at
+from grader.checks.support.topics import FieldPath, NoField, cite, losses, no_message, values_at
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 
 ENOUGH = 3
 UNFILLED = ("%s", "%d", "%f", "{}", "{0}")
@@ -74,12 +74,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
         or passed(f"all {count} messages on {params.topic} are '{in_words(params.template)}'{grows}")
     )
     measured = f"{in_one_line(heard[0].data[0])!r} to {in_one_line(heard[0].data[-1])!r} ({plural(count, 'message')})"
-    span = EvidenceCitation(
-        evidence=run.evidence,
-        topic=params.topic,
-        from_ns=min(c.times_ns[0] for c in heard),
-        to_ns=max(c.times_ns[-1] for c in heard),
-    )
+    span = cite(run, params.topic, min(c.times_ns[0] for c in heard), max(c.times_ns[-1] for c in heard))
     citations = verdict.citations or (span,)
     return verdict.about(expected=expected, measured=measured, citations=citations)
 
@@ -88,15 +83,7 @@ def _no_text(package: PackageFacts, run: Run, heard: Sequence[Channel], params: 
     if heard:
         message = f"{params.topic} carries {heard[0].type}, and no text that could be compared"
         return unjudged(message, hint="publish std_msgs/String", measured=heard[0].type)
-    if lost := all_lost(run, params.topic):
-        return lost
-    ended = early_end(run)
-    if ended is not None:
-        end = explain_end(ended, run, package)
-        message = f"nothing came on {params.topic}: the node ended before ({end.cause})"
-        return unjudged(message, hint=end.hint, measured="no message", citations=end.citations)
-    hint = f"first publish on {params.topic}: rostopic echo {params.topic} shows what comes"
-    return unjudged(f"nothing came on {params.topic}", hint=hint, measured="no message")
+    return no_message(package, run, params.topic)
 
 
 def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdict | None:
@@ -123,7 +110,7 @@ def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdic
         message = f"a message says {part!r} where the time in seconds belongs: {in_one_line(text)!r}, not '{wanted}'"
     else:
         message = f"a message reads {in_one_line(text)!r}, not '{wanted}'"
-    cited = EvidenceCitation(evidence=run.evidence, topic=params.topic, from_ns=at_ns, to_ns=at_ns)
+    cited = cite(run, params.topic, at_ns, at_ns)
     value = " % rospy.get_time()" if SECONDS in params.template else ""
     return failed(message, hint=f'publish "{form}"{value}', citations=(cited,))
 
@@ -168,11 +155,9 @@ def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: 
     few = f"only {plural(sum(len(c.messages) for c in heard), 'message')} came on {params.topic}"
     if losses(run, params.topic):
         return inconclusive(f"{few}: too few to see the time grow", hint="grade again")
-    ended = early_end(run)
-    if ended is not None:
-        end = explain_end(ended, run, package)
+    if end := explain_early_end(package, run):
         message = f"{few} before the node ended ({end.cause}): too few to see the time grow"
-        return unjudged(message, hint=end.hint, citations=end.citations)
+        return end.verdict(unjudged, message)
     if _watched_ns(run, heard) >= WATCHED_S * 1e9:
         return unjudged(f"{few}: too few to see the time grow", hint=f"publish in the loop; {GET_TIME}")
     return inconclusive(f"{few} while it was watched: too few to see the time grow", hint="grade again")
@@ -268,7 +253,7 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
         measured=verdict.measured or _range(usable),
         citations=(
             *verdict.citations,
-            EvidenceCitation(evidence=run.evidence, topic=params.topic, **span),
+            cite(run, params.topic, **span),
         ),
     )
 

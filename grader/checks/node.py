@@ -25,6 +25,7 @@ from grader.checks.support.nodes import (
 )
 from grader.checks.support.processes import Life, fell_silent, is_flood, life, lives, was_talking
 from grader.checks.support.text import listed, plural, seconds
+from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -129,11 +130,11 @@ def node_name(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
     expected = wanted_names(params.names, params.anonymous)
     if not nodes:
         return _nameless(package, run, params).about(expected=expected)
-    cite = (EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),)
+    cited = (cite(run, "/grader/graph"),)
     measured = listed(nodes)
     wrong = _misnamed(nodes, params)
     verdict = wrong or passed(f"the node is {_fitting(nodes, params)[0]}")
-    return verdict.about(expected=expected, measured=measured, citations=cite)
+    return verdict.about(expected=expected, measured=measured, citations=cited)
 
 
 def _nameless(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdict:
@@ -229,7 +230,7 @@ def _locked_up(one: Life, run: Run) -> Verdict | None:
 
 def _process_citation(one: Life, run: Run) -> EvidenceCitation:
     span = {"from_ns": one.start_ns, "to_ns": one.end_ns}
-    return EvidenceCitation(evidence=run.evidence, topic="/grader/process", **span)
+    return cite(run, "/grader/process", **span)
 
 
 def _script(one: Life) -> str:

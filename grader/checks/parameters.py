@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any
 
-from grader.checks.hears import HAND_IN
 from grader.checks.registry import check
 from grader.checks.support.console_output import printed_lines
 from grader.checks.support.nodes import GlobalName
@@ -21,17 +20,17 @@ from grader.checks.support.parameters import (
     own,
     tree,
 )
+from grader.checks.support.processes import NO_SCRIPT_HINT as HAND_IN
 from grader.checks.support.processes import Life, life, lives
 from grader.checks.support.scripts import find_script
 from grader.checks.support.text import listed, near_names, plural, shown
-from grader.checks.support.topics import no_node
+from grader.checks.support.topics import cite, no_node
 from grader.checks.support.values import differences, value_text
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import (
     Citation,
-    EvidenceCitation,
     FileCitation,
     Verdict,
     failed,
@@ -88,7 +87,7 @@ def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -
             )
         )
     measured = f"on the server: {listed(found)}" if found else "nothing on the server"
-    cited: tuple[Citation, ...] = (EvidenceCitation(evidence=run.evidence, topic="/grader/param"),)
+    cited: tuple[Citation, ...] = (cite(run, "/grader/param"),)
     place = (FileCitation(file=source.path),) if source and not verdict.citations else ()
     return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, *place, *cited))
 
@@ -192,9 +191,9 @@ def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadP
         if missing
         else passed(f"prints the values of {listed(params.names)} that are on the server")
     )
-    cite = EvidenceCitation(evidence=run.evidence, topic="/grader/console")
+    cited = cite(run, "/grader/console")
     measured = f"{len(params.names) - len(missing)} of {plural(len(params.names), 'value')} printed"
-    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cite))
+    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cited))
 
 
 def _not_printed(
@@ -211,7 +210,7 @@ def _not_printed(
     if strange:
         file = params.file or "the student's file"
         message = f"{names} {_are(missing)} not printed, and {listed(strange)} {_are(strange)} not in {file}"
-        return unjudged(message, hint=f"mend the names in {file} first")
+        return unjudged(message, hint=f"fix the names in {file} first")
     lines = printed_lines(run)
     hard = next(
         (n for n in missing if any(is_printed(v, lines) for v in _in_file(build, params.file, n))), None
@@ -281,9 +280,9 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
         or _not_logged(run, params)
         or passed(f"sets {params.name} to {params.value}{' and logs it' if params.logged else ''}")
     )
-    cite = EvidenceCitation(evidence=run.evidence, topic="/grader/param")
+    cited = cite(run, "/grader/param")
     measured = f"{params.name}: {'not there' if got is None else shown(str(got))}"
-    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cite))
+    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cited))
 
 
 def _is_value(got: object, wanted: object) -> bool:
@@ -389,11 +388,11 @@ def param_value(package: PackageFacts, run: Run, params: ParamValueParams) -> Ve
     held = tree(run, until_ns=_until_ns(run))
     got = _held(held, absolute(params.name))
     verdict = _not_there(package, run, own(held), params) if got is MISSING else _judged(got, params)
-    cite = EvidenceCitation(evidence=run.evidence, topic="/grader/param")
+    cited = cite(run, "/grader/param")
     return verdict.about(
         expected=f"{params.name}: {shown(value_text(params.value))}",
         measured=verdict.measured or ("not set" if got is MISSING else shown(value_text(got))),
-        citations=(*verdict.citations, cite),
+        citations=(*verdict.citations, cited),
     )
 
 

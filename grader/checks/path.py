@@ -25,11 +25,11 @@ from grader.checks.support.geometry import (
 from grader.checks.support.lateness import NO_EXCUSE, Lateness, lateness
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.text import listed, number
-from grader.checks.support.topics import no_message
+from grader.checks.support.topics import cite, no_message
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 
 LATE_MS = 25.0
 LATE_P95_MS = 5.0
@@ -101,7 +101,7 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
         verdict = failed(f"the messages on {params.topic} {found.fault}", measured=found.fault, hint=hint)
     else:
         verdict = _judged(found, run, params)
-    span = EvidenceCitation(evidence=run.evidence, topic=params.topic)
+    span = cite(run, params.topic)
     return verdict.about(
         expected=f"a way through {listed(map(spot, params.points))}, within {metres(params.tolerance_m)}",
         measured=verdict.measured or "no path",

@@ -9,18 +9,17 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.exit_causes import explain_end
+from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.lateness import NO_EXCUSE, Lateness, lateness
-from grader.checks.support.processes import early_end, observed_until_ns
+from grader.checks.support.processes import observed_until_ns
 from grader.checks.support.text import hertz, number, plural, seconds
-from grader.checks.support.topics import all_lost, whole_until_ns
+from grader.checks.support.topics import cite, no_message, whole_until_ns
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import (
     Citation,
-    EvidenceCitation,
     FileCitation,
     Verdict,
     failed,
@@ -115,18 +114,14 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         return inconclusive(message, expected=expected, hint="give the criterion a scenario with clock: real")
     found = judged_rhythm(run, params, run.student_channels(params.topic))
     if found is None:
-        message, hint = f"no message came on {params.topic}", f"look at rostopic hz {params.topic}"
-        absent = unjudged(message, measured="no message", hint=hint)
-        return (all_lost(run, params.topic) or absent).about(expected=expected)
+        return no_message(package, run, params.topic).about(expected=expected)
     verdict = (
         _flood(found, package, params)
         or _short(found, run, package, params)
         or _excused(_uneven(found, params), found, run, params)
         or passed(f"{params.topic} has {hertz(found.mean_hz)}, evenly")
     )
-    span = EvidenceCitation(
-        evidence=run.evidence, topic=params.topic, from_ns=found.times_ns[0], to_ns=found.times_ns[-1]
-    )
+    span = cite(run, params.topic, found.times_ns[0], found.times_ns[-1])
     citations: tuple[Citation, ...] = (*verdict.citations, span)
     return verdict.about(expected=expected, measured=_measured(found, run, params), citations=citations)
 
@@ -160,12 +155,9 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     """Too little was seen to speak of a rate."""
     if found.span_ns >= params.min_window_s * 1e9 * (1 - ROUNDING):
         return None
-    ended = early_end(run)
     seen = f"{plural(len(found.times_ns), 'message')} in {seconds(found.span_ns)}"
-    if ended is not None:
-        end = explain_end(ended, run, package)
-        message = f"only {seen} on {params.topic}: the node ended ({end.cause})"
-        return unjudged(message, hint=end.hint, citations=end.citations)
+    if end := explain_early_end(package, run):
+        return end.verdict(unjudged, f"only {seen} on {params.topic}: the node ended ({end.cause})")
     message = f"only {seen} on {params.topic}, a rate needs {params.min_window_s:g} s"
     return inconclusive(message, hint="record for longer" if run.foreign else "grade again")
 

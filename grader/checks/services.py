@@ -11,8 +11,9 @@ from pydantic import Field
 from grader.checks.registry import check
 from grader.checks.support.exit_causes import HEADING, Traceback, explain_end, explain_traceback, tracebacks
 from grader.checks.support.nodes import GlobalName, TypeName, plain_type
+from grader.checks.support.processes import life_of
 from grader.checks.support.text import listed, near_names, plural, shown
-from grader.checks.support.topics import life_of, no_node
+from grader.checks.support.topics import cite, no_node
 from grader.checks.support.values import differences, fields_text
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -62,11 +63,11 @@ def service(package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
     verdict = (
         not_offered(package, run, params.service) if offer is None else _judged(offer, package, run, params)
     )
-    cite = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
+    cited = cite(run, "/grader/graph")
     return verdict.about(
         expected=f"{params.service} of type {params.type}",
         measured=verdict.measured or described(found),
-        citations=(*verdict.citations, cite),
+        citations=(*verdict.citations, cited),
     )
 
 
@@ -169,7 +170,7 @@ def _measured(one: Exchange | None) -> str:
 
 def _citation(one: Exchange | None, run: Run) -> EvidenceCitation:
     span = {"from_ns": one.at_ns, "to_ns": one.answered_ns} if one else {}
-    return EvidenceCitation(evidence=run.evidence, topic="/grader/actor", **span)
+    return cite(run, "/grader/actor", **span)
 
 
 LOGGERS = ("/get_loggers", "/set_logger_level")

@@ -1,17 +1,15 @@
-"""Whether a topic is there and carries what it should."""
+"""Whether topics are there, have the right type, are latched, and are no others than those of the lab."""
 
 from __future__ import annotations
 
 from grader.checks.registry import check
-from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.nodes import GlobalName, plain_type
-from grader.checks.support.processes import early_end
 from grader.checks.support.text import listed, near_names, plural
-from grader.checks.support.topics import SYSTEM_TOPICS, all_lost, no_message, no_node, published_topics
+from grader.checks.support.topics import cite, no_message, no_node, nodes_on, published_topics
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Citation, Verdict, failed, inconclusive, passed
 
 
 class TopicTypeParams(Record):
@@ -47,27 +45,19 @@ def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verd
     if wrong:
         verdict = _wrong_type(wrong[0], params)
     elif not heard:
-        silent = _not_recorded(run, params.topic) if run.foreign else _silent(package, run, params)
-        verdict = all_lost(run, params.topic) or silent
+        verdict = no_message(package, run, params.topic, of_node=failed)
     else:
-        count = sum(len(c.messages) for c in heard)
+        count = plural(sum(len(c.messages) for c in heard), "message")
         publishers = listed(dict.fromkeys(c.publisher for c in heard))
-        verdict = passed(
-            f"{publishers} publishes {params.type} on {params.topic} ({plural(count, 'message')})"
-        )
-    expected = f"{params.type} on {params.topic}"
+        verdict = passed(f"{publishers} publishes {params.type} on {params.topic} ({count})")
     measured = listed(f"{plain_type(c.type)} by {c.publisher}" for c in channels) or _listed_topics(run)
-    return verdict.about(expected=expected, measured=measured, citations=_cite(run, channels))
-
-
-def _student_topics(run: Run) -> dict[str, str]:
-    """Topics that the student's nodes publish on, with their types; those of every ROS system left out."""
-    return {c.topic: plain_type(c.type) for c in run.student_channels() if c.topic not in SYSTEM_TOPICS}
+    expected = f"{params.type} on {params.topic}"
+    return verdict.about(expected=expected, measured=measured, citations=_cited(run, channels))
 
 
 def _listed_topics(run: Run) -> str:
-    topics = _student_topics(run)
-    return f"topics: {listed(f'{t} ({k})' for t, k in topics.items())}" if topics else "no topic"
+    topics = published_topics(run).items()
+    return f"topics: {listed(f'{t} ({kind})' if kind else t for t, kind in topics)}" if topics else "no topic"
 
 
 def _wrong_type(channel: Channel, params: TopicTypeParams) -> Verdict:
@@ -77,48 +67,11 @@ def _wrong_type(channel: Channel, params: TopicTypeParams) -> Verdict:
     return failed(message, hint=hint)
 
 
-def _silent(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verdict:
-    """No message came: a slip in the name, the node's early end, the recorder, or its own silence."""
-    advertised = bool(run.student_channels(params.topic))
-    others = _student_topics(run)
-    near = near_names(params.topic, others)
-    if near and not advertised:
-        message = f"there is no {params.topic}; the node publishes on {listed(near)}"
-        return failed(message, hint=f"name the topic {params.topic} in rospy.Publisher(…)")
-    ended = early_end(run)
-    if ended is not None:
-        end = explain_end(ended, run, package)
-        return unjudged(f"nothing came on {params.topic}: the node ended before ({end.cause})", hint=end.hint)
-    refused = [e for _, e in run.recorder if e.topic == params.topic and e.event in {"refused", "invalid"}]
-    if refused and not advertised:
-        message = f"the recorder could not listen to {params.topic}: {refused[0].detail or refused[0].event}"
-        return inconclusive(message, hint="grade again")
-    if advertised:
-        message = f"{params.topic} is advertised, but no message ever came"
-        return failed(message, hint="call publish(…) inside the loop `while not rospy.is_shutdown():`")
-    if not run.student_nodes():
-        hint = f"run the node, and look at rostopic info {params.topic}"
-        return unjudged(f"nothing came on {params.topic}: no node was there to publish", hint=hint)
-    message = f"no node publishes on {params.topic}"
-    only = f"it publishes on {listed(others)}; " if others else ""
-    return failed(message, hint=f"{only}add rospy.Publisher('{params.topic}', …) and publish in the loop")
-
-
-def _not_recorded(run: Run, topic: str) -> Verdict:
-    """Another tool's recording does not tell whether the topic was silent or only not recorded."""
-    near = near_names(topic, _student_topics(run))
-    instead = f"; {listed(near)} is" if near else ""
-    hint = f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all topics"
-    return unjudged(f"{topic} is not in {run.evidence}{instead}", hint=hint)
-
-
-def _cite(run: Run, channels: tuple[Channel, ...]) -> tuple[EvidenceCitation, ...]:
+def _cited(run: Run, channels: tuple[Channel, ...]) -> tuple[Citation, ...]:
     times = sorted(t for c in channels for t in c.times_ns[:1] + c.times_ns[-1:])
-    if not times:
-        graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
-        return () if run.foreign else (graph,)
-    cite = EvidenceCitation(evidence=run.evidence, topic=channels[0].topic, from_ns=times[0], to_ns=times[-1])
-    return (cite,)
+    if times:
+        return (cite(run, channels[0].topic, times[0], times[-1]),)
+    return () if run.foreign else (cite(run, "/grader/graph"),)
 
 
 class OnlyTopicsParams(Record):
@@ -163,7 +116,7 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
         measured=verdict.measured or listed(published) or "no topic",
         citations=(
             *verdict.citations,
-            EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),
+            cite(run, "/grader/graph"),
         ),
     )
 
@@ -174,15 +127,14 @@ def _unexpected(
     first = unexpected[0]
     missing = [t for t in params.topics if t not in published and not t.endswith("*")]
     meant = near_names(first, missing)
-    named = listed(f"{t} ({plain_type(published[t])})" if published[t] else t for t in unexpected)
+    named = listed(f"{t} ({published[t]})" if published[t] else t for t in unexpected)
     message = f"{_publisher(run, first)} publishes on {named}, which the lab does not ask for"
     hint = f"did you mean {meant[0]}?" if meant else f"remove the rospy.Publisher('{first}', …)"
     return failed(message, hint=hint)
 
 
 def _publisher(run: Run, topic: str) -> str:
-    by_graph = (n for _, e in run.graph for n in e.publishers.get(topic, ()) if run.is_student_node(n))
-    return next(by_graph, None) or run.student_channels(topic)[0].callerid
+    return next(iter(nodes_on(run, topic, "publishers")), "") or run.student_channels(topic)[0].callerid
 
 
 class LatchedParams(Record):
@@ -227,5 +179,5 @@ def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
     return verdict.about(
         expected=f"a latched publisher on {params.topic}",
         measured=verdict.measured or kinds,
-        citations=(*verdict.citations, EvidenceCitation(evidence=run.evidence, topic=topic)),
+        citations=(*verdict.citations, cite(run, topic)),
     )

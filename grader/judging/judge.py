@@ -97,7 +97,7 @@ def settled(
     if blocking is not None:
         root = roots[criterion.id] = roots.get(blocking, blocking)
         message = f"blocked by {root}: {verdicts[root].message}"
-        update = {"status": Status.BLOCKED, "message": message, "hint": f"mend {root} first"}
+        update = {"status": Status.BLOCKED, "message": message, "hint": f"fix {root} first"}
         return verdict.model_copy(update=update)
     unsettled = next((r for r in criterion.requires if verdicts[r].status in OPEN), None)
     if unsettled is not None:

@@ -18,7 +18,7 @@ from grader.checks.support.topics import losses, whole_until_ns
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 
 FLOOD_FACTOR = 3
 SYSTEMATIC_SHARE = 0.05
@@ -153,10 +153,6 @@ def counts(run: Run, topic: str) -> tuple[Count, ...]:
 
 def longest(run: Run, topic: str) -> Count | None:
     return max(counts(run, topic), key=lambda c: len(c.values), default=None)
-
-
-def cite(run: Run, topic: str, from_ns: int, to_ns: int) -> tuple[EvidenceCitation, ...]:
-    return (EvidenceCitation(evidence=run.evidence, topic=topic, from_ns=from_ns, to_ns=to_ns),)
 
 
 def _count(channel: Channel, until_ns: int | None) -> Count | None:

@@ -25,14 +25,14 @@ class Slip(NamedTuple):
     file: str
     line: int
     why: str
-    mend: str
+    fix: str
     of_manifest: bool = False
 
     def verdict(self, said: str = "") -> Verdict:
         """`said` is appended: what roslaunch says to it."""
         cited = (FileCitation(file=self.file, line=self.line),)
         message = f"{self.file}, line {self.line}: {self.why}{said}"
-        return (unjudged if self.of_manifest else failed)(message, hint=self.mend, citations=cited)
+        return (unjudged if self.of_manifest else failed)(message, hint=self.fix, citations=cited)
 
 
 def find_launch(package: PackageFacts, name: str) -> LaunchFile | None:
@@ -120,8 +120,8 @@ def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
         if slip is not None and slip.why.startswith("<node> has no"):
             yield slip
         elif "/" in (node.name or ""):
-            mend = f'write name="{PurePosixPath(str(node.name)).name}"; a namespace goes into ns="…"'
-            yield _slip(node, f'name="{node.name}" has a slash in it, which roslaunch refuses', mend)
+            fix = f'write name="{PurePosixPath(str(node.name)).name}"; a namespace goes into ns="…"'
+            yield _slip(node, f'name="{node.name}" has a slash in it, which roslaunch refuses', fix)
         elif node.full_name in seen and not node.uncertain:
             why = f"a second node is named {node.full_name}, like that of line {seen[node.full_name].line}"
             yield _slip(node, why, "give each <node> a name of its own: roslaunch refuses the file")
@@ -173,8 +173,8 @@ def _folder(package: PackageFacts) -> str:
     return name if name != package.name else ""
 
 
-def _slip(node: LaunchNode, why: str, mend: str) -> Slip:
-    return Slip(node.file, node.line, why, mend)
+def _slip(node: LaunchNode, why: str, fix: str) -> Slip:
+    return Slip(node.file, node.line, why, fix)
 
 
 _ERRORS = (
@@ -313,7 +313,7 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
     if script is not None and script.python_fault is not None:
         fault = script.python_fault
         place = (FileCitation(file=script.path, line=fault.line),)
-        hint = CAUSES.get(fault.kind, ("", "mend that line"))[1]
+        hint = CAUSES.get(fault.kind, ("", "fix that line"))[1]
         return Absence(f"it died: {fault.kind}: {fault.message}", hint, of_script=True, citations=place)
     hint = 'write output="screen" into the <node>, and read what it prints last'
     return Absence(f"it died with exit code {code}", hint, of_script=True)

@@ -1,34 +1,67 @@
-"""Why what a check looks for is not there at all."""
+"""Topics of a run: who is on them, why no message came, what the recorder lost, fields of messages by their path."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Annotated, Any
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator
 
-from grader.checks.hears import HAND_IN
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end
-from grader.checks.support.processes import Life, early_end, life, lives
+from grader.checks.support.nodes import plain_type
+from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives
 from grader.checks.support.text import listed, near_names, plural
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Status, Verdict, inconclusive, unjudged
+from grader.model.verdict import EvidenceCitation, Status, Verdict, inconclusive, unjudged
 
 SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
+End = Literal["publishers", "subscribers"]
+LOGGED = frozenset({"logs", "hears"})
+"""Checks that also read what is logged."""
+TAKEN = {Status.FAIL, Status.PARTIAL}
+_STEP = r"[A-Za-z]\w*(?:\[(?:\d+|\*)\])*"
+_PARTS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
+
+
+def cite(run: Run, topic: str, from_ns: int | None = None, to_ns: int | None = None) -> EvidenceCitation:
+    """Return a stretch of the run's evidence on one topic, or the whole topic."""
+    return EvidenceCitation(evidence=run.evidence, topic=topic, from_ns=from_ns, to_ns=to_ns)
+
+
+def nodes_on(run: Run, topic: str, end: End, fits: Callable[[str], bool] | None = None) -> tuple[str, ...]:
+    """Return the nodes that were ever at this end of a topic: the student's, or those that `fits` accepts."""
+    wanted = fits or run.is_student_node
+    found = (n for _, event in run.graph for n in getattr(event, end).get(topic, ()) if wanted(n))
+    return tuple(dict.fromkeys(found))
+
+
+def topics_with(run: Run, end: End, fits: Callable[[str], bool] | None = None) -> tuple[str, ...]:
+    """Return the topics with such a node at this end; `/rosout` is left out."""
+    topics = dict.fromkeys(topic for _, event in run.graph for topic in getattr(event, end))
+    return tuple(topic for topic in topics if topic != "/rosout" and nodes_on(run, topic, end, fits))
+
+
+def published_topics(run: Run) -> dict[str, str]:
+    """Return every topic on which a node of the student's publishes or could, with its type; no system topics."""
+    found = {c.topic: plain_type(c.type) for c in run.student_channels()}
+    for _, event in run.graph:
+        for topic, nodes in event.publishers.items():
+            if any(run.is_student_node(n) for n in nodes):
+                found.setdefault(topic, plain_type(event.topic_types.get(topic, "")))
+    return {topic: kind for topic, kind in found.items() if topic not in SYSTEM_TOPICS}
 
 
 def no_node(package: PackageFacts, run: Run, what: str) -> Verdict | None:
-    """`what` is missing (`nothing came on /x`) because no node was there; None where one was."""
+    """Return why `what` is missing (`no message came on /x`) if no node was there; None if one was."""
     if run.foreign:
         return unjudged(f"{what} in this recording", hint="record it too, with rosbag record -a")
-    if not lives(run):
-        return unjudged(f"{what}: there was nothing to run", measured="not started", hint=HAND_IN)
-    ended = early_end(run)
-    if ended is not None:
+    if not lives(run) and not run.student_nodes():
+        return unjudged(f"{what}: there was nothing to run", measured="not started", hint=NO_SCRIPT_HINT)
+    if ended := early_end(run):
         end = explain_end(ended, run, package)
         message = f"{what}: {ended.name} ended before ({end.cause})"
         return unjudged(message, measured="ended", hint=end.hint, citations=end.citations)
@@ -38,47 +71,41 @@ def no_node(package: PackageFacts, run: Run, what: str) -> Verdict | None:
     return None
 
 
-def no_message(package: PackageFacts, run: Run, topic: str) -> Verdict:
-    """Why nothing that can be judged came on a topic."""
+def no_message(
+    package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict] = unjudged
+) -> Verdict:
+    """Return why no message came on a topic. `of_node` makes the verdict where the node itself is the reason."""
     if lost := all_lost(run, topic):
         return lost
     published = published_topics(run)
-    measured = listed(published) or "no topic"
-    near = near_names(topic, published)
-    if topic not in published and near:
-        message = f"nothing came on {topic}; the node publishes on {listed(near)}"
-        return unjudged(message, measured=measured, hint=f"name the topic {topic}")
-    refused = [e for _, e in run.recorder if e.topic == topic and e.event in {"refused", "invalid"}]
-    if refused and not run.student_channels(topic):
-        message = f"the recorder could not listen to {topic}: {refused[0].detail or refused[0].event}"
-        return inconclusive(message, measured=measured, hint="grade again")
-    if absent := no_node(package, run, f"nothing came on {topic}"):
+    near = () if topic in published else near_names(topic, published)
+    measured, what = listed(published) or "no topic", f"no message came on {topic}"
+    if run.foreign:
+        seen = f"; {listed(near)} is" if near else ""
+        hint = (
+            f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all topics"
+        )
+        return unjudged(f"{topic} is not in {run.evidence}{seen}", measured=measured, hint=hint)
+    if near:
+        hint = f"name the topic {topic} in rospy.Publisher(…)"
+        return of_node(f"{what}; the node publishes on {listed(near)}", measured=measured, hint=hint)
+    if absent := no_node(package, run, what) or _refused(run, topic):
         return absent
     if topic in published:
-        message = f"{topic} is advertised, but no message ever came"
-        return unjudged(message, measured="no message", hint="call publish(…) on it")
-    message = f"nothing came on {topic}: no node publishes on it"
-    return unjudged(message, measured=measured, hint=f"look at rostopic info {topic}")
+        hint = "call publish(…) inside the loop `while not rospy.is_shutdown():`"
+        return of_node(f"{what}, although it is advertised", measured="no message", hint=hint)
+    only = f"it publishes on {listed(published)}; " if published else ""
+    hint = f"{only}add rospy.Publisher('{topic}', …) and publish in the loop"
+    return of_node(f"{what}: no node publishes on it", measured=measured, hint=hint)
 
 
-def published_topics(run: Run) -> dict[str, str]:
-    """Every topic on which a node of the student's publishes or could, with its type; system topics left out."""
-    found = {c.topic: c.type for c in run.student_channels()}
-    for _, event in run.graph:
-        for topic, nodes in event.publishers.items():
-            if any(run.is_student_node(n) for n in nodes):
-                found.setdefault(topic, event.topic_types.get(topic, ""))
-    return {topic: kind for topic, kind in found.items() if topic not in SYSTEM_TOPICS}
-
-
-def life_of(run: Run, node: str) -> Life | None:
-    """The process that a node belongs to; None where it cannot be told, or is not the student's."""
-    return life(run, next((e.processes[node] for _, e in reversed(run.graph) if node in e.processes), ""))
-
-
-LOGGED = frozenset({"logs", "hears"})
-"""Checks that also read what is logged."""
-TAKEN = {Status.FAIL, Status.PARTIAL}
+def _refused(run: Run, topic: str) -> Verdict | None:
+    """Return the verdict where the recorder could not connect to the topic's publisher."""
+    refused = [e for _, e in run.recorder if e.topic == topic and e.event in {"refused", "invalid"}]
+    if not refused or run.student_channels(topic):
+        return None
+    message = f"the recorder could not listen to {topic}: {refused[0].detail or refused[0].event}"
+    return inconclusive(message, measured="no message", hint="grade again")
 
 
 class Losses(Record):
@@ -158,10 +185,6 @@ def _texts(value: object) -> Iterator[str]:
     elif isinstance(value, list | tuple | set | frozenset):
         for item in value:
             yield from _texts(item)
-
-
-_STEP = r"[A-Za-z]\w*(?:\[(?:\d+|\*)\])*"
-_PARTS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
 
 
 def _sound(path: str) -> str:
