@@ -16,15 +16,7 @@ from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import CMakeCall, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import (
-    FileCitation,
-    Status,
-    Verdict,
-    failed,
-    inconclusive,
-    passed,
-    unjudged,
-)
+from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
 
 CATKIN_MAKE = "catkin_make"
 NO_PROGRAM = {"IMPORTED", "ALIAS", "EXCLUDE_FROM_ALL"}

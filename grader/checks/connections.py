@@ -60,10 +60,7 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
     return verdict.about(
         expected=f"{ends[0]} connected to {ends[1]} over {params.topic}",
         measured=verdict.measured or (f"connections over {listed(over)}" if over else "no connection"),
-        citations=(
-            *verdict.citations,
-            cite(run, "/grader/graph"),
-        ),
+        citations=(*verdict.citations, cite(run, "/grader/graph")),
     )
 
 

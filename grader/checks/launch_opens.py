@@ -29,15 +29,7 @@ from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.record import Record
-from grader.model.verdict import (
-    Citation,
-    FileCitation,
-    Status,
-    Verdict,
-    failed,
-    passed,
-    unjudged,
-)
+from grader.model.verdict import Citation, FileCitation, Status, Verdict, failed, passed, unjudged
 
 SHELL = "#!/bin/bash"
 
@@ -96,10 +88,7 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
             f"{listed(n.type or '' for n in _shells(package, file))} opens {_url(pages, params)} in {params.program}"
         )
     )
-    cited: tuple[Citation, ...] = (
-        FileCitation(file=file.path, line=1),
-        cite(run, "/grader/actor"),
-    )
+    cited: tuple[Citation, ...] = (FileCitation(file=file.path, line=1), cite(run, "/grader/actor"))
     return verdict.about(expected=expected, measured=measured, citations=verdict.citations or cited)
 
 

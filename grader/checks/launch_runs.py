@@ -34,14 +34,7 @@ from grader.evidence.events import GraphEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import (
-    Citation,
-    FileCitation,
-    Verdict,
-    failed,
-    passed,
-    unjudged,
-)
+from grader.model.verdict import Citation, FileCitation, Verdict, failed, passed, unjudged
 
 
 class LaunchConnectsParams(Record):

@@ -245,16 +245,13 @@ def field_bounds(package: PackageFacts, run: Run, params: FieldBoundsParams) -> 
             verdict = inconclusive(verdict.message, hint="grade again")
     else:
         verdict = passed(f"{params.field} of {params.topic} is {params.words} in {_share(readings, outside)}")
-    spans = outside or readings
-    span = {"from_ns": spans[0].time_ns, "to_ns": spans[-1].time_ns} if spans else {}
+    spans = [r.time_ns for r in outside or readings]
+    cited = cite(run, params.topic, spans[0], spans[-1]) if spans else cite(run, params.topic)
     share = f" in {params.share:.0%} of the messages" if params.share < 1 else ""
     return verdict.about(
         expected=f"{params.field} of {params.topic} {params.words}{share}",
         measured=verdict.measured or _range(usable),
-        citations=(
-            *verdict.citations,
-            cite(run, params.topic, **span),
-        ),
+        citations=(*verdict.citations, cited),
     )
 
 

@@ -1,4 +1,4 @@
-"""Whether a file's parameters can be loaded."""
+"""Whether parameters can be loaded, are read and set by a node, and have their values."""
 
 from __future__ import annotations
 
@@ -20,24 +20,15 @@ from grader.checks.support.parameters import (
     own,
     tree,
 )
-from grader.checks.support.processes import NO_SCRIPT_HINT as HAND_IN
-from grader.checks.support.processes import Life, life, lives
-from grader.checks.support.scripts import find_script
+from grader.checks.support.processes import Life, first_interrupt_ns, life, lives, not_started
+from grader.checks.support.scripts import add_hint, find_script, paths_by_name
 from grader.checks.support.text import listed, near_names, plural, shown
 from grader.checks.support.topics import cite, no_node
 from grader.checks.support.values import differences, value_text
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import (
-    Citation,
-    FileCitation,
-    Verdict,
-    failed,
-    inconclusive,
-    passed,
-    unjudged,
-)
+from grader.model.verdict import Citation, FileCitation, Verdict, failed, inconclusive, passed, unjudged
 
 
 class ParamsLoadedParams(Record):
@@ -78,13 +69,11 @@ def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -
         verdict = inconclusive(f"rosparam load {source.path} was not run to its end", hint="grade again")
     else:
         missing = [name for name in wanted if _is_empty(found, name)]
-        error = _error(run, one, source.path)
-        verdict = error or (
-            _missing(found, missing, source.path)
-            if missing
-            else passed(
-                f"{source.path} loads and sets {listed(wanted)}", hint=_place_hint(source.path, params.file)
-            )
+        moved = f"the handout puts it at {params.file}; move it there" if source.path != params.file else ""
+        verdict = (
+            _error(run, one, source.path)
+            or (_missing(found, missing, source.path) if missing else None)
+            or passed(f"{source.path} loads and sets {listed(wanted)}", hint=moved)
         )
     measured = f"on the server: {listed(found)}" if found else "nothing on the server"
     cited: tuple[Citation, ...] = (cite(run, "/grader/param"),)
@@ -94,11 +83,11 @@ def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -
 
 def _no_file(package: PackageFacts, path: str) -> Verdict:
     name = PurePosixPath(path).name
-    names = {PurePosixPath(f.path).name: f.path for f in package.files}
+    names = paths_by_name(package)
     yaml = [p for n, p in names.items() if n.endswith((".yaml", ".yml"))]
     near = [names[n] for n in near_names(name, names)] or yaml
     seen = f"; there is {listed(near)}" if near else ""
-    hint = f"git mv {near[0]} {path}" if near else f"write {path}, then git add, commit and push it"
+    hint = f"git mv {near[0]} {path}" if near else add_hint(path)
     return failed(f"{path} is not in the package{seen}", hint=hint)
 
 
@@ -113,9 +102,8 @@ def _error(run: Run, one: Life, path: str) -> Verdict | None:
         cited = (FileCitation(file=path, line=words.line),)
         return failed(f"{path} does not load: {words.why}", hint=words.hint, citations=cited)
     said = f": {shown(lines[-1])}" if lines else ""
-    return failed(
-        f"{path} does not load{said}", hint=f"rosparam load {PurePosixPath(path).name} shows the line"
-    )
+    hint = f"rosparam load {PurePosixPath(path).name} shows the line"
+    return failed(f"{path} does not load{said}", hint=hint)
 
 
 def _missing(found: dict[str, object], missing: list[str], path: str) -> Verdict:
@@ -150,10 +138,6 @@ def _in_its_place(found: dict[str, object], name: str, path: str) -> Verdict | N
 
 def _is_empty(found: dict[str, object], name: str) -> bool:
     return found.get(name) in (None, {})
-
-
-def _place_hint(path: str, wanted: str) -> str:
-    return "" if path == wanted else f"the handout puts it at {wanted}; move it there"
 
 
 class ParamsReadParams(Record):
@@ -202,20 +186,17 @@ def _not_printed(
     known = given(run)
     names = listed(missing)
     if not lives(run):
-        return unjudged("the node was not started: there is no script to run", hint=HAND_IN)
+        return not_started("the node")
     if end := broken(package, run):
-        message = f"{names} {_are(missing)} not printed: the node ended with {end.cause}"
-        return failed(message, hint=end.hint, citations=end.citations)
+        return end.verdict(failed, f"{names} {_are(missing)} not printed: the node ended with {end.cause}")
     strange = [n for n in missing if n not in known or not known[n].in_file]
     if strange:
         file = params.file or "the student's file"
         message = f"{names} {_are(missing)} not printed, and {listed(strange)} {_are(strange)} not in {file}"
         return unjudged(message, hint=f"fix the names in {file} first")
     lines = printed_lines(run)
-    hard = next(
-        (n for n in missing if any(is_printed(v, lines) for v in _in_file(build, params.file, n))), None
-    )
-    if hard is not None:
+    copied = (n for n in missing if any(is_printed(v, lines) for v in _in_file(build, params.file, n)))
+    if (hard := next(copied, None)) is not None:
         message = f"{hard} is printed as {params.file} has it, not as the parameter server has it"
         hint = f"read it with rospy.get_param('{hard}'), and not from the file or the script"
         return failed(message, hint=hint)
@@ -267,9 +248,7 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
         `rospy.set_param('/details/contact/phone', 55555)`: the whole name of the one value, never a map. Read it
         back with `rospy.get_param` and log it.
     """
-    until_ns = min(
-        (one.interrupt_ns for one in lives(run) if one.interrupt_ns is not None), default=run.end_ns
-    )
+    until_ns = _until_ns(run)
     after = tree(run, until_ns=until_ns)
     got = after.get(params.name)
     others = f", {listed(params.unchanged)} as before" if params.unchanged else ""
@@ -295,26 +274,21 @@ def _not_set(
     package: PackageFacts, run: Run, after: dict[str, Any], params: ParamsSetParams, until_ns: int
 ) -> Verdict:
     if not lives(run):
-        return unjudged("the node was not started: there is no script to run", hint=HAND_IN)
-    mine = [
-        e for t, e in run.params if e.action == "set" and t <= until_ns and run.is_student_node(e.caller_id)
-    ]
+        return not_started("the node")
+    sets = [e for t, e in run.params if e.action == "set" and t <= until_ns]
+    mine = [e for e in sets if run.is_student_node(e.caller_id)]
     last = next((e for e in reversed(mine) if absolute(e.name) == params.name), None)
     hint = f"write rospy.set_param('{params.name}', {params.value!r})"
     if last is not None and params.name in after:
-        return failed(
-            f"{params.name} is set to {shown(str(after[params.name]))}, not to {params.value}", hint=hint
-        )
+        message = f"{params.name} is set to {shown(str(after[params.name]))}, not to {params.value}"
+        return failed(message, hint=hint)
     if params.name not in after and params.name in given(run):
         cause = _taken_away(run, params.name)
         return failed(f"{params.name} is no longer on the server{cause}", hint=hint)
     if end := broken(package, run):
-        message = f"{params.name} was never set: the node ended with {end.cause}"
-        return unjudged(message, hint=end.hint, citations=end.citations)
+        return end.verdict(unjudged, f"{params.name} was never set: the node ended with {end.cause}")
     if _is_value(tree(run).get(params.name), params.value):
-        message = (
-            f"{params.name} is set to {params.value} only after Ctrl-C: the node does nothing for too long"
-        )
+        message = f"{params.name} is set to {params.value} only after Ctrl-C: the node waits too long"
         return failed(message, hint="set it as soon as the values are read, without a long sleep before it")
     others = dict.fromkeys(absolute(e.name) for e in mine)
     instead = f"; the node sets {listed(others)}" if others else ""
@@ -330,9 +304,8 @@ def _clobbered(run: Run, after: dict[str, Any], params: ParamsSetParams) -> Verd
             continue
         hint = f"set the one value alone: rospy.set_param('{params.name}', {params.value!r})"
         if name in after:
-            return failed(
-                f"{name} was {shown(str(was))} and is {shown(str(after[name]))} afterwards", hint=hint
-            )
+            message = f"{name} was {shown(str(was))} and is {shown(str(after[name]))} afterwards"
+            return failed(message, hint=hint)
         return failed(f"{name} is no longer on the server{_taken_away(run, name)}", hint=hint)
     return None
 
@@ -397,9 +370,9 @@ def param_value(package: PackageFacts, run: Run, params: ParamValueParams) -> Ve
 
 
 def _until_ns(run: Run) -> int:
-    """Up to the first Ctrl-C: what a node clears away as it ends does not count."""
-    pressed = (one.interrupt_ns for one in lives(run) if one.interrupt_ns is not None)
-    return min(pressed, default=run.end_ns)
+    """Return the first Ctrl-C: what a node clears away as it ends does not count."""
+    pressed_ns = first_interrupt_ns(run)
+    return run.end_ns if pressed_ns is None else pressed_ns
 
 
 def _held(leaves: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401 - a parameter may be anything

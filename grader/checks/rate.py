@@ -18,15 +18,7 @@ from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import (
-    Citation,
-    FileCitation,
-    Verdict,
-    failed,
-    inconclusive,
-    passed,
-    unjudged,
-)
+from grader.model.verdict import Citation, FileCitation, Verdict, failed, inconclusive, passed, unjudged
 
 FLOOD_FACTOR = 5
 LATE_P95_SHARE = 0.2

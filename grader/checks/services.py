@@ -20,6 +20,8 @@ from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
 
+LOGGERS = ("/get_loggers", "/set_logger_level")
+
 
 class ServiceParams(Record):
     """`service` with its slash, `type` as `rosservice type` gives it (`std_srvs/Trigger`)."""
@@ -118,7 +120,7 @@ def _judged(offer: Offer, package: PackageFacts, run: Run, params: ServiceParams
     if one is not None and one.ended_early:
         end = explain_end(one, run, package)
         message = f"{offer.node} offered {params.service}, but {one.name} ended: {end.cause}"
-        return unjudged(message, hint=end.hint, citations=end.citations)
+        return end.verdict(unjudged, message)
     if not offer.type:
         message = f"{params.service} is offered, but did not say of what type it is"
         return inconclusive(message, hint=f"rosservice type {params.service} shows it; grade again")
@@ -152,7 +154,7 @@ def _uncalled(
     if one is not None and one.ended_early:
         end = explain_end(one, run, package)
         message = f"{one.name} ended before {params.service} could be called: {end.cause}"
-        return unjudged(message, hint=end.hint, citations=end.citations)
+        return end.verdict(unjudged, message)
     message = f"{params.service} was called {plural(len(made), 'time')} of {len(params.expect)}"
     return inconclusive(message, hint="grade again")
 
@@ -169,11 +171,7 @@ def _measured(one: Exchange | None) -> str:
 
 
 def _citation(one: Exchange | None, run: Run) -> EvidenceCitation:
-    span = {"from_ns": one.at_ns, "to_ns": one.answered_ns} if one else {}
-    return cite(run, "/grader/actor", **span)
-
-
-LOGGERS = ("/get_loggers", "/set_logger_level")
+    return cite(run, "/grader/actor", one.at_ns, one.answered_ns) if one else cite(run, "/grader/actor")
 
 
 class Offer(NamedTuple):
@@ -219,16 +217,9 @@ def exchanges(run: Run, service: str) -> tuple[Exchange, ...]:
     found = []
     for number, (at_ns, call) in enumerate(calls):
         time_ns, answer = answers[number] if number < len(answers) else (None, None)
-        found.append(
-            Exchange(
-                at_ns,
-                time_ns,
-                plain_type(call.type or ""),
-                call.value or {},
-                answer.value if answer else None,
-                answer.detail if answer else "",
-            )
-        )
+        response, detail = (answer.value, answer.detail) if answer else (None, "")
+        kind = plain_type(call.type or "")
+        found.append(Exchange(at_ns, time_ns, kind, call.value or {}, response, detail))
     return tuple(found)
 
 
@@ -246,10 +237,8 @@ def not_offered(package: PackageFacts, run: Run, service: str) -> Verdict:
     if absent := no_node(package, run, f"there is no service {service}"):
         return absent
     others = f"; it offers {listed(found)}" if found else ""
-    message = f"no node offers {service}{others}"
-    return failed(
-        message, hint=f"add rospy.Service('{service}', …, callback) before the loop or rospy.spin()"
-    )
+    hint = f"add rospy.Service('{service}', …, callback) before the loop or rospy.spin()"
+    return failed(f"no node offers {service}{others}", hint=hint)
 
 
 def _other_owner(run: Run, service: str) -> str:
@@ -271,12 +260,8 @@ def handler_traceback(run: Run, service: str, since_ns: int) -> Traceback | None
     one = life_of(run, offer.node) if offer else None
     if one is None:
         return None
-    lines = [
-        part
-        for t, c in run.lines(one.name)
-        if c.stream == "stderr" and t >= since_ns
-        for part in _unpacked(c.line)
-    ]
+    printed = [c.line for t, c in run.lines(one.name) if c.stream == "stderr" and t >= since_ns]
+    lines = [part for line in printed for part in _unpacked(line)]
     return next(iter(tracebacks(lines)), None)
 
 
@@ -297,7 +282,7 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
     found = handler_traceback(run, service, one.at_ns)
     if found is not None:
         end = explain_traceback(found, package)
-        return failed(f"{asked} fails: {end.cause}", hint=end.hint, citations=end.citations)
+        return end.verdict(failed, f"{asked} fails: {end.cause}")
     kind = one.type.partition("/")[2]
     if "returned None" in one.detail:
         hint = f"end the callback with return {kind}Response(…)"

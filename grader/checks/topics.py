@@ -114,10 +114,7 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
     return verdict.about(
         expected=f"no topic beside {listed(params.topics)}" if params.topics else "no topic at all",
         measured=verdict.measured or listed(published) or "no topic",
-        citations=(
-            *verdict.citations,
-            cite(run, "/grader/graph"),
-        ),
+        citations=(*verdict.citations, cite(run, "/grader/graph")),
     )
 
 

@@ -28,11 +28,7 @@ def rubric_schema(checks: Mapping[str, Check] | None = None) -> dict[str, Any]:
     model = create_model("Rubric", __base__=Rubric, __doc__=Rubric.__doc__, criteria=(criteria, ...))
     schema = model.model_json_schema(by_alias=True)
     schema["properties"]["scenarios"]["additionalProperties"] = False
-    return {
-        "$schema": DIALECT,
-        **schema,
-        "title": "A rubric of grader",
-    }
+    return {"$schema": DIALECT, **schema, "title": "A rubric of grader"}
 
 
 def _criterion(check: Check) -> type[Criterion]:

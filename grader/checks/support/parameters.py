@@ -9,8 +9,8 @@ from pathlib import PurePosixPath
 from typing import Any, NamedTuple
 
 from grader.checks.support.console_output import Line
-from grader.checks.support.exit_causes import Ending, explain_end, explain_traceback, process_tracebacks
-from grader.checks.support.processes import early_end, lives
+from grader.checks.support.exit_causes import Ending, explain_end, explain_error
+from grader.checks.support.processes import early_end
 from grader.checks.support.text import listed, near_names
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
@@ -108,14 +108,11 @@ def broken(package: PackageFacts, run: Run) -> Ending | None:
     """An error that ended the node, or its last traceback."""
     ended = early_end(run)
     if ended is not None and ended.end is not None and ended.end.exit_code != 0:
-        end = explain_end(ended, run, package)
+        end: Ending | None = explain_end(ended, run, package)
     else:
-        found = [
-            t for one in lives(run) for t in process_tracebacks(run, one.name, before_ns=one.interrupt_ns)
-        ]
-        if not found:
-            return None
-        end = explain_traceback(found[-1], package)
+        end = explain_error(package, run)
+    if end is None:
+        return None
     key = re.match(r"KeyError: ['\"]?([^'\" (]+)", end.cause)
     if key is None:
         return end
