@@ -11,15 +11,14 @@ from grader.checks.launch_xml import missing_node
 from grader.checks.registry import check
 from grader.checks.support.launch import (
     died,
-    find_launch,
     node_slip,
     nodes_of_script,
     nodes_up,
     not_run,
     quoted,
+    read_launch,
     refusal,
     refusals,
-    unreadable,
     why_died,
     why_not_up,
 )
@@ -29,7 +28,7 @@ from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.record import Record
-from grader.model.verdict import Citation, FileCitation, Status, Verdict, failed, passed, unjudged
+from grader.model.verdict import FileCitation, Status, Verdict, failed, passed
 
 SHELL = "#!/bin/bash"
 
@@ -72,12 +71,11 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
         name="…" output="screen"/>`. `rosrun <package> <script>.sh` tries it alone.
     """
     expected = f"a shell script in {params.launch} opens {params.urls[0]} in {params.program}, beside a node"
-    file = find_launch(package, params.launch)
+    file = read_launch(package, params.launch)
     pages = _pages(run)
     measured = f"opened: {listed(_shown(p) for p in pages)}" if pages else "nothing was opened"
-    if file is None or file.fault is not None:
-        verdict = unreadable(package, file, params.launch) or failed(f"{params.launch} cannot be read")
-        return verdict.about(expected=expected, measured="no launch file that can be read")
+    if isinstance(file, Verdict):
+        return file.about(expected=expected)
     verdict = (
         not_run(run)
         or _script(package, build, file, params)
@@ -88,8 +86,8 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
             f"{listed(n.type or '' for n in _shells(package, file))} opens {_url(pages, params)} in {params.program}"
         )
     )
-    cited: tuple[Citation, ...] = (FileCitation(file=file.path, line=1), cite(run, "/grader/actor"))
-    return verdict.about(expected=expected, measured=measured, citations=verdict.citations or cited)
+    citations = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/actor"))
+    return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
 def _pages(run: Run) -> tuple[Page, ...]:
@@ -181,9 +179,7 @@ def _beside(package: PackageFacts, file: LaunchFile, run: Run, params: OpensPara
     if nodes_up(run, node) and ended is None:
         return None
     absence = ended or why_not_up(package, run, node)
-    verdict = unjudged if absence.of_script else failed
-    message = f"the page is opened, but {node.type} does not run beside it: {absence.why}"
-    return verdict(message, hint=absence.hint, citations=absence.citations)
+    return absence.verdict(f"the page is opened, but {node.type} does not run beside it: {absence.why}")
 
 
 def _is_program(name: str, params: OpensParams) -> bool:

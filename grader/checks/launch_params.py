@@ -13,26 +13,25 @@ from grader.checks.support.console_output import printed_lines
 from grader.checks.support.launch import (
     Absence,
     Slip,
-    find_launch,
     finished,
     nodes_of_script,
     nodes_up,
     not_run,
     quoted,
+    read_launch,
     refusal,
     refusals,
-    unreadable,
     why_died,
     why_not_up,
 )
 from grader.checks.support.parameters import absolute, instead, is_printed, own, tree
-from grader.checks.support.scripts import find_script
+from grader.checks.support.scripts import add_hint, find_script
 from grader.checks.support.text import listed, number, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchLoad, LaunchNode, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Citation, EvidenceCitation, FileCitation, Verdict, failed, passed, unjudged
+from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
 
 SUMMARY = re.compile(r"\s*\*\s+/")  # roslaunch's list of parameters
 OUTSIDE = 'write <rosparam file="$(find <package>)/{}"/> outside the <node>, without ns'
@@ -69,10 +68,9 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
         `ns`. `rosparam list` shows what is on the server.
     """
     expected = f"{params.launch} loads {params.file} and runs {PurePosixPath(params.script).name}"
-    file = find_launch(package, params.launch)
-    if file is None or file.fault is not None:
-        verdict = unreadable(package, file, params.launch) or failed(f"{params.launch} cannot be read")
-        return verdict.about(expected=expected, measured="no launch file that can be read")
+    file = read_launch(package, params.launch)
+    if isinstance(file, Verdict):
+        return file.about(expected=expected)
     verdict = (
         not_run(run)
         or missing_node(package, file, params.script)
@@ -80,11 +78,11 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
         or passed(f"roslaunch loads {params.file}, then runs {PurePosixPath(params.script).name}")
     )
     found = own(tree(run, by=lambda caller: caller not in run.student_nodes()))
-    cited: tuple[Citation, ...] = (FileCitation(file=file.path, line=_line(file, params)),)
+    place = FileCitation(file=file.path, line=_line(file, params))
     return verdict.about(
         expected=expected,
         measured=f"on the server: {listed(found) or 'nothing'}",
-        citations=verdict.citations or (*cited, cite(run, "/grader/param")),
+        citations=verdict.citations or (place, cite(run, "/grader/param")),
     )
 
 
@@ -128,10 +126,8 @@ def _not_running(package: PackageFacts, run: Run, node: LaunchNode) -> Verdict |
     if died is None and (nodes_up(run, node) or finished(run, node)):
         return None
     absence = died or why_not_up(package, run, node)
-    verdict = unjudged if absence.of_script else failed
-    what = "does not run through" if died else "does not run"
-    message = f"the parameters are loaded, but {node.type} {what}: {absence.why}"
-    return verdict(message, hint=absence.hint, citations=absence.citations)
+    what = "does not run to its end" if died else "does not run"
+    return absence.verdict(f"the parameters are loaded, but {node.type} {what}: {absence.why}")
 
 
 def _not_loaded(
@@ -139,7 +135,7 @@ def _not_loaded(
 ) -> Verdict:
     if find_script(package, params.file) is None:
         message = f"there is no {PurePosixPath(params.file).name} in the package to load"
-        return unjudged(message, hint=f"write {params.file}, then git add, commit and push it")
+        return unjudged(message, hint=add_hint(params.file))
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))
     if absence := refusal(run):
@@ -217,18 +213,19 @@ def _of_node(run: Run, file: LaunchFile, node: str, wanted: Wanted) -> Verdict |
     start_ns = next((t for t, event in run.graph if node in event.nodes), run.end_ns)
     before = tree(run, until_ns=start_ns, by=lambda caller: caller != node)
     places = (f"{node}/", f"{node.rpartition('/')[0]}/")
-    if any(all(_fits(before.get(place + name), value) for name, value in wanted.items()) for place in places):
+    if _is_there(before, places, wanted):
         return None
-    later = tree(run, by=lambda caller: caller != node)
-    late = any(
-        all(_fits(later.get(place + name), value) for name, value in wanted.items()) for place in places
-    )
-    if late:
+    if _is_there(tree(run, by=lambda caller: caller != node), places, wanted):
         message = f"{listed(wanted)} are set only after {node} has started, and it reads them as it starts"
         verdict = failed(message, hint="set them with <param> inside the <node>: roslaunch does that first")
     else:
         verdict = _wrong_value(before, places, wanted) or _elsewhere(before, node, wanted)
-    return verdict.about(citations=(*_lines(file, wanted), _evidence(run)))
+    return verdict.about(citations=(*_lines(file, wanted), cite(run, "/grader/param")))
+
+
+def _is_there(found: Mapping[str, Any], places: Iterable[str], wanted: Wanted) -> bool:
+    """Return whether all that is wanted is in one of the places."""
+    return any(all(_fits(found.get(p + name), value) for name, value in wanted.items()) for p in places)
 
 
 def _wrong_value(before: Mapping[str, Any], places: tuple[str, str], wanted: Wanted) -> Verdict | None:
@@ -241,17 +238,16 @@ def _wrong_value(before: Mapping[str, Any], places: tuple[str, str], wanted: Wan
         known = [place + name for name in wanted if place + name in before]
         verb = "is" if len(missing) == 1 else "are"
         message = f"{listed(place + name for name in missing)} {verb} not set, only {listed(known)}"
-        return failed(
-            message, hint="write one <param> for each inside the <node>, the names letter by letter"
-        )
+        hint = "write one <param> for each inside the <node>, the names letter by letter"
+        return failed(message, hint=hint)
     name = next(name for name, value in wanted.items() if not _fits(before[place + name], value))
     found, value = before[place + name], wanted[name]
     if isinstance(found, str) and found.strip() == str(value):
         message = f'{place}{name} is the text "{found}", which the node does not take for a number'
         return failed(message, hint=f'write <param name="{name}" type="int" value="{value}"/>')
-    colour = f"{', '.join(map(_shown, (before[place + n] for n in wanted)))}"
+    seen = ", ".join(_shown(before[place + n]) for n in wanted)
     right = ", ".join(map(_shown, wanted.values()))
-    message = f"{place}{name} is {_shown(found)}, not {_shown(value)}: {listed(wanted)} are {colour}"
+    message = f"{place}{name} is {_shown(found)}, not {_shown(value)}: {listed(wanted)} are {seen}"
     return failed(message, hint=f"{listed(wanted)} have to be {right}")
 
 
@@ -283,7 +279,3 @@ def _shown(value: object) -> str:
 def _lines(file: LaunchFile, wanted: Wanted) -> tuple[FileCitation, ...]:
     found = [p for p in file.params if p.name.rpartition("/")[2] in wanted]
     return tuple(FileCitation(file=p.file, line=p.line) for p in found[:3])
-
-
-def _evidence(run: Run) -> EvidenceCitation:
-    return cite(run, "/grader/param")

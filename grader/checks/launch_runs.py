@@ -13,7 +13,6 @@ from grader.checks.launch_xml import missing_node
 from grader.checks.registry import check
 from grader.checks.support.launch import (
     Slip,
-    find_launch,
     is_exact,
     node_slip,
     nodes_of_program,
@@ -21,20 +20,19 @@ from grader.checks.support.launch import (
     nodes_up,
     not_run,
     quoted,
+    read_launch,
     refusals,
     roslaunch_error,
-    unreadable,
     why_died,
     why_not_up,
 )
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.text import listed, near_names, plural
-from grader.checks.support.topics import cite
-from grader.evidence.events import GraphEvent
+from grader.checks.support.topics import cite, nodes_on, topics_with
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Citation, FileCitation, Verdict, failed, passed, unjudged
+from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
 
 
 class LaunchConnectsParams(Record):
@@ -67,22 +65,27 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
         `roslaunch <package> <file>`, then `rosnode list` and `rostopic info <topic>` show what came up.
     """
     expected = f"{params.launch} brings up a publisher and a subscriber connected over {params.topic}"
-    file = find_launch(package, params.launch)
+    file = read_launch(package, params.launch)
+    if isinstance(file, Verdict):
+        return file.about(expected=expected)
     found = list(connections(run, params.topic))
     nodes = run.student_nodes()
     verdict = (
-        unreadable(package, file, params.launch)
-        or not_run(run)
+        not_run(run)
         or _names_missing(nodes, file, params)
         or (None if found else _unconnected(package, file, run, params))
         or passed(f"roslaunch connects {found[0][0]} and {found[0][1]} over {params.topic}")
     )
-    place: tuple[Citation, ...] = (FileCitation(file=file.path, line=1),) if file else ()
-    measured = f"{plural(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node came up"
-    if file is None or file.fault:
-        measured = "no launch file that can be read"
-    graph = cite(run, "/grader/graph")
-    return verdict.about(expected=expected, measured=measured, citations=verdict.citations or (*place, graph))
+    return verdict.about(
+        expected=expected,
+        measured=_listed_nodes(run),
+        citations=verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph")),
+    )
+
+
+def _listed_nodes(run: Run) -> str:
+    nodes = run.student_nodes()
+    return f"{plural(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node came up"
 
 
 def connections(run: Run, topic: str) -> Iterator[tuple[str, str]]:
@@ -94,41 +97,31 @@ def connections(run: Run, topic: str) -> Iterator[tuple[str, str]]:
                 yield pair
 
 
-def _names_missing(
-    nodes: tuple[str, ...], file: LaunchFile | None, params: LaunchConnectsParams
-) -> Verdict | None:
+def _names_missing(nodes: tuple[str, ...], file: LaunchFile, params: LaunchConnectsParams) -> Verdict | None:
     missing = [n for n in params.nodes if f"/{n.lstrip('/')}" not in nodes]
     if not missing or not nodes:
         return None
-    message = f"{listed(missing)} did not come up; there is {listed(nodes)}"
-    cited = (FileCitation(file=file.path, line=1),) if file else ()
-    return failed(message, hint="the `name` in the launch file is the node's name", citations=cited)
+    cited = (FileCitation(file=file.path, line=1),)
+    hint = "the `name` in the launch file is the node's name"
+    return failed(f"{listed(missing)} did not come up; there is {listed(nodes)}", hint=hint, citations=cited)
 
 
-def _unconnected(
-    package: PackageFacts, file: LaunchFile | None, run: Run, params: LaunchConnectsParams
-) -> Verdict:
+def _unconnected(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchConnectsParams) -> Verdict:
     """Why no two nodes are connected: a wrong attribute, an error of roslaunch's, or what the graph shows."""
     said = roslaunch_error(run)
-    quoted = f"; roslaunch says: {said}" if said else ""
-    slips = (
-        (node_slip(package, node.model_copy(update={"file": file.path}), said) for node in file.nodes)
-        if file
-        else ()
-    )
-    wrong = next(filter(None, slips), None)
-    if wrong is not None:
-        return wrong.verdict(quoted)
+    for node in file.nodes:
+        if wrong := node_slip(package, node.model_copy(update={"file": file.path}), said):
+            return wrong.verdict(quoted(run))
     nodes = run.student_nodes()
     if len(nodes) < 2:
         up = f"only {nodes[0]} comes up" if nodes else "no node comes up"
-        message = f"{up}; the file declares {plural(len(file.nodes) if file else 0, 'node')}{quoted}"
+        message = f"{up}; the file declares {plural(len(file.nodes), 'node')}{quoted(run)}"
         hint = "give the talker and the listener a <node> each, and try each script alone with rosrun"
         return failed(message, hint=hint)
-    return over_another_topic(run, params.topic, quoted)
+    return over_another_topic(run, params.topic, quoted(run))
 
 
-def over_another_topic(run: Run, topic: str, quoted: str = "") -> Verdict:
+def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
     """Why nodes that are there are not connected: other topics, other types, or an end that is missing."""
     others = {
         c.topic
@@ -138,32 +131,17 @@ def over_another_topic(run: Run, topic: str, quoted: str = "") -> Verdict:
     }
     if others:
         message = f"the nodes are connected over {listed(sorted(others))}, not over {topic}"
-        return failed(message + quoted, hint=f"both have to use {topic}; look for a <remap> or a namespace")
-    publishers, subscribers = (_nodes_on(run, topic, end) for end in ("publishers", "subscribers"))
+        return failed(message + said, hint=f"both have to use {topic}; look for a <remap> or a namespace")
+    publishers, subscribers = nodes_on(run, topic, "publishers"), nodes_on(run, topic, "subscribers")
     if publishers and subscribers:
         message = f"{listed(publishers)} and {listed(subscribers)} are both on {topic}, but not connected"
-        return failed(message + quoted, hint="do both use the same message type?")
+        return failed(message + said, hint="do both use the same message type?")
     lacking = "publishes on" if not publishers else "subscribes to"
-    message = f"{listed(run.student_nodes())} are not connected: none {lacking} {topic}"
-    seen = _topics_of(run, "publishers" if not publishers else "subscribers")
+    seen = topics_with(run, "subscribers" if publishers else "publishers")
     there = f"; one {lacking} {listed(seen)}" if seen else ""
+    message = f"{listed(run.student_nodes())} are not connected: none {lacking} {topic}{there}{said}"
     hint = f"launch a talker and a listener that use {topic}; look for a <remap> or a namespace"
-    return failed(message + there + quoted, hint=hint)
-
-
-def _topics_of(run: Run, end: str) -> tuple[str, ...]:
-    """The topics that the student's nodes have at this end."""
-    ends = [event.publishers if end == "publishers" else event.subscribers for _, event in run.graph]
-    found = (topic for topics in ends for topic in topics if topic != "/rosout")
-    return tuple(topic for topic in dict.fromkeys(found) if _nodes_on(run, topic, end))
-
-
-def _nodes_on(run: Run, topic: str, end: str) -> tuple[str, ...]:
-    def nodes(event: GraphEvent) -> tuple[str, ...]:
-        return (event.publishers if end == "publishers" else event.subscribers).get(topic, ())
-
-    found = (n for _, event in run.graph for n in nodes(event) if run.is_student_node(n))
-    return tuple(dict.fromkeys(found))
+    return failed(message, hint=hint)
 
 
 class LaunchRunsParams(Record):
@@ -217,18 +195,13 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     ]
     over = f", connected over {params.topic}" if params.topic else ""
     expected = f"{params.launch} brings up {listed(what) or 'its nodes'} under the file's names{over}"
-    file = find_launch(package, params.launch)
-    nodes = run.student_nodes()
-    measured = f"{plural(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node came up"
-    if file is None or file.fault is not None:
-        verdict = unreadable(package, file, params.launch) or failed(f"{params.launch} cannot be read")
-        verdict = verdict.model_copy(update={"unjudged": bool(params.scripts)})
-        return verdict.about(expected=expected, measured="no launch file that can be read")
+    file = read_launch(package, params.launch)
+    if isinstance(file, Verdict):
+        unjudged_too = {"unjudged": bool(params.scripts)}
+        return file.about(expected=expected).model_copy(update=unjudged_too)
     verdict = not_run(run) or _unnamed(package, file, params) or _judged(package, file, run, params)
-    place: tuple[Citation, ...] = (FileCitation(file=file.path, line=1),)
-    graph = cite(run, "/grader/graph")
-    citations = verdict.citations or (*place, graph)
-    return verdict.about(expected=expected, measured=measured, citations=citations)
+    citations = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph"))
+    return verdict.about(expected=expected, measured=_listed_nodes(run), citations=citations)
 
 
 def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams) -> Verdict:
@@ -239,7 +212,7 @@ def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRun
         return _not_up(package, file, run, lacking)
     names = [name for w in wanted for name in nodes_up(run, w.node)]
     if params.topic and not _connected(run, params.topic, names):
-        return _unconnected_launch_runs(package, run, wanted, params.topic)
+        return _not_connected(package, run, wanted, params.topic)
     if dead := _died(package, run, wanted, "came up, but then"):
         return dead
     if params.programs and params.params:
@@ -305,9 +278,8 @@ def _swapped(file: LaunchFile, name: str, params: LaunchRunsParams) -> Verdict |
         program = PurePosixPath(node.type or "").stem
         if program != name.lstrip("/") and program in {n.lstrip("/") for n in params.nodes}:
             why = f"/{name.lstrip('/')} runs {node.type}, whose name is /{program}: the names are swapped"
-            return Slip(
-                node.file, node.line, why, f'write name="{program}" beside type="{node.type}"'
-            ).verdict()
+            fix = f'write name="{program}" beside type="{node.type}"'
+            return Slip(node.file, node.line, why, fix).verdict()
     return None
 
 
@@ -331,9 +303,7 @@ def _not_up(package: PackageFacts, file: LaunchFile, run: Run, lacking: Wanted) 
 
 
 def _connected(run: Run, topic: str, names: list[str]) -> bool:
-    return any(
-        publisher in names and subscriber in names for publisher, subscriber in connections(run, topic)
-    )
+    return any({*pair} <= {*names} for pair in connections(run, topic))
 
 
 def _died(package: PackageFacts, run: Run, wanted: list[Wanted], when: str) -> Verdict | None:
@@ -345,7 +315,7 @@ def _died(package: PackageFacts, run: Run, wanted: list[Wanted], when: str) -> V
     return None
 
 
-def _unconnected_launch_runs(package: PackageFacts, run: Run, wanted: list[Wanted], topic: str) -> Verdict:
+def _not_connected(package: PackageFacts, run: Run, wanted: list[Wanted], topic: str) -> Verdict:
     """A node that died, the launch file's remaps and namespaces, or the scripts' own topics."""
     if dead := _died(package, run, wanted, "came up, but before it was connected"):
         return dead

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from grader.checks.support.exit_causes import CAUSES, explain_traceback, process_tracebacks
 from grader.checks.support.processes import lives, observed_until_ns
-from grader.checks.support.scripts import find_script
+from grader.checks.support.scripts import chmod_hint, cmake_calls, find_script, paths_by_name
 from grader.checks.support.text import bare, listed, near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
@@ -29,7 +29,7 @@ class Slip(NamedTuple):
     of_manifest: bool = False
 
     def verdict(self, said: str = "") -> Verdict:
-        """`said` is appended: what roslaunch says to it."""
+        """Return the verdict with what roslaunch said (`said`) at the end."""
         cited = (FileCitation(file=self.file, line=self.line),)
         message = f"{self.file}, line {self.line}: {self.why}{said}"
         return (unjudged if self.of_manifest else failed)(message, hint=self.fix, citations=cited)
@@ -41,11 +41,19 @@ def find_launch(package: PackageFacts, name: str) -> LaunchFile | None:
     return min(found, key=lambda f: (PurePosixPath(f.path).parts[0] != "launch", f.path), default=None)
 
 
-def unreadable(package: PackageFacts, file: LaunchFile | None, launch: str) -> Verdict | None:
-    """The file is missing, not well-formed, or has another root."""
+def read_launch(package: PackageFacts, name: str) -> LaunchFile | Verdict:
+    """Return the launch file of that name, or the verdict if it is missing, not well-formed, or has another root."""
+    file = find_launch(package, name)
+    verdict = _unreadable(package, file, name)
+    if file is None or verdict is not None:
+        return (verdict or failed(f"{name} cannot be read")).about(measured="no launch file that can be read")
+    return file
+
+
+def _unreadable(package: PackageFacts, file: LaunchFile | None, launch: str) -> Verdict | None:
     if file is None:
         others = [f.path for f in package.launch_files]
-        names = {PurePosixPath(f.path).name: f.path for f in package.files}
+        names = paths_by_name(package)
         near = [names[n] for n in near_names(launch, names)]
         seen = f"; there is {listed(dict.fromkeys([*near, *others]))}" if near or others else ""
         message = f"{launch} is not in the package{seen}"
@@ -71,8 +79,7 @@ def has_program(package: PackageFacts, name: str) -> bool:
     """A file of that name, or a program that CMake builds under it."""
     if "/" not in name and find_script(package, name) is not None:
         return True
-    calls = package.cmake.calls if package.cmake else ()
-    return any(c.name == "add_executable" and c.args[:1] == (name,) for c in calls)
+    return any(c.args[:1] == (name,) for c in cmake_calls(package, "add_executable"))
 
 
 def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip | None:
@@ -226,6 +233,11 @@ class Absence(NamedTuple):
     of_script: bool = False
     citations: tuple[FileCitation, ...] = ()
 
+    def verdict(self, message: str) -> Verdict:
+        """Return the verdict: nothing to judge in the launch file where the script is at fault."""
+        kind = unjudged if self.of_script else failed
+        return kind(message, hint=self.hint, citations=self.citations)
+
 
 def name_pattern(node: LaunchNode) -> re.Pattern[str]:
     """The names that a node can come up under: `$(anon x)` becomes `x_<host>_<pid>_<digits>`.
@@ -340,9 +352,9 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
         return None
     script = find_script(package, str(node.type)) if node.pkg == package.name else None
     if script is not None and script.executable is False:
-        hint = f"chmod +x {script.path}, then git update-index --chmod=+x {script.path}, commit and push"
         why = f"{script.path} has no executable bit, so that roslaunch does not find it"
-        return Absence(why, hint, of_script=True, citations=(FileCitation(file=script.path),))
+        cited = (FileCitation(file=script.path),)
+        return Absence(why, chmod_hint(script.path), of_script=True, citations=cited)
     if "Cannot locate" not in line:
         return Absence(
             f"there is no package {node.pkg}", "check the spelling of pkg, and that it is installed"
