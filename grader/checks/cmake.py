@@ -56,9 +56,8 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
     fault = facts.fault
     if not wrong and fault is None:
         places = tuple(FileCitation(file=c.file, line=c.line) for c in named[:3])
-        return passed(
-            f"{facts.file} has all three calls", expected=expected, measured=measured, citations=places
-        )
+        all_there = passed(f"{facts.file} has all three calls")
+        return all_there.about(expected=expected, measured=measured, citations=places)
     lines = tuple(FileCitation(file=facts.file, line=line) for _, _, line in wrong)
     if fault:
         lines = (*lines, FileCitation(file=fault.file, line=fault.line))
@@ -91,11 +90,8 @@ def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[tuple[str, str
     if not any(c.args[:1] == ("catkin",) for c in packages):
         slip = next((c for c in packages if c.args and c.args[0].casefold() == "catkin"), None)
         other = f" (line {slip.line} says {slip.args[0]})" if slip else ""
-        yield (
-            f"find_package(catkin …) is missing{other}",
-            "add find_package(catkin REQUIRED)",
-            slip.line if slip else None,
-        )
+        line = slip.line if slip else None
+        yield f"find_package(catkin …) is missing{other}", "add find_package(catkin REQUIRED)", line
     if _first(facts, "catkin_package") is None:
         yield "catkin_package(…) is missing", "add catkin_package() after find_package(catkin …)", None
 

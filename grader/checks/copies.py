@@ -18,7 +18,7 @@ from grader.checks.support.console_output import (
 )
 from grader.checks.support.exit_causes import ended_after, explain_end
 from grader.checks.support.nodes import are_noted, nodes_of
-from grader.checks.support.processes import Life, life, lives
+from grader.checks.support.processes import NO_SCRIPT_HINT, Life, life, lives
 from grader.checks.support.text import VALUE, in_words, listed, plural
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
@@ -96,7 +96,8 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
 def _trio(package: PackageFacts, run: Run, params: CopiesParams) -> Trio | Verdict:
     first, second, listener = (life(run, name) for name in (params.first, params.second, params.listener))
     if first is None or second is None:
-        return _not_started(package, run, params)
+        started = listed(one.name for one in lives(run)) or "nothing"
+        return _not_started(package, run, params).about(measured=f"started: {started}")
     if listener is None:
         message = f"{params.listener} was not started, so nobody can tell whose messages arrive"
         return unjudged(message, measured="no listener", hint="add the listener's script, and push it")
@@ -105,23 +106,17 @@ def _trio(package: PackageFacts, run: Run, params: CopiesParams) -> Trio | Verdi
 
 def _not_started(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
     """A process may have to wait for another one's node: then that one is the cause."""
-    measured = listed(one.name for one in lives(run)) or "nothing"
     waited_for = [one for one in lives(run) if one.name in {params.first, params.second, params.listener}]
     for one in waited_for:
         if one.ended_early:
             end = explain_end(one, run, package)
-            message = f"{one.name} ended before the copies were started: {end.cause}"
-            return unjudged(message, measured=f"started: {measured}", hint=end.hint, citations=end.citations)
+            return end.verdict(unjudged, f"{one.name} ended before the copies were started: {end.cause}")
         if not nodes_of(run, one.name):
             message = f"{one.name} never registers as a node, so what waits for it was not started"
-            hint = "call rospy.init_node(…) before anything that waits"
-            return unjudged(message, measured=f"started: {measured}", hint=hint)
+            return unjudged(message, hint="call rospy.init_node(…) before anything that waits")
     if any(one.name in {params.first, params.second} for one in waited_for):
-        message = "only one copy was started"
-        return inconclusive(message, measured=f"started: {measured}", hint="grade again")
-    message = "no copy was started: there is no script to run"
-    hint = "add the script to the package, and push it"
-    return unjudged(message, measured=f"started: {measured}", hint=hint)
+        return inconclusive("only one copy was started", hint="grade again")
+    return unjudged("no copy was started: there is no script to run", hint=NO_SCRIPT_HINT)
 
 
 def _taken_over(run: Run, trio: Trio, params: CopiesParams) -> Verdict | None:
@@ -179,7 +174,7 @@ def _listener_gone(package: PackageFacts, run: Run, trio: Trio) -> Verdict | Non
         return None
     end = explain_end(trio.listener, run, package)
     message = f"both copies live, but {trio.listener.name} ended before it could hear both: {end.cause}"
-    return unjudged(message, hint=end.hint, citations=end.citations)
+    return end.verdict(unjudged, message)
 
 
 def _heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) -> Verdict:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from grader.checks.support.text import plural
-from grader.evidence.run import Channel, Run
+from grader.evidence.run import Run
 from grader.model.verdict import Verdict, failed, inconclusive
 
 Seconds = tuple[float, ...]
+ToSeconds = Callable[[int], float]
+"""From a `log_time` (ns) to a second of the time that the node lives in."""
 
 
 def clocks_at(run: Run, times_ns: Sequence[int]) -> tuple[Seconds, ...]:
@@ -21,19 +23,44 @@ def clocks_at(run: Run, times_ns: Sequence[int]) -> tuple[Seconds, ...]:
     wall = tuple((t - times_ns[0]) / 1e9 for t in times_ns)
     if run.clock != "warped":
         return (wall,)
-    ticks = [tick for c in run.channels if c.topic == "/clock" and c.by_grader for tick in _ticks(c)]
-    ticks.sort()
+    ticks = sorted(_ticks(run))
     at = [bisect_right(ticks, (t, float("inf"))) - 1 for t in times_ns]
     if min(at, default=-1) < 0:
         return ()
     return tuple(ticks[i][1] - ticks[at[0]][1] for i in at), wall
 
 
-def _ticks(channel: Channel) -> list[tuple[int, float]]:
-    """When a tick was sent (ns), and the time that it told (s)."""
-    told = [value.get("clock") if isinstance(value, dict) else None for value in channel.values]
-    pairs = zip(channel.times_ns, told, strict=True)
-    return [(t, clock["secs"] + clock["nsecs"] / 1e9) for t, clock in pairs if clock]
+def run_seconds(run: Run) -> ToSeconds | None:
+    """Seconds since the run began; in a warped run, those of the grader's `/clock`, None where it was not recorded."""
+    if run.clock != "warped":
+        return lambda time_ns: (time_ns - run.start_ns) / 1e9
+    ticks = _ticks(run)
+    return _interpolated(ticks) if ticks else None
+
+
+def _interpolated(ticks: list[tuple[int, float]]) -> ToSeconds:
+    times = [time_ns for time_ns, _ in ticks]
+    zero_s = ticks[0][1]
+
+    def seconds(time_ns: int) -> float:
+        after = bisect_right(times, time_ns)
+        if after in {0, len(ticks)}:
+            return ticks[max(0, after - 1)][1] - zero_s
+        (first_ns, first_s), (next_ns, next_s) = ticks[after - 1], ticks[after]
+        return first_s - zero_s + (next_s - first_s) * (time_ns - first_ns) / (next_ns - first_ns)
+
+    return seconds
+
+
+def _ticks(run: Run) -> list[tuple[int, float]]:
+    """Return when each tick of the grader's `/clock` was sent (ns), and the time that it told (s)."""
+    return [
+        (time_ns, value["clock"]["secs"] + value["clock"]["nsecs"] / 1e9)
+        for channel in run.channels
+        if channel.topic == "/clock" and channel.by_grader
+        for time_ns, value in zip(channel.times_ns, channel.values, strict=True)
+        if value and value.get("clock")
+    ]
 
 
 SLACK_S = 1.5

@@ -11,8 +11,8 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field
 
-from grader.checks.support.exit_causes import explain_end, explain_traceback, process_tracebacks
-from grader.checks.support.processes import early_end, lives, observed_until_ns
+from grader.checks.support.exit_causes import explain_early_end, explain_traceback, process_tracebacks
+from grader.checks.support.processes import lives, observed_until_ns
 from grader.checks.support.text import number, plural
 from grader.checks.support.topics import losses, whole_until_ns
 from grader.evidence.run import Channel, Run
@@ -292,10 +292,9 @@ def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
 
 
 def _died(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> Verdict | None:
-    ended = early_end(run)
-    if ended is None:
+    end = explain_early_end(package, run)
+    if end is None:
         return None
-    end = explain_end(ended, run, package)
     last = count.values[-1]
     if last >= params.maximum - 1:
         message = f"the node dies at {number(last + 1)}, where the counter should reset: {end.cause}"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
+from grader.checks.support.clocks import run_seconds
 from grader.checks.support.nodes import plain_type
 from grader.checks.support.processes import observed_until_ns
 from grader.evidence.run import Channel, Run
@@ -152,9 +152,6 @@ def followed(path: Sequence[Pose], points: Sequence[Point], tolerance_m: float) 
 
 FASTEST = 1e6
 
-Seconds = Callable[[int], float]
-"""From a `log_time` (ns) to a second of the time that the node lives in."""
-
 
 class Track(NamedTuple):
     """The path, or why the messages tell of none: `misfit` if they are of another type, `fault` if they are bad."""
@@ -183,34 +180,6 @@ def track(run: Run, topic: str, hold_s: float | None) -> Track | None:
         return Track(tuple(poses))
     end_s = seconds(observed_until_ns(run) or run.end_ns)
     return Track(tuple(driven(commands, hold_s, end_s)))
-
-
-def run_seconds(run: Run) -> Seconds | None:
-    """Seconds since the run began; in a warped run, those of the grader's `/clock`, None where it was not recorded."""
-    if run.clock != "warped":
-        return lambda time_ns: (time_ns - run.start_ns) / 1e9
-    ticks = [
-        (time_ns, value["clock"]["secs"] + value["clock"]["nsecs"] / 1e9)
-        for channel in run.channels
-        if channel.topic == "/clock" and channel.by_grader
-        for time_ns, value in zip(channel.times_ns, channel.values, strict=True)
-        if value
-    ]
-    return _interpolated(ticks) if ticks else None
-
-
-def _interpolated(ticks: list[tuple[int, float]]) -> Seconds:
-    times = [time_ns for time_ns, _ in ticks]
-    zero_s = ticks[0][1]
-
-    def seconds(time_ns: int) -> float:
-        after = bisect_right(times, time_ns)
-        if after in {0, len(ticks)}:
-            return ticks[max(0, after - 1)][1] - zero_s
-        (first_ns, first_s), (next_ns, next_s) = ticks[after - 1], ticks[after]
-        return first_s - zero_s + (next_s - first_s) * (time_ns - first_ns) / (next_ns - first_ns)
-
-    return seconds
 
 
 def _publishers(run: Run, topic: str) -> list[Channel]:
