@@ -33,7 +33,7 @@ from grader.errors import EvidenceError, UsageError
 from grader.evidence.run import Run
 from grader.faults import NOTHING_RUN
 from grader.files import check_writable
-from grader.judging.recordings import PACKAGE_RUN
+from grader.judging.facts import PACKAGE_RUN
 from grader.model.progress import Progress, Silence, StepState
 from grader.model.result import NO_TIME, EnvironmentInfo, GradingResult, SubmissionInfo
 from grader.portable import wait_for_children

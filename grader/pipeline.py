@@ -35,8 +35,7 @@ from grader.intake import open_recorded, open_recording, open_submission
 from grader.intake.source import Source
 from grader.judging import judge
 from grader.judging.early import judge_files
-from grader.judging.notes import notes_of
-from grader.judging.summary import overall_status, total_points
+from grader.judging.summary import notes_of, overall_status, total_points
 from grader.model.figure import Figures
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
@@ -56,8 +55,7 @@ from grader.portable import wait_for_children
 from grader.report.files import write_reports
 from grader.report.hidden import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
-from grader.rubric.load import LoadedRubric
-from grader.rubric.needs import needs_package, needs_ros, started
+from grader.rubric.load import LoadedRubric, needs_package, needs_ros, started
 from grader.rubric.rates import rates_of
 
 if TYPE_CHECKING:

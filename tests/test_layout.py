@@ -107,6 +107,12 @@ def test_checks_see_evidence_as_records_only() -> None:
     assert {module.split(".")[2] for module in seen} <= {"run", "events"}
 
 
+def test_the_support_of_checks_imports_no_family_of_checks() -> None:
+    shared = {"support", "registry", "evidence"}
+    found = {m for path in _sources(GRADER / "checks" / "support") for m in _imports(path)}
+    assert {m.split(".")[2] for m in found if m.startswith("grader.checks.")} <= shared
+
+
 def test_the_ros_side_needs_ros_and_the_standard_library_only() -> None:
     own = {path.stem for path in ROS_SIDE.glob("*.py")}
     known = own | ROS_MODULES | sys.stdlib_module_names

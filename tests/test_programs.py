@@ -47,7 +47,7 @@ STARTS = {
         "_environment()", "'/'", "nothing: systemd is asked for this process's number"
     ),
     "cli/sandbox_report.py:_probe": Start("HOST_ENV", "'/'", "nothing"),
-    "rubric/own_checks/testing.py:_run": Start(
+    "rubric/pytest_check.py:_run": Start(
         "_environment()", "folder", "nothing: the instructor's tests, beside a copy of the evidence"
     ),
     "intake/git.py:_configured_ssh": Start(

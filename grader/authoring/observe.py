@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median
 
-from grader.checks.support.printed import printed_lines, probes_on
-from grader.checks.support.process import lives
+from grader.checks.support.console_output import printed_lines, probes_on
+from grader.checks.support.processes import lives
 from grader.evidence.inspect import periodic_share, rate_stats
 from grader.evidence.run import Channel, Run
 from grader.model.record import Record

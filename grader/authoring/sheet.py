@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from grader.rubric.cross import TOTAL_POINTS
+from grader.rubric.consistency import TOTAL_POINTS
 
 WEIGHTS = {
     "manifest": 1, "cmake": 1, "build": 1, "executable": 1, "node-lives": 1, "node-name": 1, "topic-type": 2, "rate": 3,

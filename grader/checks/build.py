@@ -3,27 +3,37 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.registry import check
-from grader.checks.support.text import listed, near_names, seconds, shown
+from grader.checks.registry import NoParams, check
+from grader.checks.support.exit_causes import explain_end
+from grader.checks.support.processes import Life, lives
+from grader.checks.support.scripts import cmake_calls, path_in_package, paths_by_name
+from grader.checks.support.text import bare, listed, near_names, seconds, shown
+from grader.checks.support.topics import cite
 from grader.evidence.run import Run
-from grader.model.package import PackageFacts
+from grader.model.package import CMakeCall, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import (
-    EvidenceCitation,
-    FileCitation,
-    Status,
-    Verdict,
-    failed,
-    inconclusive,
-    passed,
-    unjudged,
-)
+from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
 
 CATKIN_MAKE = "catkin_make"
+NO_PROGRAM = {"IMPORTED", "ALIAS", "EXCLUDE_FROM_ALL"}
+CANNOT_START = {126, 127}
+LOADER = (
+    "error while loading shared libraries",
+    "symbol lookup error",
+    "cannot execute",
+    "Exec format error",
+)
+TELLING = ("[FATAL]", "what():")
+SAME_NAME = "new node registered with same name"
+ASTRAY = "run it with rosrun, and look for a pointer or an index that goes astray"
+LINK = (
+    "name every library in target_link_libraries(<program> ${catkin_LIBRARIES}), and every package in "
+    "find_package(catkin REQUIRED COMPONENTS …)"
+)
 EXPECTED = "catkin_make exits with 0"
 INSTALL_ROS = (
     "install ROS 1 with `make setup`, or `apt-get install python3-rospy python3-roslaunch rosbash catkin`, "
@@ -79,14 +89,14 @@ def build(package: PackageFacts, build: Run, params: BuildParams) -> Verdict:
         or where `rosrun` finds it in the package; whether it has its executable bit counts elsewhere.
 
     How to fix
-        Clone your repository into a new workspace, run `catkin_make`, and mend the first error: the later
+        Clone your repository into a new workspace, run `catkin_make`, and fix the first error: the later
         ones often follow from it.
     """
     scripts = f", and {listed(params.scripts)} there to run" if params.scripts else ""
     verdict = judge_build(package, build)
     if verdict.status is Status.PASS:
         verdict = _lost_scripts(package, params.scripts) or verdict
-    return verdict.model_copy(update={"expected": f"{verdict.expected or EXPECTED}{scripts}"})
+    return verdict.about(expected=f"{verdict.expected or EXPECTED}{scripts}")
 
 
 def judge_build(package: PackageFacts, build: Run) -> Verdict:
@@ -125,23 +135,22 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
     error = _first_error([c.line for _, c in build.console if c.process == CATKIN_MAKE])
     place = _place(error, package)
     explained = package.manifest is None or (error is not None and error.kind == "cmake")
-    verdict = unjudged if explained else failed
-    return verdict(
+    return (unjudged if explained else failed)(
         f"catkin_make failed: {error.text}" if error else "catkin_make failed without naming an error",
         expected=EXPECTED,
         measured=f"exit code {exit_code}",
-        hint="run catkin_make in a fresh clone and mend the first error that it prints",
-        citations=(place or EvidenceCitation(evidence=build.evidence, topic="/grader/console"),),
+        hint="run catkin_make in a fresh clone and fix the first error that it prints",
+        citations=(place or cite(build, "/grader/console"),),
     )
 
 
 def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | None:
     """Scripts that are nowhere in the package: their own criteria say so first."""
-    there = {PurePosixPath(f.path).name: f for f in package.files if not is_product(f.path)}
+    there = paths_by_name(package)
     lost = [s for s in scripts if PurePosixPath(s).name not in there]
     if not lost:
         return None
-    near = [there[n].path for s in lost for n in near_names(PurePosixPath(s).name, there)]
+    near = [there[n] for s in lost for n in near_names(PurePosixPath(s).name, there)]
     seen = f"; there is {listed(dict.fromkeys(near))}" if near else ""
     return unjudged(
         f"catkin_make succeeded, but there is no {listed(lost, 'or')} to run{seen}",
@@ -149,11 +158,6 @@ def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | No
         measured=f"rosrun finds no {listed((PurePosixPath(s).name for s in lost), 'or')}",
         hint=f"add {listed(lost)} to the package, then git add, commit and push",
     )
-
-
-def is_product(path: str) -> bool:
-    """Whether a build made it: nothing of what was handed in counts there."""
-    return PurePosixPath(path).parts[0] in {"build", "devel", "install"}
 
 
 def _first_error(lines: Sequence[str]) -> BuildError | None:
@@ -182,8 +186,125 @@ def _paragraph(lines: Sequence[str]) -> str:
 
 
 def _place(error: BuildError | None, package: PackageFacts) -> FileCitation | None:
-    """The error's place if it lies in the package: the longest of the package's paths that ends it."""
-    if error is None or not error.file:
-        return None
-    fits = [f.path for f in package.files if ("/" + error.file).endswith("/" + f.path)]
-    return FileCitation(file=max(fits, key=len), line=error.line) if fits else None
+    """Return the error's place if it lies in the package."""
+    path = path_in_package(package, error.file) if error is not None and error.file else None
+    return FileCitation(file=path, line=error.line) if error is not None and path else None
+
+
+class Broken(NamedTuple):
+    """A program that does not run: what it came to, and what to do."""
+
+    program: str
+    why: str
+    hint: str
+    life: Life
+
+
+@check("build-and-run", params=NoParams)
+def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
+    """The package builds, and its C++ programs run.
+
+    What it checks
+        That `catkin_make` succeeds, and that each program which `add_executable` makes of your sources can
+        be started. A package without such programs only has to build.
+
+    Why it matters on a robot
+        A program can be compiled and still not start: a library is missing, or it crashes at once. On the
+        robot that shows when it is too late.
+
+    How it is measured
+        By the exit code of `catkin_make`. Then every program is started beside a roscore: one that a signal
+        ends (a segmentation fault), or that cannot be loaded, fails. That it comes to its end by itself is
+        fine, whatever its exit code, and so are two programs that use the same node name.
+
+    How to fix
+        Fix the first error of `catkin_make`. For a program that does not start: `rosrun <package>
+        <program>` shows what is missing; `target_link_libraries(<program> ${catkin_LIBRARIES})` links ROS.
+    """
+    verdict = judge_build(package, build)
+    expected = f"{verdict.expected}; each program of add_executable starts"
+    if verdict.status is not Status.PASS:
+        return verdict.about(expected=expected)
+    programs = [one for one in lives(run) if "/" in one.name]
+    made = {call.args[0]: call for call in _made(package)}
+    if made and not programs:
+        return _not_started(package, made).about(expected=expected)
+    broken = list(_broken(package, run, programs))
+    measured = f"{verdict.measured}; programs: {listed(_name(p) for p in programs) or 'none'}"
+    if not broken:
+        message = f"{verdict.message}{_how_they_went(programs)}"
+        return passed(message, expected=expected, measured=measured)
+    first = broken[0]
+    calls = (made[b.program] for b in broken if b.program in made)
+    cited = tuple(FileCitation(file=call.file, line=call.line) for call in calls)
+    start = cite(run, "/grader/process", first.life.start_ns, first.life.end_ns)
+    return failed(
+        f"{verdict.message}, but {'; '.join(f'{b.program} does not run: {b.why}' for b in broken)}",
+        expected=expected,
+        measured=measured,
+        hint=first.hint,
+        citations=(*cited, start),
+    )
+
+
+def _made(package: PackageFacts) -> Iterator[CMakeCall]:
+    """Yield the calls that make programs of sources."""
+    for call in cmake_calls(package, "add_executable"):
+        if len(call.args) > 1 and not NO_PROGRAM & set(call.args[1:3]):
+            yield call
+
+
+def _not_started(package: PackageFacts, made: dict[str, CMakeCall]) -> Verdict:
+    """No program came out where `rosrun` looks: catkin sets that place in `catkin_package()`."""
+    set_at = next(iter(cmake_calls(package, "catkin_package")), None)
+    early = [c for c in made.values() if set_at and c.file == set_at.file and c.line < set_at.line]
+    if not early:
+        message = f"catkin_make succeeded, but no program was started ({listed(made)})"
+        return inconclusive(message, measured="built, not started", hint="grade again")
+    message = (
+        f"catkin_make succeeded, but rosrun finds no {listed((c.args[0] for c in early), 'or')}: "
+        "add_executable(…) stands above catkin_package(…)"
+    )
+    cited = tuple(FileCitation(file=c.file, line=c.line) for c in early)
+    hint = "move add_executable(…) below catkin_package(…), which says where programs go"
+    return failed(message, measured="built, not where rosrun looks", hint=hint, citations=cited)
+
+
+def _broken(package: PackageFacts, run: Run, programs: list[Life]) -> Iterator[Broken]:
+    for one in programs:
+        if not one.ended_early or one.end is None or _gave_way(run, one):
+            continue
+        code, words = one.end.exit_code, _last_words(run, one)
+        quoted = f"; its last words: {words}" if words else ""
+        unloaded = next((mark for mark in LOADER if mark in words), None)
+        if one.end.signal is not None or one.end.stopped_by is not None:
+            end = explain_end(one, run, package)
+            hint = "fix what its last words say" if any(mark in words for mark in TELLING) else ASTRAY
+            yield Broken(_name(one), f"{end.cause}{quoted}", hint, one)
+        elif unloaded or code in CANNOT_START:
+            yield Broken(_name(one), f"it cannot be started (exit code {code}){quoted}", LINK, one)
+
+
+def _gave_way(run: Run, one: Life) -> bool:
+    """Another program took its node's name: then ROS shuts this one down."""
+    return any(SAME_NAME in line.line for _, line in run.lines(one.name))
+
+
+def _last_words(run: Run, one: Life) -> str:
+    """The loader's complaint, or ROS's, or that of an exception where there is one, or else the last line."""
+    lines = [line.line for _, line in run.lines(one.name) if line.line.strip()]
+    complaints = [line for line in lines if any(mark in line for mark in (*LOADER, *TELLING))]
+    return shown(bare((complaints or lines[-1:] or [""])[0]))
+
+
+def _how_they_went(programs: list[Life]) -> str:
+    if not programs:
+        return "; the package makes no programs"
+    codes = {_name(p): p.end.exit_code for p in programs if p.ended_early and p.end is not None}
+    why = "perhaps because it needs arguments"
+    ended = [f"{name} ends with exit code {code}, {why}" for name, code in codes.items() if code]
+    return "; ".join([f", and {listed(_name(p) for p in programs)} can be started", *ended])
+
+
+def _name(one: Life) -> str:
+    return one.name.rpartition("/")[2]

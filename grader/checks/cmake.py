@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from pathlib import PurePosixPath
+from typing import Annotated, NamedTuple
+
+from pydantic import Field
 
 from grader.checks.registry import check
+from grader.checks.support.scripts import PYTHON, Installed, copies_of, installed, is_bin, names_script
+from grader.checks.support.text import listed, near_names, shown
 from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Verdict, failed, passed
+from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
 
 
 class CMakeParams(Record):
@@ -50,9 +56,8 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
     fault = facts.fault
     if not wrong and fault is None:
         places = tuple(FileCitation(file=c.file, line=c.line) for c in named[:3])
-        return passed(
-            f"{facts.file} has all three calls", expected=expected, measured=measured, citations=places
-        )
+        all_there = passed(f"{facts.file} has all three calls")
+        return all_there.about(expected=expected, measured=measured, citations=places)
     lines = tuple(FileCitation(file=facts.file, line=line) for _, _, line in wrong)
     if fault:
         lines = (*lines, FileCitation(file=fault.file, line=fault.line))
@@ -60,7 +65,7 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
         f"{facts.file}: {'; '.join([*_fault(fault), *(message for message, _, _ in wrong)])}",
         expected=expected,
         measured=measured,
-        hint="; ".join(hint for _, hint, _ in wrong) or "mend that line, then run catkin_make",
+        hint="; ".join(hint for _, hint, _ in wrong) or "fix that line, then run catkin_make",
         citations=tuple(dict.fromkeys(lines)),
     )
 
@@ -72,7 +77,7 @@ def _fault(fault: Fault | None) -> Iterator[str]:
 
 
 def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[tuple[str, str, int | None]]:
-    """What is missing or wrong, how to mend it, and the line."""
+    """What is missing or wrong, how to fix it, and the line."""
     wanted = names[0]
     project = _first(facts, "project")
     if project is None:
@@ -85,14 +90,161 @@ def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[tuple[str, str
     if not any(c.args[:1] == ("catkin",) for c in packages):
         slip = next((c for c in packages if c.args and c.args[0].casefold() == "catkin"), None)
         other = f" (line {slip.line} says {slip.args[0]})" if slip else ""
-        yield (
-            f"find_package(catkin …) is missing{other}",
-            "add find_package(catkin REQUIRED)",
-            slip.line if slip else None,
-        )
+        line = slip.line if slip else None
+        yield f"find_package(catkin …) is missing{other}", "add find_package(catkin REQUIRED)", line
     if _first(facts, "catkin_package") is None:
         yield "catkin_package(…) is missing", "add catkin_package() after find_package(catkin …)", None
 
 
 def _first(facts: CMakeFacts, name: str) -> CMakeCall | None:
     return next((c for c in facts.calls if c.name == name), None)
+
+
+BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
+
+
+class CMakeInstallParams(Record):
+    """`scripts` are paths as the handout gives them; a script that lies elsewhere is named by where it lies."""
+
+    scripts: Annotated[tuple[str, ...], Field(min_length=1)]
+
+
+class Lack(NamedTuple):
+    """Why a script is not installed, how to fix that, and the line; `{}` in both stands for the scripts.
+
+    `path` is where the script lies. `unsure` where only CMake could tell; `follows` where it follows from a missing
+    `catkin_package()`, which gives the destination its value.
+    """
+
+    why: str
+    fix: str
+    line: FileCitation | None
+    path: str = ""
+    unsure: bool = False
+    follows: bool = False
+
+
+@check("cmake-install", params=CMakeInstallParams)
+def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
+    """CMakeLists.txt installs the scripts with catkin_install_python.
+
+    What it checks
+        That `catkin_install_python(PROGRAMS … DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})` names each
+        script, in one call or in several.
+
+    Why it matters on a robot
+        A robot often runs the installed packages, not the sources. What CMake does not install is missing
+        there, and `catkin_install_python` also makes the scripts name the right Python.
+
+    How it is measured
+        By what CMake itself was told while the package was built: variables and `file(GLOB …)` are
+        expanded, comments and `if(FALSE)` ignored. Where it was not built, the file is parsed.
+        `install(PROGRAMS …)` is another command and does not count.
+
+    How to fix
+        Take away the `#` before each line of the block that `catkin_create_pkg` wrote, and name your
+        scripts: `catkin_install_python(PROGRAMS scripts/talker.py scripts/listener.py DESTINATION
+        ${CATKIN_PACKAGE_BIN_DESTINATION})`. Then run `catkin_make`.
+    """
+    names = listed(params.scripts)
+    expected = f"catkin_install_python(PROGRAMS … DESTINATION {BIN}) with {names}"
+    facts = package.cmake
+    if facts is None:
+        message = "there is no CMakeLists.txt, so nothing is installed"
+        return unjudged(message, expected=expected, measured="no file", hint="first add CMakeLists.txt")
+    all_named = list(installed(package))
+    of_python = [one for one in all_named if one.call.name == PYTHON]
+    measured = f"named: {listed(dict.fromkeys(shown(one.path) for one in of_python)) or 'none'}"
+    calls = tuple(FileCitation(file=o.call.file, line=o.call.line) for o in of_python)
+    lacks = {s: lack for s in params.scripts if (lack := _lack(package, all_named, s))}
+    if not lacks:
+        message = f"{facts.file} installs {names}"
+        cited = tuple(dict.fromkeys(calls))
+        return passed(message, expected=expected, measured=measured, citations=cited)
+    cited = tuple(dict.fromkeys([*(lack.line for lack in lacks.values() if lack.line), *calls]))
+    verdict = inconclusive if any(lack.unsure for lack in lacks.values()) else failed
+    follows = all(lack.follows for lack in lacks.values())
+    return (unjudged if facts.fault or follows else verdict)(
+        f"{facts.file}: {'; '.join(_reasons(lacks))}",
+        expected=expected,
+        measured=measured,
+        hint="; ".join(_fixes(lacks)),
+        citations=cited or (FileCitation(file=facts.file),),
+    )
+
+
+def _reasons(lacks: dict[str, Lack]) -> Iterator[str]:
+    """Each reason once, with the scripts that it is true of."""
+    for why in dict.fromkeys(lack.why for lack in lacks.values()):
+        scripts = [name for name, lack in lacks.items() if lack.why == why]
+        yield why.replace("{}", listed(scripts))
+
+
+def _fixes(lacks: dict[str, Lack]) -> Iterator[str]:
+    """Each repair once, as one line for all scripts that it is true of."""
+    for fix in dict.fromkeys(lack.fix for lack in lacks.values()):
+        yield fix.replace("{}", " ".join(lack.path for lack in lacks.values() if lack.fix == fix))
+
+
+def _lack(package: PackageFacts, all_named: Sequence[Installed], script: str) -> Lack | None:
+    """None where `catkin_install_python` puts the script where `rosrun` looks."""
+    paths = [f.path for f in copies_of(package, script)] or [script]
+    hits = [one for one in all_named if any(names_script(one, path) for path in paths)]
+    by_python = [one for one in hits if one.call.name == PYTHON]
+    if any(one.kind == "PROGRAMS" and is_bin(one.destination or "", package) for one in by_python):
+        return None
+    if by_python:
+        return _misplaced(package, by_python[0])
+    blurred = next((o for o in all_named if o.call.name == PYTHON and not o.known), None)
+    if blurred is not None:
+        why = f"which scripts {blurred.path} holds, only CMake can tell, and it was not run to its end"
+        return Lack(why, "build the package with catkin_make", _line(blurred), unsure=True)
+    return _unnamed(all_named, hits, paths[0], script)
+
+
+def _misplaced(package: PackageFacts, one: Installed) -> Lack:
+    where = f"line {one.call.line}"
+    if one.kind != "PROGRAMS":
+        why = f"{where}: catkin_install_python(…) does not begin with the word PROGRAMS"
+        return Lack(why, f"write catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(one))
+    if "DESTINATION" in one.call.args and not one.destination and not _called(package, "catkin_package"):
+        why = f"{where}: {BIN} has no value, for catkin_package() is not called before it"
+        return Lack(why, "call catkin_package() above catkin_install_python(…)", _line(one), follows=True)
+    if one.destination is None:
+        why = f"{where}: catkin_install_python(…) gives {{}} no DESTINATION"
+    elif not one.destination:
+        why = f"{where}: nothing stands behind DESTINATION, or a variable that has no value (its name misspelt?)"
+    else:
+        why = f"{where}: the destination of {{}} is {shown(one.destination)}, not {BIN} (lib/{package.name})"
+    return Lack(why, f"write DESTINATION {BIN}, below find_package(catkin …)", _line(one))
+
+
+def _unnamed(all_named: Sequence[Installed], hits: Sequence[Installed], path: str, script: str) -> Lack:
+    """Another command names it, a slip of its name or place is named, or nothing is."""
+    if hits:
+        other = f"install({hits[0].kind} …)"
+        why = f"line {hits[0].call.line}: {other} names {{}}, where catkin_install_python(PROGRAMS …) should"
+        return Lack(
+            why, f"replace {other} by catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(hits[0])
+        )
+    of_python = [one for one in all_named if one.call.name == PYTHON]
+    if not of_python:
+        why = "no catkin_install_python(…) is called, so nothing installs {}"
+        fix = f"write catkin_install_python(PROGRAMS {{}} DESTINATION {BIN}), without # before it"
+        return Lack(why, fix, None, path)
+    names = {PurePosixPath(one.path).name: one for one in of_python}
+    wanted = PurePosixPath(script).name
+    near = [wanted] if wanted in names else list(near_names(wanted, names))
+    if near:
+        one = names[near[0]]
+        why = f"line {one.call.line}: {shown(one.path)} is named, which is not there; the script is {path}"
+        return Lack(why, f"write {path}", _line(one))
+    return Lack("catkin_install_python(…) does not name {}", "write {} into it, behind PROGRAMS", None, path)
+
+
+def _called(package: PackageFacts, name: str) -> bool:
+    return package.cmake is not None and any(call.name == name for call in package.cmake.calls)
+
+
+def _line(one: Installed) -> FileCitation:
+    return FileCitation(file=one.call.file, line=one.call.line)

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Literal
 
 from grader.checks.registry import check
-from grader.checks.support.absence import no_node
-from grader.checks.support.names import GlobalName, is_called
+from grader.checks.support.nodes import GlobalName, is_called
 from grader.checks.support.text import listed, near_names
+from grader.checks.support.topics import End, cite, no_node, nodes_on, topics_with
 from grader.evidence.run import Run, is_grader_node
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Verdict, failed, passed
+from grader.model.verdict import Verdict, failed, passed
 
-End = Literal["publisher", "subscriber"]
-ENDS: tuple[End, End] = ("publisher", "subscriber")
+ENDS: tuple[End, End] = ("publishers", "subscribers")
 
 
 class ConnectedParams(Record):
@@ -26,7 +24,7 @@ class ConnectedParams(Record):
     subscriber: str = ""
 
     def name(self, end: End) -> str:
-        return self.publisher if end == "publisher" else self.subscriber
+        return self.publisher if end == "publishers" else self.subscriber
 
 
 @check("connected", params=ConnectedParams)
@@ -51,21 +49,15 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
     """
     found = next(_pairs(run, params), None)
     ends = [_wanted(params.name(end), end) for end in ENDS]
-    verdict = (
-        passed(f"{found[0]} and {found[1]} are connected over {params.topic}")
-        if found
-        else _apart(package, run, params)
-    )
+    if found:
+        verdict = passed(f"{found[0]} and {found[1]} are connected over {params.topic}")
+    else:
+        verdict = _apart(package, run, params)
     over = {c.topic: None for _, e in run.graph for c in e.connections if run.is_student_node(c.publisher)}
-    return verdict.model_copy(
-        update={
-            "expected": f"{ends[0]} connected to {ends[1]} over {params.topic}",
-            "measured": verdict.measured or (f"connections over {listed(over)}" if over else "no connection"),
-            "citations": (
-                *verdict.citations,
-                EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),
-            ),
-        }
+    return verdict.about(
+        expected=f"{ends[0]} connected to {ends[1]} over {params.topic}",
+        measured=verdict.measured or (f"connections over {listed(over)}" if over else "no connection"),
+        citations=(*verdict.citations, cite(run, "/grader/graph")),
     )
 
 
@@ -116,30 +108,19 @@ def _misnamed(run: Run, end: End, params: ConnectedParams) -> Verdict | None:
 
 
 def _not_on_topic(run: Run, end: End, params: ConnectedParams) -> Verdict:
-    wanted, does = params.name(end), "publishes on" if end == "publisher" else "subscribes to"
+    wanted, does = params.name(end), "publishes on" if end == "publishers" else "subscribes to"
     who = f"/{wanted.lstrip('/')}" if wanted else "no node"
-    topics = [t for t in _topics(run, end) if _on(run, t, end, params)]
+    topics = topics_with(run, end, lambda node: _fits(run, node, wanted))
     near = near_names(params.topic, topics) or topics
     message = f"{who} never {does} {params.topic}" if wanted else f"{who} {does} {params.topic}"
-    kind = "Publisher" if end == "publisher" else "Subscriber"
+    kind = "Publisher" if end == "publishers" else "Subscriber"
     hint = f"rospy.{kind}('{params.topic}', …); look for a <remap> or a namespace"
     return failed(f"{message}; it {does} {listed(near)}" if near and wanted else message, hint=hint)
 
 
 def _on(run: Run, topic: str, end: End, params: ConnectedParams) -> tuple[str, ...]:
-    """The nodes that fit this end and were ever on the topic."""
-    found = (
-        node
-        for _, event in run.graph
-        for node in (event.publishers if end == "publisher" else event.subscribers).get(topic, ())
-        if _fits(run, node, params.name(end))
-    )
-    return tuple(dict.fromkeys(found))
-
-
-def _topics(run: Run, end: End) -> tuple[str, ...]:
-    found = (t for _, e in run.graph for t in (e.publishers if end == "publisher" else e.subscribers))
-    return tuple(t for t in dict.fromkeys(found) if t != "/rosout")
+    """Return the nodes that fit this end and were ever on the topic."""
+    return nodes_on(run, topic, end, lambda node: _fits(run, node, params.name(end)))
 
 
 def _nodes(run: Run) -> tuple[str, ...]:
@@ -147,4 +128,4 @@ def _nodes(run: Run) -> tuple[str, ...]:
 
 
 def _wanted(name: str, end: End) -> str:
-    return f"/{name.lstrip('/')}" if name else f"a {end} of the package"
+    return f"/{name.lstrip('/')}" if name else f"a {end.removesuffix('s')} of the package"

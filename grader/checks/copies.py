@@ -8,16 +8,23 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.exit_cause import ended_after, explain_end
+from grader.checks.support.console_output import (
+    LOOKED_AT,
+    Sent,
+    both_from_ns,
+    heard_of,
+    printed_times,
+    sent_by,
+)
+from grader.checks.support.exit_causes import ended_after, explain_end
 from grader.checks.support.nodes import are_noted, nodes_of
-from grader.checks.support.pairs import LOOKED_AT, Sent, both_from_ns, heard_of, printed_times, sent_by
-from grader.checks.support.process import Life, life, lives
-from grader.checks.support.text import listed, plural
-from grader.checks.support.wording import VALUE, in_words
+from grader.checks.support.processes import NO_SCRIPT_HINT, Life, life, lives
+from grader.checks.support.text import VALUE, in_words, listed, plural
+from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, partial, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, partial, passed, unjudged
 
 SAME_NAME = "new node registered with same name"
 FEW = 2
@@ -72,7 +79,7 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
     expected = f"two copies alive under two names, and {params.listener} printing messages of both"
     trio = _trio(package, run, params)
     if isinstance(trio, Verdict):
-        return trio.model_copy(update={"expected": expected})
+        return trio.about(expected=expected)
     verdict = (
         _taken_over(run, trio, params)
         or _not_both_alive(package, run, trio)
@@ -80,16 +87,17 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
         or _heard(package, run, trio, params)
     )
     names = dict.fromkeys((*trio.first_nodes, *trio.second_nodes))
-    graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
+    graph = cite(run, "/grader/graph")
     measured = verdict.measured or f"names of the copies: {listed(names) or 'none'}"
     citations = verdict.citations or (graph,)
-    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
+    return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
 def _trio(package: PackageFacts, run: Run, params: CopiesParams) -> Trio | Verdict:
     first, second, listener = (life(run, name) for name in (params.first, params.second, params.listener))
     if first is None or second is None:
-        return _not_started(package, run, params)
+        started = listed(one.name for one in lives(run)) or "nothing"
+        return _not_started(package, run, params).about(measured=f"started: {started}")
     if listener is None:
         message = f"{params.listener} was not started, so nobody can tell whose messages arrive"
         return unjudged(message, measured="no listener", hint="add the listener's script, and push it")
@@ -98,23 +106,17 @@ def _trio(package: PackageFacts, run: Run, params: CopiesParams) -> Trio | Verdi
 
 def _not_started(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
     """A process may have to wait for another one's node: then that one is the cause."""
-    measured = listed(one.name for one in lives(run)) or "nothing"
     waited_for = [one for one in lives(run) if one.name in {params.first, params.second, params.listener}]
     for one in waited_for:
         if one.ended_early:
             end = explain_end(one, run, package)
-            message = f"{one.name} ended before the copies were started: {end.cause}"
-            return unjudged(message, measured=f"started: {measured}", hint=end.hint, citations=end.citations)
+            return end.verdict(unjudged, f"{one.name} ended before the copies were started: {end.cause}")
         if not nodes_of(run, one.name):
             message = f"{one.name} never registers as a node, so what waits for it was not started"
-            hint = "call rospy.init_node(…) before anything that waits"
-            return unjudged(message, measured=f"started: {measured}", hint=hint)
+            return unjudged(message, hint="call rospy.init_node(…) before anything that waits")
     if any(one.name in {params.first, params.second} for one in waited_for):
-        message = "only one copy was started"
-        return inconclusive(message, measured=f"started: {measured}", hint="grade again")
-    message = "no copy was started: there is no script to run"
-    hint = "add the script to the package, and push it"
-    return unjudged(message, measured=f"started: {measured}", hint=hint)
+        return inconclusive("only one copy was started", hint="grade again")
+    return unjudged("no copy was started: there is no script to run", hint=NO_SCRIPT_HINT)
 
 
 def _taken_over(run: Run, trio: Trio, params: CopiesParams) -> Verdict | None:
@@ -140,11 +142,7 @@ def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | No
         return None
     word, one = gone[-1]
     end = explain_end(one, run, package)
-    cited = end.citations or (
-        EvidenceCitation(
-            evidence=run.evidence, topic="/grader/process", from_ns=one.start_ns, to_ns=one.end_ns
-        ),
-    )
+    cited = end.citations or (cite(run, "/grader/process", one.start_ns, one.end_ns),)
     if len(gone) > 1:
         message = f"both copies ended by themselves: {end.cause}"
         return unjudged(message, hint=end.hint, citations=cited)
@@ -176,7 +174,7 @@ def _listener_gone(package: PackageFacts, run: Run, trio: Trio) -> Verdict | Non
         return None
     end = explain_end(trio.listener, run, package)
     message = f"both copies live, but {trio.listener.name} ended before it could hear both: {end.cause}"
-    return unjudged(message, hint=end.hint, citations=end.citations)
+    return end.verdict(unjudged, message)
 
 
 def _heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) -> Verdict:

@@ -7,22 +7,21 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.counter_wrap import WrapParams, judge_wraps
-from grader.checks.support.counting import (
+from grader.checks.support.counters import (
     Count,
     Step,
+    WrapParams,
     Wrong,
-    cite,
     counts,
     first_values,
+    judge_wraps,
     judged_steps,
     longest,
     wrong_steps,
 )
-from grader.checks.support.exit_cause import explain_end
-from grader.checks.support.losses import losses
-from grader.checks.support.process import early_end
+from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.text import listed, number, plural, seconds
+from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -68,24 +67,28 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
     expected = f"{params.start} is the first value on {params.topic}"
     found = counts(run, params.topic)
     if not found:
-        return _nothing(package, run, params.topic).model_copy(update={"expected": expected})
+        return _nothing(package, run, params.topic).about(expected=expected)
     first = found[0]
-    fields = {
-        "expected": expected,
-        "measured": f"{first_values(first.values)}",
-        "citations": cite(run, params.topic, first.times_ns[0], first.times_ns[0]),
-    }
+    return _start(first, run, params).about(
+        expected=expected,
+        measured=first_values(first.values),
+        citations=(cite(run, params.topic, first.times_ns[0], first.times_ns[0]),),
+    )
+
+
+def _start(first: Count, run: Run, params: StartParams) -> Verdict:
     if begins_with(first, params.start):
-        return passed(f"{params.topic} begins with {params.start}", **fields)
+        return passed(f"{params.topic} begins with {params.start}")
     if run.foreign:
         message = f"{run.evidence} may have begun after the first message on {params.topic}"
-        return inconclusive(message, hint="start the recording, and then the node", **fields)
+        return inconclusive(message, hint="start the recording, and then the node")
     if missed_the_first(run, params.topic, first):
         message = f"the recorder missed the first messages on {params.topic}"
-        return inconclusive(message, hint="grade again", **fields)
+        return inconclusive(message, hint="grade again")
     hint = f"set the counter to {params.start} before the loop, and add one after publish(…), not before"
-    message = f"the first value on {params.topic} is {number(first.values[0])}, not {params.start}"
-    return failed(message, hint=hint, **fields)
+    return failed(
+        f"the first value on {params.topic} is {number(first.values[0])}, not {params.start}", hint=hint
+    )
 
 
 @check("counter-step", params=StepParams, messages_only=True, heeds_losses=True)
@@ -112,7 +115,7 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
     expected = f"each value on {params.topic} is the one before plus one"
     count = longest(run, params.topic)
     if count is None:
-        return _nothing(package, run, params.topic).model_copy(update={"expected": expected})
+        return _nothing(package, run, params.topic).about(expected=expected)
     steps = judged_steps(count, params.maximum)
     found = wrong_steps(count, run, maximum=params.maximum, rate_hz=params.rate_hz)
     wrong, right = found.steps, sum(s.change == 1 for s in steps)
@@ -122,12 +125,10 @@ def counter_step(package: PackageFacts, run: Run, params: StepParams) -> Verdict
         or passed(f"the counter goes up by one, {plural(right, 'time')}")
     )
     at = wrong[0] if wrong else Step(0, 0, 0, count.times_ns[0], count.times_ns[-1], 0)
-    return verdict.model_copy(
-        update={
-            "expected": expected,
-            "measured": f"{plural(right, 'step')} of +1, {len(wrong)} others; {first_values(count.values)}",
-            "citations": cite(run, params.topic, at.from_ns, at.to_ns),
-        }
+    return verdict.about(
+        expected=expected,
+        measured=f"{plural(right, 'step')} of +1, {len(wrong)} others; {first_values(count.values)}",
+        citations=(cite(run, params.topic, at.from_ns, at.to_ns),),
     )
 
 
@@ -155,15 +156,13 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
     expected = f"after {high} comes {low}, after {high - 1} comes {high} or {low}; {params.wraps} times"
     count = longest(run, params.topic)
     if count is None:
-        return _nothing(package, run, params.topic).model_copy(update={"expected": expected})
+        return _nothing(package, run, params.topic).about(expected=expected)
     verdict, seen = judge_wraps(count, run, package, params)
     turn = f"{number(seen.before)}→{number(seen.after)}" if seen else "no reset"
     lowest, highest = number(min(count.values)), number(max(count.values))
     measured = f"{plural(len(count.values), 'value')}, {lowest} to {highest}, {turn}"
     at = (seen.from_ns, seen.to_ns) if seen else (count.times_ns[0], count.times_ns[-1])
-    return verdict.model_copy(
-        update={"expected": expected, "measured": measured, "citations": cite(run, params.topic, *at)}
-    )
+    return verdict.about(expected=expected, measured=measured, citations=(cite(run, params.topic, *at),))
 
 
 def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
@@ -173,10 +172,7 @@ def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
     if any(c.messages for c in run.student_channels(topic)):
         hint = "publish the counter itself, as an Int8"
         return unjudged(f"{topic} carries no numbers", measured="no number", hint=hint)
-    ended = early_end(run)
-    cause = f": the node ended ({explain_end(ended, run, package).cause})" if ended else ""
-    hint = f"look at rostopic echo {topic}"
-    return unjudged(f"no message came on {topic}{cause}", measured="no message", hint=hint)
+    return no_message(package, run, topic)
 
 
 def begins_with(first: Count, start: int) -> bool:
@@ -233,8 +229,8 @@ def _usual_fault(usual: float) -> str:
 def _too_few(steps: int, run: Run, package: PackageFacts, params: StepParams) -> Verdict | None:
     if steps >= params.min_steps:
         return None
-    ended = early_end(run)
-    cause = f": the node ended ({explain_end(ended, run, package).cause})" if ended else ""
+    end = explain_early_end(package, run)
+    cause = f": the node ended ({end.cause})" if end else ""
     message = f"only {plural(steps + 1, 'value')} came on {params.topic}{cause}"
     if losses(run, params.topic):
         return inconclusive(message, hint="grade again")

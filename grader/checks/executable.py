@@ -6,9 +6,18 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.build import CATKIN_MAKE, is_product
+from grader.checks.build import CATKIN_MAKE
 from grader.checks.registry import check
-from grader.checks.support.installing import PYTHON, installed, is_found, names_script
+from grader.checks.support.scripts import (
+    PYTHON,
+    add_hint,
+    chmod_hint,
+    find_script,
+    installed,
+    is_found,
+    names_script,
+    paths_by_name,
+)
 from grader.checks.support.text import listed, near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts, SourceFile
@@ -19,7 +28,6 @@ RIGHT_SHEBANG = "#!/usr/bin/env python3"
 # a script without its first line is run by the shell, which knows no `import`
 TELLING = ("Couldn't find", "import: command not found", "No such file or directory")
 C_SOURCES = {".c", ".cc", ".cpp", ".cxx", ".h", ".hpp"}
-NODE_FOLDERS = ("scripts", "src", "nodes", "bin")
 
 
 class ExecutableParams(Record):
@@ -29,10 +37,10 @@ class ExecutableParams(Record):
 
 
 class Obstacle(NamedTuple):
-    """Why `rosrun` cannot run the file, and the command that mends it."""
+    """Why `rosrun` cannot run the file, and the command that fixes it."""
 
     why: str
-    mend: str
+    fix: str
 
 
 @check("executable", params=ExecutableParams)
@@ -58,50 +66,31 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
         python3` as the very first line; `dos2unix <file>` for a file from Windows. `ls -lF` shows
         executable files with a `*`.
     """
-    expected = f"{params.path}, executable, beginning with {RIGHT_SHEBANG}"
     found = find_script(package, params.path)
-    if found is None:
-        return _missing(package, params.path, expected)
+    verdict = _missing(package, params.path) if found is None else _judged(package, build, found, params)
+    return verdict.about(expected=f"{params.path}, executable, beginning with {RIGHT_SHEBANG}")
+
+
+def _judged(package: PackageFacts, build: Run, found: SourceFile, params: ExecutableParams) -> Verdict:
     remarks = package.hints_on(found.path)
     obstacles = [*_shebang_obstacles(found), *_mode_obstacles(found, remarks)]
-    measured = f"{found.path}: {_mode(found)}, {_first_line(found)}"
-    line = (FileCitation(file=found.path, line=1),)
-    elsewhere = found.path != params.path
-    hint = f"the handout puts it at {params.path}; move it there" if elsewhere else "; ".join(remarks)
+    moved = f"the handout puts it at {params.path}; move it there" if found.path != params.path else ""
+    hint = moved or "; ".join(remarks)
     if found.executable and not obstacles:
-        message = f"{found.path} is executable and names {_interpreter(found)}"
-        return passed(message, expected=expected, measured=measured, hint=hint, citations=line)
-    if has_wrapper(package, build, found.path):
+        verdict = passed(f"{found.path} is executable and names {_interpreter(found)}", hint=hint)
+    elif has_wrapper(package, build, found.path):
         advice = f" (without it: {obstacles[0].why})" if obstacles else ""
-        message = f"the build makes an executable wrapper of {found.path}{advice}"
-        return passed(message, expected=expected, measured=measured, hint=hint, citations=line)
-    if obstacles:
-        return failed(
-            f"{found.path} {' and '.join(o.why for o in obstacles)}{_rosrun_answer(build, found.path)}",
-            expected=expected,
-            measured=measured,
-            hint="; ".join(o.mend for o in obstacles),
-            citations=line,
+        verdict = passed(f"the build makes an executable wrapper of {found.path}{advice}", hint=hint)
+    elif obstacles:
+        message = f"{found.path} {' and '.join(o.why for o in obstacles)}{_rosrun_answer(build, found.path)}"
+        verdict = failed(message, hint="; ".join(o.fix for o in obstacles))
+    else:
+        message = f"whether {found.path} is executable cannot be seen: the submission carries no file modes"
+        verdict = inconclusive(
+            message, hint="hand in a git repository or a .tar.gz, which keep the executable bit"
         )
-    message = f"whether {found.path} is executable cannot be seen: what was handed in carries no file modes"
-    mend = "hand in a git repository or a .tar.gz, which keep the executable bit"
-    return inconclusive(message, expected=expected, measured=measured, hint=mend, citations=line)
-
-
-def find_script(package: PackageFacts, path: str) -> SourceFile | None:
-    """The file at this path, or one of the same name in another folder (those for nodes first)."""
-
-    def rank(file: SourceFile) -> tuple[bool, bool, bool, str]:
-        folder = PurePosixPath(file.path).parts[0]
-        return file.path != path, folder not in NODE_FOLDERS, file.executable is False, file.path
-
-    return min(copies_of(package, path), key=rank, default=None)
-
-
-def copies_of(package: PackageFacts, path: str) -> list[SourceFile]:
-    """All files of this name in the package, whatever their folder; what a build made is none of them."""
-    name = PurePosixPath(path).name
-    return [f for f in package.files if PurePosixPath(f.path).name == name and not is_product(f.path)]
+    line = FileCitation(file=found.path, line=1)
+    return verdict.about(measured=f"{found.path}: {_mode(found)}, {_first_line(found)}", citations=(line,))
 
 
 def has_wrapper(package: PackageFacts, build: Run, path: str) -> bool:
@@ -111,8 +100,8 @@ def has_wrapper(package: PackageFacts, build: Run, path: str) -> bool:
     return built and any(names_script(i, path) and is_found(i.destination or "", package) for i in named)
 
 
-def _missing(package: PackageFacts, path: str, expected: str) -> Verdict:
-    names = {PurePosixPath(f.path).name: f.path for f in package.files if not is_product(f.path)}
+def _missing(package: PackageFacts, path: str) -> Verdict:
+    names = paths_by_name(package)
     wanted = PurePosixPath(path)
     near = [names[n] for n in near_names(wanted.name, names)]
     near += [p for n, p in names.items() if n == wanted.stem and p not in near]
@@ -121,39 +110,35 @@ def _missing(package: PackageFacts, path: str, expected: str) -> Verdict:
     seen = f"; there is {listed(near)}" if near else ""
     return failed(
         f"{path} is not in the package{seen}",
-        expected=expected,
         measured=f"scripts: {listed(sorted(scripts))}" if scripts else "no Python script in the package",
-        hint=f"git mv {movable[0]} {path}"
-        if movable
-        else f"write {path}, then git add {path}, commit and push",
+        hint=f"git mv {movable[0]} {path}" if movable else add_hint(path),
         citations=tuple(FileCitation(file=p) for p in near[:3]),
     )
 
 
 def _mode_obstacles(file: SourceFile, remarks: tuple[str, ...]) -> Iterator[Obstacle]:
     if file.executable is False:
-        usual = f"chmod +x {file.path}, then git update-index --chmod=+x {file.path}, commit and push"
-        yield Obstacle("has no executable bit", "; ".join(remarks) or usual)
+        yield Obstacle("has no executable bit", "; ".join(remarks) or chmod_hint(file.path))
 
 
 def _shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
     """What keeps the system from starting the file, the package facts' own words first."""
-    mend = f"write {RIGHT_SHEBANG} as the very first line, with nothing above it"
+    fix = f"write {RIGHT_SHEBANG} as the very first line, with nothing above it"
     if file.link_problem:
         yield Obstacle(f"cannot be run: {file.link_problem}", "hand in the file itself")
     elif file.shebang is not None and file.shebang.crlf:
         problem = file.shebang_problem or "its #! line ends with Windows' CRLF"
         yield Obstacle(f"cannot be run: {problem}", f"dos2unix {file.path}, then commit and push")
     elif file.shebang_problem:
-        yield Obstacle(f"cannot be run: {file.shebang_problem}", mend)
+        yield Obstacle(f"cannot be run: {file.shebang_problem}", fix)
     elif file.bom:
         yield Obstacle("begins with an invisible byte order mark (BOM)", "save it as UTF-8 without BOM")
     elif file.shebang is None:
-        yield Obstacle("does not begin with a #! line", mend)
+        yield Obstacle("does not begin with a #! line", fix)
     elif file.shebang.found is False:
-        yield Obstacle(f"names {file.shebang.interpreter}, which is not on a ROS machine", mend)
+        yield Obstacle(f"names {file.shebang.interpreter}, which is not on a ROS machine", fix)
     elif file.python and "python" not in file.shebang.interpreter:
-        yield Obstacle(f"is Python, and its first line names {file.shebang.interpreter}", mend)
+        yield Obstacle(f"is Python, and its first line names {file.shebang.interpreter}", fix)
 
 
 def _rosrun_answer(build: Run, path: str) -> str:

@@ -5,22 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from grader.checks.registry import check
-from grader.checks.support.printed import (
+from grader.checks.support.console_output import (
     Line,
     Probe,
     in_order,
+    numbers_in,
     places_of,
     printed_lines,
     probes_on,
     text_places,
 )
-from grader.checks.support.text import plural, shown
-from grader.checks.support.unheard import never_sent, not_printed
-from grader.checks.support.wording import VALUE, in_words
+from grader.checks.support.exit_causes import explain_early_end, explain_error
+from grader.checks.support.processes import lives, not_started
+from grader.checks.support.text import VALUE, in_words, listed, near_names, number, plural, shown
+from grader.checks.support.topics import cite, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Verdict, failed, passed
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 
 
 class HearsParams(Record):
@@ -60,7 +62,7 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
     expected = f"each message on {params.topic} is printed{form}, in order"
     probes = probes_on(run, params.topic)
     if not probes:
-        return never_sent(package, run, params.topic).model_copy(update={"expected": expected})
+        return never_sent(package, run, params.topic).about(expected=expected)
     lines = printed_lines(run)
     places = places_of(run, probes, lines, params.template)
     missing = [] if places is None else [p for p, found in zip(probes, places, strict=True) if not found]
@@ -77,15 +79,11 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
     else:
         verdict = passed(f"prints each of the {len(probes)} messages on {params.topic}")
     first, last = (missing[0], missing[-1]) if missing else (probes[0], probes[-1])
-    sent = EvidenceCitation(
-        evidence=run.evidence, topic="/grader/actor", from_ns=first.at_ns, to_ns=last.at_ns
-    )
-    return verdict.model_copy(
-        update={
-            "expected": expected,
-            "measured": f"{len(probes) - len(missing)} of {plural(len(probes), 'message')} printed",
-            "citations": (*verdict.citations, sent),
-        }
+    sent = cite(run, "/grader/actor", first.at_ns, last.at_ns)
+    return verdict.about(
+        expected=expected,
+        measured=f"{len(probes) - len(missing)} of {plural(len(probes), 'message')} printed",
+        citations=(*verdict.citations, sent),
     )
 
 
@@ -116,3 +114,103 @@ def _how_many(missing: Sequence[Probe], probes: Sequence[Probe]) -> str:
 
 def _squeezed(text: object) -> str:
     return "".join(str(text).split())
+
+
+HAND_IN = "add the script to the package, and push it"
+CALLBACK_HINT = (
+    "print data.data in the callback, without a condition and nothing slow beside it; end with rospy.spin()"
+)
+
+
+def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
+    """The grader sends when the node has subscribed; it never did, or it was not there."""
+    if not lives(run):
+        return not_started("the listener").about(measured="not started")
+    if end := explain_early_end(package, run):
+        message = f"the node ended before it subscribed to {topic}: {end.cause}"
+        return end.verdict(unjudged, message, measured="ended")
+    subscribed = topics_with(run, "subscribers")
+    measured = f"subscribed to {listed(subscribed)}" if subscribed else "no subscription"
+    verdict = _types_differ(run, topic)
+    if verdict is None and topic in subscribed:
+        message = f"the node subscribed to {topic}, but the grader sent nothing"
+        verdict = inconclusive(message, hint="grade again")
+    elif verdict is None:
+        near = near_names(topic, subscribed)
+        other = f"; it subscribes to {listed(near or subscribed)}" if subscribed else ""
+        hint = f"add rospy.Subscriber('{topic}', …, callback)"
+        verdict = failed(f"the node never subscribes to {topic}{other}", hint=hint)
+    return verdict.about(measured=measured, citations=(cite(run, "/grader/graph"),))
+
+
+def not_printed(
+    package: PackageFacts, run: Run, probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]
+) -> Verdict:
+    """Some or all of what was sent was not printed: the likeliest reason that shows."""
+    return (
+        _broken(package, run)
+        or _some_numbers(probes, missing, lines)
+        or _only_again(probes, missing)
+        or _by_number(probes, missing, lines)
+    )
+
+
+def _broken(package: PackageFacts, run: Run) -> Verdict | None:
+    """An error in the callback, which rospy reports and outlives, or the node's end."""
+    if end := explain_early_end(package, run):
+        return end.verdict(failed, f"the node ended before it had printed everything: {end.cause}")
+    if end := explain_error(package, run):
+        return end.verdict(failed, f"an error stops the node from printing: {end.cause}")
+    return None
+
+
+def _types_differ(run: Run, topic: str) -> Verdict | None:
+    """The grader's publisher had to refuse the node, which asked for another type."""
+    asked = next((e for _, e in run.actors if e.action == "note" and e.topic == topic and e.type), None)
+    if asked is None:
+        return None
+    message = f"{asked.actor} subscribes to {topic} with {asked.type}, so that nothing arrives"
+    return failed(message, hint=f"give rospy.Subscriber('{topic}', …) the type that the publisher uses")
+
+
+def _some_numbers(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]) -> Verdict | None:
+    """Typical ways to lose zero, or all negative numbers, and print the others."""
+    values = [p.value for p in missing if isinstance(p.value, int)]
+    if not values or len(values) == len(probes):
+        return None
+    if set(values) == {0}:
+        return failed("0 is not printed", hint="0 counts as false: print without `if data.data:`")
+    if any(v >= 0 for v in values):
+        return None
+    printed = {n for line in lines for n in numbers_in(line.text)}
+    as_unsigned = all(v + 256 in printed for v in values)
+    shape = f"as {values[0] + 256} and the like" if as_unsigned else "not at all"
+    message = f"negative numbers are printed {shape}, {values[0]} for instance"
+    return failed(message, hint="print data.data as it is: an Int8 goes from -128 to 127")
+
+
+def _only_again(probes: Sequence[Probe], missing: Sequence[Probe]) -> Verdict | None:
+    """All that is missing is what came a second time."""
+    printed = {str(p.value) for p in probes if p not in missing}
+    if not all(str(p.value) in printed for p in missing):
+        return None
+    message = f"{missing[0].value!r} came twice, and is printed once only"
+    return failed(
+        message, hint="print in the callback each time, also where the message is one that came before"
+    )
+
+
+def _by_number(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]) -> Verdict:
+    """Nothing, only the first, or some."""
+    after = [line.text for line in lines if line.at_ns >= probes[0].at_ns and line.text.strip()]
+    if len(missing) == len(probes):
+        seen = f"it prints {shown(after[0]).strip(' :')!r}" if after else "it prints nothing at all"
+        sent = f"; {probes[0].value!r} was sent first" if isinstance(probes[0].value, str) else ""
+        return failed(f"nothing of what was sent is printed{sent}; {seen}", hint=CALLBACK_HINT)
+    if len(missing) == len(probes) - 1 and missing[0] is not probes[0]:
+        hint = "subscribe with a callback and rospy.spin(); wait_for_message(…) waits for one message only"
+        return failed("only the first message is printed", hint=hint)
+    value = missing[0].value
+    first = number(value) if isinstance(value, int) else repr(value)
+    message = f"{len(missing)} of {plural(len(probes), 'message')} not printed, the first of them {first}"
+    return failed(message, hint=CALLBACK_HINT)

@@ -6,26 +6,29 @@ import re
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.executable import RIGHT_SHEBANG, ExecutableParams, executable, find_script
-from grader.checks.launch import not_run
+from grader.checks.executable import RIGHT_SHEBANG, ExecutableParams, executable
 from grader.checks.launch_xml import missing_node
 from grader.checks.registry import check
-from grader.checks.support.launching import find_launch, node_slip, nodes_of_script, refusals, unreadable
-from grader.checks.support.roslaunch import died, nodes_up, quoted, refusal, why_died, why_not_up
+from grader.checks.support.launch import (
+    died,
+    node_slip,
+    nodes_of_script,
+    nodes_up,
+    not_run,
+    quoted,
+    read_launch,
+    refusal,
+    refusals,
+    why_died,
+    why_not_up,
+)
+from grader.checks.support.scripts import find_script
 from grader.checks.support.text import bare, listed, shown
+from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.record import Record
-from grader.model.verdict import (
-    Citation,
-    EvidenceCitation,
-    FileCitation,
-    Status,
-    Verdict,
-    failed,
-    passed,
-    unjudged,
-)
+from grader.model.verdict import FileCitation, Status, Verdict, failed, passed
 
 SHELL = "#!/bin/bash"
 
@@ -68,14 +71,11 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
         name="…" output="screen"/>`. `rosrun <package> <script>.sh` tries it alone.
     """
     expected = f"a shell script in {params.launch} opens {params.urls[0]} in {params.program}, beside a node"
-    file = find_launch(package, params.launch)
+    file = read_launch(package, params.launch)
     pages = _pages(run)
     measured = f"opened: {listed(_shown(p) for p in pages)}" if pages else "nothing was opened"
-    if file is None or file.fault is not None:
-        verdict = unreadable(package, file, params.launch) or failed(f"{params.launch} cannot be read")
-        return verdict.model_copy(
-            update={"expected": expected, "measured": "no launch file that can be read"}
-        )
+    if isinstance(file, Verdict):
+        return file.about(expected=expected)
     verdict = (
         not_run(run)
         or _script(package, build, file, params)
@@ -86,13 +86,8 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
             f"{listed(n.type or '' for n in _shells(package, file))} opens {_url(pages, params)} in {params.program}"
         )
     )
-    cited: tuple[Citation, ...] = (
-        FileCitation(file=file.path, line=1),
-        EvidenceCitation(evidence=run.evidence, topic="/grader/actor"),
-    )
-    return verdict.model_copy(
-        update={"expected": expected, "measured": measured, "citations": verdict.citations or cited}
-    )
+    citations = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/actor"))
+    return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
 def _pages(run: Run) -> tuple[Page, ...]:
@@ -151,9 +146,7 @@ def _page(package: PackageFacts, file: LaunchFile, run: Run, params: OpensParams
     mine = [p for p in pages if _is_program(p.program, params)]
     if _url(mine, params):
         return None
-    cited = tuple(
-        EvidenceCitation(evidence=run.evidence, topic="/grader/actor", from_ns=p.at_ns) for p in pages[:1]
-    )
+    cited = tuple(cite(run, "/grader/actor", p.at_ns) for p in pages[:1])
     hint = f"write {params.program} {params.urls[0]} in the script"
     if not mine and _url(pages, params):
         message = f"the page is opened in {listed(p.program for p in pages)}, not in {params.program}"
@@ -186,9 +179,7 @@ def _beside(package: PackageFacts, file: LaunchFile, run: Run, params: OpensPara
     if nodes_up(run, node) and ended is None:
         return None
     absence = ended or why_not_up(package, run, node)
-    verdict = unjudged if absence.of_script else failed
-    message = f"the page is opened, but {node.type} does not run beside it: {absence.why}"
-    return verdict(message, hint=absence.hint, citations=absence.citations)
+    return absence.verdict(f"the page is opened, but {node.type} does not run beside it: {absence.why}")
 
 
 def _is_program(name: str, params: OpensParams) -> bool:

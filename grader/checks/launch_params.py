@@ -1,15 +1,201 @@
-"""Whether parameters are where a node of the launch file reads them when it starts."""
+"""Whether a launch file loads parameters before its node reads them."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
+from pathlib import PurePosixPath
 from typing import Any
 
-from grader.checks.support.param_tree import tree
-from grader.checks.support.text import listed, number
+from grader.checks.launch_xml import missing_node
+from grader.checks.registry import check
+from grader.checks.support.console_output import printed_lines
+from grader.checks.support.launch import (
+    Absence,
+    Slip,
+    finished,
+    nodes_of_script,
+    nodes_up,
+    not_run,
+    quoted,
+    read_launch,
+    refusal,
+    refusals,
+    why_died,
+    why_not_up,
+)
+from grader.checks.support.parameters import absolute, instead, is_printed, own, tree
+from grader.checks.support.scripts import add_hint, find_script
+from grader.checks.support.text import listed, number, shown
+from grader.checks.support.topics import cite
 from grader.evidence.run import Run
-from grader.model.package import LaunchFile
-from grader.model.verdict import EvidenceCitation, FileCitation, Verdict, failed
+from grader.model.package import LaunchFile, LaunchLoad, LaunchNode, PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
+
+SUMMARY = re.compile(r"\s*\*\s+/")  # roslaunch's list of parameters
+OUTSIDE = 'write <rosparam file="$(find <package>)/{}"/> outside the <node>, without ns'
+
+
+class LaunchLoadsParams(Record):
+    """`launch` is the launch file's name; `names` are on the server once `file` is loaded, and `script` reads them."""
+
+    launch: str
+    file: str
+    script: str
+    names: tuple[str, ...]
+
+
+@check("launch-loads", params=LaunchLoadsParams)
+def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> Verdict:
+    """The launch file loads the parameters before the node reads them.
+
+    What it checks
+        That `roslaunch` puts the YAML file's parameters on the server under the names that the node reads,
+        before it starts the node, and that the node runs.
+
+    Why it matters on a robot
+        Nobody types `rosparam load` on a robot. A node that starts without its parameters runs with wrong
+        ones, or dies.
+
+    How it is measured
+        By every change of the parameter server up to the node's registration, and by what `roslaunch` says of
+        the node. `<rosparam>` may stand before or behind the `<node>`: `roslaunch` sets parameters first. In a
+        namespace, the file counts as loaded where the node prints all of its values from there.
+
+    How to fix
+        `<rosparam file="$(find <package>)/config/<file>.yaml"/>` beside the `<node>`, not inside it and without
+        `ns`. `rosparam list` shows what is on the server.
+    """
+    expected = f"{params.launch} loads {params.file} and runs {PurePosixPath(params.script).name}"
+    file = read_launch(package, params.launch)
+    if isinstance(file, Verdict):
+        return file.about(expected=expected)
+    verdict = (
+        not_run(run)
+        or missing_node(package, file, params.script)
+        or _judged(package, file, run, params)
+        or passed(f"roslaunch loads {params.file}, then runs {PurePosixPath(params.script).name}")
+    )
+    found = own(tree(run, by=lambda caller: caller not in run.student_nodes()))
+    place = FileCitation(file=file.path, line=_line(file, params))
+    return verdict.about(
+        expected=expected,
+        measured=f"on the server: {listed(found) or 'nothing'}",
+        citations=verdict.citations or (place, cite(run, "/grader/param")),
+    )
+
+
+def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchLoadsParams) -> Verdict | None:
+    node = nodes_of_script(package, file, params.script)[0]
+    up = nodes_up(run, node)
+    start_ns = min((t for t, event in run.graph if set(up) & set(event.nodes)), default=run.end_ns)
+    before = tree(run, until_ns=start_ns, by=lambda caller: caller not in up)
+    missing = [name for name in map(absolute, params.names) if name not in before]
+    if missing and not _read_where_loaded(file, run, params, before):
+        return _not_loaded(package, file, run, params, missing)
+    if not (
+        any(_is_of(load, params) for load in file.loads)
+        or _by_node(file, params)
+        or _of_another_name(package, file, params)
+    ):
+        message = f"{file.path} sets the parameters, but does not load {params.file}"
+        return failed(message, hint=OUTSIDE.format(params.file))
+    return _not_running(package, run, node)
+
+
+def _read_where_loaded(
+    file: LaunchFile, run: Run, params: LaunchLoadsParams, before: Mapping[str, Any]
+) -> bool:
+    """The file is loaded into a namespace, and the node reads it there: it prints all that is in it."""
+    lines = [line for line in printed_lines(run) if not SUMMARY.match(line.text)]
+    return any(
+        all(name in before and is_printed(before[name], lines) for name in _moved(load, params))
+        for load in file.loads
+        if _is_of(load, params)
+    )
+
+
+def _moved(load: LaunchLoad, params: LaunchLoadsParams) -> list[str]:
+    return [load.namespace.rstrip("/") + absolute(name) for name in params.names]
+
+
+def _not_running(package: PackageFacts, run: Run, node: LaunchNode) -> Verdict | None:
+    """With its parameters in place, the node died or never ran."""
+    died = why_died(package, run, node)
+    if died is None and (nodes_up(run, node) or finished(run, node)):
+        return None
+    absence = died or why_not_up(package, run, node)
+    what = "does not run to its end" if died else "does not run"
+    return absence.verdict(f"the parameters are loaded, but {node.type} {what}: {absence.why}")
+
+
+def _not_loaded(
+    package: PackageFacts, file: LaunchFile, run: Run, params: LaunchLoadsParams, missing: list[str]
+) -> Verdict:
+    if find_script(package, params.file) is None:
+        message = f"there is no {PurePosixPath(params.file).name} in the package to load"
+        return unjudged(message, hint=add_hint(params.file))
+    if slip := next(refusals(package, file), None):
+        return slip.verdict(quoted(run))
+    if absence := refusal(run):
+        return _refused(file, run, params, absence)
+    loads = [load for load in file.loads if _is_of(load, params)]
+    if not loads:
+        message = f"{file.path} has no <rosparam> that loads {params.file}"
+        return failed(message, hint=OUTSIDE.format(params.file))
+    return _loaded_otherwise(run, params, loads, missing[0])
+
+
+def _loaded_otherwise(run: Run, params: LaunchLoadsParams, loads: list[LaunchLoad], missing: str) -> Verdict:
+    """The launch file loads the file: into a namespace, too late, or with other names in it."""
+    found = tree(run)
+    for load in loads:
+        moved = load.namespace.rstrip("/") + missing
+        if moved in found and moved != missing:
+            why = f"the file is loaded into {load.namespace}, where {missing} becomes {moved}"
+            return Slip(load.file, load.line, why, OUTSIDE.format(params.file)).verdict()
+    if missing in found:
+        message = f"{missing} is set only after the node has started"
+        return failed(message, hint=OUTSIDE.format(params.file))
+    message = f"{params.file} is loaded, but {instead(found, missing)}"
+    return unjudged(message, hint=f"fix the names in {params.file}")
+
+
+def _refused(file: LaunchFile, run: Run, params: LaunchLoadsParams, absence: Absence) -> Verdict:
+    """roslaunch starts nothing. Where it found the file and could not read it, the file is at fault."""
+    broken = "cannot load its file" in absence.why
+    verdict = unjudged if broken else failed
+    cited = (FileCitation(file=file.path, line=_line(file, params)),)
+    said = next((c.line for _, c in run.console if "yaml" in c.line.lower() and "XML is" not in c.line), "")
+    return verdict(
+        f"{absence.why}{f': {shown(said)}' if broken and said else ''}", hint=absence.hint, citations=cited
+    )
+
+
+def _is_of(load: LaunchLoad, params: LaunchLoadsParams) -> bool:
+    name = PurePosixPath(params.file).name
+    source = load.source or ""
+    return load.command == "load" and (PurePosixPath(source).name == name or "$(env" in source)
+
+
+def _of_another_name(package: PackageFacts, file: LaunchFile, params: LaunchLoadsParams) -> bool:
+    """The package has no file of that name, and the launch file loads one: how it is called is judged elsewhere."""
+    loads = any(load.command == "load" and load.source for load in file.loads)
+    return loads and find_script(package, params.file) is None
+
+
+def _by_node(file: LaunchFile, params: LaunchLoadsParams) -> bool:
+    """A `rosparam load` that the launch file runs as a node."""
+    name = PurePosixPath(params.file).name
+    return any(n.pkg == "rosparam" and name in (n.args or "") for n in file.brings)
+
+
+def _line(file: LaunchFile, params: LaunchLoadsParams) -> int:
+    here = [load for load in file.loads if load.file == file.path]
+    named = [load for load in here if _is_of(load, params)]
+    return (named or here)[0].line if here else 1
+
 
 Wanted = Mapping[str, int | float | str]
 
@@ -27,18 +213,19 @@ def _of_node(run: Run, file: LaunchFile, node: str, wanted: Wanted) -> Verdict |
     start_ns = next((t for t, event in run.graph if node in event.nodes), run.end_ns)
     before = tree(run, until_ns=start_ns, by=lambda caller: caller != node)
     places = (f"{node}/", f"{node.rpartition('/')[0]}/")
-    if any(all(_fits(before.get(place + name), value) for name, value in wanted.items()) for place in places):
+    if _is_there(before, places, wanted):
         return None
-    later = tree(run, by=lambda caller: caller != node)
-    late = any(
-        all(_fits(later.get(place + name), value) for name, value in wanted.items()) for place in places
-    )
-    if late:
+    if _is_there(tree(run, by=lambda caller: caller != node), places, wanted):
         message = f"{listed(wanted)} are set only after {node} has started, and it reads them as it starts"
         verdict = failed(message, hint="set them with <param> inside the <node>: roslaunch does that first")
     else:
         verdict = _wrong_value(before, places, wanted) or _elsewhere(before, node, wanted)
-    return verdict.model_copy(update={"citations": (*_lines(file, wanted), _evidence(run))})
+    return verdict.about(citations=(*_lines(file, wanted), cite(run, "/grader/param")))
+
+
+def _is_there(found: Mapping[str, Any], places: Iterable[str], wanted: Wanted) -> bool:
+    """Return whether all that is wanted is in one of the places."""
+    return any(all(_fits(found.get(p + name), value) for name, value in wanted.items()) for p in places)
 
 
 def _wrong_value(before: Mapping[str, Any], places: tuple[str, str], wanted: Wanted) -> Verdict | None:
@@ -51,17 +238,16 @@ def _wrong_value(before: Mapping[str, Any], places: tuple[str, str], wanted: Wan
         known = [place + name for name in wanted if place + name in before]
         verb = "is" if len(missing) == 1 else "are"
         message = f"{listed(place + name for name in missing)} {verb} not set, only {listed(known)}"
-        return failed(
-            message, hint="write one <param> for each inside the <node>, the names letter by letter"
-        )
+        hint = "write one <param> for each inside the <node>, the names letter by letter"
+        return failed(message, hint=hint)
     name = next(name for name, value in wanted.items() if not _fits(before[place + name], value))
     found, value = before[place + name], wanted[name]
     if isinstance(found, str) and found.strip() == str(value):
         message = f'{place}{name} is the text "{found}", which the node does not take for a number'
         return failed(message, hint=f'write <param name="{name}" type="int" value="{value}"/>')
-    colour = f"{', '.join(map(_shown, (before[place + n] for n in wanted)))}"
+    seen = ", ".join(_shown(before[place + n]) for n in wanted)
     right = ", ".join(map(_shown, wanted.values()))
-    message = f"{place}{name} is {_shown(found)}, not {_shown(value)}: {listed(wanted)} are {colour}"
+    message = f"{place}{name} is {_shown(found)}, not {_shown(value)}: {listed(wanted)} are {seen}"
     return failed(message, hint=f"{listed(wanted)} have to be {right}")
 
 
@@ -93,7 +279,3 @@ def _shown(value: object) -> str:
 def _lines(file: LaunchFile, wanted: Wanted) -> tuple[FileCitation, ...]:
     found = [p for p in file.params if p.name.rpartition("/")[2] in wanted]
     return tuple(FileCitation(file=p.file, line=p.line) for p in found[:3])
-
-
-def _evidence(run: Run) -> EvidenceCitation:
-    return EvidenceCitation(evidence=run.evidence, topic="/grader/param")

@@ -1,4 +1,4 @@
-"""Whether roslaunch brings up what the launch file names."""
+"""Whether a launch file brings the nodes up together."""
 
 from __future__ import annotations
 
@@ -8,25 +8,140 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
-from grader.checks.launch import connections, not_run, over_another_topic
 from grader.checks.launch_params import params_misplaced
 from grader.checks.launch_xml import missing_node
 from grader.checks.registry import check
-from grader.checks.support.launching import (
+from grader.checks.support.launch import (
     Slip,
-    find_launch,
+    is_exact,
+    node_slip,
     nodes_of_program,
     nodes_of_script,
+    nodes_up,
+    not_run,
+    quoted,
+    read_launch,
     refusals,
-    unreadable,
+    roslaunch_error,
+    why_died,
+    why_not_up,
 )
-from grader.checks.support.names import GlobalName
-from grader.checks.support.roslaunch import is_exact, nodes_up, quoted, why_died, why_not_up
+from grader.checks.support.nodes import GlobalName
 from grader.checks.support.text import listed, near_names, plural
+from grader.checks.support.topics import cite, nodes_on, topics_with
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Citation, EvidenceCitation, FileCitation, Verdict, failed, passed, unjudged
+from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
+
+
+class LaunchConnectsParams(Record):
+    """`launch` is the file's name, in whatever folder. `nodes` are names that have to come up."""
+
+    launch: str
+    topic: str
+    nodes: tuple[str, ...] = ()
+
+
+@check("launch-connects", params=LaunchConnectsParams)
+def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParams) -> Verdict:
+    """The launch file brings up nodes that are connected.
+
+    What it checks
+        That the launch file is well-formed, and that `roslaunch` brings up a publisher and a subscriber
+        which are connected over the topic.
+
+    Why it matters on a robot
+        A robot is started with launch files. One wrong attribute in one of them, and a part of the robot is
+        missing without anybody noticing.
+
+    How it is measured
+        `roslaunch` runs the file, which is found by its name anywhere in the package, and both nodes are
+        asked whom they are connected to; the kernel's table of connections has to bear it out. Any two
+        nodes of the package do, under any names.
+
+    How to fix
+        One `<node pkg="…" type="….py" name="…"/>` for each script, with the `.py` and the executable bit.
+        `roslaunch <package> <file>`, then `rosnode list` and `rostopic info <topic>` show what came up.
+    """
+    expected = f"{params.launch} brings up a publisher and a subscriber connected over {params.topic}"
+    file = read_launch(package, params.launch)
+    if isinstance(file, Verdict):
+        return file.about(expected=expected)
+    found = list(connections(run, params.topic))
+    nodes = run.student_nodes()
+    verdict = (
+        not_run(run)
+        or _names_missing(nodes, file, params)
+        or (None if found else _unconnected(package, file, run, params))
+        or passed(f"roslaunch connects {found[0][0]} and {found[0][1]} over {params.topic}")
+    )
+    return verdict.about(
+        expected=expected,
+        measured=_listed_nodes(run),
+        citations=verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph")),
+    )
+
+
+def _listed_nodes(run: Run) -> str:
+    nodes = run.student_nodes()
+    return f"{plural(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node came up"
+
+
+def connections(run: Run, topic: str) -> Iterator[tuple[str, str]]:
+    """Publisher and subscriber, two nodes of the student's that were connected over the topic."""
+    for _, event in run.graph:
+        for one in event.connections:
+            pair = (one.publisher, one.subscriber)
+            if one.topic == topic and pair[0] != pair[1] and all(map(run.is_student_node, pair)):
+                yield pair
+
+
+def _names_missing(nodes: tuple[str, ...], file: LaunchFile, params: LaunchConnectsParams) -> Verdict | None:
+    missing = [n for n in params.nodes if f"/{n.lstrip('/')}" not in nodes]
+    if not missing or not nodes:
+        return None
+    cited = (FileCitation(file=file.path, line=1),)
+    hint = "the `name` in the launch file is the node's name"
+    return failed(f"{listed(missing)} did not come up; there is {listed(nodes)}", hint=hint, citations=cited)
+
+
+def _unconnected(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchConnectsParams) -> Verdict:
+    """Why no two nodes are connected: a wrong attribute, an error of roslaunch's, or what the graph shows."""
+    said = roslaunch_error(run)
+    for node in file.nodes:
+        if wrong := node_slip(package, node.model_copy(update={"file": file.path}), said):
+            return wrong.verdict(quoted(run))
+    nodes = run.student_nodes()
+    if len(nodes) < 2:
+        up = f"only {nodes[0]} comes up" if nodes else "no node comes up"
+        message = f"{up}; the file declares {plural(len(file.nodes), 'node')}{quoted(run)}"
+        hint = "give the talker and the listener a <node> each, and try each script alone with rosrun"
+        return failed(message, hint=hint)
+    return over_another_topic(run, params.topic, quoted(run))
+
+
+def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
+    """Why nodes that are there are not connected: other topics, other types, or an end that is missing."""
+    others = {
+        c.topic
+        for _, event in run.graph
+        for c in event.connections
+        if c.topic not in {topic, "/rosout"} and run.is_student_node(c.subscriber)
+    }
+    if others:
+        message = f"the nodes are connected over {listed(sorted(others))}, not over {topic}"
+        return failed(message + said, hint=f"both have to use {topic}; look for a <remap> or a namespace")
+    publishers, subscribers = nodes_on(run, topic, "publishers"), nodes_on(run, topic, "subscribers")
+    if publishers and subscribers:
+        message = f"{listed(publishers)} and {listed(subscribers)} are both on {topic}, but not connected"
+        return failed(message + said, hint="do both use the same message type?")
+    lacking = "publishes on" if not publishers else "subscribes to"
+    seen = topics_with(run, "subscribers" if publishers else "publishers")
+    there = f"; one {lacking} {listed(seen)}" if seen else ""
+    message = f"{listed(run.student_nodes())} are not connected: none {lacking} {topic}{there}{said}"
+    hint = f"launch a talker and a listener that use {topic}; look for a <remap> or a namespace"
+    return failed(message, hint=hint)
 
 
 class LaunchRunsParams(Record):
@@ -80,20 +195,13 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
     ]
     over = f", connected over {params.topic}" if params.topic else ""
     expected = f"{params.launch} brings up {listed(what) or 'its nodes'} under the file's names{over}"
-    file = find_launch(package, params.launch)
-    nodes = run.student_nodes()
-    measured = f"{plural(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node came up"
-    if file is None or file.fault is not None:
-        verdict = unreadable(package, file, params.launch) or failed(f"{params.launch} cannot be read")
-        verdict = verdict.model_copy(update={"unjudged": bool(params.scripts)})
-        return verdict.model_copy(
-            update={"expected": expected, "measured": "no launch file that can be read"}
-        )
+    file = read_launch(package, params.launch)
+    if isinstance(file, Verdict):
+        unjudged_too = {"unjudged": bool(params.scripts)}
+        return file.about(expected=expected).model_copy(update=unjudged_too)
     verdict = not_run(run) or _unnamed(package, file, params) or _judged(package, file, run, params)
-    place: tuple[Citation, ...] = (FileCitation(file=file.path, line=1),)
-    graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
-    citations = verdict.citations or (*place, graph)
-    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
+    citations = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/graph"))
+    return verdict.about(expected=expected, measured=_listed_nodes(run), citations=citations)
 
 
 def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams) -> Verdict:
@@ -104,7 +212,7 @@ def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRun
         return _not_up(package, file, run, lacking)
     names = [name for w in wanted for name in nodes_up(run, w.node)]
     if params.topic and not _connected(run, params.topic, names):
-        return _unconnected(package, run, wanted, params.topic)
+        return _not_connected(package, run, wanted, params.topic)
     if dead := _died(package, run, wanted, "came up, but then"):
         return dead
     if params.programs and params.params:
@@ -170,9 +278,8 @@ def _swapped(file: LaunchFile, name: str, params: LaunchRunsParams) -> Verdict |
         program = PurePosixPath(node.type or "").stem
         if program != name.lstrip("/") and program in {n.lstrip("/") for n in params.nodes}:
             why = f"/{name.lstrip('/')} runs {node.type}, whose name is /{program}: the names are swapped"
-            return Slip(
-                node.file, node.line, why, f'write name="{program}" beside type="{node.type}"'
-            ).verdict()
+            fix = f'write name="{program}" beside type="{node.type}"'
+            return Slip(node.file, node.line, why, fix).verdict()
     return None
 
 
@@ -196,9 +303,7 @@ def _not_up(package: PackageFacts, file: LaunchFile, run: Run, lacking: Wanted) 
 
 
 def _connected(run: Run, topic: str, names: list[str]) -> bool:
-    return any(
-        publisher in names and subscriber in names for publisher, subscriber in connections(run, topic)
-    )
+    return any({*pair} <= {*names} for pair in connections(run, topic))
 
 
 def _died(package: PackageFacts, run: Run, wanted: list[Wanted], when: str) -> Verdict | None:
@@ -210,7 +315,7 @@ def _died(package: PackageFacts, run: Run, wanted: list[Wanted], when: str) -> V
     return None
 
 
-def _unconnected(package: PackageFacts, run: Run, wanted: list[Wanted], topic: str) -> Verdict:
+def _not_connected(package: PackageFacts, run: Run, wanted: list[Wanted], topic: str) -> Verdict:
     """A node that died, the launch file's remaps and namespaces, or the scripts' own topics."""
     if dead := _died(package, run, wanted, "came up, but before it was connected"):
         return dead

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from pathlib import PurePosixPath
 
-from grader.checks.executable import find_script
 from grader.checks.registry import check
-from grader.checks.support.launching import (
+from grader.checks.support.launch import (
     Slip,
-    find_launch,
     has_program,
     illegal_name,
     node_slip,
     nodes_of_program,
     nodes_of_script,
+    read_launch,
     refusals,
-    unreadable,
 )
+from grader.checks.support.scripts import add_hint, find_script
 from grader.checks.support.text import listed, near_names, plural
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
@@ -54,33 +53,22 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
         them between `<launch>` and `</launch>`. `roslaunch --nodes <package> <file>` lists what it finds.
     """
     wanted = [PurePosixPath(s).name for s in params.scripts] + list(params.programs)
-    expected = (
-        f"{params.launch}: <launch> at its root, and a <node> with pkg, type and name for {listed(wanted)}"
-    )
-    file = find_launch(package, params.launch)
-    if file is None or file.fault is not None:
-        verdict = unreadable(package, file, params.launch) or failed(f"{params.launch} cannot be read")
-        return verdict.model_copy(
-            update={"expected": expected, "measured": "no launch file that can be read"}
-        )
+    nodes = f"a <node> with pkg, type and name for {listed(wanted)}"
+    expected = f"{params.launch}: <launch> at its root, and {nodes}"
+    file = read_launch(package, params.launch)
+    if isinstance(file, Verdict):
+        return file.about(expected=expected)
+    refused = next(refusals(package, file), None)
     verdict = (
-        _refused(package, file)
+        (refused.verdict() if refused else None)
         or next(filter(None, (missing_node(package, file, script) for script in params.scripts)), None)
         or next(filter(None, (_program(file, program) for program in params.programs)), None)
         or passed(f"{file.path} has a <node> for {listed(wanted)}", hint=_advice(package, file))
     )
-    measured = (
-        f"{plural(len(file.brings), 'node')}: {listed(map(_shown, file.brings))}"
-        if file.brings
-        else "no <node>"
-    )
+    seen = f"{plural(len(file.brings), 'node')}: {listed(map(_shown, file.brings))}"
     citations = verdict.citations or (FileCitation(file=file.path, line=1),)
-    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
-
-
-def _refused(package: PackageFacts, file: LaunchFile) -> Verdict | None:
-    first = next(refusals(package, file), None)
-    return first.verdict() if first else None
+    measured = seen if file.brings else "no <node>"
+    return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
 def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdict | None:
@@ -90,11 +78,10 @@ def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdic
         return None
     if not _exists(package, name):
         message = f"there is no {name} in the package that a <node> could start"
-        return unjudged(message, hint=f"write {script}, then git add, commit and push it")
-    slips = [
-        slip for node in file.brings if _is_meant(node, name) and (slip := _slip_for(package, node, name))
-    ]
-    return slips[0].verdict() if slips else _no_node(file, package.name, name)
+        return unjudged(message, hint=add_hint(script))
+    meant = (_slip_for(package, node, name) for node in file.brings if _is_meant(node, name))
+    slip = next(filter(None, meant), None)
+    return slip.verdict() if slip else _no_node(file, package.name, name)
 
 
 def _program(file: LaunchFile, program: str) -> Verdict | None:
@@ -128,20 +115,17 @@ def _is_meant(node: LaunchNode, name: str) -> bool:
 
 def _no_node(file: LaunchFile, pkg: str, name: str) -> Verdict:
     """No node is even meant for it."""
-    hint = f'add <node pkg="{pkg}" type="{name}" name="…" output="screen"/>'
     message = f"{file.path} has no <node> for {name}"
     if test := next((t for t in file.tests if t.type == name), None):
         cited = (FileCitation(file=test.file, line=test.line),)
-        return failed(
-            f"{message}: a <test> is started by rostest only", hint="write <node …>", citations=cited
-        )
-    if unknown := next(
-        (u for u in file.unknown_tags if near_names("node", [u[0]]) or u[0].lower() == "node"), None
-    ):
-        cited = (FileCitation(file=file.path, line=unknown[1]),)
-        message = f"{message}: roslaunch skips the tag <{unknown[0]}> of line {unknown[1]}"
+        message = f"{message}: a <test> is started by rostest only"
+        return failed(message, hint="write <node …>", citations=cited)
+    unknown = (u for u in file.unknown_tags if near_names("node", [u[0]]) or u[0].lower() == "node")
+    for tag, line in unknown:
+        cited = (FileCitation(file=file.path, line=line),)
+        message = f"{message}: roslaunch skips the tag <{tag}> of line {line}"
         return failed(message, hint="the tag is <node …>, in small letters", citations=cited)
-    return failed(message, hint=hint)
+    return failed(message, hint=f'add <node pkg="{pkg}" type="{name}" name="…" output="screen"/>')
 
 
 def _exists(package: PackageFacts, name: str) -> bool:
@@ -153,7 +137,7 @@ def _advice(package: PackageFacts, file: LaunchFile) -> str:
     slip = next(filter(None, (node_slip(package, node) for node in file.brings)), None)
     if slip is None:
         slip = next(filter(None, map(illegal_name, file.brings)), None)
-    return f"{slip.file}, line {slip.line}: {slip.why}; {slip.mend}" if slip else ""
+    return f"{slip.file}, line {slip.line}: {slip.why}; {slip.fix}" if slip else ""
 
 
 def _shown(node: LaunchNode) -> str:

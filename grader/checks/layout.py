@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.executable import find_script
 from grader.checks.registry import check
+from grader.checks.support.scripts import find_script
 from grader.checks.support.text import listed, near_names, plural
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -30,10 +30,10 @@ class LayoutParams(Record):
 
 
 class Slip(NamedTuple):
-    """What is not in its place, how to mend it, where it lies. `explained`: another criterion names the cause."""
+    """What is not in its place, how to fix it, where it lies. `explained`: another criterion names the cause."""
 
     what: str
-    mend: str
+    fix: str
     place: str = ""
     explained: bool = False
 
@@ -74,7 +74,7 @@ def layout(package: PackageFacts, params: LayoutParams) -> Verdict:
         "; ".join(slip.what for slip in slips),
         expected=expected,
         measured=measured,
-        hint="; ".join(dict.fromkeys(slip.mend for slip in slips)),
+        hint="; ".join(dict.fromkeys(slip.fix for slip in slips)),
         citations=tuple(dict.fromkeys(places)),
     )
 
@@ -114,8 +114,8 @@ def _lost_folder(package: PackageFacts, folder: str, params: LayoutParams) -> Sl
         return Slip(what, f"git mv {instead} {folder}", f"{instead}/")
     own = [s for s in params.scripts if PurePosixPath(s).parts[0] == folder]
     nowhere = bool(own) and all(find_script(package, s) is None for s in own)
-    mend = f"mkdir {folder} in the package folder, put the files there that belong into it, and git add them"
-    return Slip(f"there is no folder {folder}/", mend, explained=nowhere)
+    fix = f"mkdir {folder} in the package folder, put the files there that belong into it, and git add them"
+    return Slip(f"there is no folder {folder}/", fix, explained=nowhere)
 
 
 def _instead(package: PackageFacts, folder: str) -> str:
@@ -137,5 +137,5 @@ def _lost_file(package: PackageFacts, name: str) -> Slip:
         if path.parent == wanted.parent and near_names(wanted.name, [path.name])
     ]
     other = next(iter([*near, *same]), "")
-    seen, mend = (f", but {other}", f"git mv {other} {name}") if other else ("", f"add {name}, and push it")
-    return Slip(f"there is no {name}{seen}", mend, other, explained=True)
+    seen, fix = (f", but {other}", f"git mv {other} {name}") if other else ("", f"add {name}, and push it")
+    return Slip(f"there is no {name}{seen}", fix, other, explained=True)

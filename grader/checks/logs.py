@@ -9,15 +9,17 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.exit_cause import explain_end
+from grader.checks.support.console_output import CALLS, Level, Logged, console_log, logged_by
+from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.nodes import nodes_of
-from grader.checks.support.process import early_end, life, lives
-from grader.checks.support.rosout import CALLS, Level, Logged, console_log, logged_by
+from grader.checks.support.processes import early_end, life, lives, not_started
 from grader.checks.support.text import listed, plural, shown
+from grader.checks.support.topics import cite
+from grader.evidence.events import ConsoleLine
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 
 ALIKE = 0.7
 
@@ -50,29 +52,25 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
         `rospy.loginfo("…")` after `rospy.init_node(…)` for the level INFO. `print(…)` does not log.
         `rostopic echo /rosout` shows what is logged.
     """
-    expected = f"{params.text!r} logged at level {params.level.upper()}"
     nodes = nodes_of(run, params.process)
     lines = logged_by(run, nodes)
     right = next((one for one in lines if _has(one.text, params) and one.level == params.level), None)
+    level = params.level.upper()
     verdict = (
-        (
-            passed(f"{right.node} logs {shown(right.text)!r} at level {params.level.upper()}")
-            if right
-            else None
-        )
+        (passed(f"{right.node} logs {shown(right.text)!r} at level {level}") if right else None)
         or _other_level(lines, params)
         or _only_printed(run, params)
         or _near(run, lines, params)
         or _nothing(package, run, nodes, lines, params)
     )
     seen = listed(f"{shown(t)!r}" for t in dict.fromkeys(one.text for one in lines[:3]))
-    measured = (
-        f"{plural(len(lines), 'log message')}{': ' if seen else ''}{seen}{', …' if len(lines) > 3 else ''}"
+    more = ", …" if len(lines) > 3 else ""
+    at_ns = right.at_ns if right else None
+    return verdict.about(
+        expected=f"{params.text!r} logged at level {level}",
+        measured=f"{plural(len(lines), 'log message')}{': ' if seen else ''}{seen}{more}",
+        citations=verdict.citations or (cite(run, "/rosout", at_ns, at_ns),),
     )
-    times = (right.at_ns, right.at_ns) if right else (None, None)
-    cite = EvidenceCitation(evidence=run.evidence, topic="/rosout", from_ns=times[0], to_ns=times[1])
-    citations = verdict.citations or (cite,)
-    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
 
 
 def _has(text: str, params: LogsParams) -> bool:
@@ -90,9 +88,7 @@ def _other_level(lines: Iterable[Logged], params: LogsParams) -> Verdict | None:
 
 def _only_printed(run: Run, params: LogsParams) -> Verdict | None:
     """On the console and not on /rosout: printed, or logged in a way that the recorder missed."""
-    said = [
-        line for _, line in run.console if _is_asked(run, line.process, params) and _has(line.line, params)
-    ]
+    said = [line for _, line in _asked_lines(run, params) if _has(line.line, params)]
     if not said:
         return None
     of_logger = next((log for log in map(console_log, (line.line for line in said)) if log), None)
@@ -113,19 +109,20 @@ def _is_late(run: Run, params: LogsParams) -> bool:
     stops = {one.name: one.interrupt_ns for one in lives(run) if one.interrupt_ns is not None}
     return any(
         line.process in stops and t >= stops[line.process] and _has(line.line, params)
-        for t, line in run.console
-        if _is_asked(run, line.process, params)
+        for t, line in _asked_lines(run, params)
     )
 
 
-def _is_asked(run: Run, process: str, params: LogsParams) -> bool:
-    return process == params.process if params.process else process in {one.name for one in lives(run)}
+def _asked_lines(run: Run, params: LogsParams) -> list[tuple[int, ConsoleLine]]:
+    """Return the console's lines of the process that is judged, or of all the student's."""
+    asked = {params.process} if params.process else {one.name for one in lives(run)}
+    return [(t, line) for t, line in run.console if line.process in asked]
 
 
 def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | None:
     """Other capitals, a missing sign, a typing error: in what was logged, or else in what was printed."""
     logged = [one.text for one in lines]
-    printed = [line.line for _, line in run.console if _is_asked(run, line.process, params)]
+    printed = [line.line for _, line in _asked_lines(run, params)]
     for texts, how in ((logged, "is logged"), (printed, "is printed")):
         alike = max(texts, key=lambda text: _likeness(text, params.text), default="")
         if _likeness(alike, params.text) >= ALIKE:
@@ -149,17 +146,14 @@ def _nothing(
         return unjudged(f"nothing in {run.evidence} logs {params.text!r}", hint=hint)
     asked = life(run, params.process) if params.process else next(iter(lives(run)), None)
     if asked is None:
-        message = "the node was not started: there is no script to run"
-        return unjudged(message, hint="add the script to the package, and push it")
+        return not_started("the node")
     ended = asked if asked.ended_early else (None if params.process else early_end(run))
     if ended is not None:
         end = explain_end(ended, run, package)
-        message = f"the node ended before it logged {params.text!r}: {end.cause}"
-        return unjudged(message, hint=end.hint, citations=end.citations)
+        return end.verdict(unjudged, f"the node ended before it logged {params.text!r}: {end.cause}")
     if not nodes:
-        return unjudged(
-            "no node was registered that could log", hint="call rospy.init_node(…) before logging"
-        )
+        hint = "call rospy.init_node(…) before logging"
+        return unjudged("no node was registered that could log", hint=hint)
     if lines:
         message = f"{listed(nodes)} logs {shown(lines[0].text)!r}, and not {params.text!r}"
         return failed(message, hint=_call(params))

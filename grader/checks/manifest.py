@@ -49,38 +49,31 @@ def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
         line (`<run_depend>` in format 1) each package that a node imports.
     """
     needs = f", {listed(params.dependencies)} at run time" if params.dependencies else ""
-    expected = f"package.xml, readable, name {params.name}, build tool catkin{needs}"
+    verdict = _judged(package, params)
+    return verdict.about(expected=f"package.xml, readable, name {params.name}, build tool catkin{needs}")
+
+
+def _judged(package: PackageFacts, params: ManifestParams) -> Verdict:
     found = package.manifest
     if found is None:
-        return _unreadable(package.manifest_fault, expected)
+        return _unreadable(package.manifest_fault)
+    place = (FileCitation(file=found.file, line=found.name_line),)
     if found.name != params.name:
         slip = " (a slip of the name)" if near_names(params.name, [found.name]) else ""
-        return failed(
-            f"{found.file} names the package {found.name!r}, the handout calls it {params.name!r}{slip}",
-            expected=expected,
-            measured=f"name {found.name}",
-            hint="; ".join([f"write <name>{params.name}</name> in {found.file}", *package.general_hints()]),
-            citations=(FileCitation(file=found.file, line=found.name_line),),
-        )
+        message = f"{found.file} names the package {found.name!r}, the handout calls it {params.name!r}{slip}"
+        hint = "; ".join([f"write <name>{params.name}</name> in {found.file}", *package.general_hints()])
+        return failed(message, measured=f"name {found.name}", hint=hint, citations=place)
     if not _builds_with_catkin(found):
-        return failed(
-            f"{found.file} does not name catkin as its build tool",
-            expected=expected,
-            measured=f"build tool {found.build_type or 'none'}, no dependency on catkin",
-            hint="add <buildtool_depend>catkin</buildtool_depend>",
-            citations=(FileCitation(file=found.file, line=found.name_line),),
-        )
+        measured = f"build tool {found.build_type or 'none'}, no dependency on catkin"
+        hint = "add <buildtool_depend>catkin</buildtool_depend>"
+        message = f"{found.file} does not name catkin as its build tool"
+        return failed(message, measured=measured, hint=hint, citations=place)
     if lacking := _lacking(found, params.dependencies):
-        return lacking.model_copy(update={"expected": expected})
-    place = (FileCitation(file=found.file, line=found.name_line),)
+        return lacking
     declares = f", declares {listed(params.dependencies)}" if params.dependencies else ""
-    return passed(
-        f"{found.file} names {found.name}, built with catkin{declares}",
-        expected=expected,
-        measured=f"name {found.name}, format {found.format}",
-        hint="; ".join(package.general_hints()),
-        citations=place,
-    )
+    message = f"{found.file} names {found.name}, built with catkin{declares}"
+    measured, hint = f"name {found.name}, format {found.format}", "; ".join(package.general_hints())
+    return passed(message, measured=measured, hint=hint, citations=place)
 
 
 @check("dependencies", params=DependenciesParams)
@@ -105,11 +98,9 @@ def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
     expected = f"{listed(params.names)} at run time"
     if found is None:
         message = "package.xml cannot be read, so its dependencies are not known"
-        return unjudged(message, expected=expected, hint="first mend package.xml")
-    if lacking := _lacking(found, params.names):
-        return lacking.model_copy(update={"expected": expected})
-    message = f"{found.file} declares {listed(params.names)}"
-    return passed(message, expected=expected, measured=_declared(found))
+        return unjudged(message, expected=expected, hint="first fix package.xml")
+    declared = passed(f"{found.file} declares {listed(params.names)}", measured=_declared(found))
+    return (_lacking(found, params.names) or declared).about(expected=expected)
 
 
 @check("maintainer", params=NoParams)
@@ -134,7 +125,7 @@ def maintainer(package: PackageFacts) -> Verdict:
     found = package.manifest
     if found is None:
         message = "package.xml cannot be read, so its maintainer is not known"
-        return unjudged(message, expected=expected, measured="not known", hint="first mend package.xml")
+        return unjudged(message, expected=expected, measured="not known", hint="first fix package.xml")
     people = found.maintainers
     measured = listed(shown(p.email) for p in people) or "no maintainer"
     left = [p for p in people if p.email.strip().casefold().endswith(LEFT_AS_MADE)]
@@ -143,11 +134,12 @@ def maintainer(package: PackageFacts) -> Verdict:
     hint = 'write your own: <maintainer email="you@university.ac.uk">Your Name</maintainer>'
     if left:
         message = f"{found.file} still has {shown(left[0].email)}, which catkin_create_pkg fills in"
-        return failed(message, expected=expected, measured=measured, hint=hint, citations=cited)
-    if not any(p.email.strip() for p in people):
-        message = f"{found.file} gives no maintainer's e-mail address"
-        return failed(message, expected=expected, measured=measured, hint=hint, citations=cited)
-    return passed(f"the maintainer is {measured}", expected=expected, measured=measured, citations=cited)
+        verdict = failed(message, hint=hint)
+    elif not any(p.email.strip() for p in people):
+        verdict = failed(f"{found.file} gives no maintainer's e-mail address", hint=hint)
+    else:
+        verdict = passed(f"the maintainer is {measured}")
+    return verdict.about(expected=expected, measured=measured, citations=cited)
 
 
 def _declared(found: Manifest) -> str:
@@ -175,14 +167,13 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
     )
 
 
-def _unreadable(fault: Fault | None, expected: str) -> Verdict:
+def _unreadable(fault: Fault | None) -> Verdict:
     if fault is None:
         hint = "every catkin package has a package.xml beside its CMakeLists.txt"
-        return failed("there is no package.xml", expected=expected, measured="no file", hint=hint)
+        return failed("there is no package.xml", measured="no file", hint=hint)
     line = f", line {fault.line}" if fault.line else ""
     return failed(
         f"{fault.file}{line} cannot be read: {fault.cause or fault.message}",
-        expected=expected,
         measured=fault.message,
         hint="open the file at that line and close or correct the element",
         citations=(FileCitation(file=fault.file, line=fault.line),),

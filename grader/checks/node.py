@@ -7,14 +7,13 @@ from typing import Annotated
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.exit_cause import (
+from grader.checks.support.exit_causes import (
     ended_after,
     explain_end,
     explain_traceback,
     is_rospys_own,
     process_tracebacks,
 )
-from grader.checks.support.lockup import fell_silent, is_flood, was_talking
 from grader.checks.support.nodes import (
     Anonymous,
     are_noted,
@@ -24,19 +23,13 @@ from grader.checks.support.nodes import (
     wanted_names,
     wrong_name,
 )
-from grader.checks.support.process import Life, life, lives
+from grader.checks.support.processes import Life, fell_silent, is_flood, life, lives, not_started, was_talking
 from grader.checks.support.text import listed, plural, seconds
+from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import (
-    EvidenceCitation,
-    Verdict,
-    failed,
-    inconclusive,
-    passed,
-    unjudged,
-)
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 
 LOOP = "loop with `while not rospy.is_shutdown():` and catch rospy.ROSInterruptException as talker.py does"
 
@@ -89,8 +82,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
     expected = f"one node{named}, alive {params.min_s:g} s and more after its first message, ending on Ctrl-C"
     one = life(run, params.process)
     if one is None:
-        message = f"{params.process} was not started: there is no script to run"
-        return unjudged(message, expected=expected, hint="add the script to the package, and push it")
+        return not_started(params.process).about(expected=expected)
     nodes = nodes_of(run, one.name)
     up_ns = _up_ns(one, run, nodes)
     message = f"{_script(one)} is the node {listed(nodes)}, stayed alive and ended on Ctrl-C"
@@ -103,8 +95,8 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
         or passed(message)
     )
     measured = f"{plural(len(nodes), 'node')} ({listed(nodes) or 'none'}), alive for {seconds(up_ns)}"
-    citations = verdict.citations or (_process_citation(one, run),)
-    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
+    citations = verdict.citations or (cite(run, "/grader/process", one.start_ns, one.end_ns),)
+    return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
 @check("node-name", params=NodeNameParams)
@@ -129,12 +121,12 @@ def node_name(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
     nodes = nodes_of(run, params.process)
     expected = wanted_names(params.names, params.anonymous)
     if not nodes:
-        return _nameless(package, run, params).model_copy(update={"expected": expected})
-    cite = (EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),)
+        return _nameless(package, run, params).about(expected=expected)
+    cited = (cite(run, "/grader/graph"),)
     measured = listed(nodes)
     wrong = _misnamed(nodes, params)
     verdict = wrong or passed(f"the node is {_fitting(nodes, params)[0]}")
-    return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": cite})
+    return verdict.about(expected=expected, measured=measured, citations=cited)
 
 
 def _nameless(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdict:
@@ -145,7 +137,7 @@ def _nameless(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
         return unjudged(message, measured="no node", hint=hint)
     end = explain_end(one, run, package)
     message = f"{_script(one)} ended by itself after {ended_after(one)}, before it was a node: {end.cause}"
-    return unjudged(message, measured="no node", hint=end.hint, citations=end.citations)
+    return end.verdict(unjudged, message, measured="no node")
 
 
 def _fitting(nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams) -> list[str]:
@@ -156,10 +148,8 @@ def _misnamed(nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams) 
     """None where a name fits, or none is asked for."""
     if not params.names or _fitting(nodes, params):
         return None
-    return failed(
-        wrong_name(params.names, nodes, params.anonymous),
-        hint=name_hint(params.names, nodes, params.anonymous),
-    )
+    given = params.names, nodes, params.anonymous
+    return failed(wrong_name(*given), hint=name_hint(*given))
 
 
 def _up_ns(one: Life, run: Run, nodes: tuple[str, ...]) -> int:
@@ -173,8 +163,7 @@ def _early_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
     if not one.ended_early:
         return None
     end = explain_end(one, run, package)
-    message = f"{_script(one)} ended by itself after {ended_after(one)}: {end.cause}"
-    return failed(message, hint=end.hint, citations=end.citations)
+    return end.verdict(failed, f"{_script(one)} ended by itself after {ended_after(one)}: {end.cause}")
 
 
 def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None:
@@ -182,10 +171,8 @@ def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None
         hint = "call rospy.init_node(…) before anything that waits"
         return failed(f"{_script(one)} runs, but never registers as a node", hint=hint)
     if len(nodes) > (1 if are_noted(run) else max(1, len(lives(run)))):
-        message = f"{_script(one)} registers as {len(nodes)} nodes: {listed(nodes)}"
-        return failed(
-            message, hint="one script is one node: call rospy.init_node(…) once, start no other process"
-        )
+        hint = "one script is one node: call rospy.init_node(…) once, start no other process"
+        return failed(f"{_script(one)} registers as {len(nodes)} nodes: {listed(nodes)}", hint=hint)
     return None
 
 
@@ -221,16 +208,9 @@ def _locked_up(one: Life, run: Run) -> Verdict | None:
         flood = "it floods its topics, which can lock up rospy itself on Ctrl-C"
         return passed(f"{_script(one)} is one node and stayed alive; {flood}, so its end is not counted")
     if was_talking(one, run):
-        message = (
-            f"{_script(one)} stopped short on Ctrl-C but did not end: rospy may have locked up by itself"
-        )
+        message = f"{_script(one)} stopped on Ctrl-C but did not end: rospy may have locked up by itself"
         return inconclusive(message, hint="grade again")
     return None
-
-
-def _process_citation(one: Life, run: Run) -> EvidenceCitation:
-    span = {"from_ns": one.start_ns, "to_ns": one.end_ns}
-    return EvidenceCitation(evidence=run.evidence, topic="/grader/process", **span)
 
 
 def _script(one: Life) -> str:

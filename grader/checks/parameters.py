@@ -1,27 +1,34 @@
-"""Whether a file's parameters can be loaded."""
+"""Whether parameters can be loaded, are read and set by a node, and have their values."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePosixPath
+from typing import Any
 
-from grader.checks.executable import find_script
 from grader.checks.registry import check
-from grader.checks.support.param_tree import absolute, instead, own, tree
-from grader.checks.support.process import Life, life
-from grader.checks.support.text import listed, near_names, shown
-from grader.checks.support.yaml_words import explain_yaml
+from grader.checks.support.console_output import printed_lines
+from grader.checks.support.nodes import GlobalName
+from grader.checks.support.parameters import (
+    absolute,
+    broken,
+    explain_yaml,
+    given,
+    instead,
+    is_printed,
+    own,
+    tree,
+)
+from grader.checks.support.processes import Life, first_interrupt_ns, life, lives, not_started
+from grader.checks.support.scripts import add_hint, find_script, paths_by_name
+from grader.checks.support.text import listed, near_names, plural, shown
+from grader.checks.support.topics import cite, no_node
+from grader.checks.support.values import differences, value_text
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import (
-    Citation,
-    EvidenceCitation,
-    FileCitation,
-    Verdict,
-    failed,
-    inconclusive,
-    passed,
-)
+from grader.model.verdict import Citation, FileCitation, Verdict, failed, inconclusive, passed, unjudged
 
 
 class ParamsLoadedParams(Record):
@@ -62,28 +69,25 @@ def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -
         verdict = inconclusive(f"rosparam load {source.path} was not run to its end", hint="grade again")
     else:
         missing = [name for name in wanted if _is_empty(found, name)]
-        error = _error(run, one, source.path)
-        verdict = error or (
-            _missing(found, missing, source.path)
-            if missing
-            else passed(
-                f"{source.path} loads and sets {listed(wanted)}", hint=_place_hint(source.path, params.file)
-            )
+        moved = f"the handout puts it at {params.file}; move it there" if source.path != params.file else ""
+        verdict = (
+            _error(run, one, source.path)
+            or (_missing(found, missing, source.path) if missing else None)
+            or passed(f"{source.path} loads and sets {listed(wanted)}", hint=moved)
         )
     measured = f"on the server: {listed(found)}" if found else "nothing on the server"
-    cited: tuple[Citation, ...] = (EvidenceCitation(evidence=run.evidence, topic="/grader/param"),)
+    cited: tuple[Citation, ...] = (cite(run, "/grader/param"),)
     place = (FileCitation(file=source.path),) if source and not verdict.citations else ()
-    update = {"expected": expected, "measured": measured, "citations": (*verdict.citations, *place, *cited)}
-    return verdict.model_copy(update=update)
+    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, *place, *cited))
 
 
 def _no_file(package: PackageFacts, path: str) -> Verdict:
     name = PurePosixPath(path).name
-    names = {PurePosixPath(f.path).name: f.path for f in package.files}
+    names = paths_by_name(package)
     yaml = [p for n, p in names.items() if n.endswith((".yaml", ".yml"))]
     near = [names[n] for n in near_names(name, names)] or yaml
     seen = f"; there is {listed(near)}" if near else ""
-    hint = f"git mv {near[0]} {path}" if near else f"write {path}, then git add, commit and push it"
+    hint = f"git mv {near[0]} {path}" if near else add_hint(path)
     return failed(f"{path} is not in the package{seen}", hint=hint)
 
 
@@ -98,9 +102,8 @@ def _error(run: Run, one: Life, path: str) -> Verdict | None:
         cited = (FileCitation(file=path, line=words.line),)
         return failed(f"{path} does not load: {words.why}", hint=words.hint, citations=cited)
     said = f": {shown(lines[-1])}" if lines else ""
-    return failed(
-        f"{path} does not load{said}", hint=f"rosparam load {PurePosixPath(path).name} shows the line"
-    )
+    hint = f"rosparam load {PurePosixPath(path).name} shows the line"
+    return failed(f"{path} does not load{said}", hint=hint)
 
 
 def _missing(found: dict[str, object], missing: list[str], path: str) -> Verdict:
@@ -137,5 +140,265 @@ def _is_empty(found: dict[str, object], name: str) -> bool:
     return found.get(name) in (None, {})
 
 
-def _place_hint(path: str, wanted: str) -> str:
-    return "" if path == wanted else f"the handout puts it at {wanted}; move it there"
+class ParamsReadParams(Record):
+    """`names` are parameters that the scenario made up; `file` is where the student keeps their usual values."""
+
+    names: tuple[GlobalName, ...]
+    file: str = ""
+
+
+@check("params-read", params=ParamsReadParams)
+def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadParams) -> Verdict:
+    """The node reads its parameters and prints them.
+
+    What it checks
+        That the node prints or logs the value of each parameter as it is on the parameter server.
+
+    Why it matters on a robot
+        A value that is written into the script instead of read cannot be changed on the robot: the node goes
+        on with the old one, whatever the file says.
+
+    How it is measured
+        The parameters have values that the grader makes up for this run. Each has to be on stdout, on stderr or
+        on /rosout; a number has to stand for itself (`12` is not in `127`).
+
+    How to fix
+        `rospy.get_param('/details/name/first')`, or `rospy.get_param('details')` for a map of them all, then
+        `rospy.loginfo(…)` each. `rosparam list` shows the names.
+    """
+    known = given(run)
+    lines = printed_lines(run)
+    missing = [n for n in params.names if n not in known or not is_printed(known[n].value, lines)]
+    expected = f"the values of {listed(params.names)} on the server are printed"
+    verdict = (
+        _not_printed(package, build, run, params, missing)
+        if missing
+        else passed(f"prints the values of {listed(params.names)} that are on the server")
+    )
+    cited = cite(run, "/grader/console")
+    measured = f"{len(params.names) - len(missing)} of {plural(len(params.names), 'value')} printed"
+    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cited))
+
+
+def _not_printed(
+    package: PackageFacts, build: Run, run: Run, params: ParamsReadParams, missing: Sequence[str]
+) -> Verdict:
+    known = given(run)
+    names = listed(missing)
+    if not lives(run):
+        return not_started("the node")
+    if end := broken(package, run):
+        return end.verdict(failed, f"{names} {_are(missing)} not printed: the node ended with {end.cause}")
+    strange = [n for n in missing if n not in known or not known[n].in_file]
+    if strange:
+        file = params.file or "the student's file"
+        message = f"{names} {_are(missing)} not printed, and {listed(strange)} {_are(strange)} not in {file}"
+        return unjudged(message, hint=f"fix the names in {file} first")
+    lines = printed_lines(run)
+    copied = (n for n in missing if any(is_printed(v, lines) for v in _in_file(build, params.file, n)))
+    if (hard := next(copied, None)) is not None:
+        message = f"{hard} is printed as {params.file} has it, not as the parameter server has it"
+        hint = f"read it with rospy.get_param('{hard}'), and not from the file or the script"
+        return failed(message, hint=hint)
+    texts = [line.text.strip() for line in lines if line.text.strip()]
+    seen = f"; it prints {shown(texts[-1])!r}" if texts else "; it prints nothing at all"
+    message = f"{names} {_are(missing)} not printed with the values on the server{seen}"
+    return failed(message, hint=f"rospy.loginfo(rospy.get_param('{missing[0]}'))")
+
+
+def _in_file(build: Run, file: str, name: str) -> list[str]:
+    """What stands behind the name's last part in the file as handed in."""
+    base = PurePosixPath(file).name
+    data = next((d for path, d in build.attachments.items() if PurePosixPath(path).name == base), b"")
+    last = re.escape(name.rpartition("/")[2])
+    found = re.findall(rf"(?m)^\s*{last}\s*:\s*(.*?)\s*(?:\s#.*)?$", data.decode("utf-8", "replace"))
+    return [value.strip("'\"") for value in found if value.strip("'\"")]
+
+
+def _are(names: Sequence[str]) -> str:
+    return "is" if len(names) == 1 else "are"
+
+
+class ParamsSetParams(Record):
+    """`name` has `value` afterwards, as a number or as text; `unchanged` keep theirs; `logged`: it is printed."""
+
+    name: GlobalName
+    value: int | float | str
+    unchanged: tuple[GlobalName, ...] = ()
+    logged: bool = True
+
+
+@check("params-set", params=ParamsSetParams)
+def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verdict:
+    """The node sets a parameter and leaves the others alone.
+
+    What it checks
+        That the parameter has its new value on the parameter server afterwards, that the others are as they
+        were, and that the new value is printed or logged.
+
+    Why it matters on a robot
+        Parameters are shared by all nodes. One that writes a whole map back with names missing takes them away
+        from everybody else.
+
+    How it is measured
+        By every change of the parameter server up to Ctrl-C or the node's own end. The value may be a number or
+        text.
+
+    How to fix
+        `rospy.set_param('/details/contact/phone', 55555)`: the whole name of the one value, never a map. Read it
+        back with `rospy.get_param` and log it.
+    """
+    until_ns = _until_ns(run)
+    after = tree(run, until_ns=until_ns)
+    got = after.get(params.name)
+    others = f", {listed(params.unchanged)} as before" if params.unchanged else ""
+    expected = f"{params.name} is {params.value}{others}" + (", and it is logged" if params.logged else "")
+    verdict = (
+        (None if _is_value(got, params.value) else _not_set(package, run, after, params, until_ns))
+        or _clobbered(run, after, params)
+        or _not_logged(run, params)
+        or passed(f"sets {params.name} to {params.value}{' and logs it' if params.logged else ''}")
+    )
+    cited = cite(run, "/grader/param")
+    measured = f"{params.name}: {'not there' if got is None else shown(str(got))}"
+    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, cited))
+
+
+def _is_value(got: object, wanted: object) -> bool:
+    return not isinstance(got, bool) and (
+        got == wanted or (got is not None and str(got).strip() == str(wanted))
+    )
+
+
+def _not_set(
+    package: PackageFacts, run: Run, after: dict[str, Any], params: ParamsSetParams, until_ns: int
+) -> Verdict:
+    if not lives(run):
+        return not_started("the node")
+    sets = [e for t, e in run.params if e.action == "set" and t <= until_ns]
+    mine = [e for e in sets if run.is_student_node(e.caller_id)]
+    last = next((e for e in reversed(mine) if absolute(e.name) == params.name), None)
+    hint = f"write rospy.set_param('{params.name}', {params.value!r})"
+    if last is not None and params.name in after:
+        message = f"{params.name} is set to {shown(str(after[params.name]))}, not to {params.value}"
+        return failed(message, hint=hint)
+    if params.name not in after and params.name in given(run):
+        cause = _taken_away(run, params.name)
+        return failed(f"{params.name} is no longer on the server{cause}", hint=hint)
+    if end := broken(package, run):
+        return end.verdict(unjudged, f"{params.name} was never set: the node ended with {end.cause}")
+    if _is_value(tree(run).get(params.name), params.value):
+        message = f"{params.name} is set to {params.value} only after Ctrl-C: the node waits too long"
+        return failed(message, hint="set it as soon as the values are read, without a long sleep before it")
+    others = dict.fromkeys(absolute(e.name) for e in mine)
+    instead = f"; the node sets {listed(others)}" if others else ""
+    return failed(f"{params.name} is never set to {params.value}{instead}", hint=hint)
+
+
+def _clobbered(run: Run, after: dict[str, Any], params: ParamsSetParams) -> Verdict | None:
+    known = given(run)
+    before = tree(run, by=lambda caller: not run.is_student_node(caller))
+    for name in params.unchanged:
+        was = known[name].value if name in known else before.get(name)
+        if was is None or after.get(name) == was:
+            continue
+        hint = f"set the one value alone: rospy.set_param('{params.name}', {params.value!r})"
+        if name in after:
+            message = f"{name} was {shown(str(was))} and is {shown(str(after[name]))} afterwards"
+            return failed(message, hint=hint)
+        return failed(f"{name} is no longer on the server{_taken_away(run, name)}", hint=hint)
+    return None
+
+
+def _taken_away(run: Run, name: str) -> str:
+    """The change that took a name away: a map that lacks it, a value in the map's place, or a delete."""
+    for _, event in reversed(run.params):
+        above = absolute(event.name)
+        if run.is_student_node(event.caller_id) and f"{name}/".startswith(f"{above.rstrip('/')}/"):
+            if event.action == "delete":
+                return f": the node deletes {above}"
+            return f": set_param('{above}', …) replaces all that was below {above}"
+    return ""
+
+
+def _not_logged(run: Run, params: ParamsSetParams) -> Verdict | None:
+    if not params.logged or is_printed(params.value, printed_lines(run)):
+        return None
+    message = f"{params.name} is set to {params.value}, but the new value is never printed"
+    return failed(message, hint=f"rospy.loginfo(rospy.get_param('{params.name}'))")
+
+
+EXACT = 1e-9
+MISSING = object()
+
+
+class ParamValueParams(Record):
+    """`name` with its slash; `value` as in YAML: a number, text, true or false, a list or a map."""
+
+    name: GlobalName
+    value: Any
+
+
+@check("param-value", params=ParamValueParams)
+def param_value(package: PackageFacts, run: Run, params: ParamValueParams) -> Verdict:
+    """The parameter has its value.
+
+    What it checks
+        That the parameter is on the parameter server under this name when the run ends, with this value and
+        of its kind: the text `'3'` is not the number 3.
+
+    Why it matters on a robot
+        Speeds, lengths and names of frames are parameters. A node that finds none under the name it asks
+        for goes on with its default, and one that finds text where it expects a number dies.
+
+    How it is measured
+        By every change that the parameter server was asked for, up to the Ctrl-C at the end of the run.
+
+    How to fix
+        `rospy.set_param('<name>', value)`, a `<param>` in the launch file, or a YAML file that `rosparam`
+        loads. Within `<node>`, and with `~`, a name is below the node's own. `rosparam get <name>` shows it.
+    """
+    held = tree(run, until_ns=_until_ns(run))
+    got = _held(held, absolute(params.name))
+    verdict = _not_there(package, run, own(held), params) if got is MISSING else _judged(got, params)
+    cited = cite(run, "/grader/param")
+    return verdict.about(
+        expected=f"{params.name}: {shown(value_text(params.value))}",
+        measured=verdict.measured or ("not set" if got is MISSING else shown(value_text(got))),
+        citations=(*verdict.citations, cited),
+    )
+
+
+def _until_ns(run: Run) -> int:
+    """Return the first Ctrl-C: what a node clears away as it ends does not count."""
+    pressed_ns = first_interrupt_ns(run)
+    return run.end_ns if pressed_ns is None else pressed_ns
+
+
+def _held(leaves: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401 - a parameter may be anything
+    """The value, or the map of all values below the name."""
+    if name in leaves:
+        return leaves[name]
+    parts = [n.removeprefix(f"{name}/").partition("/")[0] for n in leaves if n.startswith(f"{name}/")]
+    return {part: _held(leaves, f"{name}/{part}") for part in dict.fromkeys(parts)} or MISSING
+
+
+def _judged(got: object, params: ParamValueParams) -> Verdict:
+    wrong = [str(one) for one in differences(got, params.value, EXACT)]
+    if not wrong:
+        return passed(f"{params.name} is {shown(value_text(got))}")
+    hint = "numbers stand without quotes, text with them" if "(text, not" in wrong[0] else ""
+    message = shown(f"{params.name} is {listed(wrong)}")
+    return failed(message, hint=hint or f"rosparam get {params.name} shows it; set it to the lab's value")
+
+
+def _not_there(package: PackageFacts, run: Run, names: Iterable[str], params: ParamValueParams) -> Verdict:
+    near = near_names(params.name, names)
+    if near:
+        message = f"there is no parameter {params.name}; there is {listed(near)}"
+        hint = "with ~, or within <node>, a parameter's name is below the node's own; without, it is not"
+        return failed(message, hint=hint)
+    if absent := no_node(package, run, f"there is no parameter {params.name}"):
+        return absent
+    message = f"nothing set the parameter {params.name}, or it was deleted again"
+    return failed(message, hint=f"rospy.set_param('{params.name}', …), or a <param> in the launch file")

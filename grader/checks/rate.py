@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.exit_cause import explain_end
-from grader.checks.support.gaps import described, rhythm
+from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.lateness import NO_EXCUSE, Lateness, lateness
-from grader.checks.support.losses import all_lost, whole_until_ns
-from grader.checks.support.process import early_end, observed_until_ns
+from grader.checks.support.processes import observed_until_ns
 from grader.checks.support.text import hertz, number, plural, seconds
+from grader.checks.support.topics import cite, no_message, whole_until_ns
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import (
-    Citation,
-    EvidenceCitation,
-    FileCitation,
-    Verdict,
-    failed,
-    inconclusive,
-    passed,
-    unjudged,
-)
+from grader.model.verdict import Citation, FileCitation, Verdict, failed, inconclusive, passed, unjudged
 
 FLOOD_FACTOR = 5
 LATE_P95_SHARE = 0.2
@@ -115,22 +106,16 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         return inconclusive(message, expected=expected, hint="give the criterion a scenario with clock: real")
     found = judged_rhythm(run, params, run.student_channels(params.topic))
     if found is None:
-        message, hint = f"no message came on {params.topic}", f"look at rostopic hz {params.topic}"
-        absent = unjudged(message, measured="no message", hint=hint)
-        return (all_lost(run, params.topic) or absent).model_copy(update={"expected": expected})
+        return no_message(package, run, params.topic).about(expected=expected)
     verdict = (
         _flood(found, package, params)
         or _short(found, run, package, params)
         or _excused(_uneven(found, params), found, run, params)
         or passed(f"{params.topic} has {hertz(found.mean_hz)}, evenly")
     )
-    span = EvidenceCitation(
-        evidence=run.evidence, topic=params.topic, from_ns=found.times_ns[0], to_ns=found.times_ns[-1]
-    )
+    span = cite(run, params.topic, found.times_ns[0], found.times_ns[-1])
     citations: tuple[Citation, ...] = (*verdict.citations, span)
-    return verdict.model_copy(
-        update={"expected": expected, "measured": _measured(found, run, params), "citations": citations}
-    )
+    return verdict.about(expected=expected, measured=_measured(found, run, params), citations=citations)
 
 
 def judged_rhythm(run: Run, params: RateParams, channels: Sequence[Channel]) -> Rhythm | None:
@@ -162,12 +147,9 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
     """Too little was seen to speak of a rate."""
     if found.span_ns >= params.min_window_s * 1e9 * (1 - ROUNDING):
         return None
-    ended = early_end(run)
     seen = f"{plural(len(found.times_ns), 'message')} in {seconds(found.span_ns)}"
-    if ended is not None:
-        end = explain_end(ended, run, package)
-        message = f"only {seen} on {params.topic}: the node ended ({end.cause})"
-        return unjudged(message, hint=end.hint, citations=end.citations)
+    if end := explain_early_end(package, run):
+        return end.verdict(unjudged, f"only {seen} on {params.topic}: the node ended ({end.cause})")
     message = f"only {seen} on {params.topic}, a rate needs {params.min_window_s:g} s"
     return inconclusive(message, hint="record for longer" if run.foreign else "grade again")
 
@@ -279,3 +261,31 @@ def stalls_explain(found: Rhythm, late: Lateness, params: RateParams) -> bool:
         return False
     without_ns = found.span_ns - sum(stalls) + len(stalls) * params.period_ns
     return params.low_hz <= len(found.gaps_ns) * 1e9 / without_ns <= params.high_hz
+
+
+def described(found: Rhythm, low_ns: float, high_ns: float) -> str:
+    """`9.98 ± 0.02 Hz over 6.0 s: 60 messages, 98 % of gaps in 0.05 to 0.15 s, longest 0.162 s`."""
+    count = plural(len(found.times_ns), "message")
+    if not found.gaps_ns:
+        return count
+    share = 1 - len(found.outside(low_ns, high_ns)) / len(found.gaps_ns)
+    within = f"{math.floor(share * 100)} % of gaps in {low_ns / 1e9:.3g} to {high_ns / 1e9:.3g} s"
+    longest_s = max(found.gaps_ns) / 1e9
+    longest = f"longest {longest_s:.{3 if longest_s >= 0.01 else 6}f} s"
+    return f"{_mean(found)} over {found.span_ns / 1e9:.1f} s: {count}, {within}, {longest}"
+
+
+def _mean(found: Rhythm) -> str:
+    if not math.isfinite(found.interval_hz):
+        return hertz(found.mean_hz)
+    return f"{hertz(found.mean_hz).removesuffix(' Hz')} ± {found.interval_hz:.2f} Hz"
+
+
+def rhythm(channels: Sequence[Channel], until_ns: int | None, period_ns: float) -> Rhythm | None:
+    """All messages of these channels until `until_ns`. Silence at the end counts from 1.5 periods on."""
+    times = sorted(t for c in channels for t in c.times_ns if until_ns is None or t <= until_ns)
+    if not times:
+        return None
+    silent_ns = 0 if until_ns is None else until_ns - times[-1]
+    end_ns = times[-1] + silent_ns if silent_ns > 1.5 * period_ns else times[-1]
+    return Rhythm(times_ns=tuple(times), until_ns=end_ns)

@@ -50,10 +50,6 @@ class Check:
         """Whether it judges a scenario's run, and not only the package and its build."""
         return "run" in self.facts
 
-    @property
-    def family(self) -> str:
-        return self.function.__module__.rpartition(".")[2]
-
     def rate_bounds(self, parameters: Mapping[str, object]) -> RateBounds | None:
         """Return the rate that a criterion with these parameters judges, or None where it judges none."""
         if not hasattr(self.params, "rate_bounds"):
@@ -89,11 +85,7 @@ def collecting(source: str) -> Iterator[Collection]:
 
 
 def check(
-    name: str,
-    *,
-    params: type[Record] = NoParams,
-    messages_only: bool = False,
-    heeds_losses: bool = False,
+    name: str, *, params: type[Record] = NoParams, messages_only: bool = False, heeds_losses: bool = False
 ) -> Callable[[Callable[..., Verdict]], Callable[..., Verdict]]:
     """Register a function under a name. Raises ValueError for a name that is taken or a fact that nobody has."""
 

@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import ast
+from collections.abc import Mapping
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
 from grader.checks.registry import check
-from grader.checks.support.absence import life_of
-from grader.checks.support.calls import (
-    Exchange,
-    Offer,
-    described,
-    exchanges,
-    fields,
-    no_answer,
-    not_offered,
-    offers,
-    other_type,
-)
-from grader.checks.support.comparing import differences
-from grader.checks.support.exit_cause import explain_end
-from grader.checks.support.names import GlobalName, TypeName
-from grader.checks.support.text import listed, plural
+from grader.checks.support.exit_causes import HEADING, Traceback, explain_end, explain_traceback, tracebacks
+from grader.checks.support.nodes import GlobalName, TypeName, plain_type
+from grader.checks.support.processes import life_of
+from grader.checks.support.text import listed, near_names, plural, shown
+from grader.checks.support.topics import cite, no_node
+from grader.checks.support.values import differences, fields_text
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+
+LOGGERS = ("/get_loggers", "/set_logger_level")
 
 
 class ServiceParams(Record):
@@ -71,13 +65,11 @@ def service(package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
     verdict = (
         not_offered(package, run, params.service) if offer is None else _judged(offer, package, run, params)
     )
-    cite = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
-    return verdict.model_copy(
-        update={
-            "expected": f"{params.service} of type {params.type}",
-            "measured": verdict.measured or described(found),
-            "citations": (*verdict.citations, cite),
-        }
+    cited = cite(run, "/grader/graph")
+    return verdict.about(
+        expected=f"{params.service} of type {params.type}",
+        measured=verdict.measured or described(found),
+        citations=(*verdict.citations, cited),
     )
 
 
@@ -110,12 +102,10 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
         or passed(f"{params.service} answers {plural(len(pairs), 'call')} as it should")
     )
     shown = wrong[0] if wrong else next(reversed(made), None)
-    return verdict.model_copy(
-        update={
-            "expected": listed(f"call {n}: {fields(w)}" for n, w in enumerate(params.expect, 1)),
-            "measured": verdict.measured or _measured(shown),
-            "citations": (*verdict.citations, _citation(shown, run)),
-        }
+    return verdict.about(
+        expected=listed(f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1)),
+        measured=verdict.measured or _measured(shown),
+        citations=(*verdict.citations, _citation(shown, run)),
     )
 
 
@@ -130,7 +120,7 @@ def _judged(offer: Offer, package: PackageFacts, run: Run, params: ServiceParams
     if one is not None and one.ended_early:
         end = explain_end(one, run, package)
         message = f"{offer.node} offered {params.service}, but {one.name} ended: {end.cause}"
-        return unjudged(message, hint=end.hint, citations=end.citations)
+        return end.verdict(unjudged, message)
     if not offer.type:
         message = f"{params.service} is offered, but did not say of what type it is"
         return inconclusive(message, hint=f"rosservice type {params.service} shows it; grade again")
@@ -148,7 +138,7 @@ def _fault(
     found = list(differences(one.response, wanted, params.tolerance))
     if not found:
         return None
-    message = f"{params.service}, called with {fields(one.request)}, answers {listed(map(str, found))}"
+    message = f"{params.service}, called with {fields_text(one.request)}, answers {listed(map(str, found))}"
     return failed(message, hint=f"try it by hand: rosservice call {params.service} …")
 
 
@@ -164,7 +154,7 @@ def _uncalled(
     if one is not None and one.ended_early:
         end = explain_end(one, run, package)
         message = f"{one.name} ended before {params.service} could be called: {end.cause}"
-        return unjudged(message, hint=end.hint, citations=end.citations)
+        return end.verdict(unjudged, message)
     message = f"{params.service} was called {plural(len(made), 'time')} of {len(params.expect)}"
     return inconclusive(message, hint="grade again")
 
@@ -177,9 +167,141 @@ def _not_there(package: PackageFacts, run: Run, params: ServiceAnswersParams) ->
 def _measured(one: Exchange | None) -> str:
     if one is None:
         return "not called"
-    return "no answer" if one.response is None else fields(one.response)
+    return "no answer" if one.response is None else fields_text(one.response)
 
 
 def _citation(one: Exchange | None, run: Run) -> EvidenceCitation:
-    span = {"from_ns": one.at_ns, "to_ns": one.answered_ns} if one else {}
-    return EvidenceCitation(evidence=run.evidence, topic="/grader/actor", **span)
+    return cite(run, "/grader/actor", one.at_ns, one.answered_ns) if one else cite(run, "/grader/actor")
+
+
+class Offer(NamedTuple):
+    """Who offers a service, and what it says of its type: empty where nobody could ask it."""
+
+    node: str
+    type: str
+
+
+class Exchange(NamedTuple):
+    """One call of the grader's. `answered_ns` is None where the recording has no answer, not even a failed one."""
+
+    at_ns: int
+    answered_ns: int | None
+    type: str
+    request: Mapping[str, Any]
+    response: Mapping[str, Any] | None
+    detail: str
+
+
+def offers(run: Run) -> dict[str, Offer]:
+    """The services of the student's nodes by name, as they were last; every node's loggers left out."""
+    found: dict[str, Offer] = {}
+    for _, event in run.graph:
+        for name, nodes in event.services.items():
+            node = next((n for n in nodes if run.is_student_node(n)), None)
+            if node is None or name.endswith(LOGGERS):
+                continue
+            known = found[name].type if name in found and found[name].node == node else ""
+            found[name] = Offer(node, plain_type(event.service_types.get(name, known)))
+    return found
+
+
+def described(found: Mapping[str, Offer]) -> str:
+    """All services in one line."""
+    return listed(f"{name} ({offer.type or 'type unknown'})" for name, offer in found.items()) or "no service"
+
+
+def exchanges(run: Run, service: str) -> tuple[Exchange, ...]:
+    """The grader's calls of one service with their answers, in order."""
+    calls = [(t, e) for t, e in run.actors if e.action == "call" and e.topic == service]
+    answers = [(t, e) for t, e in run.actors if e.action == "answer" and e.topic == service]
+    found = []
+    for number, (at_ns, call) in enumerate(calls):
+        time_ns, answer = answers[number] if number < len(answers) else (None, None)
+        response, detail = (answer.value, answer.detail) if answer else (None, "")
+        kind = plain_type(call.type or "")
+        found.append(Exchange(at_ns, time_ns, kind, call.value or {}, response, detail))
+    return tuple(found)
+
+
+def not_offered(package: PackageFacts, run: Run, service: str) -> Verdict:
+    """Why no node of the student's offers it."""
+    found = offers(run)
+    owner = _other_owner(run, service)
+    near = near_names(service, found)
+    if owner:
+        message = f"{service} is offered by {owner}, which is not a node of the package"
+        return failed(message, hint=f"offer it with rospy.Service('{service}', …) in a node of your own")
+    if near:
+        message = f"there is no service {service}; {found[near[0]].node} offers {listed(near)}"
+        return failed(message, hint=_rename_hint(service, near[0], found[near[0]].node))
+    if absent := no_node(package, run, f"there is no service {service}"):
+        return absent
+    others = f"; it offers {listed(found)}" if found else ""
+    hint = f"add rospy.Service('{service}', …, callback) before the loop or rospy.spin()"
+    return failed(f"no node offers {service}{others}", hint=hint)
+
+
+def _other_owner(run: Run, service: str) -> str:
+    nodes = (n for _, e in run.graph for n in e.services.get(service, ()) if not run.is_student_node(n))
+    return next(nodes, "")
+
+
+def _rename_hint(wanted: str, found: str, node: str) -> str:
+    if found == f"{node}{wanted}":
+        return f"a name with ~ is put below the node's own: write rospy.Service('{wanted}', …)"
+    if wanted == f"{node}{found}":
+        return f"a name with ~ is put below the node's own: write rospy.Service('~{found[1:]}', …)"
+    return f"name it {wanted} in rospy.Service(…)"
+
+
+def handler_traceback(run: Run, service: str, since_ns: int) -> Traceback | None:
+    """The first traceback of the service's node since a call; rospy logs a handler's as a list on one line."""
+    offer = offers(run).get(service)
+    one = life_of(run, offer.node) if offer else None
+    if one is None:
+        return None
+    printed = [c.line for t, c in run.lines(one.name) if c.stream == "stderr" and t >= since_ns]
+    lines = [part for line in printed for part in _unpacked(line)]
+    return next(iter(tracebacks(lines)), None)
+
+
+def _unpacked(line: str) -> list[str]:
+    start = line.find("['" + HEADING)
+    if start < 0:
+        return [line]
+    try:
+        parts = ast.literal_eval(line[start:].strip())
+    except (SyntaxError, ValueError):
+        return [line]
+    return "".join(map(str, parts)).splitlines()
+
+
+def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> Verdict:
+    """Why a call brought nothing back."""
+    asked = f"{service}, called with {fields_text(one.request)},"
+    found = handler_traceback(run, service, one.at_ns)
+    if found is not None:
+        end = explain_traceback(found, package)
+        return end.verdict(failed, f"{asked} fails: {end.cause}")
+    kind = one.type.partition("/")[2]
+    if "returned None" in one.detail:
+        hint = f"end the callback with return {kind}Response(…)"
+        return failed(f"{asked} fails: its callback returns nothing", hint=hint)
+    if "returned invalid value" in one.detail or "wrong number of values" in one.detail:
+        message = f"{asked} fails: its callback returns what is no {kind}Response ({shown(one.detail)})"
+        return failed(message, hint=f"end the callback with return {kind}Response(…), its fields by name")
+    owner = life_of(run, offers(run)[service].node)
+    if owner is not None and owner.ended_early:
+        end = explain_end(owner, run, package)
+        return failed(f"{asked} gives no answer: {owner.name} ended ({end.cause})", hint=end.hint)
+    why = shown(one.detail) or "the call was not answered"
+    return failed(f"{asked} gives no answer: {why}", hint=f"try it by hand: rosservice call {service} …")
+
+
+def other_type(run: Run, service: str, one: Exchange) -> Verdict | None:
+    """The call could not fit, because the service is of another type."""
+    kind = offers(run)[service].type if service in offers(run) else ""
+    if not kind or not one.type or kind == one.type:
+        return None
+    message = f"{service} cannot be called as {one.type}: it is of type {kind}"
+    return unjudged(message, hint=f"give rospy.Service('{service}', …) the type {one.type}")

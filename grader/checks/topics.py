@@ -1,15 +1,77 @@
-"""Whether a package keeps to the topics of its lab."""
+"""Whether topics are there, have the right type, are latched, and are no others than those of the lab."""
 
 from __future__ import annotations
 
 from grader.checks.registry import check
-from grader.checks.support.absence import no_node, published_topics
-from grader.checks.support.names import GlobalName, plain_type
-from grader.checks.support.text import listed, near_names
-from grader.evidence.run import Run
+from grader.checks.support.nodes import GlobalName, plain_type
+from grader.checks.support.text import listed, near_names, plural
+from grader.checks.support.topics import cite, no_message, no_node, nodes_on, published_topics
+from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Verdict, failed, passed
+from grader.model.verdict import Citation, Verdict, failed, inconclusive, passed
+
+
+class TopicTypeParams(Record):
+    """`topic` with its slash, `type` as `rostopic info` gives it (`std_msgs/Int8`)."""
+
+    topic: str
+    type: str
+
+
+@check("topic-type", params=TopicTypeParams, messages_only=True, heeds_losses=True)
+def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verdict:
+    """The topic carries the right type of message.
+
+    What it checks
+        That the node publishes messages on the topic, under exactly this name, and that they have this
+        type.
+
+    Why it matters on a robot
+        Publisher and subscriber find each other by the topic's name and agree by its type. One letter or
+        one type off, and nothing arrives, without any error on the publisher's side.
+
+    How it is measured
+        By the type that the publisher itself gives when the recorder connects to it, and by the messages
+        that then come. A topic that is advertised but stays silent fails with a message of its own.
+
+    How to fix
+        `rospy.Publisher('<topic>', <Type>, queue_size=10)` with the topic and type of the handout, and
+        `from std_msgs.msg import <Type>`. `rostopic list` and `rostopic info <topic>` show what is there.
+    """
+    channels = run.student_channels(params.topic)
+    heard = [c for c in channels if c.messages]
+    wrong = [c for c in heard or channels if plain_type(c.type) != plain_type(params.type)]
+    if wrong:
+        verdict = _wrong_type(wrong[0], params)
+    elif not heard:
+        verdict = no_message(package, run, params.topic, of_node=failed)
+    else:
+        count = plural(sum(len(c.messages) for c in heard), "message")
+        publishers = listed(dict.fromkeys(c.publisher for c in heard))
+        verdict = passed(f"{publishers} publishes {params.type} on {params.topic} ({count})")
+    measured = listed(f"{plain_type(c.type)} by {c.publisher}" for c in channels) or _listed_topics(run)
+    expected = f"{params.type} on {params.topic}"
+    return verdict.about(expected=expected, measured=measured, citations=_cited(run, channels))
+
+
+def _listed_topics(run: Run) -> str:
+    topics = published_topics(run).items()
+    return f"topics: {listed(f'{t} ({kind})' if kind else t for t, kind in topics)}" if topics else "no topic"
+
+
+def _wrong_type(channel: Channel, params: TopicTypeParams) -> Verdict:
+    package, _, name = params.type.partition("/")
+    hint = f"from {package}.msg import {name}, then rospy.Publisher('{params.topic}', {name}, queue_size=10)"
+    message = f"{channel.publisher} publishes {plain_type(channel.type)} on {params.topic}, not {params.type}"
+    return failed(message, hint=hint)
+
+
+def _cited(run: Run, channels: tuple[Channel, ...]) -> tuple[Citation, ...]:
+    times = sorted(t for c in channels for t in c.times_ns[:1] + c.times_ns[-1:])
+    if times:
+        return (cite(run, channels[0].topic, times[0], times[-1]),)
+    return () if run.foreign else (cite(run, "/grader/graph"),)
 
 
 class OnlyTopicsParams(Record):
@@ -49,15 +111,10 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
     else:
         missing = None if published else no_node(package, run, "no topic was published")
         verdict = missing or passed("no topic beside those of the lab is published")
-    return verdict.model_copy(
-        update={
-            "expected": f"no topic beside {listed(params.topics)}" if params.topics else "no topic at all",
-            "measured": verdict.measured or listed(published) or "no topic",
-            "citations": (
-                *verdict.citations,
-                EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),
-            ),
-        }
+    return verdict.about(
+        expected=f"no topic beside {listed(params.topics)}" if params.topics else "no topic at all",
+        measured=verdict.measured or listed(published) or "no topic",
+        citations=(*verdict.citations, cite(run, "/grader/graph")),
     )
 
 
@@ -67,12 +124,57 @@ def _unexpected(
     first = unexpected[0]
     missing = [t for t in params.topics if t not in published and not t.endswith("*")]
     meant = near_names(first, missing)
-    named = listed(f"{t} ({plain_type(published[t])})" if published[t] else t for t in unexpected)
+    named = listed(f"{t} ({published[t]})" if published[t] else t for t in unexpected)
     message = f"{_publisher(run, first)} publishes on {named}, which the lab does not ask for"
     hint = f"did you mean {meant[0]}?" if meant else f"remove the rospy.Publisher('{first}', …)"
     return failed(message, hint=hint)
 
 
 def _publisher(run: Run, topic: str) -> str:
-    by_graph = (n for _, e in run.graph for n in e.publishers.get(topic, ()) if run.is_student_node(n))
-    return next(by_graph, None) or run.student_channels(topic)[0].callerid
+    return next(iter(nodes_on(run, topic, "publishers")), "") or run.student_channels(topic)[0].callerid
+
+
+class LatchedParams(Record):
+    """`topic` with its slash."""
+
+    topic: GlobalName
+
+
+@check("latched", params=LatchedParams, messages_only=True, heeds_losses=True)
+def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
+    """The topic is latched.
+
+    What it checks
+        That every publisher of the package on the topic latches: it keeps its last message and hands it to
+        each subscriber that comes later.
+
+    Why it matters on a robot
+        A map, a goal or a status is published once. A node that is started a second later hears nothing of
+        it, unless the topic is latched.
+
+    How it is measured
+        By what the publisher itself says when the recorder connects to it, once its first message came.
+
+    How to fix
+        `rospy.Publisher('<topic>', <Type>, latch=True, queue_size=1)`, and a message on it.
+        `rostopic echo <topic>`, started late, shows whether the last message still comes.
+    """
+    channels = [c for c in run.student_channels(params.topic) if c.messages]
+    plain = [c.callerid for c in channels if not c.latching]
+    if not channels:
+        verdict = no_message(package, run, params.topic)
+    elif plain and run.foreign:
+        message = f"the recording does not say whether {params.topic} was latched"
+        verdict = inconclusive(message, hint="let the grader run the package itself")
+    elif plain:
+        hint = f"rospy.Publisher('{params.topic}', …, latch=True, queue_size=1)"
+        verdict = failed(f"{listed(plain)} publishes on {params.topic} without latching", hint=hint)
+    else:
+        verdict = passed(f"{listed(c.callerid for c in channels)} latches {params.topic}")
+    kinds = listed(f"{'latched' if c.latching else 'not latched'} by {c.callerid}" for c in channels)
+    topic = params.topic if channels else "/grader/graph"
+    return verdict.about(
+        expected=f"a latched publisher on {params.topic}",
+        measured=verdict.measured or kinds,
+        citations=(*verdict.citations, cite(run, topic)),
+    )

@@ -19,8 +19,7 @@ from grader.errors import GraderError, HostError
 from grader.host_programs import HOST_ENV, host_program
 from grader.portable import user_id
 from grader.report.unwalled import without_sandbox
-from grader.rubric.load import LoadedRubric
-from grader.rubric.needs import needs_ros
+from grader.rubric.load import LoadedRubric, needs_ros
 
 if TYPE_CHECKING:
     from grader.arena.sandbox import Mode

@@ -8,9 +8,8 @@ from typing import Any, cast
 
 from grader.checks import CHECKS, Check
 from grader.evidence.run import Run
-from grader.judging.facts import NOT_RUN, Facts
+from grader.judging.facts import NOT_RUN, PACKAGE_RUN, Facts
 from grader.judging.judge import apply_requirements, result_of, verdict_of
-from grader.judging.recordings import PACKAGE_RUN
 from grader.model.package import PackageFacts
 from grader.model.result import EarlyVerdict
 from grader.model.verdict import Verdict

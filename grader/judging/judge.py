@@ -9,11 +9,11 @@ from traceback import extract_tb
 
 from grader.checks import CHECKS, Check
 from grader.checks.evidence import NotRecorded
-from grader.checks.support.losses import heed_losses
+from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
 from grader.judging.facts import Facts, try_facts
-from grader.judging.points import round_half_up
+from grader.judging.summary import round_half_up
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status, Verdict, inconclusive
 from grader.rubric.model import Criterion, Rubric
@@ -94,7 +94,7 @@ def apply_requirements(
     if blocking is not None:
         root = roots[criterion.id] = roots.get(blocking, blocking)
         message = f"blocked by {root}: {verdicts[root].message}"
-        update = {"status": Status.BLOCKED, "message": message, "hint": f"mend {root} first"}
+        update = {"status": Status.BLOCKED, "message": message, "hint": f"fix {root} first"}
         return verdict.model_copy(update=update)
     undecided = next((r for r in criterion.requires if verdicts[r].status.is_open), None)
     if undecided is not None:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from decimal import Decimal
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from decimal import ROUND_HALF_UP, Decimal
 from typing import Literal
 
-from grader.judging.points import round_half_up
-from grader.model.result import CriterionResult, GradingResult
+from grader.evidence.run import Run
+from grader.model.result import CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
-from grader.shown import clipped, json_text, text_limit
+from grader.shown import clip, clipped, json_text, text_limit
 
 LIMIT = 2000
 
@@ -83,3 +83,44 @@ def _criteria(results: Sequence[CriterionResult]) -> object:
 def criteria_bytes(results: Sequence[CriterionResult]) -> bytes:
     """The same as UTF-8."""
     return criteria_text(results).encode()
+
+
+def round_half_up(points: float, digits: int) -> float:
+    """`round_half_up(2.25, 1)` is 2.3, where Python's own `round` says 2.2."""
+    step = Decimal(1).scaleb(-digits)
+    return float(Decimal(repr(points)).quantize(step, rounding=ROUND_HALF_UP))
+
+
+KINDS = ("refused", "limit")
+NOTES_MAX = 20
+TEXT_CHARS = 300
+ACTOR_CHARS = 100
+
+
+def notes_of(runs: Mapping[str, Run]) -> tuple[Note, ...]:
+    """The notes of all runs, in the order of the runs and of time; equal ones once, at most 20 of each kind a run.
+
+    What was left out is counted in a last note. Recordings of other tools have none: nobody watched.
+    """
+    return tuple(
+        note
+        for scenario, run in runs.items()
+        if not run.foreign
+        for kind in KINDS
+        for note in _bounded(scenario, kind, tuple(dict.fromkeys(_notes(scenario, kind, run))))
+    )
+
+
+def _notes(scenario: str, kind: str, run: Run) -> Iterator[Note]:
+    for _, event in run.actors:
+        if event.action == kind:
+            actor, text = clip(event.actor, ACTOR_CHARS), clip(event.detail, TEXT_CHARS)
+            yield Note.model_validate({"scenario": scenario, "actor": actor, "kind": kind, "text": text})
+
+
+def _bounded(scenario: str, kind: str, notes: tuple[Note, ...]) -> Iterator[Note]:
+    yield from notes[:NOTES_MAX]
+    left = len(notes) - NOTES_MAX
+    if left > 0:
+        text = f"and {left} more of this kind"
+        yield Note.model_validate({"scenario": scenario, "actor": "", "kind": kind, "text": text})

@@ -57,6 +57,7 @@ class EvidenceCitation(Record):
 
 
 Citation = FileCitation | EvidenceCitation
+Citations = tuple[Citation, ...]
 
 
 class Verdict(Record):
@@ -72,26 +73,91 @@ class Verdict(Record):
     expected: str = ""
     measured: str = ""
     hint: str = ""
-    citations: tuple[FileCitation | EvidenceCitation, ...] = ()
+    citations: Citations = ()
     unjudged: bool = False
 
-
-def passed(message: str, **fields: object) -> Verdict:
-    return Verdict(status=Status.PASS, score=1.0, message=message, **fields)
-
-
-def partial(score: float, message: str, **fields: object) -> Verdict:
-    return Verdict(status=Status.PARTIAL, score=score, message=message, **fields)
-
-
-def failed(message: str, **fields: object) -> Verdict:
-    return Verdict(status=Status.FAIL, score=0.0, message=message, **fields)
+    def about(
+        self, *, expected: str | None = None, measured: str | None = None, citations: Citations | None = None
+    ) -> Verdict:
+        """Return the verdict with what was expected, what was measured and where it shows; None leaves a field."""
+        fields = {"expected": expected, "measured": measured, "citations": citations}
+        return self.model_copy(update={name: value for name, value in fields.items() if value is not None})
 
 
-def unjudged(message: str, **fields: object) -> Verdict:
+def passed(
+    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
+) -> Verdict:
+    """Return a verdict that earns all points."""
+    return _verdict(
+        Status.PASS, 1.0, message, expected=expected, measured=measured, hint=hint, citations=citations
+    )
+
+
+def partial(
+    score: float,
+    message: str,
+    *,
+    expected: str = "",
+    measured: str = "",
+    hint: str = "",
+    citations: Citations = (),
+) -> Verdict:
+    """Return a verdict that earns the share `score`, 0 to 1, of the points."""
+    return _verdict(
+        Status.PARTIAL, score, message, expected=expected, measured=measured, hint=hint, citations=citations
+    )
+
+
+def failed(
+    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
+) -> Verdict:
+    """Return a verdict that earns nothing."""
+    return _verdict(
+        Status.FAIL, 0.0, message, expected=expected, measured=measured, hint=hint, citations=citations
+    )
+
+
+def unjudged(
+    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
+) -> Verdict:
     """There is nothing to judge: a fail of its own, or `blocked` where a required criterion explains it."""
-    return Verdict(status=Status.FAIL, score=0.0, message=message, unjudged=True, **fields)
+    verdict = _verdict(
+        Status.FAIL, 0.0, message, expected=expected, measured=measured, hint=hint, citations=citations
+    )
+    return verdict.model_copy(update={"unjudged": True})
 
 
-def inconclusive(message: str, **fields: object) -> Verdict:
-    return Verdict(status=Status.INCONCLUSIVE, score=0.0, message=message, **fields)
+def inconclusive(
+    message: str, *, expected: str = "", measured: str = "", hint: str = "", citations: Citations = ()
+) -> Verdict:
+    """Return a verdict that is still open, for no fault of the student's."""
+    return _verdict(
+        Status.INCONCLUSIVE,
+        0.0,
+        message,
+        expected=expected,
+        measured=measured,
+        hint=hint,
+        citations=citations,
+    )
+
+
+def _verdict(
+    status: Status,
+    score: float,
+    message: str,
+    *,
+    expected: str,
+    measured: str,
+    hint: str,
+    citations: Citations,
+) -> Verdict:
+    return Verdict(
+        status=status,
+        score=score,
+        message=message,
+        expected=expected,
+        measured=measured,
+        hint=hint,
+        citations=citations,
+    )

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from grader.judging.late import lateness
-from grader.judging.settle import status_after_overrides
+from grader.judging.settle import lateness, status_after_overrides
 from grader.model.result import GradingResult
 from grader.rubric.model import Rubric
 

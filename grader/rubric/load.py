@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 
@@ -11,13 +12,11 @@ from grader.checks import Check
 from grader.errors import RubricError, UsageError
 from grader.model.record import Record
 from grader.model.version import RUBRIC, UPDATE, Versioned
-from grader.rubric.cross import cross_faults
+from grader.rubric.consistency import cross_faults
 from grader.rubric.faults import model_faults
 from grader.rubric.find import locate, rubric_ids, rubrics_folder
-from grader.rubric.instructor import Beside, read_instructor
-from grader.rubric.model import Rubric
-from grader.rubric.own_checks.known import known_checks
-from grader.rubric.own_checks.own import run_checks_file
+from grader.rubric.instructor import Beside, known_checks, read_instructor, run_checks_file
+from grader.rubric.model import Criterion, Rubric
 from grader.rubric.source import Source, read_source, text_at
 
 
@@ -125,3 +124,31 @@ def _faults(source: Source, beside: Beside) -> list[str]:
     told = [source.fault(*fault) for fault in sorted(unique, key=lambda fault: source.line(fault[0]))]
     file = Path(source.name).parent / str(source.data.get("checks"))
     return [*told, *(f"{file}:{line}: {message}" for line, message in beside.own.faults)]
+
+
+def started(rubric: Rubric) -> Rubric:
+    """The rubric without the scenarios for which nothing is run."""
+    scenarios = {name: s for name, s in rubric.scenarios.items() if s.recording is None}
+    return rubric.model_copy(update={"scenarios": scenarios})
+
+
+def needs_package(loaded: LoadedRubric) -> bool:
+    """Whether there is anything to run, or any check that looks at the package's files."""
+    rubric, checks = loaded.rubric, loaded.checks
+    return bool(started(rubric).scenarios) or any(_looks_at_files(c, checks) for c in rubric.criteria)
+
+
+def needs_ros(loaded: LoadedRubric) -> bool:
+    """Whether anything is to be built or run: files alone decide everything else."""
+    rubric, checks = loaded.rubric, loaded.checks
+    return bool(started(rubric).scenarios) or any(_needs_build(c, checks) for c in rubric.criteria)
+
+
+def _needs_build(criterion: Criterion, checks: Mapping[str, Check]) -> bool:
+    check = checks.get(criterion.check)
+    return check is not None and "build" in check.facts
+
+
+def _looks_at_files(criterion: Criterion, checks: Mapping[str, Check]) -> bool:
+    check = checks.get(criterion.check)
+    return check is not None and not check.messages_only and bool({"package", "build"} & set(check.facts))

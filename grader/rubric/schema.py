@@ -12,9 +12,9 @@ from pydantic import Field, create_model
 
 from grader.checks import HEADINGS, Check
 from grader.checks.registry import NoParams
-from grader.rubric.cross import MANUAL
+from grader.rubric.consistency import MANUAL
+from grader.rubric.instructor import known_checks
 from grader.rubric.model import Criterion, Rubric
-from grader.rubric.own_checks.known import known_checks
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -28,11 +28,7 @@ def rubric_schema(checks: Mapping[str, Check] | None = None) -> dict[str, Any]:
     model = create_model("Rubric", __base__=Rubric, __doc__=Rubric.__doc__, criteria=(criteria, ...))
     schema = model.model_json_schema(by_alias=True)
     schema["properties"]["scenarios"]["additionalProperties"] = False
-    return {
-        "$schema": DIALECT,
-        **schema,
-        "title": "A rubric of grader",
-    }
+    return {"$schema": DIALECT, **schema, "title": "A rubric of grader"}
 
 
 def _criterion(check: Check) -> type[Criterion]:

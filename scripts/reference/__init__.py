@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from grader.checks.docs import checks_page
+from scripts.reference.checks import checks_page
 from scripts.reference.commands import commands_page, exit_codes_page
 from scripts.reference.formats import format_pages
 from scripts.reference.labs import labs_page

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.arena.build import build
-from grader.checks.install import CMakeInstallParams, cmake_install
+from grader.checks.cmake import CMakeInstallParams, cmake_install
 from grader.evidence.writer import EvidenceWriter
 from grader.model.package import PackageFacts
 from grader.model.submission import SourcePackage

@@ -19,7 +19,7 @@ from grader.arena.arena_process import Frame, FrameReader
 from grader.arena.limits import Limits
 from grader.arena.session import ARENA
 from grader.checks import CHECKS
-from grader.checks.support.losses import heed_losses, losses
+from grader.checks.support.topics import heed_losses, losses
 from grader.judging.facts import NO_PACKAGE as PACKAGE
 from tests.arena.support import printed, run_script
 

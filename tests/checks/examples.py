@@ -1,4 +1,7 @@
-"""Runs a check on a timeline file: evidence as text, the check's parameters, and the verdict that it must give."""
+"""Runs a check on a timeline: evidence as text, the check's parameters, and the verdict that it must give.
+
+`timelines/<check>.yaml` holds the cases of one check by name.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from typing import Any
 import yaml
 
 from grader.checks import CHECKS
-from grader.checks.support.losses import heed_losses
+from grader.checks.support.topics import heed_losses
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status, Verdict
@@ -24,11 +27,15 @@ KEYS = {"expect", "with", "run", "build", "package"}
 
 @dataclass(frozen=True, kw_only=True)
 class Example:
-    """One file. `expect`: `status`, `unjudged`, and regular expressions for fields of the verdict."""
+    """One case. `expect`: `status`, `unjudged`, and regular expressions for fields of the verdict."""
 
     check: str
-    path: Path
+    name: str
     data: dict[str, Any]
+
+    @property
+    def id(self) -> str:
+        return f"{self.check}/{self.name}"
 
     @property
     def expect(self) -> dict[str, Any]:
@@ -40,13 +47,20 @@ class Example:
 
 def examples() -> list[Example]:
     return [
-        Example(check=path.parent.name, path=path, data=_read(path))
-        for path in sorted(TIMELINES.glob("*/*.yaml"))
+        Example(check=path.stem, name=name, data=data)
+        for path in sorted(TIMELINES.glob("*.yaml"))
+        for name, data in _read(path).items()
     ]
 
 
 def _read(path: Path) -> dict[str, Any]:
-    return yaml.load(path.read_text(encoding="utf-8"), Loader=LOADER)  # noqa: S506 - as safe
+    """Return the cases by name. Raises ValueError for a name that is given twice, of which YAML keeps the last."""
+    loader = LOADER(path.read_text(encoding="utf-8"))
+    node = loader.get_single_node()
+    names = [key.value for key, _ in node.value]
+    if len(set(names)) < len(names):
+        raise ValueError(f"{path.name} has two cases of one name")
+    return loader.construct_document(node)
 
 
 def judge_example(check: str, data: dict[str, Any]) -> Verdict:

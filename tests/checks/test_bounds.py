@@ -10,14 +10,11 @@ import pytest
 
 from grader.arena.limits import Limits
 from grader.checks.build import _first_error
-from grader.checks.support.exit_cause import _refused_name
-from grader.checks.support.pairs import printed_times
-from grader.checks.support.printed import printed_lines
-from grader.checks.support.process import lives
-from grader.checks.support.roslaunch import died, finished, name_pattern, refusal
-from grader.checks.support.rosout import console_log
+from grader.checks.support.console_output import console_log, printed_lines, printed_times
+from grader.checks.support.exit_causes import _refused_name, tracebacks
+from grader.checks.support.launch import died, finished, name_pattern, refusal
+from grader.checks.support.processes import lives
 from grader.checks.support.text import NAMES_MAX, near_names
-from grader.checks.support.traceback import tracebacks
 from grader.evidence.events import ConsoleLine, ProcessEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchNode

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.checks.support.counting import Count
+from grader.checks.support.counters import Count
 from grader.model.verdict import Status, Verdict
 from tests.checks.examples import judge_runs
 from tests.support.timeline import build_runs

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.checks.support.printed import in_order, numbers_in
+from grader.checks.support.console_output import in_order, numbers_in
 from grader.model.verdict import Status
 from tests.checks.examples import judge_runs
 from tests.support.timeline import build_runs

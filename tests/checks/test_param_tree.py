@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.checks.support.param_tree import instead, leaves, own, tree
+from grader.checks.support.parameters import instead, leaves, own, tree
 from tests.support.timeline import build_runs
 
 NAMES = st.lists(st.sampled_from("abc"), min_size=1, max_size=3)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from grader.checks.support.roslaunch import died, finished, is_exact, name_pattern, refusal
-from grader.checks.support.yaml_words import explain_yaml
+from grader.checks.support.launch import died, finished, is_exact, name_pattern, refusal
+from grader.checks.support.parameters import explain_yaml
 from grader.evidence.run import Run
 from grader.model.package import LaunchNode
 from tests.support.timeline import build_runs

@@ -34,7 +34,6 @@ MAY_PRINT = {
     "cli/errors.py",
     "cli/display.py",
     "cli/class_display.py",
-    "checks/docs.py",
     "ci/github.py",  # annotations; tests/ci
     "deliver/grading.py",  # a report as in a terminal; tests/deliver
     "similarity/job.py",  # JSON for the process that started it

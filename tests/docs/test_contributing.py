@@ -51,8 +51,7 @@ def _run(clone: Path, *words: str) -> str:
 
 
 def test_it_is_three_edits() -> None:
-    assert [edit.name.split("/")[0] for edit in EDITS] == ["grader", "rubrics", "tests", "tests", "tests"]
-    assert len({edit.name.split("/")[0] for edit in EDITS}) == 3
+    assert [edit.name.split("/")[0] for edit in EDITS] == ["grader", "rubrics", "tests"]
 
 
 def test_the_tests_of_checks_accept_the_new_check(edited: Path) -> None:
@@ -69,7 +68,7 @@ def test_the_tests_of_checks_accept_the_new_check(edited: Path) -> None:
     )
     passed = re.search(r"(\d+) passed", said)
     assert passed
-    assert int(passed[1]) >= 8
+    assert int(passed[1]) >= 7
 
 
 def test_the_rubric_is_valid_and_the_check_explains_itself(edited: Path) -> None:

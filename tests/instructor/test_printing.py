@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.rubric.own_checks.printing import Shown, printing_to_stderr
+from grader.rubric.instructor import Shown, printing_to_stderr
 from tests.report.nasty import STEERING, TEXTS
 from tests.report.test_shown import TO_A_CI
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.judging.late import deadline_of, lateness
+from grader.judging.settle import deadline_of, lateness
 from grader.model.result import HandedIn
 from grader.rubric.model import Rubric
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from grader.evidence.events import ActorEvent
 from grader.evidence.run import Run
-from grader.judging.notes import notes_of
+from grader.judging.summary import notes_of
 from grader.model.result import Note
 
 

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from grader.judging import criteria_bytes, judge, overall_status, reached_pass_mark, total_points
-from grader.judging.points import round_half_up
+from grader.judging.summary import round_half_up
 from grader.model.result import CriterionResult
 from grader.model.verdict import FileCitation, Status
 from tests.judging.rubrics import ALL, GOOD_RUN, PACKAGE, rubric

@@ -1,10 +1,9 @@
 from __future__ import annotations
 
-from grader.authoring.mutation.docs import EXAMPLE, operators_page
-
 from grader.authoring.mutation.load import load_mutants
 from grader.authoring.mutation.operators import OPERATORS
 from grader.rubric.load import load_rubric
+from scripts.reference.operators import EXAMPLE, operators_page
 from tests.mutation.samples import LABS, ROOT
 from tests.rubric.samples import spoiled
 

@@ -18,8 +18,7 @@ from grader.classes.cluster.crew import Needs
 from grader.classes.cluster.exchange import Exchange, checked_url
 from grader.classes.cluster.shift import Shift
 from grader.errors import GraderError
-from grader.rubric.load import LoadedRubric
-from grader.rubric.needs import started
+from grader.rubric.load import LoadedRubric, started
 
 PATIENCE_S = 60.0
 EXCHANGE = ".grader-exchange"

@@ -19,8 +19,7 @@ from grader.cli.sandbox_report import say_unwalled
 from grader.errors import ExitCode, UsageError
 from grader.model.batch import BatchRun
 from grader.portable import cores
-from grader.rubric.load import LoadedRubric, load_rubric
-from grader.rubric.needs import needs_ros
+from grader.rubric.load import LoadedRubric, load_rubric, needs_ros
 from grader.shown import line
 
 if TYPE_CHECKING:

@@ -25,8 +25,7 @@ from grader.model.progress import Progress, Silence
 from grader.model.result import GradingResult, Standing
 from grader.report.hidden import hidden_ids, without_hidden
 from grader.report.terminal import open_console
-from grader.rubric.load import LoadedRubric
-from grader.rubric.needs import needs_ros
+from grader.rubric.load import LoadedRubric, needs_ros
 from grader.student.git_view import write_staged
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ from grader.report.terminal import emit, open_console
 from grader.report.text import number, visible
 from grader.rubric.faults import did_you_mean
 from grader.rubric.find import rubric_ids
+from grader.rubric.instructor import known_checks
 from grader.rubric.load import LoadedRubric, all_rubrics, load_rubric
 from grader.rubric.model import Criterion
-from grader.rubric.own_checks.known import known_checks
 
 
 def run(*, name: str, rubric: str | None = None) -> ExitCode:

@@ -13,8 +13,7 @@ from typing import ParamSpec, TypeVar
 
 from grader.checks import CHECKS
 from grader.evidence.run import Run
-from grader.judging.facts import Facts, try_facts
-from grader.judging.recordings import PACKAGE_RUN
+from grader.judging.facts import PACKAGE_RUN, Facts, try_facts
 from grader.model.figure import Figure, Figures
 from grader.model.result import CriterionResult
 from grader.model.verdict import Verdict

@@ -6,14 +6,18 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 
 from grader.checks.counter import StartParams, StepParams, begins_with, missed_the_first
-from grader.checks.support.counter_wrap import (
+from grader.checks.support.counters import (
+    Count,
+    Step,
     WrapParams,
     bad_turn_message,
+    counts,
     judge_wraps,
+    longest,
     turns_of,
     whose_turn,
+    wrong_steps,
 )
-from grader.checks.support.counting import Count, Step, counts, longest, wrong_steps
 from grader.checks.support.text import number
 from grader.evidence.run import Run
 from grader.model.figure import POINTS_MAX, CounterFigure

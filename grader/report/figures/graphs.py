@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from grader.checks.topic import SYSTEM_TOPICS
+from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.evidence.events import GraphEvent
 from grader.evidence.run import BARE_NAME, Run, is_grader_node
 from grader.model.figure import Edge, GraphFigure

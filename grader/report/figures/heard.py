@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from grader.checks.hears import HearsParams
-from grader.checks.support.printed import (
+from grader.checks.support.console_output import (
     Line,
     Probe,
     chosen,

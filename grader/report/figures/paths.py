@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from grader.checks.path import PathParams
-from grader.checks.support.geometry import Pose, followed, relative
-from grader.checks.support.tracks import track
+from grader.checks.support.geometry import Pose, followed, relative, track
 from grader.evidence.run import Run
 from grader.model.figure import POINTS_MAX, PathFigure
 from grader.report.figures.bounded import finite, named, spread

@@ -1,23 +1,5 @@
 """All operators, a file for each family. Importing this fills the registry."""
 
-from grader.authoring.mutation.operators import (
-    build,
-    counter,
-    files,
-    launch,
-    life,
-    listener,
-    logs,
-    manifest,
-    message,
-    names,
-    params,
-    shebang,
-    syntax,
-    timing,
-    topics,
-    yaml,
-)
 from grader.authoring.mutation.registry import OPERATORS
 
 __all__ = [

@@ -1,0 +1,339 @@
+"""What a node printed or logged, and whether probes are among it."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Sequence
+from typing import Literal, NamedTuple
+
+from grader.checks.support.exit_causes import HEADING, tracebacks
+from grader.checks.support.text import VALUE, bare, line_pattern, words_pattern
+from grader.evidence.run import Run
+
+NUMBERS_PER_LINE = 6
+LINES_PER_PROBE = 8
+LINES_SPARE = 20
+NAMES_MAX = 100
+"""Of the student's nodes, those whose names are left out of lines."""
+CLOCK_SLACK_NS = 50_000_000
+_LOG_PREFIX = re.compile(r"^\s*\[\s*(?:DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*(?:\[[^\]]*\]\s*)*:?\s?")
+_WORD = re.compile(r"/?[A-Za-z][\w/]*")
+_ANONYMOUS_END = re.compile(r"(?=(_\d+_\d{9,}))")
+_HEX = re.compile(r"0[xX][0-9a-fA-F]+")
+_NUMBER = re.compile(r"(?<![\d.])([-+]?)(\d+)(\.\d+)?(?!\d)", re.ASCII)
+
+
+class Probe(NamedTuple):
+    """What the grader published, and when."""
+
+    at_ns: int
+    value: object
+
+
+class Line(NamedTuple):
+    """One line of output without the logger's prefix, colours and the node's own name."""
+
+    at_ns: int
+    text: str
+
+
+def probes_on(run: Run, topic: str) -> tuple[Probe, ...]:
+    return tuple(Probe(t, e.value) for t, e in run.actors if e.action == "publish" and e.topic == topic)
+
+
+def printed_lines(run: Run) -> tuple[Line, ...]:
+    """All that the student's processes printed and their nodes logged, by time; tracebacks left out."""
+    students = {e.name for _, e in run.processes if e.role == "student"}
+    lines = [
+        line
+        for process in sorted(students)
+        for stream in ("stdout", "stderr")
+        for line in _without_tracebacks([(t, c.line) for t, c in run.lines(process) if c.stream == stream])
+    ]
+    names = sorted(run.student_nodes()[:NAMES_MAX], key=len, reverse=True)
+    return tuple(
+        Line(t, _bare(text, names)) for t, text in sorted([*lines, *_logged(run)], key=lambda line: line[0])
+    )
+
+
+def stream_lines(run: Run, process: str) -> tuple[tuple[Line, ...], ...]:
+    """What one process printed on stdout and on stderr, and what its nodes logged, each by time."""
+    nodes = run.student_nodes(process)[:NAMES_MAX]
+    console = ([(t, c.line) for t, c in run.lines(process) if c.stream == s] for s in ("stdout", "stderr"))
+    streams = (*console, _logged(run, nodes))
+    return tuple(tuple(Line(t, _bare(text, nodes)) for t, text in stream) for stream in streams)
+
+
+def _logged(run: Run, nodes: Collection[str] | None = None) -> list[tuple[int, str]]:
+    """The messages on /rosout, line by line: of these nodes, or of all that are the student's."""
+    texts = (
+        (t, str(value.get("msg", "")))
+        for channel in run.student_channels("/rosout")
+        if nodes is None or channel.callerid in nodes
+        for t, value in zip(channel.times_ns, channel.values, strict=True)
+        if isinstance(value, dict)
+    )
+    return [(t, line) for t, text in texts if HEADING not in text for line in text.splitlines()]
+
+
+def _without_tracebacks(lines: Sequence[tuple[int, str]]) -> list[tuple[int, str]]:
+    hidden = {
+        i for found in tracebacks([text for _, text in lines]) for i in range(found.first, found.last + 1)
+    }
+    return [line for index, line in enumerate(lines) if index not in hidden]
+
+
+def _bare(text: str, names: Iterable[str]) -> str:
+    text = _LOG_PREFIX.sub("", bare(text))
+    for name in names:
+        text = text.replace(name, " ")
+    return _WORD.sub(_without_anonymous, text) if _ANONYMOUS_END.search(text) else text
+
+
+def _without_anonymous(word: re.Match[str]) -> str:
+    """A word up to the last digits that `anonymous=True` puts behind a node's name becomes a blank."""
+    end = max((found.end(1) for found in _ANONYMOUS_END.finditer(word[0])), default=0)
+    return f" {word[0][end:]}" if end else word[0]
+
+
+def numbers_in(text: str) -> frozenset[int]:
+    """A line's whole numbers: `12` is not in `127` and not in `3.12`. A `-` after a letter may be a dash."""
+    found: set[int] = set()
+    for match in _NUMBER.finditer(_HEX.sub(" ", text)):
+        sign, whole, fraction = match.groups()
+        if len(whole) > 18 or (fraction and fraction.strip(".0")):
+            continue
+        found.add(int(sign + whole))
+        if sign and match.string[: match.start()][-1:].isalpha():
+            found.add(int(whole))
+    return frozenset(found)
+
+
+def places_of(
+    run: Run, probes: Sequence[Probe], lines: Sequence[Line], template: str
+) -> list[tuple[int, ...]] | None:
+    """For each probe where it was printed; None where so many numbers are printed that nobody can tell.
+
+    Places follow each other as the lines do; `line_finder` gives a place's line.
+    """
+    if not _are_numbers(probes):
+        return text_places(probes, lines, template)
+    texts = {e.value for _, e in run.actors if e.action == "publish" and isinstance(e.value, str)}
+    return number_places(probes, lines, texts)
+
+
+def line_finder(probes: Sequence[Probe], lines: Sequence[Line], template: str) -> Callable[[int], Line]:
+    """From a place of `places_of` to the line that begins there, or before it."""
+    if _are_numbers(probes):
+        return lambda place: lines[place]
+    starts = [offset for _, offset in _joined(lines, template)[1]]
+    return lambda place: lines[bisect_right(starts, place) - 1]
+
+
+def _are_numbers(probes: Sequence[Probe]) -> bool:
+    return all(isinstance(p.value, int) for p in probes)
+
+
+def number_places(
+    probes: Sequence[Probe], lines: Sequence[Line], texts: Iterable[str]
+) -> list[tuple[int, ...]] | None:
+    """For each probe the indices of the lines that hold it, at its time or later.
+
+    `texts` are other probes that the lines may show too; digits in them are no numbers. None where so many
+    numbers are printed that any probe would be among them.
+    """
+    hidden = re.compile("|".join(map(re.escape, sorted(texts, key=len, reverse=True))) or r"(?!)")
+    found = ((i, line.at_ns, numbers_in(hidden.sub(" ", line.text))) for i, line in enumerate(lines))
+    rows = [(i, t, numbers) for i, t, numbers in found if numbers]
+    if len(rows) > LINES_PER_PROBE * (len(probes) + len(set(texts))) + LINES_SPARE:
+        return None
+    return [
+        tuple(
+            i
+            for i, t, numbers in rows
+            if p.value in numbers and len(numbers) <= NUMBERS_PER_LINE and t >= p.at_ns - CLOCK_SLACK_NS
+        )
+        for p in probes
+    ]
+
+
+def text_places(probes: Sequence[Probe], lines: Sequence[Line], template: str) -> list[tuple[int, ...]]:
+    """The same for texts, as offsets in all that was printed. A text may be split over lines.
+
+    The template's own words may be in capitals or not; the text itself stands letter by letter.
+    """
+    blank = "" if template == VALUE else " "
+    blob, starts = _joined(lines, template)
+    places = []
+    for probe in probes:
+        begin = next((at for t, at in starts if t >= probe.at_ns - CLOCK_SLACK_NS), len(blob))
+        spellings = {blank.join(text.split()) for text in (str(probe.value), repr(probe.value)[1:-1])}
+        patterns = [line_pattern(template, text) for text in spellings if text]
+        found = {m.start() for pattern in patterns for m in pattern.finditer(blob, begin)}
+        places.append(tuple(sorted(found)))
+    return places
+
+
+def _joined(lines: Sequence[Line], template: str) -> tuple[str, list[tuple[int, int]]]:
+    """All that was printed, and when and at which offset each line begins."""
+    blank = "" if template == VALUE else " "
+    parts, starts, offset = [], [], 0
+    for line in lines:
+        starts.append((line.at_ns, offset))
+        parts.append(blank.join(line.text.split()) + blank)
+        offset += len(parts[-1])
+    return "".join(parts), starts
+
+
+def chosen(places: Sequence[tuple[int, ...]]) -> list[int | None]:
+    """For each probe the first of its places that is behind the one before; None where it has none."""
+    position, found = -1, list[int | None]()
+    for choices in places:
+        later = next((place for place in choices if place > position), None)
+        position = position if later is None else later
+        found.append(later)
+    return found
+
+
+def in_order(places: Sequence[tuple[int, ...]]) -> bool:
+    """Whether one place can be chosen for each probe, each behind the one before."""
+    return None not in chosen(places)
+
+
+_BEFORE, _BEHIND = r"(?<![\w.])", r"(?![\w]|[.,]\d)"
+_Lines = list[tuple[str, str]]
+"""Lines with their blanks squeezed, and as they are."""
+
+LOOKED_AT, LOOKED_AT_LEAST = 400, 8
+TEXT_CHARS_MAX = 200
+SEARCHED_CHARS_MAX = 100_000_000
+"""Texts are as many times fewer as what was printed is longer, and none is longer than a lab's are."""
+PUNCTUATION = ".,;:!?'\"()[]{}<>"
+
+
+class Sent(NamedTuple):
+    """The texts that one sender published from `from_ns` on, with how many times."""
+
+    texts: Counter[str]
+
+    @property
+    def total(self) -> int:
+        return self.texts.total()
+
+
+def sent_by(run: Run, topic: str, nodes: Collection[str], from_ns: int = 0) -> Sent:
+    """What these nodes published as text on the topic at `from_ns` or later."""
+    texts = (
+        text
+        for channel in run.student_channels(topic)
+        if channel.callerid in nodes
+        for t, text in zip(channel.times_ns, channel.data, strict=True)
+        if t >= from_ns and _is_text(text)
+    )
+    return Sent(Counter(texts))
+
+
+def both_from_ns(run: Run, topic: str, first: Collection[str], second: Collection[str]) -> int | None:
+    """From when on both had sent a text; None where one of them never did."""
+    begins = [
+        [
+            t
+            for channel in run.student_channels(topic)
+            if channel.callerid in nodes
+            for t, text in zip(channel.times_ns, channel.data, strict=True)
+            if _is_text(text)
+        ]
+        for nodes in (first, second)
+    ]
+    return max(min(times) for times in begins) if all(begins) else None
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str) and bool(value.strip())
+
+
+def printed_times(run: Run, process: str, texts: Collection[str], template: str) -> Counter[str]:
+    """How many times a process printed each text: by the stream, stdout, stderr or /rosout, that shows it most.
+
+    Of a flood of texts, some that seem to have been printed are enough to look at.
+    """
+    streams = [[(_squeezed(line.text), line.text) for line in lines] for lines in stream_lines(run, process)]
+    printed_chars = sum(len(line) for lines in streams for _, line in lines)
+    most = min(LOOKED_AT, max(LOOKED_AT_LEAST, SEARCHED_CHARS_MAX // (1 + printed_chars)))
+    texts = [text for text in texts if len(text) <= TEXT_CHARS_MAX]
+    if len(texts) > most:
+        texts = _worth_a_look(texts, streams, most)
+    counts = {text: max((_times(lines, text, template) for lines in streams), default=0) for text in texts}
+    return Counter({text: count for text, count in counts.items() if count})
+
+
+def _squeezed(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _worth_a_look(texts: Iterable[str], streams: Iterable[_Lines], most: int) -> list[str]:
+    """Texts whose last word was printed, evenly spread."""
+    said = {word.strip(PUNCTUATION) for lines in streams for _, line in lines for word in line.split()}
+    found = [text for text in texts if text.split()[-1].strip(PUNCTUATION) in said]
+    return found[:: max(1, len(found) // most)]
+
+
+def heard_of(sent: Sent, other: Sent, printed: Counter[str]) -> int:
+    """How many messages were printed that can only be this sender's."""
+    return sum(min(count, max(0, printed[text] - other.texts[text])) for text, count in sent.texts.items())
+
+
+def _times(lines: _Lines, text: str, template: str) -> int:
+    before, _, behind = template.partition(VALUE)
+    words = text.split()
+    whole = r"\s+".join(map(re.escape, words))
+    pattern = re.compile(
+        f"{words_pattern(before)}{_edge(_BEFORE, whole, before)}{whole}{_BEHIND}{words_pattern(behind)}"
+    )
+    plain = " ".join(words)
+    return sum(bool(pattern.search(line)) for squeezed, line in lines if plain in squeezed)
+
+
+def _edge(mark: str, whole: str, before: str) -> str:
+    """A number has to stand for itself; a word may follow on others (`I heardThe time`)."""
+    return mark if whole[:1].isdigit() and not before else ""
+
+
+Level = Literal["debug", "info", "warn", "error", "fatal"]
+LEVELS: dict[int, Level] = {1: "debug", 2: "info", 4: "warn", 8: "error", 16: "fatal"}
+CALLS = {level: f"rospy.log{'err' if level == 'error' else level}" for level in LEVELS.values()}
+_CONSOLE = re.compile(r"^\s*\[\s*(DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*\[[^\]]*\]\s*:?\s?(.*)$")
+
+
+class Logged(NamedTuple):
+    """One log message; `level` is None for a number that ROS does not know."""
+
+    at_ns: int
+    node: str
+    level: Level | None
+    text: str
+
+
+def logged_by(run: Run, nodes: Collection[str]) -> tuple[Logged, ...]:
+    """The log messages of these nodes, by time; of all nodes in another tool's recording, which knows no graph."""
+    found = [
+        Logged(
+            t,
+            channel.callerid or str(value.get("name", "")),
+            LEVELS.get(value.get("level", 0)),
+            str(value.get("msg", "")),
+        )
+        for channel in run.student_channels("/rosout")
+        if run.foreign or channel.callerid in nodes
+        for t, value in zip(channel.times_ns, channel.values, strict=True)
+        if isinstance(value, dict)
+    ]
+    return tuple(sorted(found, key=lambda one: one.at_ns))
+
+
+def console_log(line: str) -> tuple[str, str] | None:
+    """Level and text of a line as rospy and roscpp print what they log; None for any other line."""
+    match = _CONSOLE.match(bare(line))
+    return (match[1].lower(), match[2]) if match else None

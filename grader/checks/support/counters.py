@@ -1,0 +1,345 @@
+"""A counter's values as they came: steps, what was lost on the way, floods."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import pairwise
+from statistics import median
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import Field
+
+from grader.checks.support.exit_causes import explain_early_end, explain_traceback, process_tracebacks
+from grader.checks.support.processes import lives, observed_until_ns
+from grader.checks.support.text import number, plural
+from grader.checks.support.topics import losses, whole_until_ns
+from grader.evidence.run import Channel, Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+
+FLOOD_FACTOR = 3
+SYSTEMATIC_SHARE = 0.05
+STUCK_COUNT = 5
+
+
+class Step(NamedTuple):
+    """From one value to the next. `number` is the later one's, counted from 0."""
+
+    number: int
+    before: float
+    after: float
+    from_ns: int
+    to_ns: int
+    lost_messages: int
+
+    @property
+    def change(self) -> float:
+        return self.after - self.before
+
+
+class Count(Record):
+    """The numbers of one publisher in the order of their arrival; times in ns."""
+
+    callerid: str
+    values: tuple[float, ...]
+    times_ns: tuple[int, ...]
+    sequences: tuple[int, ...]
+
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        rows = list(zip(self.values, self.times_ns, self.sequences, strict=True))
+        return tuple(
+            Step(i + 1, a[0], b[0], a[1], b[1], max(0, b[2] - a[2] - 1))
+            for i, (a, b) in enumerate(pairwise(rows))
+        )
+
+    @cached_property
+    def stuck(self) -> int:
+        """How many times the last value came at the end."""
+        same = 0
+        for value in reversed(self.values):
+            if value != self.values[-1]:
+                break
+            same += 1
+        return same
+
+    @cached_property
+    def period_ns(self) -> float:
+        """The usual time between two values: the median, or half the mean where they come in bursts."""
+        gaps = [s.to_ns - s.from_ns for s in self.steps]
+        if not gaps:
+            return 0.0
+        return max(median(gaps), sum(gaps) / len(gaps) / 2)
+
+    def lost_on_the_way(self, step: Step, jump: float) -> bool:
+        """Whether `jump - 1` values between these two were published and did not arrive.
+
+        The recording says so, or the time between them fits: then it was the transport or the host. A jump in
+        normal time, or one that comes again and again, is the program's.
+        """
+        if step.lost_messages:
+            return True
+        if jump < 2 or self.period_ns <= 0 or self._comes_again(step):
+            return False
+        return 0.75 <= (step.to_ns - step.from_ns) / self.period_ns / jump <= 4
+
+    def _comes_again(self, step: Step) -> bool:
+        same = self._pairs[step.before, step.after]
+        return same > 1 or self._jumps > SYSTEMATIC_SHARE * len(self.steps) + 1
+
+    @cached_property
+    def _pairs(self) -> Counter[tuple[float, float]]:
+        return Counter((s.before, s.after) for s in self.steps)
+
+    @cached_property
+    def _jumps(self) -> int:
+        return sum(s.change > 1 for s in self.steps)
+
+    def is_flood(self, run: Run, rate_hz: float) -> bool:
+        """So many messages that the publisher's own queue drops some."""
+        span_s = (self.times_ns[-1] - self.times_ns[0]) / 1e9
+        warp = run.warp if run.clock == "warped" else 1.0
+        return len(self.steps) > 20 and len(self.steps) >= FLOOD_FACTOR * rate_hz * warp * span_s
+
+    def usual_step(self) -> float | None:
+        """The step that at least four of five are, None where there is none."""
+        changes = Counter(s.change for s in self.steps)
+        change, times = changes.most_common(1)[0] if changes else (0.0, 0)
+        return change if times and times >= 0.8 * len(self.steps) else None
+
+
+class Wrong(NamedTuple):
+    """Steps that are not +1: the program's `own`, or of values that were `lost` on the way.
+
+    Where it is a `flood`, they are skips of a publisher whose queue drops values, and neither of both; `excused` where
+    the others are right.
+    """
+
+    steps: tuple[Step, ...]
+    own: tuple[Step, ...] = ()
+    lost: tuple[Step, ...] = ()
+    flood: bool = False
+    excused: bool = False
+
+
+def wrong_steps(count: Count, run: Run, *, maximum: int, rate_hz: float) -> Wrong:
+    """Of `judged_steps`. Where the counter falls by more than one, it may have started again: that is no such step."""
+    wrong = tuple(s for s in judged_steps(count, maximum) if s.change in {0, -1} or s.change > 1)
+    skips = tuple(s for s in wrong if s.change > 1)
+    usual = count.usual_step()
+    if wrong and skips == wrong and usual in {None, 1} and count.is_flood(run, rate_hz):
+        return Wrong(wrong, flood=True, excused=usual == 1)
+    lost = tuple(s for s in skips if count.lost_on_the_way(s, s.change))
+    numbers = {s.number for s in lost}
+    return Wrong(wrong, own=tuple(s for s in wrong if s.number not in numbers), lost=lost)
+
+
+def judged_steps(count: Count, maximum: int) -> tuple[Step, ...]:
+    """All of them, without the repeats of a counter that stays at its maximum: that is the wrap's fault."""
+    stays = count.values[-1] == maximum and count.stuck > 1
+    return count.steps[: len(count.steps) - (count.stuck - 1)] if stays else count.steps
+
+
+def counts(run: Run, topic: str) -> tuple[Count, ...]:
+    """What the student's publishers counted on a topic, the earliest first; what is no number is left out, and what
+    came after the recorder had lost something."""
+    until_ns = whole_until_ns(run, topic)
+    found = [_count(c, until_ns) for c in run.student_channels(topic)]
+    return tuple(sorted((c for c in found if c is not None), key=lambda c: c.times_ns[0]))
+
+
+def longest(run: Run, topic: str) -> Count | None:
+    return max(counts(run, topic), key=lambda c: len(c.values), default=None)
+
+
+def _count(channel: Channel, until_ns: int | None) -> Count | None:
+    rows = [
+        (number, message.log_time_ns, message.sequence)
+        for message, value in zip(channel.messages, channel.data, strict=True)
+        if (number := _number(value)) is not None and (until_ns is None or message.log_time_ns <= until_ns)
+    ]
+    if not rows:
+        return None
+    values, times, sequences = zip(*rows, strict=True)
+    return Count(callerid=channel.callerid, values=values, times_ns=times, sequences=sequences)
+
+
+def _number(value: object) -> float | None:
+    """A number; text is none, even if it is written in digits."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return value
+    return None
+
+
+def first_values(values: Sequence[float]) -> str:
+    from_start = ", ".join(f"{v:g}" for v in values[:4])
+    return f"{from_start}, …" if len(values) > 4 else from_start
+
+
+SILENT_PERIODS = 20
+SILENT_NS = 500_000_000
+
+
+class WrapParams(Record):
+    """After `maximum`, or the value before it, comes `minimum`, `wraps` times; `rate_hz` is nominal."""
+
+    topic: str
+    minimum: int = 0
+    maximum: int = 127
+    wraps: Annotated[int, Field(ge=1)] = 2
+    rate_hz: Annotated[float, Field(gt=0)] = 10.0
+
+    @property
+    def reset_hint(self) -> str:
+        if self.minimum == 0:
+            return f"reset before publishing: counter = (counter + 1) % {self.maximum + 1}"
+        return f"reset before publishing: if counter > {self.maximum}: counter = {self.minimum}"
+
+
+def judge_wraps(
+    count: Count, run: Run, package: PackageFacts, params: WrapParams
+) -> tuple[Verdict, Step | None]:
+    """The verdict, and the turn that it rests on."""
+    turns, good, wrong = turns_of(count, run, params)
+    bad = wrong[0] if wrong else None
+    if bad is not None:
+        return _bad_turn(bad, turns, count, run, params), bad
+    last = good[-1] if good else None
+    if len(good) >= params.wraps:
+        message = f"after {number(good[0].before)} comes {params.minimum}, {plural(len(good), 'time')}"
+        return passed(message), last
+    if losses(run, params.topic) and not count.is_flood(run, params.rate_hz):
+        message = f"only {plural(len(good), 'reset')} of {params.wraps} is recorded"
+        return inconclusive(message, hint="grade again"), last
+    verdict = _died(count, run, package, params) or _stuck(count, params)
+    return verdict or _silent(count, run, package, params) or _too_few(count, good, run, params), last
+
+
+class Turns(NamedTuple):
+    """`every` step down, those of them that are `good`, and all `bad` steps: also those past the maximum."""
+
+    every: list[Step]
+    good: list[Step]
+    bad: list[Step]
+
+
+def turns_of(count: Count, run: Run, params: WrapParams) -> Turns:
+    """Where bad turns of a flood are let pass, all count as good."""
+    turns = [s for s in count.steps if s.change < 0]
+    good = [s for s in turns if _is_good(s, params)]
+    bad = [s for s in count.steps if _is_bad(s, params)]
+    in_range = bool(bad) and params.minimum <= bad[0].after <= params.maximum
+    if in_range and good and count.is_flood(run, params.rate_hz):
+        # the publisher dropped values around this turn: those that came whole decide
+        return Turns(turns, turns, [])
+    return Turns(turns, good, bad)
+
+
+def _is_good(step: Step, params: WrapParams) -> bool:
+    return step.before in {params.maximum, params.maximum - 1} and step.after == params.minimum
+
+
+def _is_bad(step: Step, params: WrapParams) -> bool:
+    beyond = step.after > params.maximum
+    return beyond or (
+        (step.change < -1 or (step.before >= params.maximum - 1 and step.change < 0))
+        and not _is_good(step, params)
+    )
+
+
+def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: WrapParams) -> Verdict:
+    whose = whose_turn(step, count, run, params)
+    if whose == "flood":
+        message = f"{params.topic} is flooded, so its publisher drops values, also around the wrap"
+        return unjudged(message, hint="first make the loop sleep, then look at the counter again")
+    if whose == "lost":
+        message = f"values of {params.topic} got lost around the wrap, with a gap in time"
+        return inconclusive(message, hint="grade again while the machine has less to do")
+    return failed(bad_turn_message(step, turns, params), hint=params.reset_hint)
+
+
+def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Literal["program", "flood", "lost"]:
+    """Whether a bad turn is the program's own, or one of values that its flood, or the way, swallowed."""
+    low, high = params.minimum, params.maximum
+    if step.after > high or step.after < low:
+        return "program"
+    if count.is_flood(run, params.rate_hz):
+        return "flood"
+    jump = (high - step.before) + (step.after - low) + 1
+    return "lost" if count.lost_on_the_way(step, jump) else "program"
+
+
+def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
+    """What is wrong with a turn, in a student's words."""
+    low, high = params.minimum, params.maximum
+    before, after = number(step.before), number(step.after)
+    comes = f"after {before} comes {after}"
+    if step.after > high:
+        late = next((s for s in turns if s.before > high), None)
+        if late is None:
+            return f"the counter never resets: {comes}, and it counts on"
+        return f"the counter resets too late, from {number(late.before)} to {number(late.after)}: {comes}"
+    if step.after == -(high + 1):
+        return f"the counter runs over to {after}, as a signed number of this width does: {comes}"
+    if step.before >= high - 1:
+        return f"the counter resets to {after}, not to {low}: {comes}"
+    if step.after == low:
+        return f"the counter resets too early: {comes}"
+    return f"the counter falls back before it has reached {high}: {comes}"
+
+
+def _died(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> Verdict | None:
+    end = explain_early_end(package, run)
+    if end is None:
+        return None
+    last = count.values[-1]
+    if last >= params.maximum - 1:
+        message = f"the node dies at {number(last + 1)}, where the counter should reset: {end.cause}"
+        return failed(message, hint=params.reset_hint)
+    message = f"the node ended at {number(last)}, before the counter could reset twice: {end.cause}"
+    return unjudged(message, hint=end.hint)
+
+
+def _stuck(count: Count, params: WrapParams) -> Verdict | None:
+    if count.stuck < STUCK_COUNT:
+        return None
+    last = number(count.values[-1])
+    message = f"the counter stays at {last} ({plural(count.stuck, 'time')} at the end)"
+    at_top = count.values[-1] >= params.maximum - 1
+    return (failed if at_top else unjudged)(message, hint=params.reset_hint)
+
+
+def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> Verdict | None:
+    """The node lives, and has stopped to publish."""
+    until_ns = observed_until_ns(run)
+    if until_ns is None or losses(run, params.topic):
+        return None
+    if until_ns - count.times_ns[-1] < max(SILENT_PERIODS * count.period_ns, SILENT_NS):
+        return None
+    found = [t for one in lives(run) for t in process_tracebacks(run, one.name)]
+    cause = f": {explain_traceback(found[-1], package).cause}" if found else ""
+    message = f"the node stops publishing after {number(count.values[-1])}, while it lives on{cause}"
+    return failed(message, hint=params.reset_hint)
+
+
+def _too_few(count: Count, good: list[Step], run: Run, params: WrapParams) -> Verdict:
+    span_s = (count.times_ns[-1] - count.times_ns[0]) / 1e9
+    seen = f"{plural(len(good), 'reset')} in {plural(len(count.values), 'value')}"
+    wrong = any(s.change in {0, -1} or s.change > 1 for s in count.steps)
+    outcome = run.outcome.outcome if run.outcome else None
+    if good and outcome == "complete" and all(s.change in {0, 1} or s in good for s in count.steps):
+        return passed(f"after {number(good[0].before)} comes {params.minimum}; values repeat, so only {seen}")
+    if count.is_flood(run, params.rate_hz) or wrong:
+        message = f"{params.wraps} resets were not seen: {seen}, which do not count up one by one"
+        return unjudged(message, hint="first make the counter go up by one at its rate")
+    if len(count.steps) < params.rate_hz * span_s / 2:
+        message = f"{params.topic} is too slow to see {params.wraps} resets: {seen}"
+        return unjudged(message, hint=f"use rospy.Rate({number(params.rate_hz)})")
+    end = {"timeout": "the run's time was over", "host": "the grading machine failed"}.get(
+        outcome or "", "the run ended"
+    )
+    hint = "record for longer" if run.foreign else "grade again"
+    return inconclusive(f"right as far as it goes, but {end} after {seen}", hint=hint)

@@ -1,0 +1,235 @@
+"""Why a process ended, in a student's words: Python tracebacks, limits, signals, what rospy says."""
+
+from __future__ import annotations
+
+import re
+import signal
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from grader.checks.support.processes import Life, early_end, lives
+from grader.checks.support.scripts import path_in_package
+from grader.checks.support.text import seconds, shown
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.verdict import FileCitation, Verdict
+
+SYNTAX = ("SyntaxError", "IndentationError", "TabError")
+RUN_IT = "run it by itself with rosrun, and read what it prints last"
+RACE = "publish() to a closed topic"
+LIMITS = ("limit", "note")  # evidence of earlier versions has it as a note
+CAUSES = {
+    "EOFError": ("it asks for input (`input()`), and a node is given none", "remove `input()`: a node runs by itself"),
+    "ROSInterruptException": ("ROS was told to shut down while the node slept, and nothing caught it",
+     "call your main function in `try: … except rospy.ROSInterruptException: pass`, as talker.py does"),
+    "ROSInitException": ("it uses ROS before `rospy.init_node(…)`",
+     "call `rospy.init_node(…)` before the first publish, Rate or sleep"),
+    "KeyboardInterrupt": ("Ctrl-C reached it in a place where nothing expects it",
+     "loop with `while not rospy.is_shutdown():` and sleep with `rospy.Rate`"),
+    "ModuleNotFoundError": ("", "check the spelling of the import; a message package is imported as `std_msgs.msg`"),
+    "ImportError": ("", "check the spelling of the import: the message types are at http://wiki.ros.org/std_msgs"),
+    "NameError": ("", "check the spelling, and that it is imported or assigned before it is used"),
+    "ROSSerializationException": ("", "publish a value that fits the message's type"),
+    "SerializationError": ("", "publish a value that fits the message's type"),
+    "SyntaxError": ("", "fix that line, or the one above it"),
+    "IndentationError": ("", "indent every line with four spaces"),
+    "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
+}  # fmt: skip
+# what rospy says of a slip that its exception's class does not tell of
+SLIPS = {
+    "namespaces are not allowed in node names": ("the name in `rospy.init_node(…)` has a slash in it",
+     "write the node's name without a slash"),
+    "init_node() has already been called with different arguments": ("`rospy.init_node(…)` is called a second time",
+     "one script is one node: call `rospy.init_node(…)` once"),
+    "Invalid number of arguments, args should be": (
+     "the message is given another number of values than it has fields",
+     'one value for each field; numbers get into a text by `%`: `publish("… %s" % value)`, not by a comma'),
+}  # fmt: skip
+_ILLEGAL_NAME = re.compile(
+    r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
+)
+HEADING = "Traceback (most recent call last):"
+_FRAME = re.compile(r'^\s+File "([^"]+)", line (\d+)')
+_LAST = re.compile(r"^([A-Za-z_][\w.]*)(?:: ?(.*))?$")
+_LIBRARY = ("/dist-packages/", "/site-packages/", "/usr/lib/python", "<frozen", "/opt/ros/")
+
+
+class Frame(NamedTuple):
+    file: str
+    line: int
+
+    @property
+    def in_library(self) -> bool:
+        return any(part in self.file for part in _LIBRARY)
+
+
+class Traceback(NamedTuple):
+    """`kind` is the exception's class without its module; `first` and `last` are the indices of its lines."""
+
+    kind: str
+    message: str
+    frames: tuple[Frame, ...]
+    first: int
+    last: int
+
+    @property
+    def text(self) -> str:
+        """The last line, as Python prints it."""
+        return f"{self.kind}: {self.message}" if self.message else self.kind
+
+    @property
+    def own_frames(self) -> tuple[Frame, ...]:
+        """Those outside Python's and ROS's own code, the innermost last."""
+        return tuple(f for f in self.frames if not f.in_library)
+
+
+def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
+    """Every traceback, also the bare `File …` form of a syntax error. One that was cut short is left out."""
+    found: list[Traceback] = []
+    frames: list[Frame] = []
+    first: int | None = None
+    bare = _followed_by_syntax_error(lines)
+    for index, line in enumerate(lines):
+        frame = _FRAME.match(line)
+        if HEADING in line:
+            first, frames = index, []
+        elif frame and (first is not None or bare[index]):
+            first = index if first is None else first
+            frames.append(Frame(frame[1], int(frame[2])))
+        elif first is not None and line and not line[0].isspace():
+            last = _LAST.match(line)
+            if last:
+                kind = last[1].rpartition(".")[2]
+                found.append(Traceback(kind, (last[2] or "").strip(), tuple(frames), first, index))
+            first = None
+    return tuple(found)
+
+
+def _followed_by_syntax_error(lines: Sequence[str]) -> list[bool]:
+    """For each line whether only indented ones come, then the name of a syntax error: one of the script itself has no
+    heading."""
+    found, named = [False] * len(lines), False
+    for index in range(len(lines) - 1, -1, -1):
+        found[index], line = named, lines[index]
+        if line and not line[0].isspace():
+            named = line.startswith(("SyntaxError", "IndentationError", "TabError"))
+    return found
+
+
+class Ending(NamedTuple):
+    """What was the matter with a process: a clause after `it ended because …`, what to do, and where it shows."""
+
+    cause: str
+    hint: str
+    citations: tuple[FileCitation, ...] = ()
+    process: str = ""
+
+    def verdict(self, kind: Callable[..., Verdict], message: str, measured: str = "") -> Verdict:
+        """Return a verdict of this kind (`failed`, `unjudged`) with the ending's hint and citations."""
+        return kind(message, measured=measured, hint=self.hint, citations=self.citations)
+
+
+def explain_early_end(package: PackageFacts, run: Run) -> Ending | None:
+    """Return why the first of the student's processes that ended early did so; None where none did."""
+    ended = early_end(run)
+    return None if ended is None else explain_end(ended, run, package)
+
+
+def explain_end(life: Life, run: Run, package: PackageFacts) -> Ending:
+    """Return why a process ended: a name that ROS refuses, its last traceback, a limit, a signal, or its last words."""
+    return _explained(life, run, package)._replace(process=life.name)
+
+
+def _explained(life: Life, run: Run, package: PackageFacts) -> Ending:
+    if refused := _refused_name(life, run):
+        return refused
+    if limit := _limit(life, run):
+        return Ending(limit, "a node of this lab needs little memory, few processes and little time")
+    found = process_tracebacks(run, life.name)
+    code = life.end.exit_code if life.end else None
+    if found and code != 0:
+        return explain_traceback(found[-1], package)
+    if life.end is not None and life.end.signal is not None and life.end.stopped_by is None:
+        return Ending(f"{_signal_name(life.end.signal)} ended it", RUN_IT)
+    if code == 0:
+        hint = "a node has to stay alive: `rospy.spin()`, or a loop `while not rospy.is_shutdown():`"
+        return Ending("its script came to its end", hint)
+    last = next((line.line for _, line in reversed(list(run.lines(life.name))) if line.line.strip()), "")
+    words = f"; its last words: {shown(last)}" if last else ""
+    return Ending(f"it exited with code {code}{words}", RUN_IT)
+
+
+def explain_error(package: PackageFacts, run: Run) -> Ending | None:
+    """Return the last traceback of the student's processes before Ctrl-C; None where there is none."""
+    found = [t for one in lives(run) for t in process_tracebacks(run, one.name, before_ns=one.interrupt_ns)]
+    return explain_traceback(found[-1], package) if found else None
+
+
+def _limit(life: Life, run: Run) -> str:
+    """What it had too much of, so that it was stopped."""
+    met = (e.detail for _, e in run.actors if e.action in LIMITS and e.actor == life.name)
+    return next((detail for detail in met if detail.startswith("stopped by the grader")), "")
+
+
+def _refused_name(life: Life, run: Run) -> Ending | None:
+    """rospy shuts a node down whose topic has a name that the master does not take."""
+    found = (_ILLEGAL_NAME.search(c.line) for _, c in run.lines(life.name) if "illegal chars" in c.line)
+    match = next(filter(None, found), None)
+    if match is None:
+        return None
+    kind, name = "service" if match[1] == "service" else "topic", match[2]
+    what = "has a blank in it" if re.search(r"\s", name) else "is no name that ROS takes"
+    hint = (
+        f"a {kind}'s name is made of letters, digits, _ and /: no blanks, also none before the closing quote"
+    )
+    return Ending(f"ROS shuts it down, for the name of its {kind} {name!r} {what}", hint)
+
+
+def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
+    """One traceback, with the line of the student's own file where it names one."""
+    place = _place(found, package)
+    slip = next((known for said, known in SLIPS.items() if said in found.message), None)
+    cause, hint = slip or CAUSES.get(found.kind, ("", "fix the line that is named"))
+    source = package.file(place.file) if place and found.kind in SYNTAX else None
+    if source is not None and source.python_fault is not None:
+        cause = source.python_fault.cause or cause
+    where = f" ({place.file}, line {place.line})" if place else ""
+    text = f"{shown(found.text)}{where}" + (f": {cause}" if cause else "")
+    return Ending(text, hint, (place,) if place else ())
+
+
+def process_tracebacks(
+    run: Run, process: str, *, after_ns: int | None = None, before_ns: int | None = None
+) -> tuple[Traceback, ...]:
+    """The tracebacks on a process's stderr that began at `after_ns` or later, and before `before_ns`."""
+    lines = [(t, c.line) for t, c in run.lines(process) if c.stream == "stderr"]
+    found = tracebacks([line for _, line in lines])
+    first_ns = after_ns if after_ns is not None else run.start_ns
+    end_ns = before_ns if before_ns is not None else run.end_ns + 1
+    return tuple(f for f in found if first_ns <= lines[f.first][0] < end_ns)
+
+
+def is_rospys_own(found: Traceback) -> bool:
+    """A race of rospy's own shutdown, or a thread in which no line of the student's takes part."""
+    race = found.kind == "ROSException" and RACE in found.message
+    return race or (bool(found.frames) and not found.own_frames)
+
+
+def ended_after(life: Life) -> str:
+    return seconds((life.end_ns or life.start_ns) - life.start_ns)
+
+
+def _place(found: Traceback, package: PackageFacts) -> FileCitation | None:
+    """Return the innermost line that lies in a file of the package."""
+    for frame in reversed(found.frames):
+        path = None if frame.in_library else path_in_package(package, frame.file)
+        if path is not None:
+            return FileCitation(file=path, line=frame.line)
+    return None
+
+
+def _signal_name(number: int) -> str:
+    try:
+        return f"signal {number} ({signal.Signals(number).name})"
+    except ValueError:
+        return f"signal {number}"

@@ -1,0 +1,405 @@
+"""A launch file and its nodes, as far as the package's files tell."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import PurePosixPath
+from typing import NamedTuple
+
+from grader.checks.support.exit_causes import CAUSES, explain_traceback, process_tracebacks
+from grader.checks.support.processes import lives, observed_until_ns
+from grader.checks.support.scripts import chmod_hint, cmake_calls, find_script, paths_by_name
+from grader.checks.support.text import bare, listed, near_names, shown
+from grader.evidence.run import Run
+from grader.model.package import LaunchFile, LaunchNode, PackageFacts
+from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, unjudged
+
+UNRESOLVED = "$("
+ATTRIBUTES = ("pkg", "type", "name")
+
+
+class Slip(NamedTuple):
+    """What is wrong with a line of a launch file, and what to write. `of_manifest`: the manifest's name is at fault."""
+
+    file: str
+    line: int
+    why: str
+    fix: str
+    of_manifest: bool = False
+
+    def verdict(self, said: str = "") -> Verdict:
+        """Return the verdict with what roslaunch said (`said`) at the end."""
+        cited = (FileCitation(file=self.file, line=self.line),)
+        message = f"{self.file}, line {self.line}: {self.why}{said}"
+        return (unjudged if self.of_manifest else failed)(message, hint=self.fix, citations=cited)
+
+
+def find_launch(package: PackageFacts, name: str) -> LaunchFile | None:
+    """The launch file of that name in any folder, one in `launch/` first."""
+    found = [f for f in package.launch_files if PurePosixPath(f.path).name == name]
+    return min(found, key=lambda f: (PurePosixPath(f.path).parts[0] != "launch", f.path), default=None)
+
+
+def read_launch(package: PackageFacts, name: str) -> LaunchFile | Verdict:
+    """Return the launch file of that name, or the verdict if it is missing, not well-formed, or has another root."""
+    file = find_launch(package, name)
+    verdict = _unreadable(package, file, name)
+    if file is None or verdict is not None:
+        return (verdict or failed(f"{name} cannot be read")).about(measured="no launch file that can be read")
+    return file
+
+
+def _unreadable(package: PackageFacts, file: LaunchFile | None, launch: str) -> Verdict | None:
+    if file is None:
+        others = [f.path for f in package.launch_files]
+        names = paths_by_name(package)
+        near = [names[n] for n in near_names(launch, names)]
+        seen = f"; there is {listed(dict.fromkeys([*near, *others]))}" if near or others else ""
+        message = f"{launch} is not in the package{seen}"
+        hint = f"put it at launch/{launch}, then git add, commit and push it"
+        cited = tuple(FileCitation(file=p) for p in (near or others)[:3])
+        return failed(message, hint=hint, citations=cited or (FileCitation(file="package.xml"),))
+    if file.fault is None:
+        return None
+    line = f", line {file.fault.line}" if file.fault.line else ""
+    message = f"{file.path}{line} is not well-formed: {file.fault.cause or file.fault.message}"
+    hint = "close every element, and begin with <launch> and end with </launch>"
+    return failed(message, hint=hint, citations=(FileCitation(file=file.path, line=file.fault.line),))
+
+
+def not_run(run: Run) -> Verdict | None:
+    """Nothing was started at all."""
+    if lives(run) or run.graph:
+        return None
+    return inconclusive("roslaunch was not run", hint="grade again")
+
+
+def has_program(package: PackageFacts, name: str) -> bool:
+    """A file of that name, or a program that CMake builds under it."""
+    if "/" not in name and find_script(package, name) is not None:
+        return True
+    return any(c.args[:1] == (name,) for c in cmake_calls(package, "add_executable"))
+
+
+def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip | None:
+    """Why a node cannot start by what the file says of it. Names with `$(…)` are roslaunch's to resolve.
+
+    `said` is what roslaunch said: a package that it does not find is a slip, any other is not this package's.
+    """
+    missing = [a for a in ATTRIBUTES if not (getattr(node, a) or "").strip()]
+    if missing:
+        return _slip(node, f"<node> has no {listed(missing)}", "a <node> needs pkg, type and name")
+    pkg, name = str(node.pkg), str(node.type)
+    if path := next((a for a in ("pkg", "type") if "$(find" in str(getattr(node, a))), None):
+        return _slip(
+            node, f"{path} is a path", f'write pkg="{package.name}" and type="<file>.py": names alone'
+        )
+    if UNRESOLVED in pkg + name:
+        return None
+    if pkg == package.name:
+        return None if has_program(package, name) else _no_program(package, node)
+    if near_names(package.name, [pkg]) or f"[{pkg}/{name}]" in said or _folder(package) == pkg:
+        slip = _slip(node, f"there is no {name} in a package {pkg}", f'write pkg="{package.name}"')
+        # Where the launch file has the folder's name and the manifest another one, the manifest is at fault.
+        return slip._replace(of_manifest=_folder(package) == pkg)
+    return None
+
+
+def illegal_name(node: LaunchNode) -> Slip | None:
+    """A name at which roslaunch only warns, and which other tools stumble over."""
+    name = node.name or ""
+    if UNRESOLVED in name or re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
+        return None
+    why = f'name="{name}" is no legal name in ROS, and other tools stumble over it'
+    return _slip(node, why, "begin it with a letter, and use letters, digits and _ only")
+
+
+def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
+    """What makes roslaunch start nothing at all."""
+    for fault in file.include_faults:
+        yield Slip(
+            fault.file or file.path, fault.line or 1, fault.message, "write $(find <package>)/launch/<file>"
+        )
+    seen: dict[str, LaunchNode] = {}
+    for node in file.brings:
+        slip = node_slip(package, node)
+        if slip is not None and slip.why.startswith("<node> has no"):
+            yield slip
+        elif "/" in (node.name or ""):
+            fix = f'write name="{PurePosixPath(str(node.name)).name}"; a namespace goes into ns="…"'
+            yield _slip(node, f'name="{node.name}" has a slash in it, which roslaunch refuses', fix)
+        elif node.full_name in seen and not node.uncertain:
+            why = f"a second node is named {node.full_name}, like that of line {seen[node.full_name].line}"
+            yield _slip(node, why, "give each <node> a name of its own: roslaunch refuses the file")
+        if not node.uncertain:
+            seen.setdefault(node.full_name, node)
+
+
+def nodes_of_script(package: PackageFacts, file: LaunchFile, script: str) -> tuple[LaunchNode, ...]:
+    """The nodes that run this script of the package, or may run it as far as can be seen."""
+    name = PurePosixPath(script).name
+    return tuple(n for n in file.brings if _may_be(n.pkg, package.name) and _may_be(n.type, name))
+
+
+def nodes_of_program(file: LaunchFile, program: str) -> tuple[LaunchNode, ...]:
+    """The nodes that run `package/program`; a Python program's `.py` may be there or not."""
+    pkg, _, name = program.partition("/")
+    names = {name, name.removesuffix(".py"), f"{name}.py"}
+    return tuple(n for n in file.brings if _may_be(n.pkg, pkg) and any(_may_be(n.type, one) for one in names))
+
+
+def _may_be(written: str | None, name: str) -> bool:
+    return written == name or (UNRESOLVED in (written or "") and "$(find" not in (written or ""))
+
+
+def _no_program(package: PackageFacts, node: LaunchNode) -> Slip:
+    name = str(node.type)
+    why = f"there is no {name} in the package"
+    plain = PurePosixPath(name).name
+    if plain != name and has_program(package, plain):
+        return _slip(node, f"{why}: type is the file's name without its folder", f'write type="{plain}"')
+    if found := find_script(package, f"{plain}.py"):
+        return _slip(node, f'{why}: type="{name}" lacks the .py of {found.path}', f'write type="{plain}.py"')
+    suffix = PurePosixPath(plain).suffix
+    names = [n for n in _program_names(package) if n != name]
+    near = near_names(plain, names) or [n for n in names if suffix and suffix != ".py" and n.endswith(suffix)]
+    if near:
+        return _slip(node, f"{why}; there is {listed(near)}", f'write type="{near[0]}"')
+    return _slip(node, why, "type is the script's whole file name, with its ending")
+
+
+def _program_names(package: PackageFacts) -> list[str]:
+    """Files that may be meant as programs."""
+    return [PurePosixPath(f.path).name for f in package.files if f.python or f.shebang or f.executable]
+
+
+def _folder(package: PackageFacts) -> str:
+    """The folder's name where it is not the package's."""
+    name = PurePosixPath(package.path).name
+    return name if name != package.name else ""
+
+
+def _slip(node: LaunchNode, why: str, fix: str) -> Slip:
+    return Slip(node.file, node.line, why, fix)
+
+
+_ERRORS = (
+    "ERROR: cannot launch",
+    "RLException",
+    "Invalid ",
+    "ERROR:",
+    "process has died",
+    "roslaunch:",
+    "Resource not found",
+)
+_SUBSTITUTION = re.compile(r"\\\$\\\(([^)]*)\\\)")
+# Students print such lines too: between brackets is no other bracket, so that a line is looked through once.
+_STARTED = re.compile(r"process\[([^\s\[\]]+)-\d+\]: started with pid")
+_DIED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has died \[pid \d+, exit code (-?\d+)")
+_FINISHED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has finished cleanly")
+_REQUIRED = re.compile(r"REQUIRED process (\[[^\s\[\]]+-\d+\]) has died")
+
+# what roslaunch says when it starts nothing, what it means, and what to do ({0}: the pattern's group)
+_REFUSALS = (
+    (r"multiple nodes named \[([^\[\]\n]+)\]", "two nodes are named {0}", "give each <node> a name of its own"),
+    (r"cannot contain a namespace", "a node's name has a slash in it",
+     'write name="…" without a slash; a namespace goes into ns="…"'),
+    (r"missing required attribute: '?(\w+)", "a tag has no {0}", "add the attribute"),
+    (r"file does not exist \[([^\[\]\n]+)\]", "the file {0} that <rosparam> loads does not exist",
+     "write $(find <package>)/config/<file>, and push the file"),
+    (r"Resource not found: (\S+)", "there is no package {0}",
+     "$(find …) and pkg take the package's name, letter by letter"),
+    (r"requires the '(\w+)' arg to be set", 'its <arg name="{0}"> has no default',
+     'write <arg name="{0}" default="…"/>'),
+    (r"output must be one of", 'output is "screen" or "log", in small letters', 'write output="screen"'),
+    (r"multiple files named", "the package has two launch files of that name",
+     "delete one of them, also one in a folder of old files: find . -name '*.launch' lists them"),
+    (r"Unable to launch \[([^\s\[\]]+)-\d+\]", "the system cannot start the script of {0}",
+     "its first line has to be #!/usr/bin/env python3, or #!/bin/bash for a shell script"),
+    (r"Unknown substitution command \[([^\[\]\n]+)\]", "$({0}) is nothing that roslaunch knows",
+     "write $(find <package>)/…"),
+    (r"error loading <rosparam> tag", "<rosparam> cannot load its file",
+     "rosparam load <file> shows what is wrong with the file"),
+    (r"Invalid roslaunch XML syntax", "it is not well-formed", "close every element"),
+)  # fmt: skip
+
+
+class Absence(NamedTuple):
+    """Why a node is not there. `of_script`: the reason lies in the script, not in the launch file."""
+
+    why: str
+    hint: str
+    of_script: bool = False
+    citations: tuple[FileCitation, ...] = ()
+
+    def verdict(self, message: str) -> Verdict:
+        """Return the verdict: nothing to judge in the launch file where the script is at fault."""
+        kind = unjudged if self.of_script else failed
+        return kind(message, hint=self.hint, citations=self.citations)
+
+
+def name_pattern(node: LaunchNode) -> re.Pattern[str]:
+    """The names that a node can come up under: `$(anon x)` becomes `x_<host>_<pid>_<digits>`.
+
+    However many substitutions there are, a name is looked through once: each takes the least that it can, and what it
+    took stands (a group in a lookahead is not tried again).
+    """
+    before, *others = _SUBSTITUTION.split(re.escape(node.full_name).replace(r"\ ", " "))
+    literals, gaps = [before], list[str]()
+    for inside, literal in zip(others[::2], others[1::2], strict=True):
+        name, gap = _substituted(inside)
+        literals[-1] += name
+        gaps.append(gap)
+        literals.append(literal)
+    steps = [
+        f"(?=(?P<g{number}>{gap}?{literals[number]}))(?P=g{number})"
+        for number, gap in enumerate(gaps[:-1], 1)
+    ]
+    return re.compile("".join([literals[0], *steps, *gaps[-1:], *literals[1:][-1:]]))
+
+
+def is_exact(node: LaunchNode) -> bool:
+    """Whether the file alone says the node's name."""
+    return "$(" not in node.full_name
+
+
+def nodes_up(run: Run, node: LaunchNode) -> tuple[str, ...]:
+    """The names in the graph under which it came up."""
+    pattern = name_pattern(node)
+    return tuple(name for name in run.student_nodes() if pattern.fullmatch(name))
+
+
+def refusal(run: Run) -> Absence | None:
+    """Why roslaunch started nothing, or broke off."""
+    text = "\n".join(line for line in _lines(run))
+    for pattern, why, hint in _REFUSALS:
+        if match := re.search(pattern, text):
+            words = [shown(PurePosixPath(g).name if "/" in g.strip("/") else g) for g in match.groups()]
+            return Absence(f"roslaunch starts nothing: {why.format(*words)}", hint.format(*words))
+    return None
+
+
+def died(run: Run, node: LaunchNode) -> int | None:
+    """The exit code with which roslaunch saw it die before Ctrl-C; None where it did not."""
+    until_ns = observed_until_ns(run) or run.end_ns
+    lines = _joined(bare(c.line) for t, c in run.console if t <= until_ns)
+    codes = [int(m[2]) for line in lines if (m := _DIED.search(line)) and _is(node, m[1])]
+    return codes[-1] if codes else None
+
+
+def finished(run: Run, node: LaunchNode) -> bool:
+    """Whether it ran to its own end without an error."""
+    return any((m := _FINISHED.search(line)) and _is(node, m[1]) for line in _joined(_lines(run)))
+
+
+def why_not_up(package: PackageFacts, run: Run, node: LaunchNode) -> Absence:
+    """Why a node of the launch file did not come up."""
+    return (
+        _not_found(package, run, node)
+        or why_died(package, run, node)
+        or refusal(run)
+        or _silent(run, node)
+        or Absence(
+            f"roslaunch did not start it{quoted(run)}", "run roslaunch by hand and read what it prints"
+        )
+    )
+
+
+def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | None:
+    """Its traceback where it was printed, or what roslaunch says of its end."""
+    code = died(run, node)
+    if code is None:
+        return None
+    script = find_script(package, str(node.type)) if node.pkg == package.name else None
+    found = [
+        t
+        for one in lives(run)
+        for t in process_tracebacks(run, one.name, before_ns=one.interrupt_ns)
+        if script is None
+        or any(PurePosixPath(f.file).name == PurePosixPath(script.path).name for f in t.frames)
+    ]
+    if found:
+        end = explain_traceback(found[-1], package)
+        return Absence(f"it died: {end.cause}", end.hint, of_script=True, citations=end.citations)
+    if script is not None and script.python_fault is not None:
+        fault = script.python_fault
+        place = (FileCitation(file=script.path, line=fault.line),)
+        hint = CAUSES.get(fault.kind, ("", "fix that line"))[1]
+        return Absence(f"it died: {fault.kind}: {fault.message}", hint, of_script=True, citations=place)
+    hint = 'write output="screen" into the <node>, and read what it prints last'
+    return Absence(f"it died with exit code {code}", hint, of_script=True)
+
+
+def quoted(run: Run) -> str:
+    """The first line in which roslaunch says what is wrong, as the end of a sentence."""
+    said = roslaunch_error(run)
+    return f"; roslaunch says: {said}" if said else ""
+
+
+def roslaunch_error(run: Run) -> str:
+    """The first line in which roslaunch, or a node that it started, says what is wrong."""
+    lines = [c.line for _, c in run.console if c.line.strip()]
+    found = (line for mark in _ERRORS for line in lines if mark in line)
+    return shown(next(found, ""))
+
+
+def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | None:
+    """roslaunch did not find the program, or none that may be executed."""
+    mark = f"cannot launch node of type [{node.pkg}/{node.type}]"
+    line = next((text for text in _lines(run) if mark in text), None)
+    if line is None:
+        return None
+    script = find_script(package, str(node.type)) if node.pkg == package.name else None
+    if script is not None and script.executable is False:
+        why = f"{script.path} has no executable bit, so that roslaunch does not find it"
+        cited = (FileCitation(file=script.path),)
+        return Absence(why, chmod_hint(script.path), of_script=True, citations=cited)
+    if "Cannot locate" not in line:
+        return Absence(
+            f"there is no package {node.pkg}", "check the spelling of pkg, and that it is installed"
+        )
+    why = f"roslaunch finds no program {node.type} in the package {node.pkg}"
+    return Absence(why, "type is the file's name, with .py for a script, and the file needs chmod +x")
+
+
+def _silent(run: Run, node: LaunchNode) -> Absence | None:
+    """Started, and never registered."""
+    hint = "call rospy.init_node(…) before anything that waits"
+    others = [n for n in run.student_nodes() if re.fullmatch(r"/.+_\d+_\d{9,}", n)]
+    if finished(run, node):
+        return Absence("its script came to its end without ever being a node", hint, of_script=True)
+    started = any((m := _STARTED.search(line)) and _is(node, m[1]) for line in _lines(run))
+    if not started:
+        return None
+    if others:
+        why = f"{listed(others)} came up instead: the script does not take the name that roslaunch gives it"
+        return Absence(why, "start the script itself, and leave sys.argv as it is", of_script=True)
+    return Absence("its script runs, but never registers as a node", hint, of_script=True)
+
+
+def _is(node: LaunchNode, process: str) -> bool:
+    return name_pattern(node).fullmatch(f"/{process}") is not None
+
+
+def _substituted(inside: str) -> tuple[str, str]:
+    """What stands for `$(inside)` in a pattern: the name that is known, and what follows it."""
+    words = re.sub(r"\\(.)", r"\1", inside).split()
+    return (f"{re.escape(words[1])}_", ".+") if len(words) == 2 and words[0] == "anon" else ("", ".*")
+
+
+def _joined(lines: Iterable[str]) -> Iterator[str]:
+    """Of a node with required="true", roslaunch says in one line that it "died", and in the next one how it ended."""
+    name = ""
+    for line in lines:
+        if match := _REQUIRED.search(line):
+            name = match[1]
+        elif name and line.startswith("process has "):
+            yield f"{name} {line}"
+            name = ""
+        else:
+            yield line
+
+
+def _lines(run: Run) -> list[str]:
+    return [bare(c.line) for _, c in run.console]

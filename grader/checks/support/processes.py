@@ -1,0 +1,122 @@
+"""The life of the student's processes in a run, and how they took Ctrl-C.
+
+Ctrl-C in the middle of `publish(…)` or `loginfo(…)` can lock up rospy's own shutdown, by no fault of the student's: its
+signal handler then waits for a lock that the interrupted call holds.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from grader.evidence.events import ProcessEvent
+from grader.evidence.run import Run
+from grader.model.verdict import Verdict, unjudged
+
+NO_SCRIPT_HINT = "add the script to the package, and push it"
+FLOOD_HZ = 100
+SILENT_AFTER_NS = 500_000_000
+TALKING_NS = 1_000_000_000
+TALKING_LINES = 5
+
+
+class Life(NamedTuple):
+    """One process from start to end. `end` is None while it ran on to the end of the recording."""
+
+    name: str
+    start_ns: int
+    start: ProcessEvent
+    end_ns: int | None
+    end: ProcessEvent | None
+    interrupt_ns: int | None
+
+    @property
+    def ended_early(self) -> bool:
+        """It ended before the grader pressed Ctrl-C: by itself, or because it broke a limit."""
+        return self.end is not None and self.interrupt_ns is None and self.end.stopped_by in {None, "KILL"}
+
+    def until_ns(self, run: Run) -> int:
+        """Return up to when it could act freely: Ctrl-C, its own end, or the recording's."""
+        times = (t for t in (self.interrupt_ns, self.end_ns) if t is not None)
+        return min(times, default=run.end_ns)
+
+
+def not_started(who: str) -> Verdict:
+    """Return the verdict where there was no script to start."""
+    return unjudged(f"{who} was not started: there is no script to run", hint=NO_SCRIPT_HINT)
+
+
+def lives(run: Run) -> tuple[Life, ...]:
+    """Return the student's processes in order of their start."""
+    starts = [(t, e) for t, e in run.processes if e.role == "student" and e.event == "start"]
+    return tuple(_life(run, start_ns, start) for start_ns, start in starts)
+
+
+def _life(run: Run, start_ns: int, start: ProcessEvent) -> Life:
+    ends = ((t, e) for t, e in run.processes if e.event == "exit" and e.name == start.name and t >= start_ns)
+    end_ns, end = next(ends, (None, None))
+    interrupt_ns = _interrupt_ns(run, start.name)
+    if interrupt_ns is not None and end_ns is not None and end_ns < interrupt_ns:
+        interrupt_ns = None
+    return Life(start.name, start_ns, start, end_ns, end, interrupt_ns)
+
+
+def _interrupt_ns(run: Run, process: str) -> int | None:
+    """Return when the grader pressed Ctrl-C on this process. An interrupt that names no known process is for all."""
+    known = {e.name for _, e in run.processes}
+    pressed = ((t, {e.actor, e.detail} & known) for t, e in run.actors if e.action == "interrupt")
+    return min((t for t, named in pressed if not named or process in named), default=None)
+
+
+def life(run: Run, process: str) -> Life | None:
+    """Return the process of that name; the only one of the run where `process` is empty."""
+    found = lives(run)
+    if not process:
+        return found[0] if len(found) == 1 else None
+    return next((one for one in found if one.name == process), None)
+
+
+def life_of(run: Run, node: str) -> Life | None:
+    """Return the process that a node belongs to; None where it cannot be told, or is not the student's."""
+    return life(run, next((e.processes[node] for _, e in reversed(run.graph) if node in e.processes), ""))
+
+
+def early_end(run: Run) -> Life | None:
+    """Return the first process of the student's that ended before the grader stopped it."""
+    early = [one for one in lives(run) if one.ended_early]
+    return min(early, key=lambda one: one.end_ns or 0, default=None)
+
+
+def first_interrupt_ns(run: Run) -> int | None:
+    """Return when the grader first pressed Ctrl-C; None where it never did."""
+    return min((one.interrupt_ns for one in lives(run) if one.interrupt_ns is not None), default=None)
+
+
+def observed_until_ns(run: Run) -> int | None:
+    """Return up to when silence is a living node's own: the first Ctrl-C. None where none was recorded."""
+    ends = [one.until_ns(run) for one in lives(run) if not one.ended_early and one.end_ns is not None]
+    pressed = first_interrupt_ns(run)
+    return min(ends if pressed is None else [*ends, pressed], default=None)
+
+
+def fell_silent(one: Life, run: Run) -> bool:
+    """Whether it had to be killed, and neither printed nor published after Ctrl-C."""
+    if one.interrupt_ns is None or one.end is None or one.end.stopped_by != "KILL":
+        return False
+    quiet_ns = one.interrupt_ns + SILENT_AFTER_NS
+    printed = any(t > quiet_ns for t, _ in run.lines(one.name))
+    return not printed and not any(t > quiet_ns for c in run.student_channels() for t in c.times_ns[-1:])
+
+
+def was_talking(one: Life, run: Run) -> bool:
+    """Whether it printed line after line until Ctrl-C, so that its silence afterwards is no loop that goes on."""
+    end_ns = one.interrupt_ns or 0
+    return sum(end_ns - TALKING_NS <= t <= end_ns for t, _ in run.lines(one.name)) >= TALKING_LINES
+
+
+def is_flood(run: Run) -> bool:
+    """Whether so many messages came that Ctrl-C most likely comes in the middle of one."""
+    return any(
+        len(c.times_ns) > FLOOD_HZ
+        and (len(c.times_ns) - 1) * 1e9 >= FLOOD_HZ * (c.times_ns[-1] - c.times_ns[0])
+        for c in run.student_channels()
+    )

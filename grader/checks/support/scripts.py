@@ -1,0 +1,142 @@
+"""Scripts and other files of a package: where they lie, and what `CMakeLists.txt` installs."""
+
+from __future__ import annotations
+
+import posixpath
+from collections.abc import Iterator
+from pathlib import PurePosixPath
+from typing import NamedTuple
+
+from grader.model.package import CMakeCall, PackageFacts, SourceFile
+
+PYTHON = "catkin_install_python"
+NODE_FOLDERS = ("scripts", "src", "nodes", "bin")
+_KINDS = ("PROGRAMS", "FILES", "TARGETS", "DIRECTORY", "SCRIPT", "CODE")
+_OPTIONS = (
+    *("DESTINATION", "TYPE", "OPTIONAL", "PERMISSIONS", "CONFIGURATIONS", "COMPONENT", "RENAME"),
+    *("EXCLUDE_FROM_ALL", "ARCHIVE", "LIBRARY", "RUNTIME"),
+)
+_HERE = tuple(
+    f"${{{name}}}"
+    for name in (
+        "CMAKE_CURRENT_SOURCE_DIR",
+        "PROJECT_SOURCE_DIR",
+        "CMAKE_SOURCE_DIR",
+        "CMAKE_CURRENT_LIST_DIR",
+    )
+)
+_BIN = ("${CATKIN_PACKAGE_BIN_DESTINATION}", "lib/${PROJECT_NAME}")
+
+
+class Installed(NamedTuple):
+    """One file that a call names. `kind` is the signature (`PROGRAMS`), "" where the call gives none.
+
+    `destination` is None where the call has no such word, and "" where nothing stands behind it.
+    """
+
+    call: CMakeCall
+    kind: str
+    path: str
+    destination: str | None
+
+    @property
+    def known(self) -> bool:
+        """False where CMake was not asked and the name is a variable that only it knows."""
+        return "${" not in self.path
+
+
+def find_script(package: PackageFacts, path: str) -> SourceFile | None:
+    """Return the file at this path, or one of the same name in another folder (those for nodes first)."""
+
+    def rank(file: SourceFile) -> tuple[bool, bool, bool, str]:
+        folder = PurePosixPath(file.path).parts[0]
+        return file.path != path, folder not in NODE_FOLDERS, file.executable is False, file.path
+
+    return min(copies_of(package, path), key=rank, default=None)
+
+
+def copies_of(package: PackageFacts, path: str) -> list[SourceFile]:
+    """Return all files of this name in the package, whatever their folder; what a build made is none of them."""
+    name = PurePosixPath(path).name
+    return [f for f in package.files if PurePosixPath(f.path).name == name and not is_product(f.path)]
+
+
+def is_product(path: str) -> bool:
+    """Return whether a build made it: nothing of what was handed in counts there."""
+    return PurePosixPath(path).parts[0] in {"build", "devel", "install"}
+
+
+def path_in_package(package: PackageFacts, file: str) -> str | None:
+    """Return the longest of the package's paths with which an absolute path ends; None where there is none."""
+    return max((f.path for f in package.files if f"/{file}".endswith(f"/{f.path}")), key=len, default=None)
+
+
+def paths_by_name(package: PackageFacts) -> dict[str, str]:
+    """Return the paths of all files that no build made, by their names without folders."""
+    return {PurePosixPath(f.path).name: f.path for f in package.files if not is_product(f.path)}
+
+
+def add_hint(path: str) -> str:
+    return f"write {path}, then git add, commit and push it"
+
+
+def chmod_hint(path: str) -> str:
+    return f"chmod +x {path}, then git update-index --chmod=+x {path}, commit and push"
+
+
+def cmake_calls(package: PackageFacts, *names: str) -> tuple[CMakeCall, ...]:
+    """Return the calls of these commands, in order."""
+    return tuple(c for c in package.cmake.calls if c.name in names) if package.cmake else ()
+
+
+def installed(package: PackageFacts) -> Iterator[Installed]:
+    """Yield every file that `install` or `catkin_install_python` names, in the order of the calls."""
+    for call in cmake_calls(package, PYTHON, "install"):
+        yield from _named(call)
+
+
+def names_script(one: Installed, path: str) -> bool:
+    """Return whether the file named is the one at `path`, which is relative to the package."""
+    text = one.path
+    for here in _HERE:
+        text = text.removeprefix(here + "/")
+    if text.startswith("/"):
+        return posixpath.normpath(text).endswith("/" + path)
+    file = one.call.file
+    # Paths in a file that is included count from the place that includes it, mostly the package.
+    folder = posixpath.dirname(file) if file.endswith("CMakeLists.txt") else ""
+    return posixpath.normpath(posixpath.join(folder, text)) == path
+
+
+def is_bin(destination: str, package: PackageFacts) -> bool:
+    """Return whether it is `${CATKIN_PACKAGE_BIN_DESTINATION}`, which CMake gives as `lib/<project>`."""
+    place = "/" + posixpath.normpath(destination)
+    return destination in _BIN or any(place.endswith(f"/lib/{name}") for name in _names(package))
+
+
+def is_found(destination: str, package: PackageFacts) -> bool:
+    """Return whether `rosrun` looks for programs there: it does so in all of `lib/<package>` and `share/<package>`."""
+    place = f"/{posixpath.normpath(destination)}/"
+    below = any(f"/{kind}/{name}/" in place for kind in ("lib", "share") for name in _names(package))
+    return below or is_bin(destination, package)
+
+
+def _names(package: PackageFacts) -> set[str]:
+    """Return the names of the package by its manifest, its folder and its CMake project."""
+    projects = {call.args[0] for call in cmake_calls(package, "project") if call.args}
+    return {package.name, *projects} | ({package.manifest.name} if package.manifest else set())
+
+
+def _named(call: CMakeCall) -> Iterator[Installed]:
+    kind, words = "", list(call.args)
+    if words and words[0].upper() in _KINDS:
+        kind = words.pop(0).upper()
+    destination: str | None = None
+    if "DESTINATION" in words:
+        at = words.index("DESTINATION")
+        given = [w for w in words[at + 1 : at + 2] if w not in _OPTIONS]
+        destination = "".join(given)
+        del words[at : at + 1 + len(given)]
+    last = next((i for i, word in enumerate(words) if word in _OPTIONS), len(words))
+    for path in words[:last]:
+        yield Installed(call, kind, path, destination)

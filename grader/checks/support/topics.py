@@ -1,0 +1,225 @@
+"""Topics of a run: who is on them, why no message came, what the recorder lost, fields of messages by their path."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator
+
+from grader.checks.registry import Check
+from grader.checks.support.exit_causes import explain_end
+from grader.checks.support.nodes import plain_type
+from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives
+from grader.checks.support.text import listed, near_names, plural
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import EvidenceCitation, Status, Verdict, inconclusive, unjudged
+
+SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
+End = Literal["publishers", "subscribers"]
+LOGGED = frozenset({"logs", "hears"})
+"""Checks that also read what is logged."""
+TAKEN = {Status.FAIL, Status.PARTIAL}
+_STEP = r"[A-Za-z]\w*(?:\[(?:\d+|\*)\])*"
+_PARTS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
+
+
+def cite(run: Run, topic: str, from_ns: int | None = None, to_ns: int | None = None) -> EvidenceCitation:
+    """Return a stretch of the run's evidence on one topic, or the whole topic."""
+    return EvidenceCitation(evidence=run.evidence, topic=topic, from_ns=from_ns, to_ns=to_ns)
+
+
+def nodes_on(run: Run, topic: str, end: End, fits: Callable[[str], bool] | None = None) -> tuple[str, ...]:
+    """Return the nodes that were ever at this end of a topic: the student's, or those that `fits` accepts."""
+    wanted = fits or run.is_student_node
+    found = (n for _, event in run.graph for n in getattr(event, end).get(topic, ()) if wanted(n))
+    return tuple(dict.fromkeys(found))
+
+
+def topics_with(run: Run, end: End, fits: Callable[[str], bool] | None = None) -> tuple[str, ...]:
+    """Return the topics with such a node at this end; `/rosout` is left out."""
+    topics = dict.fromkeys(topic for _, event in run.graph for topic in getattr(event, end))
+    return tuple(topic for topic in topics if topic != "/rosout" and nodes_on(run, topic, end, fits))
+
+
+def published_topics(run: Run) -> dict[str, str]:
+    """Return every topic on which a node of the student's publishes or could, with its type; no system topics."""
+    found = {c.topic: plain_type(c.type) for c in run.student_channels()}
+    for _, event in run.graph:
+        for topic, nodes in event.publishers.items():
+            if any(run.is_student_node(n) for n in nodes):
+                found.setdefault(topic, plain_type(event.topic_types.get(topic, "")))
+    return {topic: kind for topic, kind in found.items() if topic not in SYSTEM_TOPICS}
+
+
+def no_node(package: PackageFacts, run: Run, what: str) -> Verdict | None:
+    """Return why `what` is missing (`no message came on /x`) if no node was there; None if one was."""
+    if run.foreign:
+        return unjudged(f"{what} in this recording", hint="record it too, with rosbag record -a")
+    if not lives(run) and not run.student_nodes():
+        return unjudged(f"{what}: there was nothing to run", measured="not started", hint=NO_SCRIPT_HINT)
+    if ended := early_end(run):
+        end = explain_end(ended, run, package)
+        message = f"{what}: {ended.name} ended before ({end.cause})"
+        return unjudged(message, measured="ended", hint=end.hint, citations=end.citations)
+    if not run.student_nodes():
+        hint = "call rospy.init_node(…), and run the node"
+        return unjudged(f"{what}: no node was registered", measured="no node", hint=hint)
+    return None
+
+
+def no_message(
+    package: PackageFacts, run: Run, topic: str, of_node: Callable[..., Verdict] = unjudged
+) -> Verdict:
+    """Return why no message came on a topic. `of_node` makes the verdict where the node itself is the reason."""
+    if lost := all_lost(run, topic):
+        return lost
+    published = published_topics(run)
+    near = () if topic in published else near_names(topic, published)
+    measured, what = listed(published) or "no topic", f"no message came on {topic}"
+    if run.foreign:
+        seen = f"; {listed(near)} is" if near else ""
+        hint = (
+            f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all topics"
+        )
+        return unjudged(f"{topic} is not in {run.evidence}{seen}", measured=measured, hint=hint)
+    if near:
+        hint = f"name the topic {topic} in rospy.Publisher(…)"
+        return of_node(f"{what}; the node publishes on {listed(near)}", measured=measured, hint=hint)
+    if absent := no_node(package, run, what) or _refused(run, topic):
+        return absent
+    if topic in published:
+        hint = "call publish(…) inside the loop `while not rospy.is_shutdown():`"
+        return of_node(f"{what}, although it is advertised", measured="no message", hint=hint)
+    only = f"it publishes on {listed(published)}; " if published else ""
+    hint = f"{only}add rospy.Publisher('{topic}', …) and publish in the loop"
+    return of_node(f"{what}: no node publishes on it", measured=measured, hint=hint)
+
+
+def _refused(run: Run, topic: str) -> Verdict | None:
+    """Return the verdict where the recorder could not connect to the topic's publisher."""
+    refused = [e for _, e in run.recorder if e.topic == topic and e.event in {"refused", "invalid"}]
+    if not refused or run.student_channels(topic):
+        return None
+    message = f"the recorder could not listen to {topic}: {refused[0].detail or refused[0].event}"
+    return inconclusive(message, measured="no message", hint="grade again")
+
+
+class Losses(Record):
+    """From `at_ns` on messages of the topic are missing: `dropped` of them, or nobody knows how many (0)."""
+
+    topic: str
+    at_ns: int
+    kept: int
+    dropped: int
+
+    @property
+    def words(self) -> str:
+        if self.dropped:
+            return (
+                f"the recorder kept {plural(self.kept, 'message')} of {self.topic} and dropped {self.dropped}"
+            )
+        return f"the recorder may have missed messages of {self.topic}, because it could not keep up"
+
+
+def losses(run: Run, topic: str) -> Losses | None:
+    """What is missing of a topic, None where the recorder took all that came."""
+    events = [(at_ns, e) for at_ns, e in run.recorder if e.topic == topic]
+    lost = [at_ns for at_ns, e in events if e.event in {"limit", "behind"} or e.dropped]
+    if not lost:
+        return None
+    kept = sum(len(c.messages) for c in run.channels if c.topic == topic)
+    return Losses(topic=topic, at_ns=min(lost), kept=kept, dropped=sum(e.dropped for _, e in events))
+
+
+def whole_until_ns(run: Run, topic: str, until_ns: int | None = None) -> int | None:
+    """Up to when every message of the topic was recorded, `until_ns` at the most."""
+    lost = losses(run, topic)
+    if lost is None:
+        return until_ns
+    return lost.at_ns - 1 if until_ns is None else min(until_ns, lost.at_ns - 1)
+
+
+def all_lost(run: Run, topic: str) -> Verdict | None:
+    """Where nothing came on a topic because the recorder dropped it."""
+    lost = losses(run, topic)
+    if lost is None or lost.kept:
+        return None
+    return inconclusive(f"nothing is recorded of {topic}", measured="no message", hint="grade again")
+
+
+def heed_losses(check: Check, facts: Mapping[str, object], verdict: Verdict) -> Verdict:
+    """The verdict with what the recorder lost of its topics.
+
+    A lost mark becomes `inconclusive`, unless the check rests on what came whole (`heeds_losses`).
+    """
+    run = facts.get("run")
+    if not isinstance(run, Run):
+        return verdict
+    found = [one for topic in _topics(check, facts.get("params")) if (one := losses(run, topic))]
+    if not found:
+        return verdict
+    message = "; ".join([verdict.message, *(one.words for one in found)])
+    update: dict[str, object] = {"message": message}
+    if verdict.status in TAKEN and not check.heeds_losses:
+        update |= {"status": Status.INCONCLUSIVE, "score": 0.0, "unjudged": False, "hint": "grade again"}
+    return verdict.model_copy(update=update)
+
+
+def _topics(check: Check, params: object) -> Iterable[str]:
+    """Whatever of its parameters may be the name of a topic."""
+    named = dict.fromkeys(_texts(params.model_dump() if isinstance(params, Record) else None))
+    return (*named, "/rosout") if check.name in LOGGED and "/rosout" not in named else named
+
+
+def _texts(value: object) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _texts(key)
+            yield from _texts(item)
+    elif isinstance(value, list | tuple | set | frozenset):
+        for item in value:
+            yield from _texts(item)
+
+
+def _sound(path: str) -> str:
+    if not re.fullmatch(rf"{_STEP}(?:\.{_STEP})*", path):
+        raise ValueError(f'must be a field like linear.x, ranges[0] or ranges[*], not "{path}"')
+    return path
+
+
+FieldPath = Annotated[str, AfterValidator(_sound)]
+
+
+class NoField(LookupError):
+    """What of the path is not there, and what is there instead."""
+
+
+def values_at(message: Any, path: str) -> list[Any]:  # noqa: ANN401 - decoded messages hold anything
+    """All values that the path names, several where it holds `[*]`. Raises NoField."""
+    found, done = [message], ""
+    for part in _PARTS.findall(path):
+        found = [item for one in found for item in _step(one, part, done)]
+        done += part if part.startswith("[") else f".{part}" if done else part
+    return found
+
+
+def _step(value: Any, part: str, done: str) -> list[Any]:  # noqa: ANN401 - as above
+    if not part.startswith("["):
+        if isinstance(value, Mapping) and part in value:
+            return [value[part]]
+        there = ", ".join(value) if isinstance(value, Mapping) else ""
+        raise NoField(f"{done or 'the message'} has no field {part}" + (f", but {there}" if there else ""))
+    if not isinstance(value, list | tuple | bytes):
+        raise NoField(f"{done} is no list")
+    if part == "[*]":
+        return list(value)
+    index = int(part[1:-1])
+    if index >= len(value):
+        raise NoField(f"{done} has {len(value)} items only")
+    return [value[index]]

@@ -1,0 +1,247 @@
+"""`check: pytest`: an instructor's own tests, run over the evidence in a process of their own."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import pickle
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Literal
+
+from pydantic import Field, ValidationError
+
+import grader
+from grader.checks import Check, Evidence, Record, Verdict, failed, inconclusive, passed
+from grader.checks import partial as partial_
+from grader.checks.registry import parts
+from grader.files import temporary_folder
+from grader.model.verdict import Status
+from grader.portable import end_group
+
+HINTS = 4
+SHOWN_TESTS = 20
+TAIL_BYTES = 8192
+# pytest's own exit codes: every test was run, some may have failed; an error of pytest's own, or a wrong -k
+ALL_RUN = {0, 1}
+NOT_RUN = {3, 4}
+
+
+class PytestParams(Record):
+    """`file` lies beside the rubric; `select` is what pytest's `-k` takes. The tests together have `timeout_s`."""
+
+    file: str
+    select: str = ""
+    timeout_s: Annotated[float, Field(gt=0, le=600)] = 60.0
+
+
+class TestsBroken(Exception):
+    """The tests could not be run, which is not the student's fault."""
+
+    __test__ = False
+
+
+def pytest_check(folder: Path) -> Check:
+    """The check `pytest` for the rubric in this folder."""
+    title, sections = parts(inspect.getdoc(run_tests) or "")
+    return Check(
+        name="pytest",
+        function=partial(run_tests, folder.resolve()),
+        params=PytestParams,
+        facts=("evidence", "params"),
+        title=title,
+        sections=sections,
+        messages_only=True,
+    )
+
+
+def run_tests(folder: Path, evidence: Evidence, params: PytestParams) -> Verdict:
+    """The instructor's own tests pass.
+
+    What it checks
+        What the tests of this lab's instructor check, each for its share of the points.
+
+    Why it matters on a robot
+        The instructor knows this lab's robot, and what it must and must not do.
+
+    How it is measured
+        Each test reads what was recorded while the package ran, and passes or fails. Tests that are skipped
+        do not count. If the tests themselves are broken, no mark is lost.
+
+    How to fix
+        The hint names each test that failed, and what it said.
+    """
+    try:
+        path, _ = read_beside(folder, params.file)
+        return _verdict(_session(path, evidence, params), params)
+    except (FileFault, TestsBroken) as error:
+        message = f"the tests in {params.file} could not be run; no mark is lost by this"
+        hint = f"for the instructor: {error}"
+        return Verdict(status=Status.ERROR, score=0.0, message=message, hint=hint)
+
+
+def _session(path: Path, evidence: Evidence, params: PytestParams) -> SessionOutcome:
+    """Run the file's tests. Raises TestsBroken."""
+    with temporary_folder("tests") as folder:
+        (folder / "evidence").write_bytes(pickle.dumps(evidence))
+        code = _run(_command(path, folder, params), folder, params.timeout_s)
+        try:
+            outcome = SessionOutcome.model_validate_json((folder / "outcome").read_bytes())
+        except (OSError, ValidationError) as error:
+            raise TestsBroken(_last_words(folder, code)) from error
+        if code in NOT_RUN and not outcome.faults:
+            raise TestsBroken(_last_words(folder, code))
+    if outcome.faults:
+        raise TestsBroken(outcome.faults[0])
+    if not outcome.tests:
+        fitting = f" that fits {params.select!r}" if params.select else ""
+        raise TestsBroken(f"{path.name} holds no test{fitting}")
+    if code not in ALL_RUN:
+        raise TestsBroken(f"pytest ended with code {code} before all tests were run")
+    return outcome
+
+
+def _command(path: Path, folder: Path, params: PytestParams) -> list[str]:
+    """pytest with nothing of the surrounding folders: no settings, no conftest.py, no cache, no other plugin."""
+    own = ["-p", "grader.rubric.pytest_plugin", "--grader-evidence", str(folder / "evidence")]
+    own += ["--grader-outcome", str(folder / "outcome"), "--basetemp", str(folder / "tmp")]
+    alone = ["-c", os.devnull, "--rootdir", str(path.parent), "--noconftest", "-p", "no:cacheprovider"]
+    select = ["-k", params.select] if params.select else []
+    return [
+        sys.executable, "-m", "pytest", *own, *alone, "--import-mode=importlib", "-q", "--tb=line", *select, str(path)
+    ]  # fmt: skip
+
+
+def _environment() -> dict[str, str]:
+    env = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
+    return {
+        **env,
+        "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "PYTHONHASHSEED": "0",
+        "PYTHONPATH": str(Path(grader.__file__).resolve().parent.parent),
+    }
+
+
+def _run(command: list[str], folder: Path, timeout_s: float) -> int:
+    """The exit code. What the tests started ends with them. Raises TestsBroken after `timeout_s`."""
+    with (folder / "output").open("wb") as output:
+        process = subprocess.Popen(
+            command,
+            cwd=folder,
+            env=_environment(),
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        try:
+            return process.wait(timeout_s)
+        except subprocess.TimeoutExpired as error:
+            raise TestsBroken(f"the tests took longer than {timeout_s:g} s") from error
+        finally:
+            end_group(process)
+
+
+def _last_words(folder: Path, code: int) -> str:
+    """What the last line of output says of a session that left no outcome."""
+    with (folder / "output").open("rb") as file:
+        file.seek(max(0, file.seek(0, os.SEEK_END) - TAIL_BYTES))
+        lines = [line.strip() for line in file.read().decode(errors="replace").splitlines() if line.strip()]
+    how = f"signal {-code}" if code < 0 else f"code {code}"
+    said = next((line for line in reversed(lines) if "rror" in line), lines[-1] if lines else "")
+    return f"pytest ended with {how}" + (f": {said[:200]}" if said else "")
+
+
+def _verdict(outcome: SessionOutcome, params: PytestParams) -> Verdict:
+    """The share of the points of the tests that passed, of those that count."""
+    verdict = _judged(outcome, params)
+    return verdict.about(expected=f"the tests in {params.file} pass", measured=_sub_scores(outcome.tests))
+
+
+def _judged(outcome: SessionOutcome, params: PytestParams) -> Verdict:
+    counted = [t for t in outcome.tests if t.outcome in {"passed", "failed"}]
+    unsettled = [t for t in outcome.tests if t.outcome == "open"]
+    if unsettled:
+        return inconclusive(f"{unsettled[0].name} could not be run: {unsettled[0].message}")
+    if not counted:
+        reason = next((t.message for t in outcome.tests if t.message), "")
+        skipped = inconclusive(f"every test was skipped{f': {reason}' if reason else ''}")
+        return skipped.model_copy(update={"unjudged": True})
+    total = sum(t.points for t in counted)
+    reached = sum(t.points for t in counted if t.outcome == "passed")
+    if total <= 0:
+        raise TestsBroken(f"the tests of {params.file} that count have 0 points together")
+    return _scored(counted, reached / total)
+
+
+def _scored(counted: list[TestOutcome], score: float) -> Verdict:
+    lost = [t for t in counted if t.outcome == "failed"]
+    passing = f"{len(counted) - len(lost)} of {len(counted)} tests pass"
+    hint = "; ".join(f"{t.name}: {t.message}" for t in lost[:HINTS])
+    if len(lost) > HINTS:
+        hint += f"; and {len(lost) - HINTS} more"
+    if score >= 1:
+        return passed(passing, hint=hint)
+    message = f"{passing}; failed: {lost[0].title.rstrip('.') or lost[0].name} ({lost[0].message})"
+    return partial_(score, message, hint=hint) if score > 0 else failed(message, hint=hint)
+
+
+def _sub_scores(tests: tuple[TestOutcome, ...]) -> str:
+    """`test_counts 1/1, test_resets 0/2, test_extra skipped`."""
+    shown = [_sub_score(t) for t in tests[:SHOWN_TESTS]]
+    more = [f"and {len(tests) - SHOWN_TESTS} more"] if len(tests) > SHOWN_TESTS else []
+    return ", ".join([*shown, *more])
+
+
+def _sub_score(test: TestOutcome) -> str:
+    if test.outcome in {"skipped", "open"}:
+        return f"{test.name} {'skipped' if test.outcome == 'skipped' else 'not run'}"
+    return f"{test.name} {test.points if test.outcome == 'passed' else 0:g}/{test.points:g}"
+
+
+Outcome = Literal["passed", "failed", "skipped", "open"]
+
+
+class TestOutcome(Record):
+    """One test. `open`: a run that it asks for was not recorded. `message` is one line, empty where it passed."""
+
+    __test__ = False
+
+    name: str
+    title: str
+    outcome: Outcome
+    message: str
+    points: float
+
+
+class SessionOutcome(Record):
+    """`faults` are the instructor's: a file that cannot be read, a marker that is wrong."""
+
+    tests: tuple[TestOutcome, ...]
+    faults: tuple[str, ...]
+
+
+MAX_BYTES = 1_000_000
+
+
+class FileFault(ValueError):
+    """The file is not there, or is none that may be used."""
+
+
+def read_beside(folder: Path, name: str) -> tuple[Path, bytes]:
+    """The file of that name in the rubric's folder, or below it. Raises FileFault."""
+    plain = PurePosixPath(name)
+    if plain.suffix != ".py" or plain.is_absolute() or ".." in plain.parts or "\0" in name:
+        raise FileFault("must name a Python file beside the rubric, like my_checks.py")
+    path = folder.resolve() / plain
+    try:
+        with path.open("rb") as file:
+            raw = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise FileFault(f"{name} cannot be read beside the rubric: {error.strerror}") from error
+    if len(raw) > MAX_BYTES:
+        raise FileFault(f"{name} is larger than 1 MB")
+    return path, raw

@@ -1,0 +1,136 @@
+"""The pytest plugin with the fixtures `evidence`, `run` and `package`, loaded by `-p` in a process of its own."""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+import re
+from collections.abc import Generator
+from pathlib import Path
+
+import pytest
+
+from grader.checks import Evidence, PackageFacts, Run
+from grader.checks.evidence import NoSuchScenario, NotRecorded
+from grader.model.verdict import Status
+from grader.rubric.pytest_check import Outcome, SessionOutcome, TestOutcome
+
+MESSAGE_CHARS = 200
+_ADDRESS = re.compile(r"\b0x[0-9a-fA-F]{6,}\b")
+_EVIDENCE = pytest.StashKey[Evidence]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Two options of ours: where the evidence is, and where the outcome goes."""
+    parser.addoption("--grader-evidence", type=Path, required=True)
+    parser.addoption("--grader-outcome", type=Path, required=True)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Read the evidence, and begin to take notes."""
+    config.addinivalue_line("markers", "points(n): how much this test weighs among the others (default: 1)")
+    data = config.getoption("--grader-evidence").read_bytes()
+    config.stash[_EVIDENCE] = pickle.loads(data)  # noqa: S301 - written by the grader, in a folder of its own
+    config.pluginmanager.register(_Notes(config.getoption("--grader-outcome"), config))
+
+
+@pytest.fixture(scope="session")
+def evidence(pytestconfig: pytest.Config) -> Evidence:
+    """The runs by scenario: `evidence["talker"]`."""
+    return pytestconfig.stash[_EVIDENCE]
+
+
+@pytest.fixture(scope="session")
+def run(evidence: Evidence) -> Run:
+    """The run of the criterion's own scenario."""
+    return evidence.run
+
+
+@pytest.fixture(scope="session")
+def package(evidence: Evidence) -> PackageFacts:
+    """What the package's files say."""
+    return evidence.package
+
+
+class _Notes:
+    """What became of each test, written down when all are done."""
+
+    def __init__(self, path: Path, config: pytest.Config) -> None:
+        self._path = path
+        self._folder = str(path.parent)
+        self._rootdir = str(config.rootpath)
+        self._tests: dict[str, TestOutcome] = {}
+        self._faults: list[str] = []
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        """A file that cannot be read is the instructor's fault."""
+        if report.failed:
+            lines = [line for line in report.longreprtext.splitlines() if line.strip()]
+            self._faults.append(
+                self._short(lines[-1].removeprefix("E ").strip() if lines else "cannot be read")
+            )
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_makereport(
+        self, item: pytest.Item, call: pytest.CallInfo[None]
+    ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+        """One note a test: the worst of its setup, its call and its teardown."""
+        report = yield
+        error = call.excinfo.value if call.excinfo else None
+        if isinstance(error, NoSuchScenario | pytest.FixtureLookupError):
+            text = error.msg if isinstance(error, pytest.FixtureLookupError) else str(error)
+            fixture = getattr(error, "argname", "")
+            self._faults.append(f"{item.name}: {text or f'there is no fixture {fixture!r}'}")
+        if report.when == "call" or not report.passed:
+            self._note(item, self._outcome(report, error), error, report)
+        return report
+
+    def pytest_sessionfinish(self) -> None:
+        """Write the outcome down."""
+        outcome = SessionOutcome(tests=tuple(self._tests.values()), faults=tuple(self._faults))
+        self._path.write_bytes(outcome.model_dump_json().encode())
+
+    def _outcome(self, report: pytest.TestReport, error: BaseException | None) -> Outcome:
+        if isinstance(error, NotRecorded):
+            return "open" if error.verdict.status is Status.INCONCLUSIVE else "failed"
+        return report.outcome
+
+    def _note(
+        self, item: pytest.Item, outcome: Outcome, error: BaseException | None, report: pytest.TestReport
+    ) -> None:
+        function = getattr(item, "function", None)
+        title = (inspect.getdoc(function) or "").partition("\n")[0].strip()
+        message = "" if outcome == "passed" else self._message(error, report)
+        name = item.name
+        noted = self._tests.get(item.nodeid)
+        if noted is None or noted.outcome == "passed":
+            self._tests[item.nodeid] = TestOutcome(
+                name=name, title=title, outcome=outcome, message=message, points=self._points(item)
+            )
+
+    def _points(self, item: pytest.Item) -> float:
+        marker = item.get_closest_marker("points")
+        if marker is None:
+            return 1.0
+        given = marker.args[0] if len(marker.args) == 1 and not marker.kwargs else None
+        if isinstance(given, bool) or not isinstance(given, int | float) or not 0 <= given < float("inf"):
+            self._faults.append(f"{item.name}: points(…) takes one number, 0 or more")
+            return 1.0
+        return float(given)
+
+    def _message(self, error: BaseException | None, report: pytest.TestReport) -> str:
+        """The first line of what was asserted or raised; for anything but an assertion, with its place."""
+        if error is None:
+            return self._short(report.longreprtext.strip().partition("\n")[0])
+        text = str(error).strip().partition("\n")[0]
+        said = isinstance(error, AssertionError | NotRecorded | pytest.fail.Exception | pytest.skip.Exception)
+        if said:
+            return self._short(text or "an assertion does not hold")
+        return self._short(f"{type(error).__name__}{': ' if text else ''}{text}")
+
+    def _short(self, text: str) -> str:
+        """Without what differs from run to run, addresses and folders, and as what can be written down."""
+        text = text.encode("utf-8", "backslashreplace").decode()
+        text = text.replace(self._folder, "…").replace(f"{self._rootdir}/", "")
+        text = _ADDRESS.sub("0x…", text)
+        return text if len(text) <= MESSAGE_CHARS else text[: MESSAGE_CHARS - 1] + "…"
