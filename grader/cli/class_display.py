@@ -18,7 +18,7 @@ from grader.classes.batch.flow import Watcher
 from grader.classes.batch.job import Outcome
 from grader.classes.batch.progress import Course
 from grader.report.text import number
-from grader.shown import line
+from grader.untrusted_text import line
 
 REFRESH_HZ = 4
 NAME_CHARS = 40

@@ -10,7 +10,7 @@ from grader.evidence.run import Run
 from grader.model.result import CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
-from grader.shown import clip, clipped, json_text, text_limit
+from grader.untrusted_text import clip, clipped, json_text, text_limit
 
 LIMIT = 2000
 

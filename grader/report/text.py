@@ -19,7 +19,7 @@ import re
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from grader.shown import clip, json_text, line, text_limit, uncommanded, visible
+from grader.untrusted_text import clip, json_text, line, text_limit, uncommanded, visible
 
 __all__ = [
     "clip",

@@ -8,7 +8,7 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
 from grader.report.text import number
 from grader.rubric.model import Rubric
-from grader.shown import CITATIONS_MAX, clip
+from grader.untrusted_text import CITATIONS_MAX, clip
 
 PLACE_CHARS = 300
 

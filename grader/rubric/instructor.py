@@ -22,7 +22,7 @@ from grader.checks.registry import collecting
 from grader.model.verdict import Verdict
 from grader.rubric.pytest_check import FileFault, pytest_check, read_beside
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps
-from grader.shown import visible
+from grader.untrusted_text import visible
 
 PYTEST = "pytest"
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.shown import (
+from grader.untrusted_text import (
     HIDDEN_CATEGORIES,
     clip,
     clipped,

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 from itertools import islice
 
-from grader.shown import visible
+from grader.untrusted_text import visible
 
 SIMILARITY = 0.8
 NAMES_MAX, NAME_CHARS_MAX = 1_000, 60

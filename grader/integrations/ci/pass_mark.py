@@ -9,7 +9,7 @@ from grader.errors import UsageError
 from grader.report.text import number
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
-from grader.shown import line
+from grader.untrusted_text import line
 
 FORM = re.compile(r"(\d{1,6}(?:\.\d{1,6})?)\s*(%?)")
 HINT = "write points (12.5) or a percentage of the visible points (60%)"

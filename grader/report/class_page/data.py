@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from grader.model.batch import CriterionInfo
 from grader.report.class_page.lines import CHARS, REPORT, Line, link_to
-from grader.shown import line
+from grader.untrusted_text import line
 
 COLUMNS = ("id", "name", "group", "link", "state", "points", "letters", "earned", "late", "decided", "time")
 

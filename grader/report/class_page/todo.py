@@ -11,7 +11,7 @@ from markupsafe import Markup
 from grader.model.batch import BatchRun
 from grader.report.class_page.commands import again, review
 from grader.report.class_page.lines import CHARS, MESSAGE_CHARS, Line, link_to
-from grader.shown import line
+from grader.untrusted_text import line
 
 SHOWN_MAX = 200
 
