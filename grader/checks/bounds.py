@@ -12,11 +12,11 @@ from grader.checks.support.absence import no_message
 from grader.checks.support.fields import FieldPath, NoField, values_at
 from grader.checks.support.losses import losses
 from grader.checks.support.names import GlobalName, plain_type
-from grader.checks.support.text import number, plural, seconds
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import plural, seconds, significant
 
 ROUNDING = 1e-6
 
@@ -44,11 +44,11 @@ class FieldBoundsParams(Record):
     @property
     def words(self) -> str:
         if self.min is None:
-            return f"at most {number(self.max or 0)}"
+            return f"at most {significant(self.max or 0)}"
         return (
-            f"at least {number(self.min)}"
+            f"at least {significant(self.min)}"
             if self.max is None
-            else f"{number(self.min)} to {number(self.max)}"
+            else f"{significant(self.min)} to {significant(self.max)}"
         )
 
     def holds(self, value: float) -> bool:
@@ -152,7 +152,7 @@ def _outside(outside: Sequence[Reading], readings: Sequence[Reading], params: Fi
     first = outside[0]
     after = seconds(first.time_ns - readings[0].time_ns)
     wrong = [value for value in first.values if not params.holds(value)]
-    seen = f"is {number(wrong[0])}" if wrong else f"is not there ({first.fault})"
+    seen = f"is {significant(wrong[0])}" if wrong else f"is not there ({first.fault})"
     count = f"in {len(outside)} of {plural(len(readings), 'message')}"
     message = (
         f"{params.field} of {params.topic} is not {params.words} {count}: it {seen}, {after} after the first"
@@ -172,5 +172,5 @@ def _range(readings: Sequence[Reading]) -> str:
         return "no value"
     nan = sum(value != value for value in values)  # noqa: PLR0124 - NaN is not itself
     real = [value for value in values if value == value]  # noqa: PLR0124 - as above
-    span = f"{number(min(real))} to {number(max(real))}" if real else "no number"
+    span = f"{significant(min(real))} to {significant(max(real))}" if real else "no number"
     return f"{span}, and {plural(nan, 'NaN')}" if nan else span

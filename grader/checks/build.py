@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import check
-from grader.checks.support.text import listed, near_names, seconds, shown
+from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -22,6 +22,7 @@ from grader.model.verdict import (
     passed,
     unjudged,
 )
+from grader.wording import join_words, seconds
 
 CATKIN_MAKE = "catkin_make"
 EXPECTED = "catkin_make exits with 0"
@@ -82,7 +83,7 @@ def build(package: PackageFacts, build: Run, params: BuildParams) -> Verdict:
         Clone your repository into a new workspace, run `catkin_make`, and mend the first error: the later
         ones often follow from it.
     """
-    scripts = f", and {listed(params.scripts)} there to run" if params.scripts else ""
+    scripts = f", and {join_words(params.scripts)} there to run" if params.scripts else ""
     verdict = judge_build(package, build)
     if verdict.status is Status.PASS:
         verdict = _lost_scripts(package, params.scripts) or verdict
@@ -142,12 +143,12 @@ def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | No
     if not lost:
         return None
     near = [there[n].path for s in lost for n in near_names(PurePosixPath(s).name, there)]
-    seen = f"; there is {listed(dict.fromkeys(near))}" if near else ""
+    seen = f"; there is {join_words(dict.fromkeys(near))}" if near else ""
     return unjudged(
-        f"catkin_make succeeded, but there is no {listed(lost, 'or')} to run{seen}",
+        f"catkin_make succeeded, but there is no {join_words(lost, 'or')} to run{seen}",
         expected=EXPECTED,
-        measured=f"rosrun finds no {listed((PurePosixPath(s).name for s in lost), 'or')}",
-        hint=f"add {listed(lost)} to the package, then git add, commit and push",
+        measured=f"rosrun finds no {join_words((PurePosixPath(s).name for s in lost), 'or')}",
+        hint=f"add {join_words(lost)} to the package, then git add, commit and push",
     )
 
 

@@ -8,11 +8,12 @@ from typing import Literal
 from grader.checks.registry import check
 from grader.checks.support.absence import no_node
 from grader.checks.support.names import GlobalName, is_called
-from grader.checks.support.text import listed, near_names
+from grader.checks.support.text import near_names
 from grader.evidence.run import Run, is_grader_node
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, passed
+from grader.wording import join_words
 
 End = Literal["publisher", "subscriber"]
 ENDS: tuple[End, End] = ("publisher", "subscriber")
@@ -60,7 +61,8 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
     return verdict.model_copy(
         update={
             "expected": f"{ends[0]} connected to {ends[1]} over {params.topic}",
-            "measured": verdict.measured or (f"connections over {listed(over)}" if over else "no connection"),
+            "measured": verdict.measured
+            or (f"connections over {join_words(over)}" if over else "no connection"),
             "citations": (
                 *verdict.citations,
                 EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),
@@ -110,7 +112,7 @@ def _misnamed(run: Run, end: End, params: ConnectedParams) -> Verdict | None:
     if not wanted or not there or any(is_called(n, wanted) for n in there):
         return None
     near = near_names(f"/{wanted.lstrip('/')}", there)
-    seen = listed(near or run.student_nodes() or there)
+    seen = join_words(near or run.student_nodes() or there)
     hint = f"the node's name is what rospy.init_node(…) or the launch file gives it: {wanted.lstrip('/')}"
     return failed(f"there is no node /{wanted.lstrip('/')}; there is {seen}", hint=hint)
 
@@ -123,7 +125,7 @@ def _not_on_topic(run: Run, end: End, params: ConnectedParams) -> Verdict:
     message = f"{who} never {does} {params.topic}" if wanted else f"{who} {does} {params.topic}"
     kind = "Publisher" if end == "publisher" else "Subscriber"
     hint = f"rospy.{kind}('{params.topic}', …); look for a <remap> or a namespace"
-    return failed(f"{message}; it {does} {listed(near)}" if near and wanted else message, hint=hint)
+    return failed(f"{message}; it {does} {join_words(near)}" if near and wanted else message, hint=hint)
 
 
 def _on(run: Run, topic: str, end: End, params: ConnectedParams) -> tuple[str, ...]:

@@ -12,12 +12,12 @@ from grader.checks.support.exit_cause import ended_after, explain_end
 from grader.checks.support.nodes import are_noted, nodes_of
 from grader.checks.support.pairs import LOOKED_AT, Sent, both_from_ns, heard_of, printed_times, sent_by
 from grader.checks.support.process import Life, life, lives
-from grader.checks.support.text import listed, plural
 from grader.checks.support.wording import VALUE, in_words
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, partial, passed, unjudged
+from grader.wording import join_words, plural
 
 SAME_NAME = "new node registered with same name"
 FEW = 2
@@ -81,7 +81,7 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
     )
     names = dict.fromkeys((*trio.first_nodes, *trio.second_nodes))
     graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
-    measured = verdict.measured or f"names of the copies: {listed(names) or 'none'}"
+    measured = verdict.measured or f"names of the copies: {join_words(names) or 'none'}"
     citations = verdict.citations or (graph,)
     return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
 
@@ -98,7 +98,7 @@ def _trio(package: PackageFacts, run: Run, params: CopiesParams) -> Trio | Verdi
 
 def _not_started(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
     """A process may have to wait for another one's node: then that one is the cause."""
-    measured = listed(one.name for one in lives(run)) or "nothing"
+    measured = join_words(one.name for one in lives(run)) or "nothing"
     waited_for = [one for one in lives(run) if one.name in {params.first, params.second, params.listener}]
     for one in waited_for:
         if one.ended_early:
@@ -185,7 +185,7 @@ def _heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) ->
     from_ns = both_from_ns(run, params.topic, *copies)
     if from_ns is None:
         silent = next(nodes for nodes in copies if not sent_by(run, params.topic, nodes).texts)
-        message = f"both copies live, but {listed(silent)} sends no text on {params.topic}"
+        message = f"both copies live, but {join_words(silent)} sends no text on {params.topic}"
         return unjudged(message, hint=f"publish on {params.topic} in the loop, as a copy alone does")
     first, second = (sent_by(run, params.topic, nodes, from_ns) for nodes in copies)
     if first.total + second.total > LOOKED_AT:  # the listener lags behind a flood

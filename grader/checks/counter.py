@@ -22,11 +22,11 @@ from grader.checks.support.counting import (
 from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.losses import losses
 from grader.checks.support.process import early_end
-from grader.checks.support.text import listed, number, plural, seconds
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, plural, seconds, significant
 
 CONNECT_NS = 1_000_000_000
 LARGEST = 2.0**64
@@ -84,7 +84,7 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
         message = f"the recorder missed the first messages on {params.topic}"
         return inconclusive(message, hint="grade again", **fields)
     hint = f"set the counter to {params.start} before the loop, and add one after publish(…), not before"
-    message = f"the first value on {params.topic} is {number(first.values[0])}, not {params.start}"
+    message = f"the first value on {params.topic} is {significant(first.values[0])}, not {params.start}"
     return failed(message, hint=hint, **fields)
 
 
@@ -157,8 +157,8 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
     if count is None:
         return _nothing(package, run, params.topic).model_copy(update={"expected": expected})
     verdict, seen = judge_wraps(count, run, package, params)
-    turn = f"{number(seen.before)}→{number(seen.after)}" if seen else "no reset"
-    lowest, highest = number(min(count.values)), number(max(count.values))
+    turn = f"{significant(seen.before)}→{significant(seen.after)}" if seen else "no reset"
+    lowest, highest = significant(min(count.values)), significant(max(count.values))
     measured = f"{plural(len(count.values), 'value')}, {lowest} to {highest}, {turn}"
     at = (seen.from_ns, seen.to_ns) if seen else (count.times_ns[0], count.times_ns[-1])
     return verdict.model_copy(
@@ -208,13 +208,13 @@ def _wrong(count: Count, found: Wrong, params: StepParams) -> Verdict | None:
         return inconclusive(message, hint="grade again while the machine has less to do")
     first, usual = found.own[0], count.usual_step()
     after = seconds(first.to_ns - count.times_ns[0])
-    comes = f"after {number(first.before)} comes {number(first.after)}"
+    comes = f"after {significant(first.before)} comes {significant(first.after)}"
     place = f"{comes} (value {first.number + 1}, {after} after the first)"
     if usual not in {None, 1}:
         message = _usual_fault(usual or 0.0)
     else:
         kinds: dict[float, str] = {0: "repeats a value", -1: "goes back"}
-        message = listed(dict.fromkeys(kinds.get(s.change, "skips values") for s in found.own))
+        message = join_words(dict.fromkeys(kinds.get(s.change, "skips values") for s in found.own))
     hint = "add one to the counter in one place only, once in each turn of the loop"
     return failed(f"the counter {message}: {place}", hint=hint)
 
@@ -227,7 +227,7 @@ def _flooded(skips: int, params: StepParams) -> Verdict:
 def _usual_fault(usual: float) -> str:
     if usual == 0:
         return "stays at one value"
-    return f"counts in steps of {number(usual)}" if usual > 0 else "counts down"
+    return f"counts in steps of {significant(usual)}" if usual > 0 else "counts down"
 
 
 def _too_few(steps: int, run: Run, package: PackageFacts, params: StepParams) -> Verdict | None:

@@ -14,13 +14,14 @@ from grader.checks.support.printed import (
     probes_on,
     text_places,
 )
-from grader.checks.support.text import plural, shown
+from grader.checks.support.text import shown
 from grader.checks.support.unheard import never_sent, not_printed
 from grader.checks.support.wording import VALUE, in_words
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, passed
+from grader.wording import plural
 
 
 class HearsParams(Record):

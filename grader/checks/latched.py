@@ -5,11 +5,11 @@ from __future__ import annotations
 from grader.checks.registry import check
 from grader.checks.support.absence import no_message
 from grader.checks.support.names import GlobalName
-from grader.checks.support.text import listed
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed
+from grader.wording import join_words
 
 
 class LatchedParams(Record):
@@ -46,10 +46,10 @@ def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
         verdict = inconclusive(message, hint="let the grader run the package itself")
     elif plain:
         hint = f"rospy.Publisher('{params.topic}', …, latch=True, queue_size=1)"
-        verdict = failed(f"{listed(plain)} publishes on {params.topic} without latching", hint=hint)
+        verdict = failed(f"{join_words(plain)} publishes on {params.topic} without latching", hint=hint)
     else:
-        verdict = passed(f"{listed(c.callerid for c in channels)} latches {params.topic}")
-    kinds = listed(f"{'latched' if c.latching else 'not latched'} by {c.callerid}" for c in channels)
+        verdict = passed(f"{join_words(c.callerid for c in channels)} latches {params.topic}")
+    kinds = join_words(f"{'latched' if c.latching else 'not latched'} by {c.callerid}" for c in channels)
     topic = params.topic if channels else "/grader/graph"
     return verdict.model_copy(
         update={

@@ -8,7 +8,6 @@ from grader.checks.registry import check
 from grader.checks.support.launching import find_launch, node_slip, unreadable
 from grader.checks.support.process import lives
 from grader.checks.support.roslaunch import roslaunch_error
-from grader.checks.support.text import listed, plural
 from grader.evidence.events import GraphEvent
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, PackageFacts
@@ -22,6 +21,7 @@ from grader.model.verdict import (
     inconclusive,
     passed,
 )
+from grader.wording import join_words, plural
 
 
 class LaunchConnectsParams(Record):
@@ -65,7 +65,7 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
         or passed(f"roslaunch connects {found[0][0]} and {found[0][1]} over {params.topic}")
     )
     place: tuple[Citation, ...] = (FileCitation(file=file.path, line=1),) if file else ()
-    measured = f"{plural(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node came up"
+    measured = f"{plural(len(nodes), 'node')}: {join_words(nodes)}" if nodes else "no node came up"
     if file is None or file.fault:
         measured = "no launch file that can be read"
     graph = EvidenceCitation(evidence=run.evidence, topic="/grader/graph")
@@ -100,7 +100,7 @@ def _names_missing(
     missing = [n for n in params.nodes if f"/{n.lstrip('/')}" not in nodes]
     if not missing or not nodes:
         return None
-    message = f"{listed(missing)} did not come up; there is {listed(nodes)}"
+    message = f"{join_words(missing)} did not come up; there is {join_words(nodes)}"
     cited = (FileCitation(file=file.path, line=1),) if file else ()
     return failed(message, hint="the `name` in the launch file is the node's name", citations=cited)
 
@@ -137,16 +137,18 @@ def over_another_topic(run: Run, topic: str, quoted: str = "") -> Verdict:
         if c.topic not in {topic, "/rosout"} and run.is_student_node(c.subscriber)
     }
     if others:
-        message = f"the nodes are connected over {listed(sorted(others))}, not over {topic}"
+        message = f"the nodes are connected over {join_words(sorted(others))}, not over {topic}"
         return failed(message + quoted, hint=f"both have to use {topic}; look for a <remap> or a namespace")
     publishers, subscribers = (_nodes_on(run, topic, end) for end in ("publishers", "subscribers"))
     if publishers and subscribers:
-        message = f"{listed(publishers)} and {listed(subscribers)} are both on {topic}, but not connected"
+        message = (
+            f"{join_words(publishers)} and {join_words(subscribers)} are both on {topic}, but not connected"
+        )
         return failed(message + quoted, hint="do both use the same message type?")
     lacking = "publishes on" if not publishers else "subscribes to"
-    message = f"{listed(run.student_nodes())} are not connected: none {lacking} {topic}"
+    message = f"{join_words(run.student_nodes())} are not connected: none {lacking} {topic}"
     seen = _topics_of(run, "publishers" if not publishers else "subscribers")
-    there = f"; one {lacking} {listed(seen)}" if seen else ""
+    there = f"; one {lacking} {join_words(seen)}" if seen else ""
     hint = f"launch a talker and a listener that use {topic}; look for a <remap> or a namespace"
     return failed(message + there + quoted, hint=hint)
 

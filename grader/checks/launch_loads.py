@@ -16,11 +16,12 @@ from grader.checks.support.param_given import is_printed
 from grader.checks.support.param_tree import absolute, instead, own, tree
 from grader.checks.support.printed import printed_lines
 from grader.checks.support.roslaunch import Absence, finished, nodes_up, quoted, refusal, why_died, why_not_up
-from grader.checks.support.text import listed, shown
+from grader.checks.support.text import shown
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchLoad, LaunchNode, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Citation, EvidenceCitation, FileCitation, Verdict, failed, passed, unjudged
+from grader.wording import join_words
 
 SUMMARY = re.compile(r"\s*\*\s+/")  # roslaunch's list of parameters
 OUTSIDE = 'write <rosparam file="$(find <package>)/{}"/> outside the <node>, without ns'
@@ -74,7 +75,7 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
     return verdict.model_copy(
         update={
             "expected": expected,
-            "measured": f"on the server: {listed(found) or 'nothing'}",
+            "measured": f"on the server: {join_words(found) or 'nothing'}",
             "citations": verdict.citations
             or (*cited, EvidenceCitation(evidence=run.evidence, topic="/grader/param")),
         }

@@ -12,7 +12,7 @@ from grader.checks.launch_xml import missing_node
 from grader.checks.registry import check
 from grader.checks.support.launching import find_launch, node_slip, nodes_of_script, refusals, unreadable
 from grader.checks.support.roslaunch import died, nodes_up, quoted, refusal, why_died, why_not_up
-from grader.checks.support.text import bare, listed, shown
+from grader.checks.support.text import bare, shown
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.record import Record
@@ -26,6 +26,7 @@ from grader.model.verdict import (
     passed,
     unjudged,
 )
+from grader.wording import join_words
 
 SHELL = "#!/bin/bash"
 
@@ -70,7 +71,7 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
     expected = f"a shell script in {params.launch} opens {params.urls[0]} in {params.program}, beside a node"
     file = find_launch(package, params.launch)
     pages = _pages(run)
-    measured = f"opened: {listed(_shown(p) for p in pages)}" if pages else "nothing was opened"
+    measured = f"opened: {join_words(_shown(p) for p in pages)}" if pages else "nothing was opened"
     if file is None or file.fault is not None:
         verdict = unreadable(package, file, params.launch) or failed(f"{params.launch} cannot be read")
         return verdict.model_copy(
@@ -83,7 +84,7 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
         or missing_node(package, file, params.script)
         or _beside(package, file, run, params)
         or passed(
-            f"{listed(n.type or '' for n in _shells(package, file))} opens {_url(pages, params)} in {params.program}"
+            f"{join_words(n.type or '' for n in _shells(package, file))} opens {_url(pages, params)} in {params.program}"
         )
     )
     cited: tuple[Citation, ...] = (
@@ -139,7 +140,7 @@ def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> V
     if slips:
         return slips[0].verdict()
     lying = [f.path for f in package.files if f.path.endswith(".sh")]
-    seen = f"; there is {listed(lying)} in the package" if lying else ""
+    seen = f"; there is {join_words(lying)} in the package" if lying else ""
     name = PurePosixPath(lying[0]).name if lying else "<script>.sh"
     hint = f'add <node pkg="{package.name}" type="{name}" name="…" output="screen"/>'
     return failed(f"{file.path} has no <node> that is a shell script{seen}", hint=hint)
@@ -156,10 +157,12 @@ def _page(package: PackageFacts, file: LaunchFile, run: Run, params: OpensParams
     )
     hint = f"write {params.program} {params.urls[0]} in the script"
     if not mine and _url(pages, params):
-        message = f"the page is opened in {listed(p.program for p in pages)}, not in {params.program}"
+        message = f"the page is opened in {join_words(p.program for p in pages)}, not in {params.program}"
         return failed(message, hint=hint, citations=cited)
     if mine:
-        message = f"{params.program} is asked to open {listed(map(_arguments, mine))}, not {params.urls[0]}"
+        message = (
+            f"{params.program} is asked to open {join_words(map(_arguments, mine))}, not {params.urls[0]}"
+        )
         return failed(message, hint=hint, citations=cited)
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))

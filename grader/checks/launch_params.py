@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from grader.checks.support.param_tree import tree
-from grader.checks.support.text import listed, number
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile
 from grader.model.verdict import EvidenceCitation, FileCitation, Verdict, failed
+from grader.wording import join_words, significant
 
 Wanted = Mapping[str, int | float | str]
 
@@ -34,7 +34,9 @@ def _of_node(run: Run, file: LaunchFile, node: str, wanted: Wanted) -> Verdict |
         all(_fits(later.get(place + name), value) for name, value in wanted.items()) for place in places
     )
     if late:
-        message = f"{listed(wanted)} are set only after {node} has started, and it reads them as it starts"
+        message = (
+            f"{join_words(wanted)} are set only after {node} has started, and it reads them as it starts"
+        )
         verdict = failed(message, hint="set them with <param> inside the <node>: roslaunch does that first")
     else:
         verdict = _wrong_value(before, places, wanted) or _elsewhere(before, node, wanted)
@@ -50,7 +52,7 @@ def _wrong_value(before: Mapping[str, Any], places: tuple[str, str], wanted: Wan
     if missing:
         known = [place + name for name in wanted if place + name in before]
         verb = "is" if len(missing) == 1 else "are"
-        message = f"{listed(place + name for name in missing)} {verb} not set, only {listed(known)}"
+        message = f"{join_words(place + name for name in missing)} {verb} not set, only {join_words(known)}"
         return failed(
             message, hint="write one <param> for each inside the <node>, the names letter by letter"
         )
@@ -61,8 +63,8 @@ def _wrong_value(before: Mapping[str, Any], places: tuple[str, str], wanted: Wan
         return failed(message, hint=f'write <param name="{name}" type="int" value="{value}"/>')
     colour = f"{', '.join(map(_shown, (before[place + n] for n in wanted)))}"
     right = ", ".join(map(_shown, wanted.values()))
-    message = f"{place}{name} is {_shown(found)}, not {_shown(value)}: {listed(wanted)} are {colour}"
-    return failed(message, hint=f"{listed(wanted)} have to be {right}")
+    message = f"{place}{name} is {_shown(found)}, not {_shown(value)}: {join_words(wanted)} are {colour}"
+    return failed(message, hint=f"{join_words(wanted)} have to be {right}")
 
 
 def _elsewhere(before: Mapping[str, Any], node: str, wanted: Wanted) -> Verdict:
@@ -74,8 +76,8 @@ def _elsewhere(before: Mapping[str, Any], node: str, wanted: Wanted) -> Verdict:
         message = f"{found} is on the parameter server, but {node} reads {node}/{found.rpartition('/')[2]}"
         return failed(message, hint=hint)
     near = [name for name in before if name.startswith(f"{node}/")]
-    seen = f"; under {node}/ there is {listed(near)}" if near else ""
-    message = f"{listed(wanted)} are not on the parameter server{seen}: {node} reads {node}/{first}"
+    seen = f"; under {node}/ there is {join_words(near)}" if near else ""
+    message = f"{join_words(wanted)} are not on the parameter server{seen}: {node} reads {node}/{first}"
     return failed(message, hint=hint)
 
 
@@ -87,7 +89,9 @@ def _fits(found: object, wanted: float | str) -> bool:
 
 
 def _shown(value: object) -> str:
-    return number(value) if isinstance(value, int | float) and not isinstance(value, bool) else f'"{value}"'
+    return (
+        significant(value) if isinstance(value, int | float) and not isinstance(value, bool) else f'"{value}"'
+    )
 
 
 def _lines(file: LaunchFile, wanted: Wanted) -> tuple[FileCitation, ...]:

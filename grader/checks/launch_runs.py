@@ -22,11 +22,12 @@ from grader.checks.support.launching import (
 )
 from grader.checks.support.names import GlobalName
 from grader.checks.support.roslaunch import is_exact, nodes_up, quoted, why_died, why_not_up
-from grader.checks.support.text import listed, near_names, plural
+from grader.checks.support.text import near_names
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Citation, EvidenceCitation, FileCitation, Verdict, failed, passed, unjudged
+from grader.wording import join_words, plural
 
 
 class LaunchRunsParams(Record):
@@ -79,10 +80,10 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
         *params.programs,
     ]
     over = f", connected over {params.topic}" if params.topic else ""
-    expected = f"{params.launch} brings up {listed(what) or 'its nodes'} under the file's names{over}"
+    expected = f"{params.launch} brings up {join_words(what) or 'its nodes'} under the file's names{over}"
     file = find_launch(package, params.launch)
     nodes = run.student_nodes()
-    measured = f"{plural(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node came up"
+    measured = f"{plural(len(nodes), 'node')}: {join_words(nodes)}" if nodes else "no node came up"
     if file is None or file.fault is not None:
         verdict = unreadable(package, file, params.launch) or failed(f"{params.launch} cannot be read")
         verdict = verdict.model_copy(update={"unjudged": bool(params.scripts)})
@@ -113,7 +114,7 @@ def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRun
         if misplaced is not None:
             return misplaced
     over = f", connected over {params.topic}" if params.topic else ""
-    return passed(f"roslaunch brings up {listed(dict.fromkeys(names))}{over}")
+    return passed(f"roslaunch brings up {join_words(dict.fromkeys(names))}{over}")
 
 
 def _wanted(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams) -> Iterator[Wanted]:
@@ -145,7 +146,7 @@ def _unnamed(package: PackageFacts, file: LaunchFile, params: LaunchRunsParams) 
         if not nodes_of_program(file, program):
             pkg, _, name = program.partition("/")
             hint = f'add <node pkg="{pkg}" type="{name}" name="…"/>'
-            seen = f"; it has {listed(f'{n.pkg}/{n.type}' for n in file.brings)}" if file.brings else ""
+            seen = f"; it has {join_words(f'{n.pkg}/{n.type}' for n in file.brings)}" if file.brings else ""
             return failed(f"{file.path} has no <node> for {program}{seen}", hint=hint)
     return None
 
@@ -159,7 +160,7 @@ def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
         return Slip(found[0].file, found[0].line, why, f'write pkg="{pkg}"').verdict()
     others = [n.full_name for n in file.brings]
     near = near_names(f"/{name.lstrip('/')}", others) or tuple(others)
-    seen = f"; it has {listed(near)}" if near else ""
+    seen = f"; it has {join_words(near)}" if near else ""
     hint = f'write <node pkg="{pkg}" name="{name.lstrip("/")}" …/>'
     return failed(f"{file.path} has no node /{name.lstrip('/')}{seen}", hint=hint)
 

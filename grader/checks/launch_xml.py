@@ -17,10 +17,11 @@ from grader.checks.support.launching import (
     refusals,
     unreadable,
 )
-from grader.checks.support.text import listed, near_names, plural
+from grader.checks.support.text import near_names
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
+from grader.wording import join_words, plural
 
 
 class LaunchXmlParams(Record):
@@ -54,9 +55,7 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
         them between `<launch>` and `</launch>`. `roslaunch --nodes <package> <file>` lists what it finds.
     """
     wanted = [PurePosixPath(s).name for s in params.scripts] + list(params.programs)
-    expected = (
-        f"{params.launch}: <launch> at its root, and a <node> with pkg, type and name for {listed(wanted)}"
-    )
+    expected = f"{params.launch}: <launch> at its root, and a <node> with pkg, type and name for {join_words(wanted)}"
     file = find_launch(package, params.launch)
     if file is None or file.fault is not None:
         verdict = unreadable(package, file, params.launch) or failed(f"{params.launch} cannot be read")
@@ -67,10 +66,10 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
         _refused(package, file)
         or next(filter(None, (missing_node(package, file, script) for script in params.scripts)), None)
         or next(filter(None, (_program(file, program) for program in params.programs)), None)
-        or passed(f"{file.path} has a <node> for {listed(wanted)}", hint=_advice(package, file))
+        or passed(f"{file.path} has a <node> for {join_words(wanted)}", hint=_advice(package, file))
     )
     measured = (
-        f"{plural(len(file.brings), 'node')}: {listed(map(_shown, file.brings))}"
+        f"{plural(len(file.brings), 'node')}: {join_words(map(_shown, file.brings))}"
         if file.brings
         else "no <node>"
     )

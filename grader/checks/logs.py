@@ -13,11 +13,12 @@ from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.nodes import nodes_of
 from grader.checks.support.process import early_end, life, lives
 from grader.checks.support.rosout import CALLS, Level, Logged, console_log, logged_by
-from grader.checks.support.text import listed, plural, shown
+from grader.checks.support.text import shown
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, plural
 
 ALIKE = 0.7
 
@@ -65,7 +66,7 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
         or _near(run, lines, params)
         or _nothing(package, run, nodes, lines, params)
     )
-    seen = listed(f"{shown(t)!r}" for t in dict.fromkeys(one.text for one in lines[:3]))
+    seen = join_words(f"{shown(t)!r}" for t in dict.fromkeys(one.text for one in lines[:3]))
     measured = (
         f"{plural(len(lines), 'log message')}{': ' if seen else ''}{seen}{', …' if len(lines) > 3 else ''}"
     )
@@ -161,10 +162,10 @@ def _nothing(
             "no node was registered that could log", hint="call rospy.init_node(…) before logging"
         )
     if lines:
-        message = f"{listed(nodes)} logs {shown(lines[0].text)!r}, and not {params.text!r}"
+        message = f"{join_words(nodes)} logs {shown(lines[0].text)!r}, and not {params.text!r}"
         return failed(message, hint=_call(params))
     hint = f"{_call(params)} below rospy.init_node(…): above it, nothing is sent"
-    return failed(f"{listed(nodes)} logs nothing", hint=hint)
+    return failed(f"{join_words(nodes)} logs nothing", hint=hint)
 
 
 def _call(params: LogsParams) -> str:

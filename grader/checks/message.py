@@ -14,13 +14,14 @@ from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.lockup import is_flood
 from grader.checks.support.losses import all_lost, losses
 from grader.checks.support.process import early_end, observed_until_ns
-from grader.checks.support.text import in_one_line, plural
+from grader.checks.support.text import in_one_line
 from grader.checks.support.time_growth import GET_TIME, WATCHED_S, wrong_growth
 from grader.checks.support.wording import NUMBER, SECONDS, in_words, message_pattern
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import plural
 
 ENOUGH = 3
 UNFILLED = ("%s", "%d", "%f", "{}", "{0}")

@@ -25,7 +25,6 @@ from grader.checks.support.nodes import (
     wrong_name,
 )
 from grader.checks.support.process import Life, life, lives
-from grader.checks.support.text import listed, plural, seconds
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -37,6 +36,7 @@ from grader.model.verdict import (
     passed,
     unjudged,
 )
+from grader.wording import join_words, plural, seconds
 
 LOOP = "loop with `while not rospy.is_shutdown():` and catch rospy.ROSInterruptException as talker.py does"
 
@@ -93,7 +93,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
         return unjudged(message, expected=expected, hint="add the script to the package, and push it")
     nodes = nodes_of(run, one.name)
     up_ns = _up_ns(one, run, nodes)
-    message = f"{_script(one)} is the node {listed(nodes)}, stayed alive and ended on Ctrl-C"
+    message = f"{_script(one)} is the node {join_words(nodes)}, stayed alive and ended on Ctrl-C"
     verdict = (
         _early_end(one, run, package)
         or _registration(one, run, nodes)
@@ -102,7 +102,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
         or _bad_end(one, run, package)
         or passed(message)
     )
-    measured = f"{plural(len(nodes), 'node')} ({listed(nodes) or 'none'}), alive for {seconds(up_ns)}"
+    measured = f"{plural(len(nodes), 'node')} ({join_words(nodes) or 'none'}), alive for {seconds(up_ns)}"
     citations = verdict.citations or (_process_citation(one, run),)
     return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": citations})
 
@@ -131,7 +131,7 @@ def node_name(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
     if not nodes:
         return _nameless(package, run, params).model_copy(update={"expected": expected})
     cite = (EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),)
-    measured = listed(nodes)
+    measured = join_words(nodes)
     wrong = _misnamed(nodes, params)
     verdict = wrong or passed(f"the node is {_fitting(nodes, params)[0]}")
     return verdict.model_copy(update={"expected": expected, "measured": measured, "citations": cite})
@@ -182,7 +182,7 @@ def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None
         hint = "call rospy.init_node(…) before anything that waits"
         return failed(f"{_script(one)} runs, but never registers as a node", hint=hint)
     if len(nodes) > (1 if are_noted(run) else max(1, len(lives(run)))):
-        message = f"{_script(one)} registers as {len(nodes)} nodes: {listed(nodes)}"
+        message = f"{_script(one)} registers as {len(nodes)} nodes: {join_words(nodes)}"
         return failed(
             message, hint="one script is one node: call rospy.init_node(…) once, start no other process"
         )

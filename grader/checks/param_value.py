@@ -12,11 +12,12 @@ from grader.checks.support.comparing import differences
 from grader.checks.support.names import GlobalName
 from grader.checks.support.param_tree import absolute, own, tree
 from grader.checks.support.process import lives
-from grader.checks.support.text import listed, near_names, shown
+from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, passed
+from grader.wording import join_words
 
 EXACT = 1e-9
 MISSING = object()
@@ -80,14 +81,14 @@ def _judged(got: object, params: ParamValueParams) -> Verdict:
     if not wrong:
         return passed(f"{params.name} is {shown(text(got))}")
     hint = "numbers stand without quotes, text with them" if "(text, not" in wrong[0] else ""
-    message = shown(f"{params.name} is {listed(wrong)}")
+    message = shown(f"{params.name} is {join_words(wrong)}")
     return failed(message, hint=hint or f"rosparam get {params.name} shows it; set it to the lab's value")
 
 
 def _not_there(package: PackageFacts, run: Run, names: Iterable[str], params: ParamValueParams) -> Verdict:
     near = near_names(params.name, names)
     if near:
-        message = f"there is no parameter {params.name}; there is {listed(near)}"
+        message = f"there is no parameter {params.name}; there is {join_words(near)}"
         hint = "with ~, or within <node>, a parameter's name is below the node's own; without, it is not"
         return failed(message, hint=hint)
     if absent := no_node(package, run, f"there is no parameter {params.name}"):

@@ -8,7 +8,7 @@ from grader.checks.executable import find_script
 from grader.checks.registry import check
 from grader.checks.support.param_tree import absolute, instead, own, tree
 from grader.checks.support.process import Life, life
-from grader.checks.support.text import listed, near_names, shown
+from grader.checks.support.text import near_names, shown
 from grader.checks.support.yaml_words import explain_yaml
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -22,6 +22,7 @@ from grader.model.verdict import (
     inconclusive,
     passed,
 )
+from grader.wording import join_words
 
 
 class ParamsLoadedParams(Record):
@@ -52,7 +53,7 @@ def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -
         `rosparam load <file>`, then `rosparam list` shows the names.
     """
     wanted = [absolute(name) for name in params.names]
-    expected = f"rosparam load {params.file} sets {listed(wanted)}"
+    expected = f"rosparam load {params.file} sets {join_words(wanted)}"
     source = find_script(package, params.file)
     found = own(tree(run))
     one = life(run, params.process)
@@ -67,10 +68,11 @@ def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -
             _missing(found, missing, source.path)
             if missing
             else passed(
-                f"{source.path} loads and sets {listed(wanted)}", hint=_place_hint(source.path, params.file)
+                f"{source.path} loads and sets {join_words(wanted)}",
+                hint=_place_hint(source.path, params.file),
             )
         )
-    measured = f"on the server: {listed(found)}" if found else "nothing on the server"
+    measured = f"on the server: {join_words(found)}" if found else "nothing on the server"
     cited: tuple[Citation, ...] = (EvidenceCitation(evidence=run.evidence, topic="/grader/param"),)
     place = (FileCitation(file=source.path),) if source and not verdict.citations else ()
     update = {"expected": expected, "measured": measured, "citations": (*verdict.citations, *place, *cited)}
@@ -82,7 +84,7 @@ def _no_file(package: PackageFacts, path: str) -> Verdict:
     names = {PurePosixPath(f.path).name: f.path for f in package.files}
     yaml = [p for n, p in names.items() if n.endswith((".yaml", ".yml"))]
     near = [names[n] for n in near_names(name, names)] or yaml
-    seen = f"; there is {listed(near)}" if near else ""
+    seen = f"; there is {join_words(near)}" if near else ""
     hint = f"git mv {near[0]} {path}" if near else f"write {path}, then git add, commit and push it"
     return failed(f"{path} is not in the package{seen}", hint=hint)
 

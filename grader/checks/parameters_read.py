@@ -11,12 +11,13 @@ from grader.checks.support.names import GlobalName
 from grader.checks.support.param_given import broken, given, is_printed
 from grader.checks.support.printed import printed_lines
 from grader.checks.support.process import lives
-from grader.checks.support.text import listed, plural, shown
+from grader.checks.support.text import shown
 from grader.checks.support.unheard import HAND_IN
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, passed, unjudged
+from grader.wording import join_words, plural
 
 
 class ParamsReadParams(Record):
@@ -48,11 +49,11 @@ def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadP
     known = given(run)
     lines = printed_lines(run)
     missing = [n for n in params.names if n not in known or not is_printed(known[n].value, lines)]
-    expected = f"the values of {listed(params.names)} on the server are printed"
+    expected = f"the values of {join_words(params.names)} on the server are printed"
     verdict = (
         _not_printed(package, build, run, params, missing)
         if missing
-        else passed(f"prints the values of {listed(params.names)} that are on the server")
+        else passed(f"prints the values of {join_words(params.names)} that are on the server")
     )
     cite = EvidenceCitation(evidence=run.evidence, topic="/grader/console")
     measured = f"{len(params.names) - len(missing)} of {plural(len(params.names), 'value')} printed"
@@ -64,7 +65,7 @@ def _not_printed(
     package: PackageFacts, build: Run, run: Run, params: ParamsReadParams, missing: Sequence[str]
 ) -> Verdict:
     known = given(run)
-    names = listed(missing)
+    names = join_words(missing)
     if not lives(run):
         return unjudged("the node was not started: there is no script to run", hint=HAND_IN)
     if end := broken(package, run):
@@ -73,7 +74,9 @@ def _not_printed(
     strange = [n for n in missing if n not in known or not known[n].in_file]
     if strange:
         file = params.file or "the student's file"
-        message = f"{names} {_are(missing)} not printed, and {listed(strange)} {_are(strange)} not in {file}"
+        message = (
+            f"{names} {_are(missing)} not printed, and {join_words(strange)} {_are(strange)} not in {file}"
+        )
         return unjudged(message, hint=f"mend the names in {file} first")
     lines = printed_lines(run)
     hard = next(

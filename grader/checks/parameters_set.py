@@ -10,12 +10,13 @@ from grader.checks.support.param_given import broken, given, is_printed
 from grader.checks.support.param_tree import absolute, tree
 from grader.checks.support.printed import printed_lines
 from grader.checks.support.process import lives
-from grader.checks.support.text import listed, shown
+from grader.checks.support.text import shown
 from grader.checks.support.unheard import HAND_IN
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, passed, unjudged
+from grader.wording import join_words
 
 
 class ParamsSetParams(Record):
@@ -52,7 +53,7 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
     )
     after = tree(run, until_ns=until_ns)
     got = after.get(params.name)
-    others = f", {listed(params.unchanged)} as before" if params.unchanged else ""
+    others = f", {join_words(params.unchanged)} as before" if params.unchanged else ""
     expected = f"{params.name} is {params.value}{others}" + (", and it is logged" if params.logged else "")
     verdict = (
         (None if _is_value(got, params.value) else _not_set(package, run, after, params, until_ns))
@@ -98,7 +99,7 @@ def _not_set(
         )
         return failed(message, hint="set it as soon as the values are read, without a long sleep before it")
     others = dict.fromkeys(absolute(e.name) for e in mine)
-    instead = f"; the node sets {listed(others)}" if others else ""
+    instead = f"; the node sets {join_words(others)}" if others else ""
     return failed(f"{params.name} is never set to {params.value}{instead}", hint=hint)
 
 

@@ -14,12 +14,12 @@ from grader.checks.support.geometry import followed, relative
 from grader.checks.support.lateness import NO_EXCUSE, Lateness, lateness
 from grader.checks.support.names import GlobalName
 from grader.checks.support.path_deviation import Way, measured, metres, spot, stands, what_is_wrong
-from grader.checks.support.text import listed, number
 from grader.checks.support.tracks import Track, run_seconds, track
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, significant
 
 LATE_MS = 25.0
 LATE_P95_MS = 5.0
@@ -94,7 +94,7 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
     span = EvidenceCitation(evidence=run.evidence, topic=params.topic)
     return verdict.model_copy(
         update={
-            "expected": f"a way through {listed(map(spot, params.points))}, within {metres(params.tolerance_m)}",
+            "expected": f"a way through {join_words(map(spot, params.points))}, within {metres(params.tolerance_m)}",
             "measured": verdict.measured or "no path",
             "citations": (*verdict.citations, span),
         }
@@ -113,7 +113,7 @@ def _judged(found: Track, run: Run, params: PathParams) -> Verdict:
     figures = measured(taken, course, params.way)
     if course.done:
         count = f"{len(params.points)} points" if len(params.points) > 1 else "its point"
-        return passed(f"the path passes {count} within {number(params.tolerance_m)} m", measured=figures)
+        return passed(f"the path passes {count} within {significant(params.tolerance_m)} m", measured=figures)
     if stands(taken):
         hint = "publish a velocity that is not 0, again and again while it has to drive"
         return unjudged("it never moves", measured=figures, hint=hint)

@@ -9,10 +9,11 @@ from grader.checks.build import judge_build
 from grader.checks.registry import NoParams, check
 from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.process import Life, lives
-from grader.checks.support.text import bare, listed, shown
+from grader.checks.support.text import bare, shown
 from grader.evidence.run import Run
 from grader.model.package import CMakeCall, PackageFacts
 from grader.model.verdict import EvidenceCitation, FileCitation, Status, Verdict, failed, inconclusive, passed
+from grader.wording import join_words
 
 NO_PROGRAM = {"IMPORTED", "ALIAS", "EXCLUDE_FROM_ALL"}
 CANNOT_START = {126, 127}
@@ -70,7 +71,7 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
     if made and not programs:
         return _not_started(package, made).model_copy(update={"expected": expected})
     broken = list(_broken(package, run, programs))
-    measured = f"{verdict.measured}; programs: {listed(_name(p) for p in programs) or 'none'}"
+    measured = f"{verdict.measured}; programs: {join_words(_name(p) for p in programs) or 'none'}"
     if not broken:
         message = f"{verdict.message}{_how_they_went(programs)}"
         return passed(message, expected=expected, measured=measured)
@@ -102,10 +103,10 @@ def _not_started(package: PackageFacts, made: dict[str, CMakeCall]) -> Verdict:
     set_at = next((c for c in calls if c.name == "catkin_package"), None)
     early = [c for c in made.values() if set_at and c.file == set_at.file and c.line < set_at.line]
     if not early:
-        message = f"catkin_make succeeded, but no program was started ({listed(made)})"
+        message = f"catkin_make succeeded, but no program was started ({join_words(made)})"
         return inconclusive(message, measured="built, not started", hint="grade again")
     message = (
-        f"catkin_make succeeded, but rosrun finds no {listed((c.args[0] for c in early), 'or')}: "
+        f"catkin_make succeeded, but rosrun finds no {join_words((c.args[0] for c in early), 'or')}: "
         "add_executable(…) stands above catkin_package(…)"
     )
     cited = tuple(FileCitation(file=c.file, line=c.line) for c in early)
@@ -150,7 +151,7 @@ def _how_they_went(programs: list[Life]) -> str:
         for name, code in codes.items()
         if code
     ]
-    return "; ".join([f", and {listed(_name(p) for p in programs)} can be started", *ended])
+    return "; ".join([f", and {join_words(_name(p) for p in programs)} can be started", *ended])
 
 
 def _name(one: Life) -> str:

@@ -13,7 +13,6 @@ from grader.checks.support.gaps import described, rhythm
 from grader.checks.support.lateness import NO_EXCUSE, Lateness, lateness
 from grader.checks.support.losses import all_lost, whole_until_ns
 from grader.checks.support.process import early_end, observed_until_ns
-from grader.checks.support.text import hertz, number, plural, seconds
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
@@ -28,6 +27,7 @@ from grader.model.verdict import (
     passed,
     unjudged,
 )
+from grader.wording import hertz, plural, seconds, significant
 
 FLOOD_FACTOR = 5
 LATE_P95_SHARE = 0.2
@@ -153,7 +153,7 @@ def _flood(found: Rhythm, package: PackageFacts, params: RateParams) -> Verdict 
     where = f" ({slips[0].file}, line {slips[0].line}: {slips[0].message})" if slips else ""
     return failed(
         f"{params.topic} is flooded with {hertz(found.mean_hz)}: the loop does not sleep{where}",
-        hint=f"call rate.sleep(), with brackets, in each turn; rate = rospy.Rate({number(params.rate_hz)})",
+        hint=f"call rate.sleep(), with brackets, in each turn; rate = rospy.Rate({significant(params.rate_hz)})",
         citations=tuple(FileCitation(file=s.file, line=s.line) for s in slips[:3]),
     )
 
@@ -206,7 +206,7 @@ def _bursts(found: Rhythm, outside: list[int], even: bool, params: RateParams) -
 
 
 def _wrong_mean(found: Rhythm, params: RateParams) -> Verdict:
-    direction, nominal = "slow" if found.mean_hz < params.rate_hz else "fast", number(params.rate_hz)
+    direction, nominal = "slow" if found.mean_hz < params.rate_hz else "fast", significant(params.rate_hz)
     message = f"{params.topic} is too {direction}: {hertz(found.mean_hz)} instead of {nominal} Hz"
     return failed(message, hint=_rate_hint(found.mean_hz / params.rate_hz, nominal))
 

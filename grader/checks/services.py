@@ -22,11 +22,11 @@ from grader.checks.support.calls import (
 from grader.checks.support.comparing import differences
 from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.names import GlobalName, TypeName
-from grader.checks.support.text import listed, plural
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, plural
 
 
 class ServiceParams(Record):
@@ -112,7 +112,7 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
     shown = wrong[0] if wrong else next(reversed(made), None)
     return verdict.model_copy(
         update={
-            "expected": listed(f"call {n}: {fields(w)}" for n, w in enumerate(params.expect, 1)),
+            "expected": join_words(f"call {n}: {fields(w)}" for n, w in enumerate(params.expect, 1)),
             "measured": verdict.measured or _measured(shown),
             "citations": (*verdict.citations, _citation(shown, run)),
         }
@@ -148,7 +148,7 @@ def _fault(
     found = list(differences(one.response, wanted, params.tolerance))
     if not found:
         return None
-    message = f"{params.service}, called with {fields(one.request)}, answers {listed(map(str, found))}"
+    message = f"{params.service}, called with {fields(one.request)}, answers {join_words(map(str, found))}"
     return failed(message, hint=f"try it by hand: rosservice call {params.service} …")
 
 

@@ -6,11 +6,12 @@ from grader.checks.registry import check
 from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.losses import all_lost
 from grader.checks.support.process import early_end
-from grader.checks.support.text import listed, near_names, plural
+from grader.checks.support.text import near_names
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, plural
 
 SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
 
@@ -52,12 +53,12 @@ def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verd
         verdict = all_lost(run, params.topic) or silent
     else:
         count = sum(len(c.messages) for c in heard)
-        publishers = listed(dict.fromkeys(c.publisher for c in heard))
+        publishers = join_words(dict.fromkeys(c.publisher for c in heard))
         verdict = passed(
             f"{publishers} publishes {params.type} on {params.topic} ({plural(count, 'message')})"
         )
     expected = f"{params.type} on {params.topic}"
-    measured = listed(f"{plain_type(c.type)} by {c.publisher}" for c in channels) or published_topics(run)
+    measured = join_words(f"{plain_type(c.type)} by {c.publisher}" for c in channels) or published_topics(run)
     return verdict.model_copy(
         update={"expected": expected, "measured": measured, "citations": _cite(run, channels)}
     )
@@ -74,7 +75,7 @@ def student_topics(run: Run) -> dict[str, str]:
 
 def published_topics(run: Run) -> str:
     topics = student_topics(run)
-    return f"topics: {listed(f'{t} ({k})' for t, k in topics.items())}" if topics else "no topic"
+    return f"topics: {join_words(f'{t} ({k})' for t, k in topics.items())}" if topics else "no topic"
 
 
 def _wrong_type(channel: Channel, params: TopicTypeParams) -> Verdict:
@@ -90,7 +91,7 @@ def _silent(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verdict
     others = student_topics(run)
     near = near_names(params.topic, others)
     if near and not advertised:
-        message = f"there is no {params.topic}; the node publishes on {listed(near)}"
+        message = f"there is no {params.topic}; the node publishes on {join_words(near)}"
         return failed(message, hint=f"name the topic {params.topic} in rospy.Publisher(…)")
     ended = early_end(run)
     if ended is not None:
@@ -107,14 +108,14 @@ def _silent(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verdict
         hint = f"run the node, and look at rostopic info {params.topic}"
         return unjudged(f"nothing came on {params.topic}: no node was there to publish", hint=hint)
     message = f"no node publishes on {params.topic}"
-    only = f"it publishes on {listed(others)}; " if others else ""
+    only = f"it publishes on {join_words(others)}; " if others else ""
     return failed(message, hint=f"{only}add rospy.Publisher('{params.topic}', …) and publish in the loop")
 
 
 def _not_recorded(run: Run, topic: str) -> Verdict:
     """Another tool's recording does not tell whether the topic was silent or only not recorded."""
     near = near_names(topic, student_topics(run))
-    instead = f"; {listed(near)} is" if near else ""
+    instead = f"; {join_words(near)} is" if near else ""
     hint = f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all topics"
     return unjudged(f"{topic} is not in {run.evidence}{instead}", hint=hint)
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from grader.checks.registry import check
 from grader.checks.support.absence import no_node, published_topics
 from grader.checks.support.names import GlobalName, plain_type
-from grader.checks.support.text import listed, near_names
+from grader.checks.support.text import near_names
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, passed
+from grader.wording import join_words
 
 
 class OnlyTopicsParams(Record):
@@ -51,8 +52,10 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
         verdict = missing or passed("no topic beside those of the lab is published")
     return verdict.model_copy(
         update={
-            "expected": f"no topic beside {listed(params.topics)}" if params.topics else "no topic at all",
-            "measured": verdict.measured or listed(published) or "no topic",
+            "expected": f"no topic beside {join_words(params.topics)}"
+            if params.topics
+            else "no topic at all",
+            "measured": verdict.measured or join_words(published) or "no topic",
             "citations": (
                 *verdict.citations,
                 EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),
@@ -67,7 +70,7 @@ def _unexpected(
     first = unexpected[0]
     missing = [t for t in params.topics if t not in published and not t.endswith("*")]
     meant = near_names(first, missing)
-    named = listed(f"{t} ({plain_type(published[t])})" if published[t] else t for t in unexpected)
+    named = join_words(f"{t} ({plain_type(published[t])})" if published[t] else t for t in unexpected)
     message = f"{_publisher(run, first)} publishes on {named}, which the lab does not ask for"
     hint = f"did you mean {meant[0]}?" if meant else f"remove the rospy.Publisher('{first}', …)"
     return failed(message, hint=hint)

@@ -17,8 +17,8 @@ from rich.text import Text
 from grader.classes.batch.flow import Watcher
 from grader.classes.batch.job import Outcome
 from grader.classes.batch.progress import Course
-from grader.report.text import number
 from grader.shown import line
+from grader.wording import number
 
 REFRESH_HZ = 4
 NAME_CHARS = 40

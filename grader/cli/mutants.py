@@ -11,7 +11,8 @@ from rich.text import Text
 
 from grader.authoring.mutation.model import LostCriterion, MutantResult, RubricTest
 from grader.report.terminal import emit, open_console
-from grader.report.text import line, number, visible
+from grader.report.text import line, visible
+from grader.wording import number
 
 MARKS = {
     "killed": ("✓", "green"),

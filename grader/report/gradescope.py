@@ -16,9 +16,10 @@ from grader.model.verdict import Status
 from grader.report.hidden import hidden_ids
 from grader.report.settled import decided, decision, late_words, look_again
 from grader.report.summary import missing_hidden, visible_words
-from grader.report.text import json_text, line, number, text_limit
+from grader.report.text import json_text, line, text_limit
 from grader.report.view import places, points_of
 from grader.rubric.model import Rubric
+from grader.wording import number
 
 LIMIT = 1000
 HIDDEN = "after_published"

@@ -13,8 +13,9 @@ from grader.model.verdict import FileCitation, Status
 from grader.report.findings import repository_path
 from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
 from grader.report.settled import automatic_words, decision, look_again
-from grader.report.text import line, number, text_limit, visible
+from grader.report.text import line, text_limit, visible
 from grader.report.view import places, points_of
+from grader.wording import number
 
 OUTCOME = {
     Status.PASS: None,

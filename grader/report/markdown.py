@@ -13,10 +13,11 @@ from grader.report import noticed
 from grader.report.mermaid import mermaid
 from grader.report.settled import TITLE, automatic_words, decided, decision, late_words, look_again
 from grader.report.summary import NOT_SETTLED, verdict_words, visible_words
-from grader.report.text import line, markdown, markdown_code, number
+from grader.report.text import line, markdown, markdown_code
 from grader.report.unwalled import without_sandbox
 from grader.report.view import Loss, arrange, not_graded, places, points_of
 from grader.rubric.model import Rubric
+from grader.wording import number
 
 BYTES_MAX = 60_000
 """A comment on GitHub has 65,536 characters, a step's summary 1 MiB."""

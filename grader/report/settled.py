@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 
 from grader.model.result import AppliedOverride, Automatic, CriterionResult, GradingResult, HandedIn
-from grader.report.text import number
+from grader.wording import number, plural
 
 TITLE = "Decided by a person"
 BY = {"roster": "as the roster says", "commit": "the commit's date", "nobody": "nobody says it"}
@@ -27,7 +27,7 @@ def _times(known: HandedIn) -> str:
     zone = (known.deadline or known.at).tzinfo if known.at else None
     at = f"handed in {_time(known.at.astimezone(zone))} ({BY[known.by]})" if known.at else ""
     days = known.extension_days
-    extension = f" with {number(days)} {'day' if days == 1 else 'days'} of extension" if days else ""
+    extension = f" with {plural(days, 'day')} of extension" if days else ""
     deadline = f"deadline {_time(known.deadline)}{extension}" if known.deadline else ""
     return ", ".join(words for words in (at, deadline) if words)
 

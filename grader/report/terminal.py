@@ -16,10 +16,11 @@ from grader.model.verdict import Status
 from grader.report import settled
 from grader.report.noticed import COSTS_NOTHING, TITLE, place, words
 from grader.report.summary import visible_words
-from grader.report.text import line, number, uncommanded
+from grader.report.text import line, uncommanded
 from grader.report.unwalled import without_sandbox
 from grader.report.view import Loss, arrange, not_graded, places, points_of
 from grader.rubric.model import Rubric
+from grader.wording import number
 
 LIMIT = 500
 NAME_LIMIT = 30

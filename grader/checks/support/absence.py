@@ -5,12 +5,13 @@ from __future__ import annotations
 from grader.checks.support.exit_cause import explain_end
 from grader.checks.support.losses import all_lost
 from grader.checks.support.process import Life, early_end, life, lives
-from grader.checks.support.text import listed, near_names
+from grader.checks.support.text import near_names
 from grader.checks.support.unheard import HAND_IN
 from grader.checks.topic import SYSTEM_TOPICS
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.verdict import Verdict, inconclusive, unjudged
+from grader.wording import join_words
 
 
 def no_node(package: PackageFacts, run: Run, what: str) -> Verdict | None:
@@ -35,10 +36,10 @@ def no_message(package: PackageFacts, run: Run, topic: str) -> Verdict:
     if lost := all_lost(run, topic):
         return lost
     published = published_topics(run)
-    measured = listed(published) or "no topic"
+    measured = join_words(published) or "no topic"
     near = near_names(topic, published)
     if topic not in published and near:
-        message = f"nothing came on {topic}; the node publishes on {listed(near)}"
+        message = f"nothing came on {topic}; the node publishes on {join_words(near)}"
         return unjudged(message, measured=measured, hint=f"name the topic {topic}")
     refused = [e for _, e in run.recorder if e.topic == topic and e.event in {"refused", "invalid"}]
     if refused and not run.student_channels(topic):

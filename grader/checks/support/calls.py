@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 from grader.checks.support.absence import life_of, no_node
 from grader.checks.support.exit_cause import explain_end, explain_traceback
 from grader.checks.support.names import plain_type
-from grader.checks.support.text import listed, near_names, shown
+from grader.checks.support.text import near_names, shown
 from grader.checks.support.traceback import HEADING, Traceback, tracebacks
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.verdict import Verdict, failed, unjudged
+from grader.wording import join_words
 
 LOGGERS = ("/get_loggers", "/set_logger_level")
 
@@ -51,7 +52,10 @@ def offers(run: Run) -> dict[str, Offer]:
 
 def described(found: Mapping[str, Offer]) -> str:
     """All services in one line."""
-    return listed(f"{name} ({offer.type or 'type unknown'})" for name, offer in found.items()) or "no service"
+    return (
+        join_words(f"{name} ({offer.type or 'type unknown'})" for name, offer in found.items())
+        or "no service"
+    )
 
 
 def exchanges(run: Run, service: str) -> tuple[Exchange, ...]:
@@ -83,11 +87,11 @@ def not_offered(package: PackageFacts, run: Run, service: str) -> Verdict:
         message = f"{service} is offered by {owner}, which is not a node of the package"
         return failed(message, hint=f"offer it with rospy.Service('{service}', …) in a node of your own")
     if near:
-        message = f"there is no service {service}; {found[near[0]].node} offers {listed(near)}"
+        message = f"there is no service {service}; {found[near[0]].node} offers {join_words(near)}"
         return failed(message, hint=_rename_hint(service, near[0], found[near[0]].node))
     if absent := no_node(package, run, f"there is no service {service}"):
         return absent
-    others = f"; it offers {listed(found)}" if found else ""
+    others = f"; it offers {join_words(found)}" if found else ""
     message = f"no node offers {service}{others}"
     return failed(
         message, hint=f"add rospy.Service('{service}', …, callback) before the loop or rospy.spin()"

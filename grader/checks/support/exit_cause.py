@@ -7,11 +7,12 @@ import signal
 from typing import NamedTuple
 
 from grader.checks.support.process import Life
-from grader.checks.support.text import seconds, shown
+from grader.checks.support.text import shown
 from grader.checks.support.traceback import Traceback, tracebacks
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.verdict import FileCitation
+from grader.wording import seconds
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
 RUN_IT = "run it by itself with rosrun, and read what it prints last"

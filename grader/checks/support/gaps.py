@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from grader.checks.support.text import hertz, plural
 from grader.evidence.run import Channel
 from grader.model.message_rate import Rhythm
+from grader.wording import hertz, plural
 
 
 def described(found: Rhythm, low_ns: float, high_ns: float) -> str:

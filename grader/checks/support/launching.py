@@ -8,9 +8,10 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.executable import find_script
-from grader.checks.support.text import listed, near_names
+from grader.checks.support.text import near_names
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.verdict import FileCitation, Verdict, failed, unjudged
+from grader.wording import join_words
 
 UNRESOLVED = "$("
 ATTRIBUTES = ("pkg", "type", "name")
@@ -44,7 +45,7 @@ def unreadable(package: PackageFacts, file: LaunchFile | None, launch: str) -> V
         others = [f.path for f in package.launch_files]
         names = {PurePosixPath(f.path).name: f.path for f in package.files}
         near = [names[n] for n in near_names(launch, names)]
-        seen = f"; there is {listed(dict.fromkeys([*near, *others]))}" if near or others else ""
+        seen = f"; there is {join_words(dict.fromkeys([*near, *others]))}" if near or others else ""
         message = f"{launch} is not in the package{seen}"
         hint = f"put it at launch/{launch}, then git add, commit and push it"
         cited = tuple(FileCitation(file=p) for p in (near or others)[:3])
@@ -72,7 +73,7 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
     """
     missing = [a for a in ATTRIBUTES if not (getattr(node, a) or "").strip()]
     if missing:
-        return _slip(node, f"<node> has no {listed(missing)}", "a <node> needs pkg, type and name")
+        return _slip(node, f"<node> has no {join_words(missing)}", "a <node> needs pkg, type and name")
     pkg, name = str(node.pkg), str(node.type)
     if path := next((a for a in ("pkg", "type") if "$(find" in str(getattr(node, a))), None):
         return _slip(
@@ -148,7 +149,7 @@ def _no_program(package: PackageFacts, node: LaunchNode) -> Slip:
     names = [n for n in _program_names(package) if n != name]
     near = near_names(plain, names) or [n for n in names if suffix and suffix != ".py" and n.endswith(suffix)]
     if near:
-        return _slip(node, f"{why}; there is {listed(near)}", f'write type="{near[0]}"')
+        return _slip(node, f"{why}; there is {join_words(near)}", f'write type="{near[0]}"')
     return _slip(node, why, "type is the script's whole file name, with its ending")
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from grader.checks.registry import Check
-from grader.checks.support.text import plural
 from grader.evidence.run import Run
 from grader.model.record import Record
 from grader.model.verdict import Status, Verdict, inconclusive
+from grader.wording import plural
 
 LOGGED = frozenset({"logs", "hears"})
 """Families that also read what is logged."""

@@ -11,9 +11,10 @@ from grader.checks.support.exit_cause import Ending, explain_end, explain_traceb
 from grader.checks.support.param_tree import absolute, own, tree
 from grader.checks.support.printed import Line
 from grader.checks.support.process import early_end, lives
-from grader.checks.support.text import listed, near_names
+from grader.checks.support.text import near_names
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
+from grader.wording import join_words
 
 NOT_IN_FILE = "not in the file"
 
@@ -61,6 +62,6 @@ def broken(package: PackageFacts, run: Run) -> Ending | None:
     parts = {part for name in own(tree(run)) for part in name.split("/") if part}
     last = PurePosixPath(key[1]).name
     near = near_names(last, parts - {last})
-    seen = f"; there is {listed(near)}" if near else ""
+    seen = f"; there is {join_words(near)}" if near else ""
     hint = "write the name as rosparam list shows it, one key for each level: get_param('details')['name']['first']"
     return end._replace(cause=f"{end.cause}: nothing is named {key[1]} there{seen}", hint=hint)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from grader.checks.support.text import listed, near_names
+from grader.checks.support.text import near_names
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
+from grader.wording import join_words
 
 SYSTEM = (
     "/rosdistro",
@@ -66,4 +67,4 @@ def instead(found: Mapping[str, Any], name: str) -> str:
     others = own(found)
     same = [n for n in others if n.rpartition("/")[2] == last]
     near = same or near_names(name, others) or list(others)
-    return f"there is no {name}" + (f"; there is {listed(near)}" if near else "")
+    return f"there is no {name}" + (f"; there is {join_words(near)}" if near else "")

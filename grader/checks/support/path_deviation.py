@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from grader.checks.support.geometry import Course, Point, Pose, followed, length_m, off_m
-from grader.checks.support.text import number
+from grader.wording import significant
 
 MOVED_M = 0.01
 
@@ -34,7 +34,7 @@ class Way(NamedTuple):
 
 
 def spot(point: Point) -> str:
-    return f"({number(round(point[0], 2))}, {number(round(point[1], 2))})"
+    return f"({significant(round(point[0], 2))}, {significant(round(point[1], 2))})"
 
 
 def metres(distance_m: float) -> str:
@@ -83,7 +83,7 @@ def _wrong_start(path: Sequence[Pose], way: Way, course: Course) -> Words | None
 def _strays(path: Sequence[Pose], way: Way, course: Course) -> Words:
     peak, far_m = _peak(path, way, course)
     where = f"at {spot(peak.point)}, {_after(path, peak)}"
-    allowed = f"{number(way.tolerance_m)} m are allowed"
+    allowed = f"{significant(way.tolerance_m)} m are allowed"
     if course.reached == len(way.points):
         apart = metres(math.dist(peak.point, way.points[-1]))
         message = f"it passes every point, and goes on: it is {apart} from the last {where}"
@@ -113,7 +113,7 @@ def _too_far(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
         return None
     message = f"it drives {metres(beyond_m)} past {way.name(corner)}, {_after(path, path[first])}"
     return Words(
-        message, f"turn sooner: {number(way.tolerance_m)} m are allowed; distance is speed times time"
+        message, f"turn sooner: {significant(way.tolerance_m)} m are allowed; distance is speed times time"
     )
 
 

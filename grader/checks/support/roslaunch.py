@@ -10,10 +10,11 @@ from typing import NamedTuple
 from grader.checks.executable import find_script
 from grader.checks.support.exit_cause import CAUSES, explain_traceback, process_tracebacks
 from grader.checks.support.process import lives, observed_until_ns
-from grader.checks.support.text import bare, listed, shown
+from grader.checks.support.text import bare, shown
 from grader.evidence.run import Run
 from grader.model.package import LaunchNode, PackageFacts
 from grader.model.verdict import FileCitation
+from grader.wording import join_words
 
 _ERRORS = (
     "ERROR: cannot launch",
@@ -199,7 +200,9 @@ def _silent(run: Run, node: LaunchNode) -> Absence | None:
     if not started:
         return None
     if others:
-        why = f"{listed(others)} came up instead: the script does not take the name that roslaunch gives it"
+        why = (
+            f"{join_words(others)} came up instead: the script does not take the name that roslaunch gives it"
+        )
         return Absence(why, "start the script itself, and leave sys.argv as it is", of_script=True)
     return Absence("its script runs, but never registers as a node", hint, of_script=True)
 

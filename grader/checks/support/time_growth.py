@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from grader.checks.support.clocks import Seconds
-from grader.checks.support.text import plural
 from grader.model.verdict import Verdict, failed, inconclusive
+from grader.wording import plural
 
 SLACK_S = 1.5
 SLACK_SHARE = 0.05

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from grader.checks.support.exit_cause import explain_end, explain_traceback, process_tracebacks
 from grader.checks.support.printed import Line, Probe, numbers_in
 from grader.checks.support.process import early_end, lives
-from grader.checks.support.text import listed, near_names, number, plural, shown
+from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, unjudged
+from grader.wording import join_words, plural, significant
 
 HAND_IN = "add the script to the package, and push it"
 CALLBACK_HINT = (
@@ -31,14 +32,14 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
         return unjudged(message, hint=end.hint, citations=end.citations, measured="ended")
     subscribed = student_subscriptions(run)
     cite = (EvidenceCitation(evidence=run.evidence, topic="/grader/graph"),)
-    measured = f"subscribed to {listed(subscribed)}" if subscribed else "no subscription"
+    measured = f"subscribed to {join_words(subscribed)}" if subscribed else "no subscription"
     if differs := _types_differ(run, topic):
         return differs.model_copy(update={"measured": measured, "citations": cite})
     if topic in subscribed:
         message = f"the node subscribed to {topic}, but the grader sent nothing"
         return inconclusive(message, hint="grade again", measured=measured, citations=cite)
     near = near_names(topic, subscribed)
-    other = f"; it subscribes to {listed(near or subscribed)}" if subscribed else ""
+    other = f"; it subscribes to {join_words(near or subscribed)}" if subscribed else ""
     hint = f"add rospy.Subscriber('{topic}', …, callback)"
     return failed(
         f"the node never subscribes to {topic}{other}", hint=hint, measured=measured, citations=cite
@@ -130,6 +131,6 @@ def _by_number(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequenc
         hint = "subscribe with a callback and rospy.spin(); wait_for_message(…) waits for one message only"
         return failed("only the first message is printed", hint=hint)
     value = missing[0].value
-    first = number(value) if isinstance(value, int) else repr(value)
+    first = significant(value) if isinstance(value, int) else repr(value)
     message = f"{len(missing)} of {plural(len(probes), 'message')} not printed, the first of them {first}"
     return failed(message, hint=CALLBACK_HINT)

@@ -11,6 +11,7 @@ from grader.classes.overrides import FILE as OVERRIDES
 from grader.model.batch import MISSING, ROSTER
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status
+from grader.wording import first_few
 
 WHY_OPEN = {
     Status.INCONCLUSIVE: "could not be judged",
@@ -68,5 +69,4 @@ def _waiting(row: Row) -> tuple[CriterionResult, ...]:
 
 def _open(row: Row) -> str:
     names = [f"{c.id} ({WHY_OPEN[c.status]})" for c in _waiting(row)]
-    more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
-    return ", ".join(names[:NAMES_SHOWN]) + more
+    return first_few(names, NAMES_SHOWN)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from grader.classes.gradebook.identity import Kind, Platform, plain
 from grader.classes.gradebook.marks import Wanted
 from grader.errors import UsageError
+from grader.wording import first_few
 
 _GRADE = {"grade", "bewertung", "note", "calificación", "valutazione"}
 _MAXIMUM = {"maximumgrade", "bestwertung", "notemaximale", "calificaciónmáxima", "valutazionemassima"}
@@ -74,5 +75,4 @@ def _titles(name: str, platform: Platform) -> set[str]:
 
 def _others(header: Sequence[str], known: dict[str, Kind]) -> str:
     names = [name for name in header if name.strip() and name not in known]
-    more = f" and {len(names) - SHOWN_MAX} more" if len(names) > SHOWN_MAX else ""
-    return f"there are: {', '.join(names[:SHOWN_MAX])}{more}"
+    return f"there are: {first_few(names, SHOWN_MAX)}"

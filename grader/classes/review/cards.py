@@ -10,8 +10,8 @@ from grader.classes.review.edit_conflicts import mark
 from grader.model.result import AppliedOverride, CriterionResult, Override
 from grader.model.verdict import Status
 from grader.report.html.words import SIGNS
-from grader.report.text import number
 from grader.rubric.model import Rubric
+from grader.wording import number
 
 MANUAL = "manual"
 

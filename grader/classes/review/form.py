@@ -7,7 +7,7 @@ import unicodedata
 from datetime import date
 
 from grader.model.result import AUTHOR_CHARS, COMMENT_CHARS, Override
-from grader.report.text import number
+from grader.wording import number
 
 POINTS = re.compile(r"\d{1,9}(?:[.,]\d{0,9})?|[.,]\d{1,9}", re.ASCII)
 

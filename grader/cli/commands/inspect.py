@@ -14,7 +14,8 @@ from grader.cli.output import say_json
 from grader.errors import ExitCode
 from grader.evidence.inspect import ChannelSummary, Inspection, ProcessSummary, inspect_file
 from grader.report.terminal import emit, open_console
-from grader.report.text import line, number
+from grader.report.text import line
+from grader.wording import number
 
 CHANNELS_MAX = 500
 

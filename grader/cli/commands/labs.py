@@ -10,9 +10,10 @@ from rich.text import Text
 from grader.cli.output import say_json
 from grader.errors import ExitCode
 from grader.report.terminal import emit, open_console
-from grader.report.text import number, visible
+from grader.report.text import visible
 from grader.rubric.load import all_rubrics
 from grader.rubric.model import Rubric
+from grader.wording import number
 
 
 def run(*, as_json: bool = False) -> ExitCode:

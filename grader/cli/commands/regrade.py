@@ -16,8 +16,8 @@ from grader.cli.output import say, say_json
 from grader.cli.sandbox_report import say_unwalled
 from grader.errors import ExitCode
 from grader.portable import cores
-from grader.report.text import number
 from grader.rubric.load import load_rubric
+from grader.wording import first_few, number
 
 if TYPE_CHECKING:
     from grader.arena.sandbox import Mode
@@ -98,10 +98,9 @@ def _told(batch: BatchFolder, regraded: Sequence[Regraded]) -> Iterator[str]:
             yield f"{one.entry.id}: stays as it was: {one.error}"
     missing = [one for one in regraded if one.missing]
     if missing:
-        names = ", ".join(one.entry.id for one in missing[:NAMES_SHOWN])
-        more = f" and {len(missing) - NAMES_SHOWN} more" if len(missing) > NAMES_SHOWN else ""
+        names = first_few([one.entry.id for one in missing], NAMES_SHOWN)
         scenarios = ", ".join(dict.fromkeys(name for one in missing for name in one.missing))
-        yield f"{len(missing)} must run again, there is no recording of {scenarios}: {names}{more}"
+        yield f"{len(missing)} must run again, there is no recording of {scenarios}: {names}"
         yield "  hint: --run-missing runs them"
     changed = sum(bool(one.changes) for one in regraded)
     judged = sum(one.after is not None for one in regraded)

@@ -36,6 +36,7 @@ from grader.report.terminal import open_console, print_report
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.model import Rubric
+from grader.wording import first_few
 
 STDOUT = "-"
 OF_LINES = ("junit", "sarif", "code-quality", "annotations", "classroom")
@@ -119,9 +120,8 @@ def _written(folders: Sequence[Path], rubric: LoadedRubric) -> ExitCode:
 
 def _say_others(names: Sequence[str], rubric: LoadedRubric) -> None:
     if names:
-        more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
-        shown = ", ".join(names[:NAMES_SHOWN])
-        _remark(f"{shown}{more}: judged by another version of {rubric.path} than this one")
+        shown = first_few(names, NAMES_SHOWN)
+        _remark(f"{shown}: judged by another version of {rubric.path} than this one")
 
 
 def _remark(text: str) -> None:

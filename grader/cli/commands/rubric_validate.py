@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from grader.cli.output import say
 from grader.errors import ExitCode, RubricError
-from grader.report.text import number
 from grader.rubric.load import load_rubric
+from grader.wording import number
 
 
 def run(*, files: list[str]) -> ExitCode:

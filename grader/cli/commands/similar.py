@@ -22,6 +22,7 @@ from grader.model.similarity import NotCompared, Pair, Similarity
 from grader.portable import cores
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
+from grader.wording import first_few
 
 NAME_CHARS = 22
 PATH_CHARS = 40
@@ -134,5 +135,4 @@ def _not_compared(one: NotCompared) -> str:
 
 
 def _ids(group: tuple[str, ...]) -> str:
-    more = f" and {len(group) - IDS_SHOWN} more" if len(group) > IDS_SHOWN else ""
-    return ", ".join(line(name, NAME_CHARS) for name in group[:IDS_SHOWN]) + more
+    return first_few([line(name, NAME_CHARS) for name in group], IDS_SHOWN)

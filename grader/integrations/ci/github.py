@@ -17,7 +17,8 @@ from grader.integrations.ci.outcome import TITLES, Graded, Outcome, of_error
 from grader.report.annotations import EACH_MAX, github_annotation, github_annotations
 from grader.report.classroom import classroom
 from grader.report.findings import Severity
-from grader.report.text import line, markdown, number
+from grader.report.text import line, markdown
+from grader.wording import number
 
 LINE_CHARS = 1000
 

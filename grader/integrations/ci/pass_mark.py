@@ -6,10 +6,10 @@ import re
 from dataclasses import dataclass
 
 from grader.errors import UsageError
-from grader.report.text import number
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 from grader.shown import line
+from grader.wording import number
 
 FORM = re.compile(r"(\d{1,6}(?:\.\d{1,6})?)\s*(%?)")
 HINT = "write points (12.5) or a percentage of the visible points (60%)"

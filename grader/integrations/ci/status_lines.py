@@ -6,9 +6,9 @@ from grader.errors import PackageNotFound, SubmissionError
 from grader.integrations.ci.outcome import Outcome
 from grader.integrations.ci.pass_mark import needed_words
 from grader.model.result import GradingResult
-from grader.report.text import number
 from grader.report.view import arrange
 from grader.rubric.model import Rubric
+from grader.wording import number
 
 STUDENTS = {SubmissionError.kind, PackageNotFound.kind}
 NO_MARK_LOST = "this is not the submission's fault, and no mark is lost"

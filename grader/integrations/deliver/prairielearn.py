@@ -18,8 +18,9 @@ from grader.integrations.deliver.wheel import system_script, wheel
 from grader.model.result import CriterionResult, GradingResult
 from grader.report.hidden import hidden_ids
 from grader.report.settled import late_words
-from grader.report.text import html, line, number, text_limit
+from grader.report.text import html, line, text_limit
 from grader.rubric.load import LoadedRubric
+from grader.wording import number
 
 DEFAULT_MINUTES, MOST_MINUTES = 10, 10
 """PrairieLearn lets an external grader run for 600 seconds at most."""

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from grader.model.batch import CriterionInfo
 from grader.report.class_page.lines import LETTERS, Line
 from grader.report.html import svg
-from grader.report.text import number
+from grader.wording import number
 
 ROW = 22
 ONE_EACH_MAX = 500

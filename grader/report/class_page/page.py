@@ -27,7 +27,8 @@ from grader.report.class_page.points import histogram, spread
 from grader.report.class_page.timing import span, timing
 from grader.report.class_page.todo import todos
 from grader.report.html.shell import environment, policy, script, style
-from grader.report.html.words import SIGNS, count
+from grader.report.html.words import SIGNS
+from grader.wording import plural
 
 UNWALLED_MAX = 3
 SHARED_MAX, SHARED_FIRST, ALONE_MAX, WORDINGS_MAX = 100, 12, 100, 12
@@ -145,7 +146,7 @@ def _template() -> Template:
         "scripts": (copying, own),
         "policy": Markup(policy(copying, own)),  # noqa: S704 - ours
         "signs": {LETTERS[status]: (sign, status.value) for status, sign in SIGNS.items()},
-        "count": count,
+        "count": plural,
         "span": span,
         "link_to": link_to,
         "shared_first": SHARED_FIRST,

@@ -10,7 +10,7 @@ from statistics import fmean, median
 from markupsafe import Markup
 
 from grader.report.html import svg
-from grader.report.text import number
+from grader.wording import number
 
 BINS_MAX = 20
 STEPS = (0.1, 0.2, 0.25, 0.5, 1, 2, 2.5, 5, 10, 20, 25, 50, 100, 200, 250, 500, 1000)

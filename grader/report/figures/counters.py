@@ -14,12 +14,12 @@ from grader.checks.support.counter_wrap import (
     whose_turn,
 )
 from grader.checks.support.counting import Count, Step, counts, longest, wrong_steps
-from grader.checks.support.text import number
 from grader.evidence.run import Run
 from grader.model.figure import POINTS_MAX, CounterFigure
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status
 from grader.report.figures.bounded import finite, named, second, short, spread
+from grader.wording import significant
 
 FIRST_VALUES = 40
 MARKS_MAX = 40
@@ -36,7 +36,9 @@ def start_figures(run: Run, params: StartParams) -> Iterator[CounterFigure]:
     for count in counts(run, params.topic)[:1]:
         right = begins_with(count, params.start) or run.foreign
         known = right or missed_the_first(run, params.topic, count)
-        marks = [] if known else [(0, f"the first value is {number(count.values[0])}, not {params.start}")]
+        marks = (
+            [] if known else [(0, f"the first value is {significant(count.values[0])}, not {params.start}")]
+        )
         steps = [s for s in count.steps[:FIRST_VALUES] if s.change < -1]
         first = range(len(count.values))[:FIRST_VALUES]
         yield _figure(count, steps, marks, run=run, topic=params.topic, kept=first)
@@ -69,7 +71,7 @@ def wrap_figures(run: Run, package: PackageFacts, params: WrapParams) -> Iterato
 
 
 def _step_text(step: Step, *, flood: bool, lost: bool) -> str:
-    comes = f"after {number(step.before)} comes {number(step.after)}"
+    comes = f"after {significant(step.before)} comes {significant(step.after)}"
     if flood or lost:
         why = "a flood: its publisher drops values" if flood else "lost on the way, with a gap in time"
         return f"{comes} ({why})"
@@ -94,7 +96,7 @@ def _figure(
 ) -> CounterFigure:
     shown = [mark for mark in marks[:MARKS_MAX] if _drawable(count.values[mark[0]])]
     numbers = [i for i in kept or _kept(count, [i for i, _ in shown], turns) if _drawable(count.values[i])]
-    places = {number: place for place, number in enumerate(numbers)}
+    places = {significant: place for place, significant in enumerate(numbers)}
     return CounterFigure(
         topic=named(topic),
         publisher=named(count.callerid or "an unnamed node"),

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 
 from grader.checks.rate import RateParams, judged_rhythm, sleeps_explain, was_late
 from grader.checks.support.lateness import lateness
-from grader.checks.support.text import listed
 from grader.evidence.run import Channel, Run
 from grader.model.figure import POINTS_MAX, RateFigure
 from grader.model.message_rate import Rhythm
 from grader.report.figures.bounded import finite, named, second, spread
+from grader.wording import join_words
 
 PUBLISHERS_MAX = 3
 EXTREMES = 20
@@ -38,7 +38,7 @@ def _figure(run: Run, params: RateParams, found: Rhythm, channels: Sequence[Chan
     low_ns, high_ns = params.bounds_ns
     return RateFigure(
         topic=named(params.topic),
-        publisher=named(listed(c.publisher for c in channels)),
+        publisher=named(join_words(c.publisher for c in channels)),
         scenario=named(run.scenario),
         times_s=tuple(second(run, arrivals[i]) for i in kept),
         gaps_s=tuple(round(found.gaps_ns[i] / 1e9, 6) for i in kept),

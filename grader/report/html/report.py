@@ -15,10 +15,10 @@ from grader.report.html import words
 from grader.report.html.page import Detail, Docs, Maker, Page
 from grader.report.html.shell import environment, policy, script, style
 from grader.report.summary import visible_words
-from grader.report.text import number
 from grader.report.unwalled import without_sandbox
 from grader.report.view import ReportView, arrange, not_graded
 from grader.rubric.model import Rubric
+from grader.wording import number
 
 BYTES_MAX = 400_000
 DETAILS = (

@@ -6,7 +6,8 @@ from collections.abc import Iterable
 
 from markupsafe import Markup
 
-from grader.report.text import html, line, number
+from grader.report.text import html, line
+from grader.wording import number
 
 TEXT_CHARS = 80
 

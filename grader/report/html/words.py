@@ -8,9 +8,9 @@ from grader.errors import GraderError
 from grader.judging.summary import passed
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
-from grader.report.text import number
 from grader.report.view import ReportView, not_graded
 from grader.rubric.model import Rubric
+from grader.wording import number, plural
 
 SIGNS = {
     Status.PASS: "✓",
@@ -54,12 +54,7 @@ def _kinds(error: type[GraderError]) -> Iterator[type[GraderError]]:
 
 def points(value: float) -> str:
     """`1 point`, `2.5 points`."""
-    return f"{number(value)} {'point' if value == 1 else 'points'}"
-
-
-def count(many: int, one: str, more: str = "") -> str:
-    """`1 thing`, `3 things`."""
-    return f"{many} {one if many == 1 else more or one + 's'}"
+    return plural(value, "point")
 
 
 def verdict(result: GradingResult, rubric: Rubric, hidden: int) -> tuple[str, str]:
@@ -102,7 +97,7 @@ def in_short(result: GradingResult, view: ReportView) -> str:
     said = [] if late > 0 else ["Nothing was lost."]
     if lost > 0:
         costs = "costs" if len(view.lost) == 1 else "cost"
-        said = [f"{count(len(view.lost), 'thing')} {costs} you {points(lost)}."]
+        said = [f"{plural(len(view.lost), 'thing')} {costs} you {points(lost)}."]
     if len(view.lost) > 1:
         said.append(f"The first one alone is worth {points(view.lost[0].points)}.")
     if late > 0:

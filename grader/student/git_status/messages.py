@@ -11,6 +11,7 @@ from grader.student.git_status.commands import Commands
 from grader.student.git_status.environment import Surroundings
 from grader.student.git_status.pushed import pushed_points
 from grader.student.git_status.state import Change, State
+from grader.wording import plural
 
 LAST_FETCH = "as of the last fetch or push"
 
@@ -52,7 +53,7 @@ def _in_git(state: State, commands: Commands, around: Surroundings) -> Iterator[
         yield Point(kind="unfinished", text=text, mend=commands.git("status"))
     if head.commit is None and not around.committing:
         named = [*(c.path for c in files.changes if c.what != "deleted"), *files.untracked]
-        text = f"Nothing is committed yet, none of {_count(len(named), 'file')}."
+        text = f"Nothing is committed yet, none of {plural(len(named), 'file')}."
         yield Point(kind="no-commit", text=text, mend=commands.add_and_commit(named))
     else:
         changes = () if around.committing else files.changes
@@ -70,7 +71,7 @@ def _changed(changes: tuple[Change, ...], commands: Commands) -> Iterator[Point]
     if present:
         paths = [c.path for c in present]
         staged = all(c.staged for c in present)
-        text = f"{_count(len(paths), 'file')} that {_were(paths)} checked {_are(paths)} not committed: {listing(paths)}"
+        text = f"{plural(len(paths), 'file')} that {_were(paths)} checked {_are(paths)} not committed: {listing(paths)}"
         mend = commands.commit() if staged else commands.add_and_commit(paths)
         yield Point(kind="uncommitted", text=text, mend=mend)
     gone = [c.path for c in changes if c.what == "deleted"]
@@ -86,7 +87,7 @@ def _changed(changes: tuple[Change, ...], commands: Commands) -> Iterator[Point]
 def _new(state: State, commands: Commands, where: str) -> Iterator[Point]:
     paths = list(state.files.untracked)
     if paths:
-        number = _count(len(paths), "file")
+        number = plural(len(paths), "file")
         text = f"{number} that {_were(paths)} {where} {_are(paths)} not in git: {listing(paths)}"
         yield Point(kind="untracked", text=text, mend=commands.add_and_commit(paths))
 
@@ -130,10 +131,6 @@ def _around(state: State, *, mends: bool) -> Iterator[Point]:
         yield Point(
             kind="submodule", text=text, mend=Commands.status_of(state.around, state.top), remark=True
         )
-
-
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}{'' if number == 1 else 's'}"
 
 
 def _were(paths: list[str]) -> str:

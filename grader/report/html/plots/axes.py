@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from markupsafe import Markup
 
 from grader.report.html.svg import element, text
-from grader.report.text import number
+from grader.wording import number
 
 LEFT, RIGHT, TOP, BOTTOM = 46.0, 14.0, 22.0, 40.0
 TICKS = 5

@@ -9,7 +9,7 @@ from markupsafe import Markup
 from grader.model.figure import CounterFigure
 from grader.report.html.plots.axes import TOP, Frame
 from grader.report.html.svg import dots, drawing, element, path, text
-from grader.report.text import number
+from grader.wording import number
 
 WHOLE = (760.0, 240.0)
 CLOSE = (760.0, 220.0)

@@ -9,7 +9,7 @@ from markupsafe import Markup
 from grader.model.figure import PathFigure
 from grader.report.html.plots.axes import BOTTOM, LEFT, RIGHT, TOP, Frame
 from grader.report.html.svg import drawing, element, path, text
-from grader.report.text import number
+from grader.wording import number
 
 SIDE = 340.0
 WIDEST = 2.0

@@ -10,8 +10,7 @@ from markupsafe import Markup
 from grader.model.figure import RateFigure
 from grader.report.html.plots.axes import TOP, Frame
 from grader.report.html.svg import dots, drawing, element, text
-from grader.report.html.words import count
-from grader.report.text import number
+from grader.wording import number, plural
 
 OVER_TIME = (460.0, 230.0)
 HISTOGRAM = (330.0, 230.0)
@@ -39,7 +38,7 @@ def rate_words(figure: RateFigure) -> str:
     if figure.ends_silent:
         words += "; the last one is the silence at the end"
     if figure.late:
-        words += f". The grading machine itself was late {count(len(figure.late), 'time')} (hatched)"
+        words += f". The grading machine itself was late {plural(len(figure.late), 'time')} (hatched)"
     return words + "."
 
 
@@ -137,9 +136,9 @@ def _histogram(figure: RateFigure, name: str) -> Markup:
     children = _gap_bounds(figure, frame)
     children += frame.axes("milliseconds from message to message", "messages")
     children += [
-        frame.box((i * width, (i + 1) * width), (0, count), class_="column")
-        for i, count in enumerate(counts)
-        if count
+        frame.box((i * width, (i + 1) * width), (0, plural), class_="column")
+        for i, plural in enumerate(counts)
+        if plural
     ]
     longer = sum(gap > longest for gap in figure.gaps_s)
     if longer:

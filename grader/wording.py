@@ -1,0 +1,54 @@
+"""How numbers, counts and lists are written in every text that the grader shows.
+
+Pure functions that every room may use. Nothing is escaped here: `untrusted_text` does that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+LISTED_MAX = 6
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Return `10`, `87.5`: at most so many decimals, and no zeros at the end."""
+    return f"{value:.{digits}f}".rstrip("0").rstrip(".") or "0"
+
+
+def significant(value: float) -> str:
+    """Return a measured number with four significant digits: `9.98`, `0.001234`; whole numbers as they are."""
+    return f"{value:.10g}" if float(value).is_integer() else f"{value:.4g}"
+
+
+def hertz(rate_hz: float) -> str:
+    """Return `9.98 Hz`, `1200 Hz`."""
+    return f"{rate_hz:.2f} Hz" if rate_hz < 1000 else f"{rate_hz:.0f} Hz"
+
+
+def seconds(duration_ns: float) -> str:
+    """Return nanoseconds as `2.5 s`."""
+    return f"{duration_ns / 1e9:.1f} s"
+
+
+def plural(count: float, noun: str, more: str = "") -> str:
+    """Return `1 node`, `2.5 points`, `3 nodes`; `more` is a plural that is not the noun with an s."""
+    return f"{number(count)} {noun if count == 1 else more or noun + 's'}"
+
+
+def join_words(names: Iterable[str], last: str = "and") -> str:
+    """Return `a, b and c`, at most six of them and how many more there are."""
+    items = list(names)
+    if len(items) > LISTED_MAX:
+        items = [*items[:LISTED_MAX], f"{len(items) - LISTED_MAX} more"]
+    return " ".join([", ".join(items[:-1]), last, items[-1]]) if len(items) > 1 else "".join(items)
+
+
+def first_few(names: Sequence[str], most: int) -> str:
+    """Return `a, b, c and 4 more`: the first `most` names, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+def shorten(text: str, chars_max: int) -> str:
+    """Return `text`, or its beginning with an ellipsis, at most so many characters."""
+    return text if len(text) <= chars_max else text[: chars_max - 1] + "…"
