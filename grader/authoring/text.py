@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from grader.shown import line, uncommanded, visible
+from grader.untrusted_text import line, uncommanded, visible
 
 NOTE_CHARS = 300
 HEAD = """\

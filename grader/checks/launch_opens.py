@@ -77,15 +77,14 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
         return verdict.model_copy(
             update={"expected": expected, "measured": "no launch file that can be read"}
         )
+    scripts = join_words(node.type or "" for node in _shells(package, file))
     verdict = (
         not_run(run)
         or _script(package, build, file, params)
         or _page(package, file, run, params)
         or missing_node(package, file, params.script)
         or _beside(package, file, run, params)
-        or passed(
-            f"{join_words(n.type or '' for n in _shells(package, file))} opens {_url(pages, params)} in {params.program}"
-        )
+        or passed(f"{scripts} opens {_url(pages, params)} in {params.program}")
     )
     cited: tuple[Citation, ...] = (
         FileCitation(file=file.path, line=1),

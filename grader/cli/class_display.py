@@ -17,7 +17,7 @@ from rich.text import Text
 from grader.classes.batch.flow import Watcher
 from grader.classes.batch.job import Outcome
 from grader.classes.batch.progress import Course
-from grader.shown import line
+from grader.untrusted_text import line
 from grader.wording import number
 
 REFRESH_HZ = 4

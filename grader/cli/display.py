@@ -20,7 +20,7 @@ from rich.text import Text
 from grader.cli.early import print_early
 from grader.model.progress import Progress, StepState
 from grader.model.result import EarlyVerdict
-from grader.shown import line
+from grader.untrusted_text import line
 
 REFRESH_HZ = 8
 NAME_LIMIT = 120

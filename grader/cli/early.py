@@ -12,7 +12,7 @@ from grader.cli.output import say
 from grader.model.result import EarlyVerdict
 from grader.report.terminal import STYLES, mark
 from grader.report.text import line, visible
-from grader.shown import uncommanded
+from grader.untrusted_text import uncommanded
 
 TITLE = "Your files, before anything is built or run:"
 SO_FAR = "so far: the build may still settle it otherwise"

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from grader.errors import ExitCode, GraderError, RubricError
-from grader.shown import line, visible
+from grader.untrusted_text import line, visible
 
 LINE_CHARS = 2000
 SIGPIPE_CODE = 141  # what a shell reports for a program that a closed pipe ended

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 
-from grader.shown import json_text, line
+from grader.untrusted_text import json_text, line
 
 LINE_CHARS = 4000
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 from grader.evidence.run import Run
 from grader.model.result import Note
-from grader.shown import clip
+from grader.untrusted_text import clip
 
 KINDS = ("refused", "limit")
 NOTES_MAX = 20

@@ -10,7 +10,7 @@ from grader.judging.points import round_half_up
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
-from grader.shown import clipped, json_text, text_limit
+from grader.untrusted_text import clipped, json_text, text_limit
 
 LIMIT = 2000
 

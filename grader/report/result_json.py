@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from grader.model.result import GradingResult
-from grader.shown import clipped, json_text, text_limit
+from grader.untrusted_text import clipped, json_text, text_limit
 
 LIMIT = 2000
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
 from grader.rubric.model import Rubric
-from grader.shown import CITATIONS_MAX, clip
+from grader.untrusted_text import CITATIONS_MAX, clip
 from grader.wording import number
 
 PLACE_CHARS = 300

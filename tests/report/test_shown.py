@@ -10,7 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.shown import HIDDEN_CATEGORIES, clip, clipped, json_text, line, text_limit, uncommanded, visible
+from grader.untrusted_text import (
+    HIDDEN_CATEGORIES,
+    clip,
+    clipped,
+    json_text,
+    line,
+    text_limit,
+    uncommanded,
+    visible,
+)
 from tests.report.nasty import ANY_TEXT, STEERING, TEXTS
 
 TO_A_CI = re.compile(r"^\s*::|##[A-Za-z]*\[", re.MULTILINE)

@@ -8,7 +8,7 @@ import yaml
 
 from grader.authoring.mutation.model import MutantResult, Step
 from grader.authoring.mutation.plan import Planned
-from grader.shown import visible
+from grader.untrusted_text import visible
 
 HEADER = """\
 # The mutants of {rubric}'s reference solution, and the criteria that each of them must cost, no more and no less.

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 from itertools import islice
 
-from grader.shown import visible
+from grader.untrusted_text import visible
 from grader.wording import shorten
 
 SIMILARITY = 0.8

@@ -25,7 +25,7 @@ from grader.model.version import RUN as RUN_FORMAT
 from grader.model.version import UPDATE
 from grader.results import EVIDENCE
 from grader.results import read_result as read_result  # noqa: PLC0414 - for whoever has a batch's folder
-from grader.shown import json_text
+from grader.untrusted_text import json_text
 
 RUN = "run.json"
 BYTES_MAX = 64 << 20

@@ -9,7 +9,7 @@ from grader.errors import UsageError
 from grader.intake import safe_name
 from grader.model.batch import Entry
 from grader.model.result import GradingResult
-from grader.shown import line
+from grader.untrusted_text import line
 
 FAILED, INCONCLUSIVE, CHANGED = "failed", "inconclusive", "changed"
 WORDS = (FAILED, INCONCLUSIVE, CHANGED)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from decimal import Decimal
 
 from grader.report.text import csv_text
-from grader.shown import line
+from grader.untrusted_text import line
 
 CELL_CHARS = 10_000
 """What a cell holds of a longer text; a workbook's may have 32,767 characters."""

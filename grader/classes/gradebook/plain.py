@@ -12,7 +12,7 @@ from grader.classes.gradebook.model import Book, Row
 from grader.classes.gradebook.table import cells, header
 from grader.classes.gradebook.whole import whole_file
 from grader.model.result import GradingResult
-from grader.shown import json_text, steers
+from grader.untrusted_text import json_text, steers
 
 OPTIONAL = {
     name for name, field in GradingResult.model_fields.items() if not (field.is_required() or field.default)

@@ -21,7 +21,7 @@ from grader.model.batch import BatchRun
 from grader.portable import cores
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.needs import needs_ros
-from grader.shown import line
+from grader.untrusted_text import line
 
 if TYPE_CHECKING:
     from grader.arena.sandbox import Mode

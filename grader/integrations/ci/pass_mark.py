@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from grader.errors import UsageError
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
-from grader.shown import line
+from grader.untrusted_text import line
 from grader.wording import number
 
 FORM = re.compile(r"(\d{1,6}(?:\.\d{1,6})?)\s*(%?)")

@@ -11,7 +11,7 @@ from typing import Literal, cast
 from grader.errors import UsageError
 from grader.integrations.ci.outcome import Outcome
 from grader.integrations.ci.pass_mark import Mark, read_mark
-from grader.shown import line
+from grader.untrusted_text import line
 
 Mode = Literal["auto", "require", "none"]
 MODES = ("auto", "require", "none")

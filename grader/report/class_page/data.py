@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from grader.model.batch import CriterionInfo
 from grader.report.class_page.lines import CHARS, Line
-from grader.shown import line
+from grader.untrusted_text import line
 
 REPORT = "report.html"
 COLUMNS = ("id", "name", "group", "link", "state", "points", "letters", "earned", "late", "decided", "time")

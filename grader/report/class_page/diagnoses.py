@@ -11,7 +11,7 @@ from grader.model.batch import MISSING, ROSTER
 from grader.model.result import GradingResult
 from grader.model.verdict import Status
 from grader.report.class_page.lines import MESSAGE_CHARS
-from grader.shown import line
+from grader.untrusted_text import line
 
 WORDINGS_MAX = 40
 LOST = {Status.PARTIAL, Status.FAIL}

@@ -10,7 +10,7 @@ from grader.model.batch import MISSING, ROSTER, CriterionInfo, Entry
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.unwalled import without_sandbox
-from grader.shown import line
+from grader.untrusted_text import line
 
 CHARS = 160
 MESSAGE_CHARS = 300

@@ -12,7 +12,7 @@ from grader.model.batch import BatchRun
 from grader.report.class_page.commands import again, review
 from grader.report.class_page.data import link_to
 from grader.report.class_page.lines import CHARS, MESSAGE_CHARS, Line
-from grader.shown import line
+from grader.untrusted_text import line
 
 SHOWN_MAX = 200
 

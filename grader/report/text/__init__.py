@@ -13,7 +13,7 @@
 from grader.report.text.html import html, html_address
 from grader.report.text.markdown import markdown, markdown_code
 from grader.report.text.table import csv_text
-from grader.shown import clip, json_text, line, text_limit, uncommanded, visible
+from grader.untrusted_text import clip, json_text, line, text_limit, uncommanded, visible
 
 __all__ = [
     "clip",

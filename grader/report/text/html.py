@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from html import escape
 
-from grader.shown import visible
+from grader.untrusted_text import visible
 
 _ADDRESS = re.compile(r"https?://[!-~]+", re.IGNORECASE)
 

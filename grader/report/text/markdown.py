@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from grader.shown import visible
+from grader.untrusted_text import visible
 
 _LINKED = re.compile(
     r"""

@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 
-from grader.shown import line
+from grader.untrusted_text import line
 
 CELL_CHARS = 2000
 Cell = str | float | None

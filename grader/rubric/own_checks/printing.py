@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from typing import TextIO
 
-from grader.shown import visible
+from grader.untrusted_text import visible
 
 LINE_CHARS = 65_536
 _STREAMS = threading.RLock()

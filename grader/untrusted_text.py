@@ -1,6 +1,6 @@
-r"""Text that others wrote, made visible: what would steer a terminal or command a CI's log is written out.
+r"""Make text of unknown origin visible: what would control a terminal or command a CI system is escaped.
 
-An escape becomes `\x1b`. Every station may use this; `grader.report.text` has what documents need beyond it.
+An escape character becomes `\x1b`. Every room may use this; `grader.report.text` adds what documents need.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ INVISIBLE = frozenset(
 STACKED_MAX = 4
 CACHED_SIGNS = 1 << 16
 CRITERIA_CHARS = 600_000
-"""What all the texts of a report's criteria together may have."""
+"""Of all the texts of a report's criteria together."""
 TEXTS_EACH = 8
 CITATIONS_MAX = 20
 
@@ -32,45 +32,42 @@ _COMMAND_AT_START = re.compile(r"^((?:[^\S\n]|\x1b\[[0-9;]*m)*):(?=:)", re.MULTI
 
 
 def steers(character: str) -> bool:
-    """Whether it is no sign that can be seen: a control, format, private, unassigned or invisible character."""
+    """Return whether it is a control, format, private, unassigned or otherwise invisible character."""
     return unicodedata.category(character) in HIDDEN_CATEGORIES or ord(character) in INVISIBLE
 
 
 def visible(text: str, *, lines: bool = False) -> str:
-    """`text` with whatever steers, hides or commands written out. With `lines`, line ends and tabs stay.
-
-    What is visible already stays as it is.
-    """
+    """Return `text` with everything escaped that controls, hides or commands. With `lines`, line ends and tabs stay."""
     if not (text.isascii() and text.isprintable()):
         text = _unstacked(text.translate(_LINES if lines else _LINE))
     return uncommanded(text)
 
 
 def uncommanded(text: str) -> str:
-    """Lines that no CI system takes for a command to itself. Colours that are ours may stand before them."""
+    """Return lines that no CI system takes for a command, also behind the grader's own colours."""
     if "##" in text:
         text = _COMMAND.sub(r"\\x23", text)
     return _COMMAND_AT_START.sub(r"\1\\x3a", text) if "::" in text else text
 
 
 def clip(text: str, limit: int) -> str:
-    """`text`, or its beginning and how much is left out."""
+    """Return `text`, or its beginning and how many characters are left out."""
     return _cut(text[:limit], max(0, len(text) - limit))
 
 
 def line(text: str, limit: int) -> str:
-    """One visible line that is hardly longer than `limit` characters; it says how many of `text` are left out."""
+    """Return one visible line of about `limit` characters at most, which says how many of `text` are left out."""
     head = _fitting(text, limit, visible)
     return _cut(visible(head), len(text) - len(head))
 
 
 def text_limit(criteria: int, most: int) -> int:
-    """How long one text of a report may be, so that a report of many criteria does not grow without end."""
+    """Return how long one text of a report may be, so that many criteria do not make it grow without end."""
     return max(200, min(most, CRITERIA_CHARS // (TEXTS_EACH * max(criteria, 1))))
 
 
 def json_text(data: object, *, ascii_only: bool = False) -> str:
-    """JSON that can be printed anywhere: nothing in it steers or hides, and it reads back as `data`.
+    """Return JSON that can be printed anywhere: invisible characters are escaped, and it reads back as `data`.
 
     Numbers that JSON does not have become null, lone surrogates the text of their escape.
     """
@@ -79,7 +76,7 @@ def json_text(data: object, *, ascii_only: bool = False) -> str:
 
 
 def clipped(data: Any, limit: int) -> Any:  # noqa: ANN401 - JSON
-    """The same data with every text clipped to what JSON writes in `limit` characters, and of citations the first."""
+    """Return the data with every text clipped to what JSON writes in `limit` characters, and the first citations."""
     if isinstance(data, str):
         head = _fitting(data, limit, _json_escaped)
         return _cut(head, len(data) - len(head))
@@ -94,7 +91,7 @@ def clipped(data: Any, limit: int) -> Any:  # noqa: ANN401 - JSON
 
 
 def _fitting(text: str, limit: int, written: Callable[[str], str]) -> str:
-    """The beginning of `text` that is written in `limit` characters."""
+    """Return the beginning of `text` that is written in `limit` characters."""
     head = text[:limit]
     while (length := len(written(head))) > limit:
         head = head[: min(len(head) - 1, len(head) * limit // length)]
@@ -109,13 +106,13 @@ def _plain(data: Any) -> Any:  # noqa: ANN401 - JSON
     if isinstance(data, float):
         return data if math.isfinite(data) else None
     if isinstance(data, str):
-        return data if data.isascii() else _surrogates_written_out(data)
+        return data if data.isascii() else _surrogates_escaped(data)
     if isinstance(data, dict):
         return {_plain(key): _plain(item) for key, item in data.items()}
     return [_plain(item) for item in data] if isinstance(data, list | tuple) else data
 
 
-def _surrogates_written_out(text: str) -> str:
+def _surrogates_escaped(text: str) -> str:
     return text.encode("utf-8", "backslashreplace").decode()
 
 
@@ -143,7 +140,7 @@ class _Signs(dict[int, int | str]):
         return found
 
 
-def _written_out(character: str) -> str:
+def _escaped(character: str) -> str:
     code = ord(character)
     if character in _NAMED:
         return _NAMED[character]
@@ -153,13 +150,13 @@ def _written_out(character: str) -> str:
 
 
 def _unstacked(text: str) -> str:
-    """Marks that are drawn over their letter, and in number over the lines around it: four, then written out."""
+    """Escape all but four marks on a letter: more of them are drawn over the lines around it."""
     if text.isascii() or not any(map(_is_mark, text)):
         return text
     shown, height = [], 0
     for character in text:
         height = height + 1 if _is_mark(character) else 0
-        shown.append(character if height <= STACKED_MAX else _written_out(character))
+        shown.append(character if height <= STACKED_MAX else _escaped(character))
     return "".join(shown)
 
 
@@ -167,4 +164,4 @@ def _is_mark(character: str) -> bool:
     return unicodedata.category(character) in {"Mn", "Me"}
 
 
-_LINE, _LINES, _JSON = _Signs("", _written_out), _Signs("\n\t", _written_out), _Signs("\n", _json_escape)
+_LINE, _LINES, _JSON = _Signs("", _escaped), _Signs("\n\t", _escaped), _Signs("\n", _json_escape)
