@@ -39,8 +39,8 @@ class ExitCode(IntEnum):
 
 
 class GraderError(Exception):
-    """The root. `kind` is the word that `result.json` carries, `blame` says whose fault it is: only one of the
-    submission may take the place of an earlier result. `note` says what became of the result."""
+    """The root. `kind` is the word in `result.json`, `blame` says whose fault it is: only a fault of the submission
+    replaces an earlier result. `note` says what happened to the result."""
 
     kind = "grader"
     blame: Blame = "grader"
@@ -54,7 +54,7 @@ class GraderError(Exception):
 
 
 class UsageError(GraderError):
-    """What was asked for cannot be; nothing was graded, and no result says so."""
+    """What was asked for is not possible; nothing was graded, and no result is written."""
 
     kind = "usage"
     exit_code = ExitCode.USAGE
@@ -92,7 +92,7 @@ class Unreachable(SubmissionError):
 
 
 class EvidenceError(GraderError):
-    """Evidence, or a result, cannot be read, or a newer grader wrote it."""
+    """Evidence or a result cannot be read, or a newer grader wrote it."""
 
     kind = "evidence"
 
@@ -102,7 +102,7 @@ class InternalError(GraderError):
 
 
 class HostError(GraderError):
-    """This machine cannot do what is asked. It costs nobody a mark."""
+    """This machine cannot do what is asked. It costs no marks."""
 
     kind = "host"
     blame = "machine"

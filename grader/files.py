@@ -1,4 +1,8 @@
-"""Files that appear whole or not at all, and folders that are known to be writable before anything is run."""
+"""Files that appear whole or not at all, locks, and temporary folders that do not outlive their grader.
+
+Each temporary folder holds a file that its grader keeps locked: if the lock is free, that grader was killed, and the
+next one removes the folder.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +26,7 @@ if sys.platform != "win32":
 
 HAS_LOCKS = sys.platform != "win32"
 FILE, FOLDER = 0o600, 0o700
-"""Modes of what is for its owner alone: marks are."""
+"""Modes of what only its owner may read, as marks."""
 
 FULL = {
     errno.ENOSPC: "the disk is full",
@@ -35,10 +39,10 @@ FULL = {
 def atomic_write(path: Path, data: bytes, *, public: bool = False) -> None:
     """Write `data` beside `path`, flush it to the disk, and rename it into place.
 
-    The file is for its owner alone, whatever the umask, with folders that are missing; a `public` one is as the umask
-    says. A link stays a link, and what is no file (`/dev/null`, a pipe) is written to and stays what it is.
-    Raises OutputError, or HostError where the disk gives out; then `path` is as it was before, and nothing is
-    left beside it.
+    The file is private to its owner, whatever the umask, and so are missing folders, which are made; a `public` one is
+    as the umask says. A link stays a link, and what is not a file (`/dev/null`, a pipe) is written to.
+    Raises OutputError, or HostError where the disk fails; then `path` is as it was before, and nothing is left beside
+    it.
     """
     path = path.resolve() if path.is_symlink() else path
     if path.exists() and not path.is_file():
@@ -61,14 +65,15 @@ def atomic_write(path: Path, data: bytes, *, public: bool = False) -> None:
 
 
 def new_file(path: Path, *, public: bool = False) -> BinaryIO:
-    """Open a file that is not there yet, for its owner alone unless it is `public`. Raises OSError."""
+    """Create a file and open it, private to its owner unless it is `public`. Raises OSError."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | CLOEXEC | NOFOLLOW | BINARY
     return os.fdopen(os.open(path, flags, 0o666 if public else FILE), "wb")
 
 
 def make_folder(folder: Path, *, public: bool = False) -> bool:
-    """Make a folder, and those above it that are missing, for their owner alone unless they are `public`; whether it is
-    new. One that was there keeps its mode: who made it has decided. Raises OSError."""
+    """Make a folder and its missing parents, private to their owner unless `public`, and return whether it is new.
+
+    A folder that was there keeps its mode, which somebody has chosen. Raises OSError."""
     try:
         folder.mkdir(0o777 if public else FOLDER)
     except FileNotFoundError:
@@ -82,7 +87,7 @@ def make_folder(folder: Path, *, public: bool = False) -> bool:
 
 
 def keep_private(path: Path) -> None:
-    """Leave a file or a folder to its owner alone, where the file system knows modes; a link stays as it is."""
+    """Make a file or folder private to its owner, where the file system has modes; a link stays as it is."""
     with suppress(OSError):
         if not path.is_symlink():
             path.chmod(FOLDER if path.is_dir() else FILE)
@@ -97,7 +102,7 @@ def _write_into(path: Path, data: bytes) -> None:
 
 
 def check_writable(folder: Path) -> None:
-    """Raise OutputError where `folder` (which need not exist yet) cannot be written. Leaves nothing."""
+    """Raise OutputError if `folder` (which need not exist yet) cannot be written. Leaves nothing behind."""
     try:
         place = next(p for p in (folder, *folder.absolute().parents) if os.path.lexists(p))
         with tempfile.TemporaryFile(dir=place):  # without a name: a grader that is killed here leaves nothing
@@ -107,7 +112,7 @@ def check_writable(folder: Path) -> None:
 
 
 def unwritable(path: Path, error: OSError) -> GraderError:
-    """The error for what cannot be written: HostError where the disk gives out, else OutputError."""
+    """Return the error for what cannot be written: HostError if the disk fails, else OutputError."""
     if error.errno in FULL:
         return HostError(
             f"cannot write {path}: {FULL[error.errno]}",
@@ -118,7 +123,7 @@ def unwritable(path: Path, error: OSError) -> GraderError:
 
 
 def sync_tree(folder: Path) -> None:
-    """Flush everything in `folder`, and the folder itself, to the disk, for its owner alone. Raises OSError."""
+    """Make everything in `folder` private to its owner, and flush it and the folder to the disk. Raises OSError."""
     for place, _, files in os.walk(folder, topdown=False):
         for path in (*(Path(place) / name for name in files), Path(place)):
             keep_private(path)
@@ -137,11 +142,11 @@ def sync(path: Path) -> None:
 
 
 def lock(descriptor: int, *, shared: bool = False) -> bool:
-    """Lock an open file or folder until it is closed or this process ends; False where another process has it.
+    """Lock an open file or folder until it is closed or this process ends. Return False if another process holds it.
 
-    Those that lock it `shared` do not keep each other out. Where the system has no such locks, nobody is kept out.
+    `shared` locks do not exclude each other. On a system without locks, nothing is excluded.
 
-    Raises OSError where the file system knows no locks.
+    Raises OSError if the file system has no locks.
     """
     if sys.platform != "win32":
         try:
@@ -152,14 +157,10 @@ def lock(descriptor: int, *, shared: bool = False) -> bool:
 
 
 def wait_for_lock(descriptor: int) -> None:
-    """As `lock`, when those that hold it let it go. Raises OSError where the file system knows no locks."""
+    """Wait until it can be locked, and lock it. Raises OSError if the file system has no locks."""
     if sys.platform != "win32":
         fcntl.flock(descriptor, fcntl.LOCK_EX)
 
-
-# [temporary] Temporary folders that are gone when their grader is: the next grader sweeps up after one that was killed.
-#
-# Each holds a file that its grader keeps locked: where nobody holds the lock, nobody needs the folder.
 
 MARK = ".grader"
 NAME = re.compile(r"grader-(source|fetch|run|check|new|mutants|tests)-[a-z0-9_]{8}")
@@ -168,9 +169,9 @@ ATTEMPTS = 10
 
 @contextmanager
 def temporary_folder(kind: str, base: Path | None = None) -> Iterator[Path]:
-    """A folder `grader-<kind>-…` in `base` (by default where temporary files go), for its owner alone.
+    """Make a private folder `grader-<kind>-…` in `base` (by default where temporary files go), for the block.
 
-    Raises HostError where there is no room for one.
+    Raises HostError if it cannot be made.
     """
     place = base or Path(tempfile.gettempdir())
     sweep(place)
@@ -186,7 +187,7 @@ def temporary_folder(kind: str, base: Path | None = None) -> Iterator[Path]:
 
 
 def sweep(place: Path) -> None:
-    """Remove those of our user's temporary folders in `place` whose graders have ended."""
+    """Remove the user's temporary folders in `place` whose graders have ended."""
     if not HAS_LOCKS:  # nothing tells which have
         return
     with suppress(OSError):  # housekeeping: what cannot be looked at is not ours
@@ -211,7 +212,7 @@ def _sweep(folder: Path) -> None:
 
 
 def _new(prefix: str, place: Path) -> tuple[Path, int]:
-    """A new folder and the descriptor that locks it. One that is still empty may be swept away: then another."""
+    """Return a new folder and the descriptor that locks it. One that is swept away while still empty is made again."""
     try:
         for _ in range(ATTEMPTS):
             folder = Path(tempfile.mkdtemp(prefix=prefix, dir=place))
@@ -237,7 +238,7 @@ def _held(descriptor: int) -> bool:
 
 
 def _remove(folder: Path) -> None:
-    """The mark goes last, so that what is left of a removal that was killed can be told."""
+    """Remove the folder, its mark last: so the rest of a removal that was killed is still recognised."""
     with suppress(OSError):
         for entry in list(os.scandir(folder)):
             if entry.name != MARK:
@@ -257,7 +258,7 @@ def _remove_tree(path: Path) -> None:
 
 
 def _open_up(folder: Path) -> None:
-    """A build may close folders to everybody: what is left of them belongs to our user."""
+    """Make folders accessible again: a build may have removed all permissions."""
     with suppress(OSError):
         folder.chmod(0o700)
         for entry in list(os.scandir(folder)):

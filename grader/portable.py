@@ -1,6 +1,6 @@
-"""What of the system is there on Linux, and elsewhere only in part: whatever judges files alone does without the rest.
+"""What Linux has and other systems have in part. Judging files alone works without the rest.
 
-On Windows no file says whether it may be run, and no folder can be opened or locked. Where a flag is not known it is 0.
+On Windows, files have no executable bit, and folders cannot be opened or locked. Unknown flags are 0.
 """
 
 from __future__ import annotations
@@ -21,48 +21,48 @@ DIRECTORY: int = getattr(os, "O_DIRECTORY", 0)
 CLOEXEC: int = getattr(os, "O_CLOEXEC", 0)
 BINARY: int = getattr(os, "O_BINARY", 0)
 READ = os.O_RDONLY | NONBLOCK | CLOEXEC | BINARY
-"""For files of somebody else: a pipe is not waited for."""
+"""For files that others wrote: opening a pipe does not block."""
 MODES_ON_DISK = os.name == "posix"
-"""Whether a file's mode on the disk says that it may be run."""
+"""Whether files on the disk have an executable bit."""
 SYSTEMS = {"win32": "Windows", "darwin": "macOS"}
 
 
 def system() -> str:
-    """What people call this system; "" for Linux, the only one on which ROS 1's nodes are run."""
+    """Return the name of this system; "" for Linux, the only one on which ROS 1's nodes are run."""
     return "" if sys.platform == "linux" else SYSTEMS.get(sys.platform, sys.platform)
 
 
 def user_id() -> int | None:
-    """The user whose files these are; None where users have no numbers."""
+    """Return the effective user id; None on systems without one."""
     return getattr(os, "geteuid", lambda: None)()
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Return how many cores this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def open_folder(path: os.PathLike[str]) -> int:
-    """A descriptor of a folder, to lock or to flush it; -1 where folders cannot be opened. Raises OSError."""
+    """Open a folder, to lock or to flush it; return -1 where folders cannot be opened. Raises OSError."""
     return os.open(path, os.O_RDONLY | DIRECTORY | CLOEXEC) if DIRECTORY else -1
 
 
 def close(descriptor: int) -> None:
-    """Close what `open_folder` gave."""
+    """Close a descriptor that `open_folder` returned."""
     if descriptor >= 0:
         os.close(descriptor)
 
 
 def kill_group(process: subprocess.Popen[bytes]) -> None:
-    """End a process that has a session of its own, with all that it started, if it is still alive; it is waited for."""
+    """Kill a process in a session of its own with everything it started, if it still runs, and wait for it."""
     if process.poll() is None:
         end_group(process)
 
 
 def end_group(process: subprocess.Popen[bytes]) -> None:
-    """End all that a process with a session of its own started, and itself; it is waited for."""
+    """Kill everything in the session of a process, and itself, and wait for it."""
     with suppress(ProcessLookupError):
         if sys.platform == "win32":
             process.kill()

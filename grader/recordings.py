@@ -1,4 +1,4 @@
-"""Recordings of other tools take their place in a submission's evidence, each as it was handed in."""
+"""Copy recordings that students submit (bags, MCAP files of other tools) into the evidence, unchanged."""
 
 from __future__ import annotations
 
@@ -22,55 +22,55 @@ NAMES_SHOWN = 4
 
 
 def keep_recording(path: Path, folder: Path) -> Path:
-    """The recording that is the whole submission, in the evidence under its own name.
+    """Copy the recording that is the whole submission into the folder, under its own name, and return the copy.
 
-    Raises EvidenceError where it cannot be read, SubmissionError where it is evidence of the grader's own.
+    Raises EvidenceError if it cannot be read, SubmissionError if it is the grader's own evidence.
     """
-    return _taken(path, folder / (safe_name(path.stem) + _suffix(path)))
+    return _copy(path, folder / (safe_name(path.stem) + _suffix(path)))
 
 
 def keep_scenarios(
     rubric: Rubric, submission: Submission | RecordedSubmission, folder: Path, progress: Progress
 ) -> None:
-    """For every scenario with a recording its file, or a file of the grader's own that says why there is none."""
+    """Copy the recording of each scenario that names one, or write an evidence file that says why there is none."""
     for name, scenario in rubric.scenarios.items():
         if scenario.recording is None:
             continue
         progress.step(name, "running", f"looking for {scenario.recording}")
         found = find_recordings(submission.root, scenario.recording)
-        reason = _reason(found, scenario.recording, submission.root, folder / name)
+        reason = _copy_recording(found, scenario.recording, submission.root, folder / name)
         if reason:
-            _note(folder / f"{name}.mcap", name, reason, submission)
+            _write_reason(folder / f"{name}.mcap", name, reason, submission)
         progress.step(
             name, "failed" if reason else "done", next(iter(reason.values()), found[0].name if found else "")
         )
 
 
-def _reason(found: list[Path], pattern: str, root: Path, target: Path) -> dict[str, str]:
-    """What keeps a scenario from having its recording; empty where it is kept as `target`, with its own suffix."""
+def _copy_recording(found: list[Path], pattern: str, root: Path, target: Path) -> dict[str, str]:
+    """Return why a scenario has no recording; empty if it was copied to `target`, with its own suffix."""
     if not found:
         return {RECORDING_MISSING: pattern}
     if len(found) > 1:
         names = ", ".join(path.relative_to(root).as_posix() for path in found[:NAMES_SHOWN])
         return {RECORDING_PROBLEM: f"{len(found)} recordings fit {pattern}: {names}"}
     try:
-        _taken(found[0], target.with_name(target.name + _suffix(found[0])))
+        _copy(found[0], target.with_name(target.name + _suffix(found[0])))
     except (EvidenceError, SubmissionError) as error:
         return {RECORDING_PROBLEM: error.message.replace(f"{root}/", "")}
     return {}
 
 
 def _check(path: Path) -> None:
-    """Raise EvidenceError or SubmissionError where this is no recording that another tool made."""
+    """Raise EvidenceError or SubmissionError if this is not a recording of another tool."""
     (run,) = load_evidence([path]).values()
     if not run.foreign:
         raise SubmissionError(
-            f"{path}: evidence of the grader's own, no recording", hint="`grader judge` judges it again"
+            f"{path}: the grader's own evidence, not a recording", hint="`grader judge` judges it again"
         )
 
 
 def _suffix(path: Path) -> str:
-    """`.bag` or `.mcap`, by which the evidence is found again."""
+    """Return `.bag` or `.mcap`, by which evidence is found."""
     suffix = path.suffix.casefold()
     if suffix in SUFFIXES:
         return suffix
@@ -78,8 +78,8 @@ def _suffix(path: Path) -> str:
         return ".mcap" if file.read(5) == b"\x89MCAP" else ".bag"
 
 
-def _taken(path: Path, target: Path) -> Path:
-    """Copy it, and keep the copy if that is a recording: what is judged is what was looked at."""
+def _copy(path: Path, target: Path) -> Path:
+    """Copy it, and check the copy: so what is judged is what was checked."""
     limit_bytes = Limits().recording_bytes
     if path.stat().st_size > limit_bytes:
         raise EvidenceError(f"{path}: larger than {limit_bytes >> 20} MiB", hint=LESS)
@@ -95,7 +95,7 @@ def _taken(path: Path, target: Path) -> Path:
     return target
 
 
-def _note(
+def _write_reason(
     path: Path, scenario: str, reason: Mapping[str, str], submission: Submission | RecordedSubmission
 ) -> None:
     about = {"submission.id": submission.id, "submission.digest": submission.digest, **reason}

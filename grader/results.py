@@ -1,10 +1,10 @@
-"""One submission's folder of results: evidence and reports take the place of older ones together.
+"""The results folder of one submission: evidence and reports replace older ones together, or not at all.
 
-Everything is written into `.grader-new`, flushed to the disk, and renamed to `.grader-ready`: from there on it counts.
-Then the old result goes, the new evidence and reports come, and the new result last. A grader that is killed in between
-leaves no result, or one that fits the evidence beside it; the next one finishes what it had begun.
+Everything is written into `.grader-new`, flushed to the disk, and renamed to `.grader-ready`: this commits it. Then
+the old result is removed, the new evidence and reports are moved into place, and the new result last. A grader that is
+killed in between leaves no result, or one that fits the evidence beside it; the next one finishes what it had begun.
 
-Folders that are made and files that are written are for their owner alone: they hold a student's marks.
+Folders and files are private to their owner: they hold a student's marks.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ ATTEMPTS = 10
 
 
 class Results:
-    """`with Results(folder) as results:` write into `results.new`, then `results.commit()`; without it nothing changes,
-    and folders that were made are gone again.
+    """`with Results(folder) as results:` write into `results.new`, then call `results.commit()`. Without that, nothing
+    changes, and folders that were made are removed again.
 
-    Raises Busy where another grader works on the same submission, OutputError or HostError where the folder cannot
-    be written.
+    Raises Busy if another grader works on the same submission, OutputError or HostError if the folder cannot be
+    written.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -72,14 +72,14 @@ class Results:
 
     @property
     def complete(self) -> bool:
-        """Whether an earlier run left a result that says what was reached."""
+        """Whether an earlier run left a complete result, one with points."""
         try:
             return json.loads((self.folder / RESULT).read_bytes()).get("status") in COMPLETE
         except (OSError, ValueError, AttributeError):
             return False
 
     def commit(self, *, keep: tuple[str, ...] = ()) -> None:
-        """Let what is in `new` take the place of what was there, but for the parts to `keep`."""
+        """Replace what was there by what is in `new`, except for the parts to `keep`."""
         with self._writable():
             if EVIDENCE in keep:
                 shutil.rmtree(self.evidence)
@@ -106,8 +106,8 @@ class Results:
 
 
 def read_result(folder: Path) -> GradingResult | None:
-    """The result in a submission's folder, of any version that a grader wrote; None where there is none, or a damaged
-    one. Raises EvidenceError where a newer grader wrote it: it must not look as if there were none.
+    """Read the result in a submission's folder, of any version up to this grader's; None if there is none, or it is
+    damaged. Raises EvidenceError if a newer grader wrote it: it must not look as if there were none.
     """
     try:
         return read_result_file(folder / RESULT)
@@ -116,7 +116,7 @@ def read_result(folder: Path) -> GradingResult | None:
 
 
 def read_result_file(file: Path) -> GradingResult | None:
-    """The same of a file of any name. Raises OSError, too."""
+    """Read a result from a file of any name, as `read_result`. Raises OSError, too."""
     data = file.read_bytes()
     try:
         return GradingResult.read_json(data)
@@ -127,7 +127,7 @@ def read_result_file(file: Path) -> GradingResult | None:
 
 
 def finish_killed(out: Path) -> None:
-    """Finish, or throw away, what graders that were killed left in the folders of `out`. Those of live ones stay."""
+    """Finish or discard what killed graders left in the folders of `out`. What running ones are at stays."""
     with suppress(OSError):  # there is no such folder yet
         for folder in list(out.iterdir()):
             with suppress(OSError):  # what cannot be done here is done when that submission is graded
@@ -146,7 +146,7 @@ def _finish(folder: Path) -> None:
 
 
 def _locked(folder: Path) -> int:
-    """A descriptor that holds the folder, made anew where the grader that held it before has just removed it."""
+    """Lock the folder and return its descriptor. The folder is made again if its last grader has just removed it."""
     for _ in range(ATTEMPTS):
         try:
             make_folder(folder)
@@ -177,7 +177,7 @@ def _is_at(descriptor: int, folder: Path) -> bool:
 def _held(descriptor: int) -> bool:
     try:
         return lock(descriptor)
-    except OSError:  # a file system without locks: whoever shares it has to know what they do
+    except OSError:  # a file system without locks: its users must not grade the same submission at once
         return True
 
 
@@ -188,7 +188,7 @@ def _recover(folder: Path) -> None:
 
 
 def _roll_forward(folder: Path) -> None:
-    """Put what is ready into its place. May be stopped anywhere, and begun again."""
+    """Move what is ready into place. Can be interrupted anywhere, and started again."""
     ready = folder / READY
     names = ready / NAMES
     if names.exists():
@@ -204,7 +204,7 @@ def _roll_forward(folder: Path) -> None:
 
 
 def _clear(folder: Path, coming: list[str]) -> None:
-    """The old result goes first. What is in place already is no longer among what is ready, and stays."""
+    """Remove what is replaced, the old result first. What is in place already is no longer in `ready`, and stays."""
     ready = folder / READY
     for name in dict.fromkeys((*PARTS, *coming)):
         old = folder / name

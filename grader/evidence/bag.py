@@ -1,4 +1,4 @@
-"""ROS 1 bags (`rosbag record`) as runs, by rosbags."""
+"""Read ROS 1 bags (`rosbag record`) as runs, with rosbags."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MAX_RECORDS = 2_000_000
 MAX_HEADER_BYTES = 1 << 20
 MAX_LINE_BYTES = 64
 READ_TIMES = 4
-"""No sound bag's bytes are read as often as this."""
+"""Reading a sound bag takes fewer bytes than its size times this."""
 _LENGTH = struct.Struct("<I")
 _DAMAGE = (
     AssertionError,
@@ -41,21 +41,21 @@ _DAMAGE = (
     ValueError,
 )
 _AGAIN = "record it again, or copy it again"
-_REINDEX = "`rosbag reindex FILE` mends a bag whose recording was not ended with Ctrl-C"
+_REINDEX = "`rosbag reindex FILE` fixes a bag whose recording was not ended with Ctrl-C"
 
 
 class BagLimitError(ValueError):
-    """The bag breaks a limit."""
+    """The bag exceeds a limit."""
 
 
 def load_bag(path: Path, budget: MemoryBudget | None = None) -> Run:
-    """A bag as a real-time run named after the file; it says nothing of processes. Raises EvidenceError."""
+    """Read a bag as a real-time run named after the file, without processes. Raises EvidenceError."""
     budget = budget or MemoryBudget()
     try:
         with _Reader(path) as reader:
             channels = _channels(reader, budget)
     except ReaderError as error:
-        raise _refusal(path, str(error)) from error
+        raise _explain(path, str(error)) from error
     except BagLimitError as error:
         raise EvidenceError(f"{path}: {error}") from error
     except BudgetExceeded as error:
@@ -75,8 +75,8 @@ def load_bag(path: Path, budget: MemoryBudget | None = None) -> Run:
     )
 
 
-def _refusal(path: Path, reason: str) -> EvidenceError:
-    """What rosbags cannot read, in an owner's words."""
+def _explain(path: Path, reason: str) -> EvidenceError:
+    """Return the error for what rosbags cannot read, in words for the owner of the bag."""
     if "not indexed" in reason:
         return EvidenceError(f"{path}: cut short: it has no index", hint=_REINDEX)
     if "version" in reason and "Bag" in reason:
@@ -123,17 +123,17 @@ class _Reader(Reader):
         return super().read_chunk_info()
 
     def read_index_data(self, pos: int, indexes: dict[int, list[object]]) -> None:  # type: ignore[override]
-        """Passed over."""
+        """Skip it."""
 
     def read_chunks(self) -> Iterator[bytes]:
-        """The chunks' bytes, unpacked, in the order in which they lie in the file."""
+        """Yield the unpacked bytes of the chunks, in the order of the file."""
         unpacker = _Unpacker()
         for _, chunk in sorted(self.chunks.items()):
             yield unpacker(self.file.chunk(chunk.datapos, chunk.datasize))
 
 
 class _File:
-    """A file that gives no more at once than a header may be, and no more in all than a sound bag needs."""
+    """A file of which no more is read at once than a header may have, and no more in all than a sound bag needs."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -161,19 +161,19 @@ class _File:
     def read(self, size: int) -> bytes:
         if size > MAX_HEADER_BYTES:
             raise ReaderError("a header is too long")
-        return self._taken(size)
+        return self._read(size)
 
     def chunk(self, place: int, size: int) -> bytes:
-        """Raises ReaderError where the file ends before."""
+        """Return the bytes of a chunk. Raises ReaderError if the file ends before."""
         if size > MAX_CHUNK_BYTES:
             raise BagLimitError(f"a chunk of more than {MAX_CHUNK_BYTES >> 20} MiB")
         self._file.seek(place)
-        data = self._taken(size)
+        data = self._read(size)
         if len(data) < size:
             raise ReaderError("a chunk is cut short")
         return data
 
-    def _taken(self, size: int) -> bytes:
+    def _read(self, size: int) -> bytes:
         data = self._file.read(size)
         self._left_bytes -= len(data)
         if self._left_bytes < 0:
@@ -198,7 +198,7 @@ def _channels(reader: _Reader, budget: MemoryBudget) -> tuple[Channel, ...]:
 
 
 def _records(chunk: bytes) -> Iterator[tuple[Header, bytes]]:
-    """Header and content of each record; content of messages alone."""
+    """Yield header and content of each record; only messages have content."""
     stream, size = BytesIO(chunk), len(chunk)
     while (place := stream.tell()) < size:
         if _LENGTH.unpack_from(chunk, place)[0] > MAX_HEADER_BYTES:
@@ -213,7 +213,7 @@ def _records(chunk: bytes) -> Iterator[tuple[Header, bytes]]:
 
 
 class _Unpacker:
-    """Unpacks chunks to no more than the limits, whatever they hold."""
+    """Unpacks chunks, to no more than the limits."""
 
     def __init__(self) -> None:
         self._unpacked_bytes = 0

@@ -1,4 +1,4 @@
-"""What the arena notes beside the messages: one record a JSON channel. Times are its `log_time`s (ns)."""
+"""What the arena records beside the messages: one record for each JSON channel. Times are their `log_time`s (ns)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Evidence as a ROS 1 bag, for `rosbag` and `rqt_bag`."""
+"""Export evidence as a ROS 1 bag, for `rosbag` and `rqt_bag`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Row(NamedTuple):
 
 
 def export_bag(run: Run, path: Path, *, everything: bool = False) -> int:
-    """Write a run's messages as the bag `path`, whole or not at all; gives how many there are.
+    """Write a run's messages as the bag `path`, whole or not at all, and return how many there are.
 
     Publisher, latching, definition, MD5 sum and time stay what they were. With `everything`, the grader's own records
     come along as JSON in std_msgs/String on their topics. Raises EvidenceError where there is nothing to write or a
@@ -90,7 +90,7 @@ def _connection(writer: Writer, channel: Channel) -> Connection:
 
 
 def _md5sum(channel: Channel) -> str:
-    """Of the definition, where the recording does not say it. What cannot be followed gets a sum of its own.
+    """Return the MD5 sum of the definition, if the recording lacks it; of its text, if it cannot be parsed.
 
     rosbags registers types by generating code; its hash needs only their fields.
     """
@@ -105,14 +105,14 @@ def _md5sum(channel: Channel) -> str:
 
 
 def _check_times(run: Run, channels: Sequence[Channel]) -> None:
-    """A bag holds seconds in 32 bits."""
+    """Raise EvidenceError for times that do not fit: a bag holds seconds in 32 bits."""
     times = [t for c in channels for t in (c.messages[0].log_time_ns, c.messages[-1].log_time_ns)]
     if min(times) < 0 or max(times) > LATEST_NS:
         raise EvidenceError(f"{run.evidence}: its times do not fit into a bag (1970 to 2106)")
 
 
 def _records(run: Run) -> Iterator[Channel]:
-    """The grader's own records, each of a kind a channel of text."""
+    """Yield the grader's own records as channels of text, one for each kind."""
     for field, topic in FIELDS.items():
         texts = [(time_ns, event.model_dump_json()) for time_ns, event in getattr(run, field)]
         if texts:

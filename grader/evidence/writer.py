@@ -1,4 +1,4 @@
-"""Writes evidence files. Equal calls in equal order give equal bytes."""
+"""Write evidence files. The same calls in the same order give the same bytes."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ class EvidenceChannel:
         self._sequence = 0
 
     def message(self, log_time_ns: int, data: bytes) -> None:
-        """One message as sent, with its arrival (ns)."""
+        """Write one message as sent, with its arrival (ns)."""
         self._mcap.add_message(self._number, log_time_ns, data, log_time_ns, self._sequence)
         self._sequence += 1
 
 
 class EvidenceStream:
-    """Evidence into any binary stream. Not for several threads at once. `finish` must come last."""
+    """Writes evidence into a binary stream, from one thread at a time. Call `finish` last."""
 
     def __init__(
         self, stream: IO[bytes], *, scenario: str, clock: str, warp: float, metadata: Mapping[str, str]
@@ -70,7 +70,7 @@ class EvidenceStream:
         definition: str,
         latching: bool,
     ) -> EvidenceChannel:
-        """A publisher's channel, made on first use: it is there even if no message ever comes."""
+        """Return a publisher's channel, made on first use: it is in the file even if no message comes."""
         key = (topic, callerid, type, md5sum)
         if key in self._channels:
             return self._channels[key]
@@ -94,35 +94,35 @@ class EvidenceStream:
         log_time_ns: int,
         data: bytes,
     ) -> None:
-        """One message as sent, with its arrival (ns). The channel is made on first use."""
+        """Write one message as sent, with its arrival (ns). The channel is made on first use."""
         channel = self.register_channel(
             topic=topic, callerid=callerid, type=type, md5sum=md5sum, definition=definition, latching=latching
         )
         channel.message(log_time_ns, data)
 
     def event(self, topic: str, log_time_ns: int, record: Record) -> None:
-        """One event on the JSON channel `topic` (one of `events.TOPICS`), whose record it must be."""
+        """Write one event on the JSON channel `topic` (one of `events.TOPICS`), whose record it must be."""
         if type(record) is not TOPICS.get(topic):
             raise TypeError(f"{type(record).__name__} does not belong on {topic}")
         self._json(topic, log_time_ns, record)
 
     def package(self, facts: PackageFacts, log_time_ns: int) -> None:
-        """The package facts, on `/grader/package`."""
+        """Write the package facts, on `/grader/package`."""
         self._json(PACKAGE_TOPIC, log_time_ns, facts)
 
     def attach(self, name: str, data: bytes, log_time_ns: int, media_type: str) -> None:
-        """A file of the package as it was judged."""
+        """Attach a file of the package as it was judged."""
         self._mcap.add_attachment(log_time_ns, log_time_ns, _text(name), _text(media_type), data)
 
     def finish(self) -> None:
-        """Writes what is left and the index. The stream stays open."""
+        """Write what is left and the index. The stream stays open."""
         self._mcap.finish()  # type: ignore[no-untyped-call] # mcap leaves this one out
 
     def _json(self, topic: str, log_time_ns: int, record: Record) -> None:
         data = _encoded(record)
         channel = self._events.get(topic)
         if channel is None:
-            schema = self._schema(f"grader.{type(record).__name__}", "jsonschema", _described(type(record)))
+            schema = self._schema(f"grader.{type(record).__name__}", "jsonschema", _json_schema(type(record)))
             channel = self._events[topic] = [self._mcap.register_channel(topic, "json", schema), 0]
         self._mcap.add_message(channel[0], log_time_ns, data, log_time_ns, channel[1])
         channel[1] += 1
@@ -135,8 +135,8 @@ class EvidenceStream:
 
 
 @cache
-def _described(record: type[Record]) -> bytes:
-    """Its JSON schema, which pydantic takes its time to make."""
+def _json_schema(record: type[Record]) -> bytes:
+    """Return its JSON schema, which pydantic makes slowly."""
     return json.dumps(record.model_json_schema(), sort_keys=True).encode()
 
 
@@ -144,7 +144,7 @@ class EvidenceWriter(EvidenceStream):
     """An evidence file that appears whole or not at all: `with EvidenceWriter(path, …) as evidence: …`.
 
     It is written beside `path` as `<name>.part` and takes its name when the block ends well. Every method
-    raises OutputError where the folder cannot be written and HostError where the disk gives out.
+    raises OutputError if the folder cannot be written, HostError if the disk fails.
     """
 
     def __init__(
@@ -172,7 +172,7 @@ class EvidenceWriter(EvidenceStream):
             self.abort()
 
     def close(self) -> None:
-        """Finishes the file and gives it its name."""
+        """Finish the file and give it its name."""
         try:
             self.finish()
             self._file.flush()
@@ -187,7 +187,7 @@ class EvidenceWriter(EvidenceStream):
             raise
 
     def abort(self) -> None:
-        """Leaves nothing behind."""
+        """Remove the file."""
         with suppress(OSError):  # what could not be flushed is thrown away anyway
             self._file.close()
         with suppress(OSError):
@@ -195,7 +195,7 @@ class EvidenceWriter(EvidenceStream):
 
 
 class _Guarded(BufferedIOBase):
-    """The part of a stream that the MCAP writer uses, with the machine's errors in one line."""
+    """The part of a stream that the MCAP writer uses, with errors of the machine as the grader's."""
 
     def __init__(self, file: BinaryIO, path: Path) -> None:
         self._file = file
@@ -220,12 +220,12 @@ def _open(part: Path) -> BinaryIO:
 
 
 def _text(text: str) -> str:
-    """Names come from hostile programs: what is not text becomes question marks."""
+    """Return text that can be encoded: names from students' programs may hold anything."""
     return text.encode(errors="replace").decode()
 
 
 def _encoded(record: Record) -> bytes:
-    """The record as JSON that can be read again; what could not be is brought into a form that can."""
+    """Return the record as JSON that reads back; a value that would not is converted into one that does."""
     try:
         data = record.model_dump_json().encode()
         if "value" in type(record).model_fields:

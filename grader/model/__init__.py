@@ -1,1 +1,5 @@
-"""The records that cross from one station of the data flow to the next. No I/O in here."""
+"""The records that pass from one room to the next: frozen, typed, without any I/O.
+
+Every definition that several rooms need is here once: statuses, results, package facts, rates. Reading, writing and
+judging them is the business of other rooms.
+"""

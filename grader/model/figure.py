@@ -1,6 +1,6 @@
-"""What a report shows beside a verdict: numbers and texts taken from the evidence, each of bounded size.
+"""What a report draws beside a verdict: numbers and texts from the evidence, each of bounded size.
 
-All times are seconds since the run began. Who draws them knows nothing of evidence.
+All times are seconds since the run began. Drawing needs nothing else from the evidence.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pydantic import Field
 from grader.model.record import Record
 
 POINTS_MAX = 600
-"""So many points a figure has at most; of more, those are kept that show what is judged."""
+"""The most points of a figure; of more, those that show what is judged are kept."""
 
 
 class RateFigure(Record):

@@ -1,4 +1,4 @@
-"""Package facts: what a package's files say, each with file and line. Parsed once, frozen, never executed.
+"""Package facts: what a package's files say, with file and line. Parsed once, frozen, never executed.
 
 Paths are posix and relative to the package's root; lines count from 1.
 """

@@ -1,4 +1,4 @@
-"""How a station tells what it is doing, without knowing who shows it."""
+"""How the rooms report what they are doing, without knowing the display."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ StepState = Literal["waiting", "running", "done", "failed", "skipped"]
 
 
 class Progress(Protocol):
-    """Whoever shows the course of a run. Safe to call from any thread, cheap enough to call often."""
+    """A display of a grading's progress. Safe to call from any thread, cheap enough to call often."""
 
     def step(
         self,
@@ -26,7 +26,7 @@ class Progress(Protocol):
         """
 
     def early(self, verdicts: Callable[[], tuple[EarlyVerdict, ...]]) -> None:
-        """The files are read: `verdicts` works out what they alone decide. Who shows none of it need not call it."""
+        """The files are read, and `verdicts` works out what they alone decide. A display need not call it."""
 
 
 class Silence:
@@ -39,7 +39,7 @@ class Silence:
         detail: str = "",
         expected_s: float | None = None,
     ) -> None:
-        """Take note of nothing."""
+        """Ignore it."""
 
     def early(self, verdicts: Callable[[], tuple[EarlyVerdict, ...]]) -> None:
-        """Work nothing out."""
+        """Ignore it."""

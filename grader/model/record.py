@@ -1,4 +1,4 @@
-"""The base of every record: frozen, typed, by keyword, and no key that nobody knows."""
+"""The base of all records: frozen, typed, created by keyword, without unknown keys."""
 
 from __future__ import annotations
 
@@ -13,6 +13,6 @@ class Record(BaseModel):
 
     @classmethod
     def read_json(cls, data: bytes | str) -> Self:
-        """What a grader wrote. Keys that only a later one knows are passed over: without a new version of its format,
-        no status and no point hangs on them (docs/reference/formats.md). Raises pydantic's ValidationError."""
+        """Read what a grader wrote. Keys that only a later grader knows are ignored: without a new version of the
+        format, no status and no points depend on them (docs/reference/formats.md). Raises ValidationError."""
         return cls.model_validate_json(data, extra="ignore")

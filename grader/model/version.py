@@ -18,23 +18,23 @@ class Versioned:
     version: int
 
     def __str__(self) -> str:
-        """As files say it: `grader.result/1`."""
+        """Return it as files have it: `grader.result/1`."""
         return f"{self.name}/{self.version}"
 
     @property
     def short(self) -> str:
-        """As people say it: `result`."""
+        """Return it as people say it: `result`."""
         return self.name.removeprefix("grader.")
 
     def newer(self, said: object) -> str:
-        """What is wrong, in one line, where `said` is a later version than this grader reads; else nothing."""
+        """Return what is wrong, in one line, if `said` is a later version than this grader reads; else ""."""
         found = re.fullmatch(rf"{re.escape(self.name)}/([0-9]{{1,{_DIGITS_MAX}}})", str(said)[:100])
         if found is None or int(found[1]) <= self.version:
             return ""
         return f"written by a newer grader ({found[0]}); this one reads up to {self.version}"
 
     def newer_in(self, data: bytes) -> str:
-        """The same of a JSON file with these bytes; nothing where it is none."""
+        """Return the same for the bytes of a JSON file; "" for anything else."""
         try:
             found = json.loads(data)
         except (ValueError, RecursionError):
