@@ -190,7 +190,7 @@ def test_a_recording_that_is_too_large_is_refused_unread(tmp_path, rubric, capsy
 def test_evidence_of_the_grader_is_no_submission(tmp_path, rubric, capsys):
     argv = ["grade", str(CORRECT / "talker.mcap"), "--rubric", str(rubric), "--out", str(tmp_path / "out")]
     assert grader(argv) == 3
-    assert "evidence of the grader's own" in capsys.readouterr().err
+    assert "the grader's own evidence" in capsys.readouterr().err
 
 
 def test_record_has_nothing_to_do_with_a_bag(tmp_path, rubric, capsys):

@@ -16,11 +16,7 @@ RECORDING_PROBLEM = "recording.problem"
 
 
 class ProcessEvent(Record):
-    """`/grader/process`. `role` is `student`, `build` or `grader`; CPU in seconds, memory in bytes (tree).
-
-    `stopped_by` is the last signal that the arena sent it (`INT`, `TERM`, `KILL`), None where it ended alone.
-    `repairs` names what was mended on the copy that ran (`executable bit`, `CRLF`, `shebang`).
-    """
+    """`/grader/process`: a process started or ended."""
 
     event: Literal["start", "exit"]
     """It started or ended."""
@@ -33,13 +29,13 @@ class ProcessEvent(Record):
     script: str | None = None
     """The package's script that runs, from the package's root."""
     repairs: tuple[str, ...] = ()
-    """What was fixed on the copy that ran."""
+    """What was fixed on the copy that ran: `executable bit`, `CRLF`, `shebang`."""
     exit_code: int | None = None
     """Its exit code, at the end."""
     signal: int | None = None
     """The signal that ended it."""
     stopped_by: str | None = None
-    """The last signal that the arena sent it; null if it ended on its own."""
+    """The last signal that the arena sent it (`INT`, `TERM`, `KILL`); null if it ended on its own."""
     cpu_s: float | None = None
     """CPU seconds of its process tree."""
     max_rss_bytes: int | None = None
@@ -71,10 +67,7 @@ class Connection(Record):
 
 
 class GraphEvent(Record):
-    """`/grader/graph`: the master's state after a change. Topics and services map to the nodes' names.
-
-    `processes` tells which process each node belongs to, `service_types` what services themselves say they are.
-    """
+    """`/grader/graph`: the master's state after a change. Topics and services map to the names of nodes."""
 
     nodes: tuple[str, ...]
     """All nodes."""
@@ -108,20 +101,18 @@ class ParamEvent(Record):
 
 
 class HostEvent(Record):
-    """`/grader/host`: how late a timer woke that asked for 20 ms each time, since the last such event (ms), the load
-    average, and the share of the processors' time (0 to 1) that was busy, and that the run's own student processes
-    took."""
+    """`/grader/host`: how late a timer of 20 ms woke since the last such event, and how busy the machine was."""
 
     samples: int
     """How often the timer woke since the last such event."""
     mean_ms: float
-    """How late, on average."""
+    """How late, on average (ms)."""
     p95_ms: float
-    """How late, at most, in 95 of 100 cases."""
+    """How late, at most, in 95 of 100 cases (ms)."""
     max_ms: float
-    """How late, at most."""
+    """How late, at most (ms)."""
     load_1min: float
-    """The load average."""
+    """The load average of the last minute."""
     busy: float | None = None
     """The share of the processors' time that was busy, 0 to 1; null where not known."""
     own_busy: float | None = None
@@ -129,13 +120,13 @@ class HostEvent(Record):
 
 
 class ActorEvent(Record):
-    """`/grader/actor`: what the grader, or a stand-in of its, did in the run.
+    """`/grader/actor`: what the grader, or a stand-in program of its own, did in the run.
 
     `publish`: `value` is the field `data` as sent, or a map of the message's fields. `param`: `topic` is the
     parameter's name, `value` what it was set to. `call`: `topic` is the service, `value` the request's fields;
     `answer`: the response's fields, or None and the reason in `detail`. `open`: the stand-in for the program `actor`
     was started with the arguments `value`. `refused`: `actor`, a process where it is known, else a node, was not
-    allowed what `detail` says; `limit`: it had too much of something. At most 50 of each a run, equal ones once.
+    allowed what `detail` says; `limit`: it reached a limit. At most 50 of each in a run, equal ones once.
     """
 
     action: Literal[

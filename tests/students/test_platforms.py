@@ -14,7 +14,6 @@ LOADED = (
         "portable",
         "files",
         "results",
-        "temporary",
         "faults",
         "pipeline",
         "intake",
@@ -24,7 +23,6 @@ LOADED = (
     ),
     *(
         "checks",
-        "steps",
         "evidence",
         "report",
         "instructor",
@@ -54,7 +52,8 @@ LOADED = (
         "overrides",
         "rubric",
         "model",
-        "shown",
+        "untrusted_text",
+        "wording",
         "errors",
     ),
 )
