@@ -14,9 +14,10 @@ from typing import Any, NamedTuple
 
 from typing_extensions import Self
 
-from grader.arena.arena_process import ArenaProcess, Frame, FrameReader
+from grader.arena.arena_process import ArenaProcess
 from grader.arena.control_groups import remove_groups
 from grader.arena.process_environment import Place
+from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.run_state import Live
 from grader.errors import ArenaError
 from grader.evidence.events import TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
