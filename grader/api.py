@@ -21,7 +21,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path, PurePath
 from platform import python_version
-from typing import Literal, TypeAlias, get_args
+from typing import TypeAlias, get_args
 
 from grader import __version__
 from grader.errors import EvidenceError, UsageError
@@ -31,14 +31,14 @@ from grader.files import check_writable
 from grader.judging.recordings import PACKAGE_RUN
 from grader.model.progress import Silence, StepState
 from grader.model.result import EnvironmentInfo, GradingResult, SubmissionInfo
+from grader.model.submission import SandboxMode
 from grader.results import RESULT, read_result_file
 from grader.rubric.load import LoadedRubric
 from grader.rubric.load import load_rubric as load_file
 from grader.steps import NOTHING_TOOK, outcome, run_aside, waited_for
 
 StrPath: TypeAlias = "str | os.PathLike[str]"
-Sandbox = Literal["auto", "require", "none"]
-SANDBOXES = get_args(Sandbox)
+SANDBOXES = get_args(SandboxMode)
 Told: TypeAlias = Callable[[str, str, str], None]
 """Of a step: its name, its state (`waiting`, `running`, `done`, `failed`, `skipped`), and what it does or waits for."""
 
@@ -64,7 +64,7 @@ def grade(
     out: StrPath = "grader-results",
     *,
     submission_id: str | None = None,
-    sandbox: Sandbox = "auto",
+    sandbox: SandboxMode = "auto",
     static_only: bool = False,
     keep_hidden: bool = True,
     progress: Told | None = None,

@@ -24,7 +24,7 @@ from grader.arena.asynchronous import run_until_signal
 from grader.arena.limits import Limits
 from grader.arena.process_environment import BASE, Place
 from grader.arena.ros_env import find_ros
-from grader.arena.sandbox import Mode, temporary_base
+from grader.arena.sandbox import temporary_base
 from grader.arena.sandbox_files import ANSWERS, INSIDE_WORKSPACE, QUESTIONS, prepare
 from grader.arena.sandbox_probe import choose
 from grader.arena.session import ArenaSession
@@ -32,6 +32,7 @@ from grader.arena.workspace import Workspace, read_member
 from grader.errors import ArenaError, GraderError
 from grader.evidence.writer import EvidenceWriter
 from grader.files import atomic_write, open_untrusted
+from grader.model.submission import SandboxMode
 from grader.temporary import temporary_folder
 
 NAME = "base workspace"
@@ -71,7 +72,7 @@ FILES_MAX = 8
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
-def provide_base(mode: Mode) -> None:
+def provide_base(mode: SandboxMode) -> None:
     """Have a base before many submissions are graded; where it cannot be made, each is built without.
 
     Raises GraderError where this machine lets nothing be run in this `mode`.

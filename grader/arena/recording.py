@@ -23,7 +23,7 @@ from grader.arena.build import BUILD_EXPECTED_S, build
 from grader.arena.limits import Limits
 from grader.arena.process_environment import Place
 from grader.arena.ros_env import INSTALL_HINT, find_ros
-from grader.arena.sandbox import Mode, temporary_base
+from grader.arena.sandbox import temporary_base
 from grader.arena.sandbox_files import prepare
 from grader.arena.sandbox_probe import choose
 from grader.arena.scenario import expected_s, run_scenario
@@ -45,7 +45,7 @@ from grader.files import read_untrusted
 from grader.model.message_rate import RateBounds
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
-from grader.model.submission import Submission
+from grader.model.submission import SandboxMode, Submission
 from grader.package import SyntaxReport, python_paths, read_syntax_report, with_build_facts
 from grader.package.python import REPORT_BYTES_MAX
 from grader.rubric.model import Rubric
@@ -71,7 +71,7 @@ class Recorder:
         rubric: Rubric,
         folder: Path,
         *,
-        mode: Mode,
+        mode: SandboxMode,
         progress: Progress,
         rates: Mapping[str, tuple[RateBounds, ...]] | None = None,
         recorded: Mapping[str, Path] | None = None,

@@ -14,7 +14,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, TypeAlias
 
 from grader.arena.control_groups import Cgroups
 from grader.arena.limits import Limits
@@ -24,7 +24,6 @@ from grader.errors import HostError
 from grader.host_programs import host_program
 from grader.model.record import Record
 
-Mode = Literal["auto", "require", "none"]
 Word: TypeAlias = "str | dict[str, Any]"
 """An argument, or what the arena puts into its place (`ros/launching.py`)."""
 

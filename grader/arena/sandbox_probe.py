@@ -17,9 +17,10 @@ from pathlib import Path
 
 from grader.arena.control_groups import find_cgroups
 from grader.arena.limits import Limits
-from grader.arena.sandbox import NAMESPACES, NO_NESTING, WALLS, Mode, Sandbox, system_call_filter
+from grader.arena.sandbox import NAMESPACES, NO_NESTING, WALLS, Sandbox, system_call_filter
 from grader.errors import HostError, SandboxMissing
 from grader.host_programs import HOST_ENV, host_program
+from grader.model.submission import SandboxMode
 
 UID_MAP = Path("/proc/self/uid_map")
 UNUSED_UIDS = (1_900_000_000, 2_000_000_000)
@@ -59,7 +60,7 @@ UNKNOWN_HINT = (
 )
 
 
-def choose(mode: Mode) -> Sandbox:
+def choose(mode: SandboxMode) -> Sandbox:
     """The sandbox to use: `require` raises SandboxMissing where there is none, `auto` goes without and says so.
 
     Raises SandboxMissing where it cannot be known whether there is one, and HostError where the limits that were

@@ -23,7 +23,7 @@ from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_ros
 
 if TYPE_CHECKING:
-    from grader.arena.sandbox import Mode
+    from grader.model.submission import SandboxMode
 
 
 PROGRAMS = {"bwrap": "bubblewrap", "setpriv": "util-linux", "prlimit": "util-linux"}
@@ -134,7 +134,7 @@ def _mode() -> Row:
 # Says before a command begins that students' code will run without a sandbox.
 
 
-def say_unwalled(mode: Mode, rubric: LoadedRubric | None = None) -> None:
+def say_unwalled(mode: SandboxMode, rubric: LoadedRubric | None = None) -> None:
     """Say it on stderr, where it is so. Nothing of a rubric for which nothing is run; what keeps a sandbox from being
     chosen is said by the grading itself."""
     with suppress(GraderError):

@@ -11,7 +11,7 @@ from grader.model.result import GradingResult, SubmissionInfo
 
 if TYPE_CHECKING:
     from grader.arena.asynchronous import Stop
-    from grader.arena.sandbox import Mode
+    from grader.model.submission import SandboxMode
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,7 +25,7 @@ class GradeOptions:
     again. `stop` ends what runs, in order, from another thread; then `arena.asynchronous.Stopped` is raised.
     """
 
-    sandbox: Mode = "auto"
+    sandbox: SandboxMode = "auto"
     submission_id: str | None = None
     static_only: bool = False
     keep_hidden: bool = True

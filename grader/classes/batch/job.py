@@ -12,10 +12,10 @@ from pydantic import Field
 from grader.model.record import Record
 from grader.model.result import GradingResult
 from grader.model.roster import Entry
+from grader.model.submission import SandboxMode
 from grader.model.submission_time import HandedIn, Override
 from grader.rubric.load import LoadedRubric
 
-Sandbox = Literal["auto", "require", "none"]
 OutcomeStatus = Literal["graded", "inconclusive", "error"]
 
 
@@ -31,7 +31,7 @@ class Job(Record):
     entry: Entry
     rubric: LoadedRubric
     out: Path
-    sandbox: Sandbox = "auto"
+    sandbox: SandboxMode = "auto"
     static_only: bool = False
     before: datetime | None = None
     overrides: Mapping[str, Override] = Field(default_factory=dict)

@@ -24,7 +24,7 @@ from grader.rubric.needs import needs_ros
 from grader.shown import line
 
 if TYPE_CHECKING:
-    from grader.arena.sandbox import Mode
+    from grader.model.submission import SandboxMode
 
 DEFAULT_OUT = Path("grader-results")
 JOBS_PER_CORE = 4
@@ -40,7 +40,7 @@ def run(
     only: list[str] | None = None,
     before: str | None = None,
     static: bool = False,
-    sandbox: Mode = "auto",
+    sandbox: SandboxMode = "auto",
     cluster: str | None = None,
     cluster_insecure: bool = False,
     exchange: str | None = None,

@@ -32,7 +32,7 @@ from grader.student.git_status import write_staged
 from grader.temporary import temporary_folder
 
 if TYPE_CHECKING:
-    from grader.arena.sandbox import Mode
+    from grader.model.submission import SandboxMode
     from grader.student.watching.loop import Shown
 
 
@@ -44,7 +44,7 @@ def run(
     staged: bool = False,
     watch: bool = False,
     out: Path | None = None,
-    sandbox: Mode = "auto",
+    sandbox: SandboxMode = "auto",
     as_json: bool = False,
 ) -> ExitCode:
     """Grade the package at `path` with hidden criteria left out; with `static`, from its files alone.
