@@ -21,19 +21,19 @@ ALLOWED = {
     "errors": set[str](),
     "shown": set[str](),
     "portable": set[str](),
-    "outside": set[str](),
+    "host_programs": set[str](),
     "files": {"errors", "portable"},
     "temporary": {"errors", "files", "portable"},
     "results": BASE | {"files"},
     "faults": BASE | {"files", "intake", "report", "results", "rubric"},
     "evidence": BASE | {"files"},
-    "package": BASE | {"outside"},
-    "intake": BASE | {"files", "outside"},
+    "package": BASE | {"host_programs"},
+    "intake": BASE | {"files", "host_programs"},
     "checks": BASE | {"evidence"},
     "rubric": BASE | {"checks", "evidence", "temporary"},
     "judging": BASE | {"checks", "evidence", "rubric"},
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},
-    "arena": BASE | {"evidence", "files", "package", "rubric.model", "temporary"},
+    "arena": BASE | {"evidence", "files", "host_programs", "package", "rubric.model", "temporary"},
     "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "steps": {
         *BASE, "arena", "evidence", "faults", "intake", "judging", "package", "recordings", "report", "rubric",
@@ -50,7 +50,7 @@ ALLOWED = {
         *BASE, "checks", "classes.batch", "evidence", "intake", "package", "pipeline", "rubric", "temporary"
     },
     "classes": {
-        *BASE, "arena.ros_env", "checks", "evidence", "faults", "files", "intake", "judging", "outside", "pipeline",
+        *BASE, "arena.ros_env", "checks", "evidence", "faults", "files", "host_programs", "intake", "judging", "pipeline",
         "report", "results", "rubric", "temporary"
     },
     "student": {
@@ -60,7 +60,7 @@ ALLOWED = {
     "integrations": BASE | {"faults", "files", "intake", "pipeline", "report", "results", "rubric"},
     "cli": {
         *BASE, "arena", "authoring", "checks", "classes", "evidence", "faults", "files", "integrations", "intake",
-        "judging", "outside", "package", "pipeline", "report", "rubric", "student", "temporary"
+        "judging", "host_programs", "package", "pipeline", "report", "rubric", "student", "temporary"
     },
     "__main__": {"cli"},
 }  # fmt: skip

@@ -9,11 +9,11 @@ from statistics import median
 
 from grader.checks.support.printed import printed_lines, probes_on
 from grader.checks.support.process import lives
+from grader.checks.topic import SYSTEM_TOPICS
 from grader.evidence.run import Channel, Run
 from grader.evidence.stats import periodic_share, rate_stats
 from grader.model.record import Record
 
-SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
 SYSTEM_SERVICES = ("/get_loggers", "/set_logger_level")
 INTEGER_TYPES = frozenset(f"std_msgs/{u}Int{bits}" for u in ("", "U") for bits in (8, 16, 32, 64))
 ANONYMOUS = re.compile(r"_\d+_\d{9,}$")
