@@ -204,15 +204,15 @@ class Arena:
         self._master.setParam(self._actor.caller_id, "/use_sim_time", True)
         self._actor.advertise(self._master, CLOCK)
         self._clock = Clock(self._actor, command["warp"], command["step_s"])
-        record = {"action": "clock", "actor": "grader", "topic": "/clock", "value": command["warp"]}
-        self._wire.event("/grader/actor", record)
+        self._note_clock(value=command["warp"])
         self._clock.start()
 
     def _rewarp(self, command):
         self._clock.set_warp(command["warp"])
-        record = {"action": "clock", "actor": "grader", "topic": "/clock", "value": command["warp"]}
-        record["detail"] = command["detail"]
-        self._wire.event("/grader/actor", record)
+        self._note_clock(value=command["warp"], detail=command["detail"])
+
+    def _note_clock(self, **fields):
+        self._wire.event("/grader/actor", dict(fields, action="clock", actor="grader", topic="/clock"))
 
     def _hold_clock(self, _command):
         if self._clock:
