@@ -50,8 +50,8 @@ ALLOWED = {
         *BASE, "checks", "classes.batch", "evidence", "intake", "package", "pipeline", "rubric", "temporary"
     },
     "classes": {
-        *BASE, "arena.ros_env", "checks", "evidence", "faults", "files", "host_programs", "intake", "judging", "pipeline",
-        "report", "results", "rubric", "temporary"
+        *BASE, "arena.ros_env", "checks", "evidence", "faults", "files", "host_programs", "intake", "judging",
+        "pipeline", "report", "results", "rubric", "temporary"
     },
     "student": {
         *BASE, "arena.asynchronous", "arena.workspace", "faults", "intake", "package", "pipeline", "report",

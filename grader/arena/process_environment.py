@@ -27,7 +27,7 @@ from grader.arena.sandbox_files import (
     with_standins,
 )
 from grader.arena.workspace import Built, Workspace, read_archive, read_folder
-from grader.host_programs import host_program
+from grader.host_programs import find_host_program
 
 LOOPBACK = "127.0.0.1"
 """As an address: not every machine knows the name localhost."""
@@ -198,7 +198,7 @@ class Place:
             "argv": list(argv),
             "env": self._process_env(),
             "outer": self.sandbox.outer(limits),
-            "bwrap": host_program("bwrap"),
+            "bwrap": find_host_program("bwrap"),
             "wall": self.sandbox.wall(
                 ros=self.ros,
                 place=self.folder,

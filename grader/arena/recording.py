@@ -17,7 +17,7 @@ from pathlib import Path
 from typing_extensions import Self
 
 from grader.arena.admission import Admission, shared_folder
-from grader.arena.asynchronous import Stop, run_until_signal, side_by_side
+from grader.arena.asynchronous import Stop, run_together, run_until_signal
 from grader.arena.build import BUILD_EXPECTED_S, build
 from grader.arena.limits import Limits
 from grader.arena.process_environment import Place
@@ -113,17 +113,17 @@ class Recorder:
 
     async def _record_all(self, meanwhile: Callable[[], None]) -> None:
         self._admission = Admission(shared_folder())
-        names = [name for name in in_order(self._rubric, self._rates) if name not in self._recorded]
+        names = [name for name in order_runs(self._rubric, self._rates) if name not in self._recorded]
         copy_recorded(self._recorded, self.recording.folder, self._progress)
         self._progress.step("build", "waiting", "", BUILD_EXPECTED_S)
         for name in names:
             self._progress.step(name, "waiting", "for the build", expected_s(self._rubric.scenarios[name]))
-        await side_by_side(self._record_package(), asyncio.to_thread(meanwhile))
+        await run_together(self._record_package(), asyncio.to_thread(meanwhile))
         if self._place is None:
             for name in names:
                 self._progress.step(name, "skipped", self._not_run)
             return
-        await side_by_side(*(self._record_scenario(self._place, name) for name in names))
+        await run_together(*(self._record_scenario(self._place, name) for name in names))
 
     async def _record_alone(self, names: tuple[str, ...]) -> None:
         self._admission = Admission(shared_folder())
@@ -272,7 +272,7 @@ def _needs_answer(facts: PackageFacts, path: str) -> bool:
     return file.executable is False or shebang is None or shebang.crlf or shebang.found is False
 
 
-def in_order(rubric: Rubric, rated: Container[str]) -> tuple[str, ...]:
+def order_runs(rubric: Rubric, rated: Container[str]) -> tuple[str, ...]:
     """Return the runs' names in the order in which they ask to begin: those that measure a rate (in real time) first,
     then the longest, so that the others start while it is watched."""
     scenarios = rubric.scenarios

@@ -21,7 +21,7 @@ from grader.arena.limits import Limits
 from grader.arena.ros_env import RosInstallation
 from grader.arena.sandbox_files import HOME, SHIMS, STANDINS
 from grader.errors import HostError
-from grader.host_programs import host_program
+from grader.host_programs import find_host_program
 from grader.model.record import Record
 
 Word: TypeAlias = "str | dict[str, Any]"
@@ -86,7 +86,7 @@ class Sandbox(Record):
         drop += (
             [] if self.bubblewrap else ["--no-new-privs"]
         )  # bubblewrap sees to that, and may be setuid itself
-        become = [_program("setpriv"), *drop] if drop and host_program("setpriv") else []
+        become = [_program("setpriv"), *drop] if drop and find_host_program("setpriv") else []
         return [*become, _program("prlimit"), *self.rlimits(limits), "--"]
 
     def wall(
@@ -138,7 +138,7 @@ class Sandbox(Record):
 
 def _program(name: str) -> str:
     """Where the machine has it; `choose` has seen that it does."""
-    return host_program(name) or f"/usr/bin/{name}"
+    return find_host_program(name) or f"/usr/bin/{name}"
 
 
 def _system(ros: RosInstallation) -> list[Word]:

@@ -40,6 +40,8 @@ EM = "lib/python3/dist-packages/em.py"
 STANDIN_SOURCES = Path(__file__).resolve().parent / "standins"
 SHEBANG = b"#!"
 SHARE = "share"
+TWO_NAMES = {"rospy_tutorials": ("talker", "listener")}
+"""Programs that the real package has with an ending, too."""
 LIBRARY = "python"
 MESSAGES = "from standin_messages import define\n\ndefine(globals())\n"
 CMAKE = "cmake"
@@ -118,6 +120,8 @@ def copy_standins(folder: Path, ros: RosInstallation) -> None:
     for name in missing_packages(ros):
         _copy(STANDIN_SOURCES / name, folder / SHARE / name)
         _write_modules(folder / SHARE / name)
+        for program in TWO_NAMES.get(name, ()):
+            shutil.copyfile(folder / SHARE / name / program, folder / SHARE / name / f"{program}.py")
     for path in (folder, *folder.rglob("*")):
         path.chmod(0o755 if path.is_dir() or _is_program(path) else 0o644)
 

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 from grader.arena.admission import Admission, Leave
 from grader.arena.process_environment import Place
-from grader.arena.run_state import next_look_s, settled, waiting_for
+from grader.arena.run_state import describe_wait, find_outcome, next_look_s
 from grader.arena.scenario_inputs import OVER, advertisement, call_services, make_shots, publication, settings
 from grader.arena.session import ArenaSession
 from grader.arena.static_recorder import RunCost
@@ -161,12 +161,12 @@ async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple
     warped = scenario.clock == "warped"
     while True:
         now_s = time.monotonic()
-        done = settled(live, until, now_s)
+        done = find_outcome(live, until, now_s)
         if done is not None:
             if until.heard and live.running:
                 await arena.wait(lambda: not live.running, HEARD_SETTLE_S)
             return done
-        tell(waiting_for(live, until))
+        tell(describe_wait(live, until))
         if warped and _does_not_follow(scenario, arena, now_s):
             warped = False
             detail = "the node does not follow the simulated clock; the run goes on in real time"
@@ -175,7 +175,8 @@ async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple
             await _look_at_connections(arena)
         else:
             await arena.wait(
-                lambda: settled(live, until, time.monotonic()) is not None, next_look_s(live, until, now_s)
+                lambda: find_outcome(live, until, time.monotonic()) is not None,
+                next_look_s(live, until, now_s),
             )
 
 

@@ -18,7 +18,7 @@ from grader.arena.arena_process import ArenaProcess
 from grader.arena.control_groups import remove_groups
 from grader.arena.process_environment import Place
 from grader.arena.ros.wire import Frame, FrameReader
-from grader.arena.run_state import Live
+from grader.arena.run_state import RunState
 from grader.errors import ArenaError
 from grader.evidence.events import TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
 from grader.evidence.run import is_grader_node
@@ -62,7 +62,7 @@ class ArenaSession:
         last_run: bool = False,
         on_lateness: Callable[[float], None] = lambda _: None,
     ) -> None:
-        self.live = Live()
+        self.live = RunState()
         self.cpu_s = 0.0
         self.student_cpu_s = 0.0
         self.exit_codes: dict[str, int | None] = {}

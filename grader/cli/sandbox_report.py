@@ -16,7 +16,7 @@ from grader.arena.static_recorder import why_unrun
 from grader.cli.output import say_beside
 from grader.cli.row import Row
 from grader.errors import GraderError, HostError
-from grader.host_programs import HOST_ENV, host_program
+from grader.host_programs import HOST_ENV, find_host_program
 from grader.portable import user_id
 from grader.report.unwalled import without_sandbox
 from grader.rubric.load import LoadedRubric
@@ -46,7 +46,7 @@ ROOTS_GROUPS = "in a container: start it with --privileged; in a service: Delega
 def walls() -> Iterator[Row]:
     """A row for each part, then one for what `--sandbox auto` makes of them."""
     yield from map(_program, PROGRAMS)
-    unshare = host_program("unshare") or "unshare"
+    unshare = find_host_program("unshare") or "unshare"
     yield _probe("user namespaces", [unshare, "--user", "--pid", "--fork", "/bin/true"], drop=user_id() == 0)
     yield _probe("network", [sys.executable, "-I", str(NAMESPACES), "/bin/true"], drop=False)
     yield _limits_of_trees()
@@ -56,7 +56,7 @@ def walls() -> Iterator[Row]:
 
 
 def _program(name: str) -> Row:
-    path, package = host_program(name), PROGRAMS[name]
+    path, package = find_host_program(name), PROGRAMS[name]
     if path is None:
         return Row(name=name, state="limited", detail="not found", mend=f"apt-get install {package}")
     return Row(name=name, state="ok", detail=path)
@@ -64,7 +64,7 @@ def _program(name: str) -> Row:
 
 def _probe(name: str, command: Sequence[str], *, drop: bool) -> Row:
     """Whether namespaces of that kind can be made, by the user who needs them."""
-    setpriv = host_program("setpriv") or "setpriv"
+    setpriv = find_host_program("setpriv") or "setpriv"
     nobody = [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if drop else []
     try:
         done = subprocess.run(

@@ -99,7 +99,7 @@ class Actor:
         self._other_types = set()
         self.caller_id = caller_id
         self._wire = wire
-        self.port = Door(loop, self._join, guard, owners).port
+        self.port = TcprosServer(loop, self._join, guard, owners).port
         self.uri = None
 
     def advertise(self, master, fields):
@@ -209,7 +209,7 @@ class Clock:
         self._actor.publish("/clock", TIME.pack(*divmod(self._now_ns, NS)))
 
 
-class Door:
+class TcprosServer:
     """The port of the arena's own node: takes connections in, each for no longer than its header may take.
 
     `join(sock, header, who)` keeps a connection of the process `who`, or raises ProtocolError or OSError.
