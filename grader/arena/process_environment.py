@@ -59,7 +59,7 @@ BUILD_RUN = (
 ARCHIVE = "built.tar"
 BASE = "base.tar"
 STAGE = "stage"
-"""The folder over which the arena mounts what sandboxes see (`ros/stage.py`)."""
+"""The folder over which the arena mounts what sandboxes see (`Stage` in `ros/namespaces.py`)."""
 OUTPUT_FILES = 1_000
 OWN_VARIABLES = (
     "ROS_MASTER_URI",
@@ -91,7 +91,7 @@ class Place:
 
     @property
     def base(self) -> Path:
-        """The base workspace for this place's build (`base.py`), where there is one."""
+        """The base workspace for this place's build (`base_workspace.py`), where there is one."""
         return self.workspace.kept / BASE
 
     @cached_property

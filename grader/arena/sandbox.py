@@ -1,4 +1,4 @@
-"""The wall around a student process tree: bubblewrap's arguments. Whether it can be had here: `probe.py`.
+"""The wall around a student process tree: bubblewrap's arguments. Whether it can be had here: `sandbox_probe.py`.
 
 Only arguments are made here; nothing is run. The arena starts the programs (`ros/launching.py`) in namespaces of its
 own (`ros/namespaces.py`).
@@ -92,7 +92,7 @@ class Sandbox(Record):
     def wall(
         self, *, ros: RosInstallation, place: Path, limits: Limits, binds: Sequence[Word], net: bool
     ) -> list[Word] | None:
-        """bubblewrap's arguments, None where there is none. `place` is the run's own folder (see `inside.prepare`),
+        """bubblewrap's arguments, None where there is none. `place` is the run's own folder (see `sandbox_files.prepare`),
         `binds` are more arguments. Only memory of fixed size can be written: the scratches, and what `binds` give."""
         if not self.bubblewrap:
             return None
