@@ -189,7 +189,7 @@ def template_of(argv: Sequence[str], env: Mapping[str, str]) -> Template:
 def start_arena(
     argv: Sequence[str], env: Mapping[str, str], descriptors: Sequence[int]
 ) -> tuple[Template, int, float]:
-    """A new arena of the template; a template that somebody has ended is made anew, once. Raises ArenaError."""
+    """Start an arena; a template that has ended is made anew, once. Raises ArenaError."""
     template = template_of(argv, env)
     try:
         return template, *template.start(descriptors)

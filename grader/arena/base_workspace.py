@@ -186,7 +186,7 @@ def _entries(path: str) -> list[str]:
 
 
 def read_kept(name: str) -> bytes | None:
-    """What was kept under that name; None where there is none, it is damaged, or somebody else may have written it."""
+    """Return what was kept under that name; None where there is none that is whole and only this user's."""
     with suppress(OSError):
         if _is_private(_folder().lstat()):
             return _checked(_read(name))

@@ -255,7 +255,8 @@ def _syntax_report(path: Path | None, writer: EvidenceWriter) -> SyntaxReport | 
 
 @contextmanager
 def _readable_by_all() -> Iterator[None]:
-    """Whatever the user's umask: root's student is somebody else. The folder around it has a name that nobody knows."""
+    """Inside, new files are readable by all, whatever the umask: students' processes of root's have another user. The
+    folder around them has a name that cannot be guessed."""
     with _UMASK:
         before = os.umask(0o022)
         try:

@@ -207,7 +207,7 @@ def _window(live: RunState, until: Until, now_s: float) -> bool:
 
 
 def _talks_elsewhere(live: RunState, until: Until, now_s: float) -> bool:
-    """The nodes have talked for so long on topics that nobody waits for: no more will come of them."""
+    """Whether the nodes have talked for so long on topics that are not waited for that no more will come of them."""
     first_s = min((seen.first_s for seen in _talking(live)), default=now_s)
     return now_s > first_s + max(until.window_s or 0, until.silent_s)
 

@@ -61,7 +61,7 @@ def descriptor(name: str) -> Word:
 
 
 class Sandbox(Record):
-    """`bubblewrap` or nothing; `uid` is the student's where root has to become somebody else. `nesting` is true where
+    """`bubblewrap` or nothing; `uid` is the student's where root has to become another user. `nesting` is true where
     bubblewrap cannot keep a process from making user namespaces of its own."""
 
     bubblewrap: bool
@@ -92,7 +92,7 @@ class Sandbox(Record):
     def wall(
         self, *, ros: RosInstallation, place: Path, limits: Limits, binds: Sequence[Word], net: bool
     ) -> list[Word] | None:
-        """bubblewrap's arguments, None where there is none. `place` is the run's own folder (see `sandbox_files.prepare`),
+        """bubblewrap's arguments, or None without it. `place` is the run's own folder (`sandbox_files.prepare`),
         `binds` are more arguments. Only memory of fixed size can be written: the scratches, and what `binds` give."""
         if not self.bubblewrap:
             return None

@@ -168,7 +168,7 @@ class ArenaSession:
 
     async def finish(self) -> None:
         """Let the arena stop what is left and give its last frames. Raises ArenaError where they do not come, or where
-        a process was killed, and not by the arena: the machine had no memory for it, or somebody ended it."""
+        a process was killed, and not by the arena: the machine had no memory for it, or a person ended it."""
         self.send(do="finish")
         if not await self.wait(lambda: self._done, END_S):
             raise ArenaError("the managed roscore did not end in order", hint="grade again")
@@ -315,9 +315,9 @@ class ArenaSession:
 
 class Killed:
     """The processes of one run that were killed, and not by the arena: by the kernel of a machine without memory, by
-    somebody on it, or by their own program. Those that broke a limit are not among them.
+    a person, or by their own program. Those that broke a limit are not among them.
 
-    Nobody can tell a program that kills itself from one that is killed once. Who is killed in every run, while the
+    A program that kills itself looks like one that is killed once. One that is killed in every run, while the
     machine has memory, has done it itself: nothing in a sandbox can kill the sandbox's own process.
     """
 
@@ -347,7 +347,7 @@ class Killed:
             self._from_outside |= self._sandboxed and record["exit_code"] is None
 
     def first(self, *, last_run: bool) -> str:
-        """The name of one whom the machine may have killed, or nothing."""
+        """Return the name of a process that the machine may have killed, or nothing."""
         own = last_run and not self._from_outside and not self._short_of_memory()
         return "" if own else next((name for name in self._names if name not in self._limited), "")
 

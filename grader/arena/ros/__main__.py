@@ -245,7 +245,7 @@ class Arena:
         self._end_when_empty()
 
     def _watch_sockets(self):
-        """What sockets hold belongs to nobody: where it is too much, the tree with the most of them is stopped."""
+        """No process is charged for what sockets hold: past the limit, the tree with the most of them is stopped."""
         students = [process for process in self._processes.values() if process.role != "grader"]
         if self._stage and students and buffer_bytes() > self._limits["socket_bytes"]:
             excess = "more than {} MB in sockets".format(self._limits["socket_bytes"] >> 20)

@@ -65,7 +65,7 @@ class Wire:
 
     @property
     def congested(self):
-        """Whether the grader is so far behind that who sends much should wait."""
+        """Whether the grader is so far behind that publishers that send much should wait."""
         return self._bytes > CONGESTED_BYTES
 
     def flush(self):
