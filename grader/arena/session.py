@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from typing_extensions import Self
 
+from grader.arena.admission import MEMINFO, read_numbers
 from grader.arena.arena_process import ArenaProcess
 from grader.arena.control_groups import remove_groups
 from grader.arena.process_environment import Place
@@ -357,18 +358,10 @@ class Killed:
 
 def _kernel_kills() -> int:
     """How often the kernel of this machine has killed a process for want of memory (Documentation/filesystems/proc)."""
-    return _numbers("/proc/vmstat").get("oom_kill", 0)
+    return read_numbers(Path("/proc/vmstat")).get("oom_kill", 0)
 
 
 def _available() -> float:
     """The part of this machine's memory that can be had."""
-    memory = _numbers("/proc/meminfo")
-    return memory.get("MemAvailable:", 0) / memory.get("MemTotal:", 1)
-
-
-def _numbers(path: str) -> dict[str, int]:
-    try:
-        rows = [line.split() for line in Path(path).read_text().splitlines()]
-    except OSError:
-        return {}
-    return {row[0]: int(row[1]) for row in rows if len(row) > 1 and row[1].isdecimal()}
+    memory = read_numbers(MEMINFO)
+    return memory.get("MemAvailable", 0) / memory.get("MemTotal", 1)
