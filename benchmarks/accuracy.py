@@ -14,8 +14,7 @@ from benchmarks import arena
 from benchmarks.arena import PREFIX, PUBLISHER, Load, publisher_told
 from benchmarks.figures import Found, NotMeasured, Options, mid, table
 from benchmarks.gradings import folder_for
-from benchmarks.ros import master, program, running
-from grader.arena.ros_env import require_ros
+from benchmarks.ros import master, program, require_ros, running
 
 TIMES, SECONDS = 3, 20.0
 RATES_HZ = (10.0, 100.0)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from benchmarks.figures import NotMeasured
 from benchmarks.machine import Cost, timed
-from grader.arena.ros_env import SYSTEM_PATH, require_ros
+from grader.arena.ros_env import SYSTEM_PATH, RosInstallation, find_ros
 
 MASTER_S, LOOK_S = 10.0, 0.02
 HZTEST = """<launch>
@@ -27,6 +27,14 @@ HZTEST = """<launch>
   </test>
 </launch>
 """
+
+
+def require_ros() -> RosInstallation:
+    """Return the ROS 1 of this machine. Raises NotMeasured where there is none."""
+    ros = find_ros()
+    if ros is None:
+        raise NotMeasured("no ROS 1 on this machine")
+    return ros
 
 
 def ros_env(home: Path, **more: str) -> dict[str, str]:

@@ -12,8 +12,7 @@ from rosbags.rosbag1 import Reader
 
 from benchmarks.arena import PREFIX, PUBLISHER, Load, Taken, publisher_told
 from benchmarks.figures import NotMeasured
-from benchmarks.ros import master, running
-from grader.arena.ros_env import require_ros
+from benchmarks.ros import master, require_ros, running
 
 RECORDERS = ("/usr/lib/rosbag/record", "lib/rosbag/record")
 LOOK_S, IDLE_LOOKS, REST_S, END_S = 0.1, 5, 30.0, 60.0

@@ -26,7 +26,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path, PurePath
 from platform import python_version
-from typing import TYPE_CHECKING, Literal, TypeAlias, TypeVar, get_args
+from typing import TYPE_CHECKING, TypeAlias, TypeVar, get_args
 
 from grader import __version__
 from grader.errors import EvidenceError, UsageError
@@ -36,6 +36,7 @@ from grader.files import check_writable
 from grader.judging.facts import PACKAGE_RUN
 from grader.model.progress import Progress, Silence, StepState
 from grader.model.result import NO_TIME, EnvironmentInfo, GradingResult, SubmissionInfo
+from grader.model.submission import SandboxMode
 from grader.portable import wait_for_children
 from grader.results import RESULT, read_result_file
 from grader.rubric.load import LoadedRubric
@@ -45,8 +46,7 @@ if TYPE_CHECKING:
     from grader.arena.asynchronous import Stop
 
 StrPath: TypeAlias = "str | os.PathLike[str]"
-Sandbox = Literal["auto", "require", "none"]
-SANDBOXES = get_args(Sandbox)
+SANDBOXES = get_args(SandboxMode)
 T = TypeVar("T")
 OnStep: TypeAlias = Callable[[str, str, str], None]
 """Of a step: its name, its state (`waiting`, `running`, `done`, `failed`, `skipped`), and what it does or waits for."""
@@ -73,7 +73,7 @@ def grade(
     out: StrPath = "grader-results",
     *,
     submission_id: str | None = None,
-    sandbox: Sandbox = "auto",
+    sandbox: SandboxMode = "auto",
     static_only: bool = False,
     keep_hidden: bool = True,
     progress: OnStep | None = None,

@@ -24,8 +24,8 @@ HOST_PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 HOST_ENV = {"PATH": HOST_PATH, "LANG": "C.UTF-8"}
 
 
-def anywhere(environment: Mapping[str, str]) -> dict[str, str]:
-    """The same variables, which say the same in every folder: no list has an entry that depends on where one is."""
+def with_absolute_paths(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return the same variables without the entries of `PATH` and its like that depend on the current folder."""
     whole = {name: value for name, value in environment.items() if name not in LISTS}
     for name in LISTS:
         entries = [
@@ -36,12 +36,12 @@ def anywhere(environment: Mapping[str, str]) -> dict[str, str]:
     return {"PATH": _PATH, **whole}
 
 
-def program(name: str, environment: Mapping[str, str] = os.environ) -> str | None:
-    """The absolute path of a program of the user's PATH; None where there is none.
+def find_user_program(name: str, environment: Mapping[str, str] = os.environ) -> str | None:
+    """Return the absolute path of a program of the user's PATH; None where there is none.
 
     `shutil.which` believes empty entries, and on Windows looks in the current folder first.
     """
-    for folder in anywhere(environment)["PATH"].split(os.pathsep):
+    for folder in with_absolute_paths(environment)["PATH"].split(os.pathsep):
         for suffix in _SUFFIXES:
             path = Path(folder, name + suffix)
             if path.is_file() and os.access(path, os.X_OK):
@@ -49,13 +49,13 @@ def program(name: str, environment: Mapping[str, str] = os.environ) -> str | Non
     return None
 
 
-def own_module(name: str) -> list[str]:
-    """The command that calls `main` of one of the grader's modules. `python -m` would look in the current folder first,
-    for Python's own modules too."""
+def module_command(name: str) -> list[str]:
+    """Return the command that calls `main` of one of the grader's modules. `python -m` would look in the current
+    folder first, for Python's own modules too."""
     return [sys.executable, "-c", _MODULE.format(name)]
 
 
 @lru_cache(maxsize=32)
-def host_program(name: str) -> str | None:
-    """The absolute path of a program of this machine, such as `bwrap`; None where it is not installed."""
+def find_host_program(name: str) -> str | None:
+    """Return the absolute path of a program of this machine, such as `bwrap`; None where it is not installed."""
     return shutil.which(name, path=HOST_PATH)

@@ -61,8 +61,8 @@ from grader.rubric.rates import rates_of
 if TYPE_CHECKING:
     from grader.arena.asynchronous import Stop
     from grader.arena.recording import Recorder
-    from grader.arena.sandbox import Mode
     from grader.arena.static_recorder import Recording, StaticRecorder
+    from grader.model.submission import SandboxMode
 
 LATER = ("grader.evidence.decode", "grader.evidence.reader")
 """Slow to import, and needed by no verdict that the files alone decide: imported while the build runs. The arena is
@@ -87,7 +87,7 @@ class GradeOptions:
     `arena.asynchronous.Stopped` is raised.
     """
 
-    sandbox: Mode = "auto"
+    sandbox: SandboxMode = "auto"
     submission_id: str | None = None
     static_only: bool = False
     keep_hidden: bool = True

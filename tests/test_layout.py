@@ -21,18 +21,18 @@ ALLOWED = {
     "errors": set[str](),
     "shown": set[str](),
     "portable": {"errors"},
-    "outside": set[str](),
+    "host_programs": set[str](),
     "files": {"errors", "portable"},
     "results": BASE | {"files"},
     "faults": BASE | {"files", "intake", "report", "results", "rubric"},
     "evidence": BASE | {"files"},
-    "package": BASE | {"outside"},
-    "intake": BASE | {"files", "outside"},
+    "package": BASE | {"host_programs"},
+    "intake": BASE | {"files", "host_programs"},
     "checks": BASE | {"evidence"},
     "rubric": BASE | {"checks", "evidence", "files"},
     "judging": BASE | {"checks", "evidence", "rubric"},
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},
-    "arena": BASE | {"evidence", "files", "package", "rubric.model"},
+    "arena": BASE | {"evidence", "files", "host_programs", "package", "rubric.model"},
     "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "pipeline": {
         *BASE, "arena", "evidence", "faults", "files", "intake", "judging", "package", "recordings",
@@ -45,8 +45,8 @@ ALLOWED = {
         *BASE, "checks", "classes.batch", "evidence", "files", "intake", "package", "pipeline", "rubric"
     },
     "classes": {
-        *BASE, "arena.ros_env", "checks", "evidence", "faults", "files", "intake", "judging", "outside", "pipeline",
-        "report", "results", "rubric"
+        *BASE, "arena.ros_env", "checks", "evidence", "faults", "files", "intake", "host_programs", "judging",
+        "pipeline", "report", "results", "rubric"
     },
     "student": {
         *BASE, "arena.asynchronous", "arena.workspace", "faults", "files", "intake", "package", "pipeline", "report",
@@ -55,7 +55,7 @@ ALLOWED = {
     "integrations": BASE | {"faults", "files", "intake", "pipeline", "report", "results", "rubric"},
     "cli": {
         *BASE, "arena", "authoring", "checks", "classes", "evidence", "faults", "files", "integrations", "intake",
-        "judging", "outside", "package", "pipeline", "report", "rubric", "student"
+        "judging", "host_programs", "package", "pipeline", "report", "rubric", "student"
     },
     "__main__": {"cli"},
 }  # fmt: skip

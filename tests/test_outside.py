@@ -13,7 +13,7 @@ from grader.arena.ros_env import RosInstallation
 from grader.classes.batch.job import Outcome
 from grader.classes.batch.pool import SAFE_PATH, workers
 from grader.cli.diagnosis import _modules
-from grader.host_programs import anywhere, own_module, program
+from grader.host_programs import find_user_program, module_command, with_absolute_paths
 from grader.intake.git import Git
 from tests.intake.samples import write
 
@@ -53,7 +53,9 @@ def test_a_process_of_the_grader_imports_nothing_from_the_folder_that_it_is_star
     module, marker
 ) -> None:
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(own_module(module), input=b"", env=environment, capture_output=True, check=False)
+    done = subprocess.run(
+        module_command(module), input=b"", env=environment, capture_output=True, check=False
+    )
     assert not marker.exists(), done.stderr.decode()
     old = [sys.executable, "-m", module]
     subprocess.run(old, input=b"", env=environment, capture_output=True, check=False)
@@ -94,21 +96,21 @@ def test_ci_installs_the_grader_without_a_look_into_the_students_folder(marker, 
 
 def test_lists_of_folders_lose_entries_that_depend_on_the_current_folder() -> None:
     given = {"PATH": "/a::.:b/c:/d", "LD_LIBRARY_PATH": ":/e", "PYTHONPATH": ".", "HOME": "/home/ada"}
-    assert anywhere(given) == {"PATH": "/a:/d", "LD_LIBRARY_PATH": "/e", "HOME": "/home/ada"}
-    assert anywhere({"PATH": ""})["PATH"] == "/usr/bin:/bin"
+    assert with_absolute_paths(given) == {"PATH": "/a:/d", "LD_LIBRARY_PATH": "/e", "HOME": "/home/ada"}
+    assert with_absolute_paths({"PATH": ""})["PATH"] == "/usr/bin:/bin"
 
 
 def test_programs_are_not_found_in_the_current_folder(tmp_path, monkeypatch) -> None:
     write(tmp_path, {"here/git": "#!/bin/sh\n", "bin/git": "#!/bin/sh\n"}, executable=("here/git", "bin/git"))
     monkeypatch.chdir(tmp_path / "here")
-    assert program("git", {"PATH": f".::{tmp_path}/bin"}) == str(tmp_path / "bin" / "git")
-    assert program("no-such-program") is None
+    assert find_user_program("git", {"PATH": f".::{tmp_path}/bin"}) == str(tmp_path / "bin" / "git")
+    assert find_user_program("no-such-program") is None
 
 
 def test_git_in_a_students_folder_finds_nothing_of_his(tmp_path, monkeypatch) -> None:
     """No program by an empty entry of PATH, no library by one of LD_LIBRARY_PATH, nothing that names a program."""
     names = ("git", "setpriv", "prlimit")
-    real = str(Path(program("git") or "").parent)
+    real = str(Path(find_user_program("git") or "").parent)
     student = write(tmp_path / "student", dict.fromkeys(names, "#!/bin/sh\ntouch taken\n"), executable=names)
     asked = write(
         tmp_path / "bin",

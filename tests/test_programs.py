@@ -39,7 +39,7 @@ STARTS = {
     "arena/ros_env.py:_from_setup": Start("base", "'/'", "nothing: ROS's own setup.bash"),
     "arena/arena_process.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
     "classes/batch/child.py:_started": Start(
-        "anywhere(os.environ)", None, "nothing: jobs come through a pipe, as JSON"
+        "with_absolute_paths(os.environ)", None, "nothing: jobs come through a pipe, as JSON"
     ),
     "cli/diagnosis.py:_hostname": Start("HOST_ENV", "'/'", "nothing"),
     "cli/diagnosis.py:_modules": Start("ros.env", "'/'", "nothing"),
@@ -57,9 +57,9 @@ STARTS = {
         "environment", "cwd", "its repository's data; no setting, hook or filter of it"
     ),
     "package/python.py:_run": Start(
-        "anywhere(os.environ)", None, "its source files, which are parsed and not run"
+        "with_absolute_paths(os.environ)", None, "its source files, which are parsed and not run"
     ),
-    "classes/review/serve.py:git_user": Start("anywhere(os.environ)", "'/'", "nothing"),
+    "classes/review/serve.py:git_user": Start("with_absolute_paths(os.environ)", "'/'", "nothing"),
     "classes/similarity/comparing.py:_answer": Start(
         "_environment()", None, "its source files, which are read and not run"
     ),

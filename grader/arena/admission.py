@@ -68,7 +68,7 @@ class FileLock:
         self.close()
 
     def take(self, *, shared: bool = False) -> bool:
-        """Lock it, or change how it is locked; False, and not locked, where somebody else's lock is in the way."""
+        """Lock it, or change how it is locked; False, and not locked, where another lock is in the way."""
         return lock(self._descriptor, shared=shared)
 
     def close(self) -> None:
@@ -96,7 +96,7 @@ def note(path: Path, late_ms: float) -> None:
 
 
 def latest_ms(path: Path) -> float:
-    """The worst that any grader measured within the last second; 0 where nobody did."""
+    """Return the worst that any grader measured within the last second; 0 where none did."""
     try:
         data = path.read_bytes()[: ENTRY.size * ENTRIES]
     except FileNotFoundError:
@@ -117,7 +117,7 @@ LATE_MS = 10.0
 RUN_BYTES = 400 << 20
 """A run is let in while so much memory is available, or when there is no other."""
 START_PATIENCE_S, ALONE_PATIENCE_S, ROOM_PATIENCE_S = 300.0, 900.0, 120.0
-"""After so long one goes on in any case: whoever holds what is waited for is not at work any more."""
+"""After so long one goes on in any case: the holder of what is waited for has hung."""
 
 
 class Leave:
@@ -127,7 +127,7 @@ class Leave:
         self._lock = lock
 
     def release(self) -> None:
-        """They have started: somebody else may. A second time without effect."""
+        """Give it back: they have started, and others may. A second time without effect."""
         if isinstance(self._lock, FileLock):
             self._lock.close()
 
@@ -135,7 +135,7 @@ class Leave:
 class Admission:
     """For one event loop. Starts of this object are let in in the order in which they ask.
 
-    `folder` holds the locks (`shared_folder()`); without one nobody waits for anybody.
+    `folder` holds the locks (`shared_folder()`); without one, nothing is waited for.
     """
 
     def __init__(self, folder: Path | None, *, starts: int | None = None) -> None:
@@ -147,7 +147,7 @@ class Admission:
     async def run(self, *, alone: bool = False) -> AsyncIterator[None]:
         """Wait until this run may begin: side by side with others while there is memory, or `alone`.
 
-        Whoever waits to be alone is waited for by all that come later.
+        A run that waits to be alone goes before all that come later.
         """
         if self._folder is None:
             yield
@@ -194,7 +194,7 @@ class Admission:
 
 
 def _has_room(runs: FileLock) -> bool:
-    """Whether a run that shares this lock finds memory, or nobody else shares it. It is held if so."""
+    """Whether a run that shares this lock finds memory, or no other run shares it. It is held if so."""
     if not runs.take(shared=True):
         return False
     return available_bytes() > RUN_BYTES or (runs.take() and runs.take(shared=True))
@@ -210,19 +210,21 @@ async def _until(look: Callable[[], T], patience_s: float) -> T:
 
 def available_bytes() -> int:
     """What new processes can have without anything being swapped out, of the machine and of its container."""
-    machine = _numbers(MEMINFO).get("MemAvailable", UNLIMITED_BYTES >> 10) * 1024
+    machine = read_numbers(MEMINFO).get("MemAvailable", UNLIMITED_BYTES >> 10) * 1024
     return min([machine, *(_left_bytes(*place) for place in CONTAINER)])
 
 
 def _left_bytes(folder: Path, limit: str, used: str, cache: str) -> int:
     """What a control group still gives; its page cache is given up where it is needed."""
     with suppress(OSError, ValueError):  # no such group, or no limit: it says "max"
-        reclaimable = _numbers(folder / "memory.stat").get(cache, 0)
+        reclaimable = read_numbers(folder / "memory.stat").get(cache, 0)
         return int((folder / limit).read_text()) - int((folder / used).read_text()) + reclaimable
     return UNLIMITED_BYTES
 
 
-def _numbers(path: Path) -> dict[str, int]:
-    """`name number` or `name: number`, a line each."""
-    words = [line.replace(":", " ").split() for line in path.read_text().splitlines()]
+def read_numbers(path: Path) -> dict[str, int]:
+    """Return the numbers of a kernel's file, of which each line is `name number` or `name: number`."""
+    words = []
+    with suppress(OSError):
+        words = [line.replace(":", " ").split() for line in path.read_text().splitlines()]
     return {word[0]: int(word[1]) for word in words if len(word) > 1 and word[1].isdigit()}

@@ -13,15 +13,18 @@ import socket
 import struct
 import subprocess
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import Any
 
 from grader.errors import ArenaError
 
 READ_BYTES = 1 << 18
 STDERR_BYTES = 4096
 CLOSE_S = 1.5
+ANSWER = struct.Struct("<id")
+ANSWER_S = 15.0
+TEMPLATE_END_S = 2.0
 
 
 class ArenaProcess:
@@ -102,92 +105,10 @@ class ArenaProcess:
         self._errors = (self._errors + chunk)[-STDERR_BYTES:]
 
 
-# [arena.frames] Takes the arena's frames apart (grader/arena/ros/wire.py says what they hold).
-
-HEADER = struct.Struct("<BIQ")
-CHANNEL_ID = LENGTH = struct.Struct("<I")
-FRAME_BYTES_MAX = 24 << 20
-
-
-class Frame(NamedTuple):
-    """`kind` is one of C, M, E, S; `channel` and `datas` (messages) belong to M, `fields` to the others."""
-
-    kind: str
-    time_ns: int
-    channel: int
-    datas: list[bytes]
-    fields: dict[str, Any]
-
-
-class FrameReader:
-    """Bytes in, whole frames out. Raises ArenaError for what is none."""
-
-    def __init__(self) -> None:
-        self._pieces: list[bytes] = []
-        self._size = 0
-        self._needed = HEADER.size
-
-    def feed(self, chunk: bytes) -> Iterator[Frame]:
-        self._pieces.append(chunk)
-        self._size += len(chunk)
-        if self._size < self._needed:
-            return
-        data, start = b"".join(self._pieces), 0
-        self._needed = HEADER.size
-        while len(data) - start >= HEADER.size:
-            kind, length, time_ns = HEADER.unpack_from(data, start)
-            if length > FRAME_BYTES_MAX:
-                raise ArenaError("the arena sent bytes that are no frame")
-            end = start + HEADER.size + length
-            if end > len(data):
-                self._needed = end - start
-                break
-            yield _frame(chr(kind), time_ns, data, start + HEADER.size, end)
-            start = end
-        self._pieces = [data[start:]]
-        self._size = len(data) - start
-
-
-def _frame(kind: str, time_ns: int, data: bytes, start: int, end: int) -> Frame:
-    try:
-        if kind == "M":
-            (channel,) = CHANNEL_ID.unpack_from(data[start : min(end, start + CHANNEL_ID.size)])
-            return Frame(kind, time_ns, channel, _messages(data, start + CHANNEL_ID.size, end), {})
-        return Frame(kind, time_ns, 0, [], _fields(data[start:end]))
-    except (struct.error, ValueError, TypeError, RecursionError) as error:
-        raise ArenaError("the arena sent bytes that are no frame") from error
-
-
-def _messages(data: bytes, start: int, end: int) -> list[bytes]:
-    found, unpack_from = [], LENGTH.unpack_from
-    while start < end:
-        (length,) = unpack_from(data, start)
-        start += LENGTH.size
-        found.append(data[start : start + length])
-        start += length
-    if start != end:
-        raise ValueError("a message that is not whole")
-    return found
-
-
-def _fields(payload: bytes) -> dict[str, Any]:
-    """Halves of surrogate pairs, which no record can hold, become question marks."""
-    fields = json.loads(payload)
-    if b"\\ud" in payload or b"\xed" in payload:
-        fields = json.loads(json.dumps(fields, ensure_ascii=False).encode(errors="replace"))
-    return dict(fields)
-
-
-# Starts arenas as copies of one process that has imported ROS already: one per grader.
-
-ANSWER = struct.Struct("<id")
-ANSWER_S = 15.0
-TEMPLATE_CLOSE_S = 2.0
-ERROR_BYTES = 4096
-
-
 class Template:
-    """The template's process (`ros/template.py`). It ends with this object's socket, at the latest with the grader."""
+    """The process that has imported ROS already, of which arenas are copies (`stand_by` in `ros/__main__.py`): one for
+    each grader. It ends with this object's socket, at the latest with the grader.
+    """
 
     def __init__(self, argv: Sequence[str], env: Mapping[str, str]) -> None:
         self._lock = threading.Lock()
@@ -221,7 +142,7 @@ class Template:
         """End the template; the arenas that it made are not touched."""
         self._sock.close()
         try:
-            self._popen.wait(TEMPLATE_CLOSE_S)
+            self._popen.wait(TEMPLATE_END_S)
         except subprocess.TimeoutExpired:
             self._popen.kill()
             self._popen.wait()
@@ -232,10 +153,10 @@ class Template:
         """What the template said before it ended, its last line."""
         self._sock.close()
         with suppress(subprocess.TimeoutExpired):
-            self._popen.wait(TEMPLATE_CLOSE_S)
+            self._popen.wait(TEMPLATE_END_S)
         self._popen.kill()
         _, errors = self._popen.communicate()
-        lines = errors[-ERROR_BYTES:].decode(errors="replace").strip().splitlines()
+        lines = errors[-STDERR_BYTES:].decode(errors="replace").strip().splitlines()
         return lines[-1] if lines else "it said nothing"
 
     def _ask(
@@ -268,7 +189,7 @@ def template_of(argv: Sequence[str], env: Mapping[str, str]) -> Template:
 def start_arena(
     argv: Sequence[str], env: Mapping[str, str], descriptors: Sequence[int]
 ) -> tuple[Template, int, float]:
-    """A new arena of the template; a template that somebody has ended is made anew, once. Raises ArenaError."""
+    """Start an arena; a template that has ended is made anew, once. Raises ArenaError."""
     template = template_of(argv, env)
     try:
         return template, *template.start(descriptors)

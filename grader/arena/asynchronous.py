@@ -61,7 +61,7 @@ def run_until_signal(work: Coroutine[Any, Any, None], stop: Stop | None = None) 
         raise (Stopped if stop.asked and not signals else KeyboardInterrupt) from None
 
 
-async def side_by_side(*works: Coroutine[Any, Any, None]) -> None:
+async def run_together(*works: Coroutine[Any, Any, None]) -> None:
     """Run them together; when one fails or all are cancelled, return only when every one has ended in order."""
     tasks = [asyncio.ensure_future(work) for work in works]
     try:

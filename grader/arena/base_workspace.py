@@ -24,7 +24,7 @@ from grader.arena.asynchronous import run_until_signal
 from grader.arena.limits import Limits
 from grader.arena.process_environment import BASE, Place
 from grader.arena.ros_env import find_ros
-from grader.arena.sandbox import Mode, temporary_base
+from grader.arena.sandbox import temporary_base
 from grader.arena.sandbox_files import ANSWERS, INSIDE_WORKSPACE, QUESTIONS, prepare
 from grader.arena.sandbox_probe import choose
 from grader.arena.session import ArenaSession
@@ -32,6 +32,7 @@ from grader.arena.workspace import Workspace, read_member
 from grader.errors import ArenaError, GraderError
 from grader.evidence.writer import EvidenceWriter
 from grader.files import atomic_write, open_untrusted, temporary_folder
+from grader.model.submission import SandboxMode
 
 NAME = "base workspace"
 MAKE_S = 60.0
@@ -70,7 +71,7 @@ FILES_MAX = 8
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
-def provide_base(mode: Mode) -> None:
+def provide_base(mode: SandboxMode) -> None:
     """Have a base before many submissions are graded; where it cannot be made, each is built without.
 
     Raises GraderError where this machine lets nothing be run in this `mode`.
@@ -184,7 +185,7 @@ def _entries(path: str) -> list[str]:
 
 
 def read_kept(name: str) -> bytes | None:
-    """What was kept under that name; None where there is none, it is damaged, or somebody else may have written it."""
+    """Return what was kept under that name; None where there is none that is whole and only this user's."""
     with suppress(OSError):
         if _is_private(_folder().lstat()):
             return _checked(_read(name))

@@ -120,20 +120,11 @@ def _note_excess(writer: EvidenceWriter, *found: str) -> None:
 
 
 def _syntax_spec(place: Place) -> dict[str, Any]:
-    return place.spec(
-        "syntax",
-        _syntax(place),
-        role="grader",
-        as_handed_in=True,
-        collect=SYNTAX,
-        collect_bytes=2 * REPORT_BYTES_MAX,
-    )
-
-
-def _syntax(place: Place) -> list[str]:
     """ROS's own Python compiles every script of the package, and runs none."""
     script = 'python3 -I "$1/grader-syntax.py" "$2" < "$1/python-files.json" >' + _target(place, SYNTAX)
-    return ["/bin/bash", "-c", script, "bash", place.shims, place.package_folder]
+    argv = ["/bin/bash", "-c", script, "bash", place.shims, place.package_folder]
+    room = 2 * REPORT_BYTES_MAX
+    return place.spec("syntax", argv, role="grader", as_handed_in=True, collect=SYNTAX, collect_bytes=room)
 
 
 def _target(place: Place, name: str) -> str:

@@ -217,7 +217,7 @@ def _lacks_memory(group: Path) -> bool:
 
 
 def _belongs_to_the_grader(group: Path) -> bool:
-    """Nobody else manages it, and nobody else's processes are in it."""
+    """Whether no other program manages it, and no other program's processes are in it."""
     free = not SYSTEMD.exists() or SCOPES.fullmatch(group.name) is not None
     return (free or _handed_over(group)) and _all_ours(group, _processes(group))
 

@@ -27,7 +27,7 @@ from grader.arena.sandbox_files import (
     with_standins,
 )
 from grader.arena.workspace import Built, Workspace, read_archive, read_folder
-from grader.host_programs import host_program
+from grader.host_programs import find_host_program
 
 LOOPBACK = "127.0.0.1"
 """As an address: not every machine knows the name localhost."""
@@ -59,7 +59,7 @@ BUILD_RUN = (
 ARCHIVE = "built.tar"
 BASE = "base.tar"
 STAGE = "stage"
-"""The folder over which the arena mounts what sandboxes see (`ros/stage.py`)."""
+"""The folder over which the arena mounts what sandboxes see (`Stage` in `ros/namespaces.py`)."""
 OUTPUT_FILES = 1_000
 OWN_VARIABLES = (
     "ROS_MASTER_URI",
@@ -91,7 +91,7 @@ class Place:
 
     @property
     def base(self) -> Path:
-        """The base workspace for this place's build (`base.py`), where there is one."""
+        """The base workspace for this place's build (`base_workspace.py`), where there is one."""
         return self.workspace.kept / BASE
 
     @cached_property
@@ -198,7 +198,7 @@ class Place:
             "argv": list(argv),
             "env": self._process_env(),
             "outer": self.sandbox.outer(limits),
-            "bwrap": host_program("bwrap"),
+            "bwrap": find_host_program("bwrap"),
             "wall": self.sandbox.wall(
                 ros=self.ros,
                 place=self.folder,

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import shutil
 import threading
 import time
 from collections import Counter
@@ -18,12 +17,12 @@ from pathlib import Path
 from typing_extensions import Self
 
 from grader.arena.admission import Admission, shared_folder
-from grader.arena.asynchronous import Stop, run_until_signal, side_by_side
+from grader.arena.asynchronous import Stop, run_together, run_until_signal
 from grader.arena.build import BUILD_EXPECTED_S, build
 from grader.arena.limits import Limits
 from grader.arena.process_environment import Place
 from grader.arena.ros_env import INSTALL_HINT, find_ros
-from grader.arena.sandbox import Mode, temporary_base
+from grader.arena.sandbox import temporary_base
 from grader.arena.sandbox_files import prepare
 from grader.arena.sandbox_probe import choose
 from grader.arena.scenario import expected_s, run_scenario
@@ -31,8 +30,8 @@ from grader.arena.static_recorder import (
     NO_ROS,
     PACKAGE,
     RETRIES,
-    STILL_HOLDS,
     Recording,
+    copy_recorded,
     metadata,
     not_attached,
     write_files,
@@ -45,7 +44,7 @@ from grader.files import read_untrusted, temporary_folder
 from grader.model.message_rate import RateBounds
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
-from grader.model.submission import Submission
+from grader.model.submission import SandboxMode, Submission
 from grader.package import SyntaxReport, python_paths, read_syntax_report, with_build_facts
 from grader.package.python import REPORT_BYTES_MAX
 from grader.rubric.model import Rubric
@@ -70,7 +69,7 @@ class Recorder:
         rubric: Rubric,
         folder: Path,
         *,
-        mode: Mode,
+        mode: SandboxMode,
         progress: Progress,
         rates: Mapping[str, tuple[RateBounds, ...]] | None = None,
         recorded: Mapping[str, Path] | None = None,
@@ -113,22 +112,17 @@ class Recorder:
 
     async def _record_all(self, meanwhile: Callable[[], None]) -> None:
         self._admission = Admission(shared_folder())
-        names = [name for name in in_order(self._rubric, self._rates) if name not in self._recorded]
-        self._copy_recorded()
+        names = [name for name in order_runs(self._rubric, self._rates) if name not in self._recorded]
+        copy_recorded(self._recorded, self.recording.folder, self._progress)
         self._progress.step("build", "waiting", "", BUILD_EXPECTED_S)
         for name in names:
             self._progress.step(name, "waiting", "for the build", expected_s(self._rubric.scenarios[name]))
-        await side_by_side(self._record_package(), asyncio.to_thread(meanwhile))
+        await run_together(self._record_package(), asyncio.to_thread(meanwhile))
         if self._place is None:
             for name in names:
                 self._progress.step(name, "skipped", self._not_run)
             return
-        await side_by_side(*(self._record_scenario(self._place, name) for name in names))
-
-    def _copy_recorded(self) -> None:
-        for name, path in self._recorded.items():
-            shutil.copyfile(path, self.recording.folder / f"{name}.mcap")
-            self._progress.step(name, "skipped", STILL_HOLDS)
+        await run_together(*(self._record_scenario(self._place, name) for name in names))
 
     async def _record_alone(self, names: tuple[str, ...]) -> None:
         self._admission = Admission(shared_folder())
@@ -157,25 +151,21 @@ class Recorder:
 
     async def _build(self, place: Place, writer: EvidenceWriter, *, last: bool) -> None:
         self._progress.step("build", "waiting", WAITING, BUILD_EXPECTED_S)
-        async with self._admission.run(), self._admission.start():
-            self._progress.step("build", "running", "catkin_make", BUILD_EXPECTED_S)
-            await self._built(place, writer, last=last)
-
-    async def _built(self, place: Place, writer: EvidenceWriter, *, last: bool) -> None:
         recording = self.recording
         faulty = [script for script in self._scripts() if _needs_answer(recording.facts, script)]
-        try:
-            self._place, outcome = await build(
-                place, writer, python_paths(recording.facts), faulty, last_run=last
-            )
-        except ArenaError as error:
-            if not last:
-                raise
-            event = ScenarioEvent(event="end", outcome="host", detail=error.message)
-            writer.event("/grader/scenario", time.time_ns(), event)
-            self._progress.step("build", "failed", error.message)
-            self._not_run = error.message
-            return
+        files = python_paths(recording.facts)
+        async with self._admission.run(), self._admission.start():
+            self._progress.step("build", "running", "catkin_make", BUILD_EXPECTED_S)
+            try:
+                self._place, outcome = await build(place, writer, files, faulty, last_run=last)
+            except ArenaError as error:
+                if not last:
+                    raise
+                event = ScenarioEvent(event="end", outcome="host", detail=error.message)
+                writer.event("/grader/scenario", time.time_ns(), event)
+                self._progress.step("build", "failed", error.message)
+                self._not_run = error.message
+                return
         recording.add(outcome)
         report = _syntax_report(outcome.syntax, writer)
         recording.facts = with_build_facts(
@@ -185,9 +175,7 @@ class Recorder:
             python_faults=report.faults if report else None,
             python_slips=report.slips if report else None,
         )
-        self._progress.step(
-            "build", "done" if outcome.ok else "failed", "" if outcome.ok else "catkin_make failed"
-        )
+        self._progress.step("build", *(("done", "") if outcome.ok else ("failed", "catkin_make failed")))
 
     def _make_place(self, folder: Path) -> Place:
         folder.mkdir()
@@ -197,18 +185,14 @@ class Recorder:
             workspace = make_workspace(
                 folder, self._submission, self.recording.facts, self._scripts(), self._sandbox
             )
-        name = (
-            self.recording.facts.manifest.name
-            if self.recording.facts.manifest
-            else self._submission.package.name
-        )
+        named = self.recording.facts.manifest or self._submission.package
         return Place(
             folder=folder,
             ros=self._ros,
             sandbox=self._sandbox,
             limits=self._limits,
             workspace=workspace,
-            package=name,
+            package=named.name,
         )
 
     def _scripts(self) -> list[str]:
@@ -219,13 +203,9 @@ class Recorder:
         wanted = {
             s.script for scenario in self._rubric.scenarios.values() for s in scenario.start if s.script
         }
-        found = []
-        for script in sorted(wanted):
-            name = Path(script).name
-            match = script if script in paths else next((p for p in paths if Path(p).name == name), None)
-            if match is not None:
-                found.append(match)
-        return found
+        names = {Path(path).name: path for path in reversed(paths)}
+        matches = (script if script in paths else names.get(Path(script).name) for script in sorted(wanted))
+        return [match for match in matches if match is not None]
 
     async def _record_scenario(self, place: Place, name: str, *, alone: bool = False) -> None:
         scenario, shown = self._rubric.scenarios[name], ""
@@ -274,7 +254,8 @@ def _syntax_report(path: Path | None, writer: EvidenceWriter) -> SyntaxReport | 
 
 @contextmanager
 def _readable_by_all() -> Iterator[None]:
-    """Whatever the user's umask: root's student is somebody else. The folder around it has a name that nobody knows."""
+    """Inside, new files are readable by all, whatever the umask: students' processes of root's have another user. The
+    folder around them has a name that cannot be guessed."""
     with _UMASK:
         before = os.umask(0o022)
         try:
@@ -291,7 +272,7 @@ def _needs_answer(facts: PackageFacts, path: str) -> bool:
     return file.executable is False or shebang is None or shebang.crlf or shebang.found is False
 
 
-def in_order(rubric: Rubric, rated: Container[str]) -> tuple[str, ...]:
+def order_runs(rubric: Rubric, rated: Container[str]) -> tuple[str, ...]:
     """Return the runs' names in the order in which they ask to begin: those that measure a rate (in real time) first,
     then the longest, so that the others start while it is watched."""
     scenarios = rubric.scenarios

@@ -56,13 +56,6 @@ def find_ros() -> RosInstallation | None:
     return _find(os.environ.get("GRADER_ROS_SETUP", ""), os.environ.get("CONDA_PREFIX", ""))
 
 
-def require_ros() -> RosInstallation:
-    ros = find_ros()
-    if ros is None:
-        raise RosMissing("no ROS 1 on this machine", hint=INSTALL_HINT)
-    return ros
-
-
 @lru_cache(maxsize=4)
 def _find(setup: str, conda: str) -> RosInstallation | None:
     if setup == "none":

@@ -27,7 +27,7 @@ class TopicSeen:
 
 
 @dataclass
-class Live:
+class RunState:
     """The state that conditions look at. `running` and `ended` are the student's processes, `helpers` the grader's own
     programs that run beside them, `registered` the processes of which a node has registered."""
 
@@ -116,7 +116,7 @@ class Live:
         self.unheard = {value: word for value, word in self.unheard.items() if not word.search(line)}
 
 
-def settled(live: Live, until: Until, now_s: float) -> Outcome | None:
+def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     """(outcome, detail) once the run has seen enough or has to give up, else None.
 
     `silent`: what was waited for stopped coming, or never came though the nodes were up.
@@ -151,7 +151,7 @@ def _waits(until: Until) -> bool:
     return any(seconds is not None for seconds in lasting) or any(seen)
 
 
-def waiting_for(live: Live, until: Until) -> str:
+def describe_wait(live: RunState, until: Until) -> str:
     """In a few words, what the run still waits for."""
     missing = [t for t in (*until.topics, *until.messages) if not live.topics[t].count]
     if missing:
@@ -166,7 +166,7 @@ def waiting_for(live: Live, until: Until) -> str:
     return "observing"
 
 
-def next_look_s(live: Live, until: Until, now_s: float) -> float:
+def next_look_s(live: RunState, until: Until, now_s: float) -> float:
     """How long nothing can change by time alone."""
     looks = [live.started_s + until.limit_s, live.started_s + until.first_message_s]
     for seen in live.topics.values():
@@ -183,16 +183,16 @@ def next_look_s(live: Live, until: Until, now_s: float) -> float:
     return min([*ahead, 1.0]) + 0.001
 
 
-def _seen(live: Live, topics: Iterable[str]) -> list[TopicSeen]:
+def _seen(live: RunState, topics: Iterable[str]) -> list[TopicSeen]:
     return [live.topics[t] for t in topics if live.topics[t].count]
 
 
-def _talking(live: Live) -> list[TopicSeen]:
+def _talking(live: RunState) -> list[TopicSeen]:
     """Topics with messages; what is logged says nothing of what else may come."""
     return [seen for topic, seen in live.topics.items() if seen.count and topic != "/rosout"]
 
 
-def _window(live: Live, until: Until, now_s: float) -> bool:
+def _window(live: RunState, until: Until, now_s: float) -> bool:
     if until.window_s is None:
         return True
     topics = until.topics or tuple(live.topics)
@@ -206,13 +206,13 @@ def _window(live: Live, until: Until, now_s: float) -> bool:
     return now_s >= max(s.first_s for s in seen) + max(until.window_s, until.silent_s)
 
 
-def _talks_elsewhere(live: Live, until: Until, now_s: float) -> bool:
-    """The nodes have talked for so long on topics that nobody waits for: no more will come of them."""
+def _talks_elsewhere(live: RunState, until: Until, now_s: float) -> bool:
+    """Whether the nodes have talked for so long on topics that are not waited for that no more will come of them."""
     first_s = min((seen.first_s for seen in _talking(live)), default=now_s)
     return now_s > first_s + max(until.window_s or 0, until.silent_s)
 
 
-def _rates_are_clear(live: Live, topics: tuple[str, ...]) -> bool:
+def _rates_are_clear(live: RunState, topics: tuple[str, ...]) -> bool:
     """Whether each topic is there to show a rate, and its rate is known well enough."""
     return bool(topics) and all(
         topic in live.rates
@@ -221,34 +221,34 @@ def _rates_are_clear(live: Live, topics: tuple[str, ...]) -> bool:
     )
 
 
-def _messages(live: Live, until: Until) -> bool:
+def _messages(live: RunState, until: Until) -> bool:
     return all(live.topics[topic].count >= count for topic, count in until.messages.items())
 
 
-def _connected(live: Live, until: Until, now_s: float) -> bool:
+def _connected(live: RunState, until: Until, now_s: float) -> bool:
     """For so long that a node which dies as soon as it is up has done so."""
     since = [live.connected_s.get(topic, now_s) for topic in until.connected]
     return all(now_s >= one_s + CONNECTED_S for one_s in since)
 
 
-def _nodes(live: Live, until: Until, now_s: float) -> bool:
+def _nodes(live: RunState, until: Until, now_s: float) -> bool:
     """Everything that is there or not there: nodes, programs asked to open something, processes that ended."""
     alive = until.alive_s is None or (bool(live.nodes) and now_s >= live.first_node_s + until.alive_s)
     up = len(live.nodes) >= until.nodes and set(until.opened) <= live.opened
     return alive and up and set(until.ended) <= live.ended
 
 
-def _quiet(live: Live, until: Until, now_s: float) -> bool:
+def _quiet(live: RunState, until: Until, now_s: float) -> bool:
     return until.quiet_s is None or (live.activity_s > 0 and now_s >= live.activity_s + until.quiet_s)
 
 
-def _heard(live: Live, until: Until, now_s: float) -> bool:
+def _heard(live: RunState, until: Until, now_s: float) -> bool:
     if not until.heard or not live.unheard:
         return True
     return now_s > max(live.last_line_s, live.last_sent_s) + HEARD_S
 
 
-def _silent(live: Live, until: Until, now_s: float) -> str:
+def _silent(live: RunState, until: Until, now_s: float) -> str:
     waited = (*until.topics, *until.messages)
     seen = _talking(live)
     if waited and not seen:
@@ -267,7 +267,7 @@ def _silent(live: Live, until: Until, now_s: float) -> str:
     return _standstill(live, until, now_s)
 
 
-def _standstill(live: Live, until: Until, now_s: float) -> str:
+def _standstill(live: RunState, until: Until, now_s: float) -> str:
     """Nothing happens any more, though more nodes, programs or ends were waited for."""
     growing_up = live.nodes and now_s < live.first_node_s + (until.alive_s or 0)
     if growing_up or _nodes(live, until, now_s):

@@ -1,4 +1,4 @@
-"""The wall around a student process tree: bubblewrap's arguments. Whether it can be had here: `probe.py`.
+"""The wall around a student process tree: bubblewrap's arguments. Whether it can be had here: `sandbox_probe.py`.
 
 Only arguments are made here; nothing is run. The arena starts the programs (`ros/launching.py`) in namespaces of its
 own (`ros/namespaces.py`).
@@ -14,17 +14,16 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, TypeAlias
 
 from grader.arena.control_groups import Cgroups
 from grader.arena.limits import Limits
 from grader.arena.ros_env import RosInstallation
 from grader.arena.sandbox_files import HOME, SHIMS, STANDINS
 from grader.errors import HostError
-from grader.host_programs import host_program
+from grader.host_programs import find_host_program
 from grader.model.record import Record
 
-Mode = Literal["auto", "require", "none"]
 Word: TypeAlias = "str | dict[str, Any]"
 """An argument, or what the arena puts into its place (`ros/launching.py`)."""
 
@@ -62,7 +61,7 @@ def descriptor(name: str) -> Word:
 
 
 class Sandbox(Record):
-    """`bubblewrap` or nothing; `uid` is the student's where root has to become somebody else. `nesting` is true where
+    """`bubblewrap` or nothing; `uid` is the student's where root has to become another user. `nesting` is true where
     bubblewrap cannot keep a process from making user namespaces of its own."""
 
     bubblewrap: bool
@@ -87,13 +86,13 @@ class Sandbox(Record):
         drop += (
             [] if self.bubblewrap else ["--no-new-privs"]
         )  # bubblewrap sees to that, and may be setuid itself
-        become = [_program("setpriv"), *drop] if drop and host_program("setpriv") else []
+        become = [_program("setpriv"), *drop] if drop and find_host_program("setpriv") else []
         return [*become, _program("prlimit"), *self.rlimits(limits), "--"]
 
     def wall(
         self, *, ros: RosInstallation, place: Path, limits: Limits, binds: Sequence[Word], net: bool
     ) -> list[Word] | None:
-        """bubblewrap's arguments, None where there is none. `place` is the run's own folder (see `inside.prepare`),
+        """bubblewrap's arguments, or None without it. `place` is the run's own folder (`sandbox_files.prepare`),
         `binds` are more arguments. Only memory of fixed size can be written: the scratches, and what `binds` give."""
         if not self.bubblewrap:
             return None
@@ -139,7 +138,7 @@ class Sandbox(Record):
 
 def _program(name: str) -> str:
     """Where the machine has it; `choose` has seen that it does."""
-    return host_program(name) or f"/usr/bin/{name}"
+    return find_host_program(name) or f"/usr/bin/{name}"
 
 
 def _system(ros: RosInstallation) -> list[Word]:

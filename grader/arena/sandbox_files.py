@@ -40,7 +40,10 @@ EM = "lib/python3/dist-packages/em.py"
 STANDIN_SOURCES = Path(__file__).resolve().parent / "standins"
 SHEBANG = b"#!"
 SHARE = "share"
+TWO_NAMES = {"rospy_tutorials": ("talker", "listener")}
+"""Programs that the real package has with an ending, too."""
 LIBRARY = "python"
+MESSAGES = "from standin_messages import define\n\ndefine(globals())\n"
 CMAKE = "cmake"
 
 
@@ -116,6 +119,9 @@ def copy_standins(folder: Path, ros: RosInstallation) -> None:
         _copy(STANDIN_SOURCES / name, folder / name)
     for name in missing_packages(ros):
         _copy(STANDIN_SOURCES / name, folder / SHARE / name)
+        _write_modules(folder / SHARE / name)
+        for program in TWO_NAMES.get(name, ()):
+            shutil.copyfile(folder / SHARE / name / program, folder / SHARE / name / f"{program}.py")
     for path in (folder, *folder.rglob("*")):
         path.chmod(0o755 if path.is_dir() or _is_program(path) else 0o644)
 
@@ -134,6 +140,17 @@ def with_standins(env: Mapping[str, str], copied: Path, inside: str) -> dict[str
 def _copy(source: Path, target: Path) -> None:
     ignored = shutil.ignore_patterns("__pycache__")
     shutil.copytree(source, target, ignore=ignored, copy_function=shutil.copyfile)
+
+
+def _write_modules(package: Path) -> None:
+    """Write the Python modules `<package>.msg` and `<package>.srv`, which make their classes when they are asked."""
+    library = package / LIBRARY / package.name
+    library.mkdir(parents=True)
+    (library / "__init__.py").touch()
+    for kind in ("msg", "srv"):
+        if (package / kind).is_dir():
+            (library / kind).mkdir()
+            (library / kind / "__init__.py").write_text(MESSAGES)
 
 
 def _append(path: str, entries: list[str]) -> str:

@@ -17,9 +17,10 @@ from pathlib import Path
 
 from grader.arena.control_groups import find_cgroups
 from grader.arena.limits import Limits
-from grader.arena.sandbox import NAMESPACES, NO_NESTING, WALLS, Mode, Sandbox, system_call_filter
+from grader.arena.sandbox import NAMESPACES, NO_NESTING, WALLS, Sandbox, system_call_filter
 from grader.errors import HostError, SandboxMissing
-from grader.host_programs import HOST_ENV, host_program
+from grader.host_programs import HOST_ENV, find_host_program
+from grader.model.submission import SandboxMode
 
 UID_MAP = Path("/proc/self/uid_map")
 UNUSED_UIDS = (1_900_000_000, 2_000_000_000)
@@ -59,7 +60,7 @@ UNKNOWN_HINT = (
 )
 
 
-def choose(mode: Mode) -> Sandbox:
+def choose(mode: SandboxMode) -> Sandbox:
     """The sandbox to use: `require` raises SandboxMissing where there is none, `auto` goes without and says so.
 
     Raises SandboxMissing where it cannot be known whether there is one, and HostError where the limits that were
@@ -75,7 +76,7 @@ def choose(mode: Mode) -> Sandbox:
     reason = "--sandbox none" if mode == "none" else why_not()
     if reason and mode == "require":
         raise SandboxMissing(f"no sandbox on this machine: {reason}", hint=INSTALL_HINT)
-    can_drop = os.geteuid() == 0 and host_program("setpriv") is not None
+    can_drop = os.geteuid() == 0 and find_host_program("setpriv") is not None
     uid = _nobodys_uid() if can_drop else None
     nesting = not reason and _walls()[1]
     return Sandbox(bubblewrap=not reason, uid=uid, reason=reason, nesting=nesting, cgroups=find_cgroups())
@@ -87,7 +88,7 @@ def refused_limits() -> str:
 
     They are set by the user who has them: root may do more.
     """
-    prlimit = host_program("prlimit")
+    prlimit = find_host_program("prlimit")
     if prlimit is None:
         return ""
     limits = Sandbox(bubblewrap=False, uid=None).rlimits(Limits())
@@ -106,7 +107,7 @@ def why_not() -> str:
 def _walls() -> tuple[str, bool]:
     """Why there is no sandbox, and whether what is in one can make namespaces. An error is not kept: it may pass."""
     for program in PROGRAMS:
-        if host_program(program) is None:
+        if find_host_program(program) is None:
             return f"{program} is not installed", False
     said = _refusal(NO_NESTING)
     nesting = bool(NESTS.fullmatch(said) or KNOWN.fullmatch(said))
@@ -131,12 +132,14 @@ def _refusal(*more: str) -> str:
     calls = ["--seccomp", "0"] if system_call_filter() else []
     files = ["--ro-bind", "/", "/", "--proc", "/proc", "--clearenv", "--setenv", "LANG", "C.UTF-8"]
     walls = [*files, *WALLS, *more, *calls, "--die-with-parent", "/bin/true"]
-    return _said([sys.executable, "-I", str(NAMESPACES), *_drop(), host_program("bwrap") or "bwrap", *walls])
+    return _said(
+        [sys.executable, "-I", str(NAMESPACES), *_drop(), find_host_program("bwrap") or "bwrap", *walls]
+    )
 
 
 def _drop() -> list[str]:
     """The words by which root becomes another user."""
-    setpriv = host_program("setpriv") if os.geteuid() == 0 else None
+    setpriv = find_host_program("setpriv") if os.geteuid() == 0 else None
     return [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if setpriv else []
 
 

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 from grader.arena.admission import Admission, Leave
 from grader.arena.process_environment import Place
-from grader.arena.run_state import next_look_s, settled, waiting_for
+from grader.arena.run_state import describe_wait, find_outcome, next_look_s
 from grader.arena.scenario_inputs import OVER, advertisement, call_services, make_shots, publication, settings
 from grader.arena.session import ArenaSession
 from grader.arena.static_recorder import RunCost
@@ -87,7 +87,7 @@ async def run_scenario(
             session.live.rate(rates)
             async with admission.start() as leave, session as arena:
                 arena.course(ScenarioEvent(event="begin"))
-                async with given_back(leave, {spec["name"] for _, spec in starts}, arena):
+                async with release_when_up(leave, {spec["name"] for _, spec in starts}, arena):
                     outcome, detail = await _run(scenario, starts, arena, tell)
                 await stop(scenario.start, arena, warped=scenario.clock == "warped")
                 await arena.finish()
@@ -161,12 +161,12 @@ async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple
     warped = scenario.clock == "warped"
     while True:
         now_s = time.monotonic()
-        done = settled(live, until, now_s)
+        done = find_outcome(live, until, now_s)
         if done is not None:
             if until.heard and live.running:
                 await arena.wait(lambda: not live.running, HEARD_SETTLE_S)
             return done
-        tell(waiting_for(live, until))
+        tell(describe_wait(live, until))
         if warped and _does_not_follow(scenario, arena, now_s):
             warped = False
             detail = "the node does not follow the simulated clock; the run goes on in real time"
@@ -175,7 +175,8 @@ async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple
             await _look_at_connections(arena)
         else:
             await arena.wait(
-                lambda: settled(live, until, time.monotonic()) is not None, next_look_s(live, until, now_s)
+                lambda: find_outcome(live, until, time.monotonic()) is not None,
+                next_look_s(live, until, now_s),
             )
 
 
@@ -201,13 +202,15 @@ def process_specs(start: Start, place: Place) -> Iterator[Spec]:
     if start.launch is not None:
         yield place.spec(start.name, ["roslaunch", place.package, start.launch, *start.args])
     elif start.load is not None:
-        yield from _loading(start.name, start.load, place)
+        file = place.script_path(start.load)
+        if file is not None:
+            yield place.spec(start.name, ["rosparam", "load", f"{place.package_folder}/{file}"], script=file)
     elif start.program is not None:
         package, _, program = start.program.partition("/")
         argv = ["rosrun", package, program, *start.args]
         yield replace(place, env={}).spec(start.name, argv, role="grader", copy=False)
     elif start.built:
-        for program in built_programs(place):
+        for program in sorted(place.built.compiled)[:BUILT_PROGRAMS_MAX]:
             yield place.spec(f"{start.name}/{program}", [f"{place.devel_programs}/{program}", *start.args])
     else:
         yield from _script(start, place)
@@ -221,17 +224,6 @@ def _script(start: Start, place: Place) -> Iterator[Spec]:
         yield place.spec(start.name, [program, *start.args], script=path, repairs=repairs)
 
 
-def _loading(name: str, file: str, place: Place) -> Iterator[Spec]:
-    found = place.script_path(file)
-    if found is not None:
-        yield place.spec(name, ["rosparam", "load", f"{place.package_folder}/{found}"], script=found)
-
-
-def built_programs(place: Place) -> list[str]:
-    """The names of what the compiler made for `rosrun` to find, in order."""
-    return sorted(place.built.compiled)[:BUILT_PROGRAMS_MAX]
-
-
 def set_params(params: tuple[Param, ...], arena: ArenaSession) -> None:
     """Set them, each with its event in the evidence; a file that cannot be read, or is too much, is noted there."""
     found, remarks = settings(params, arena.place.package_file)
@@ -240,18 +232,13 @@ def set_params(params: tuple[Param, ...], arena: ArenaSession) -> None:
         actor = "the package" if over else "grader"
         arena.note(ActorEvent(action="limit" if over else "note", actor=actor, detail=remark))
     for one in found:
-        record = {
-            "action": "param",
-            "actor": "grader",
-            "topic": one.name,
-            "value": one.value,
-            "detail": one.detail,
-        }
+        about = {"topic": one.name, "value": one.value, "detail": one.detail}
+        record = {"action": "param", "actor": "grader", **about}
         arena.send(do="set_param", name=one.name, value=one.value, record=record)
 
 
 @asynccontextmanager
-async def given_back(leave: Leave, names: set[str], arena: ArenaSession) -> AsyncIterator[None]:
+async def release_when_up(leave: Leave, names: set[str], arena: ArenaSession) -> AsyncIterator[None]:
     """Inside, the leave to start is given back as soon as these processes are up."""
 
     async def give_back() -> None:

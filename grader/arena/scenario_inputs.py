@@ -182,7 +182,7 @@ def settings(
 
 
 def made_up(like: object) -> Any:  # noqa: ANN401 - of the type that it stands for
-    """A value of the same type that nobody can guess; digits stay digits."""
+    """Return a value of the same type that cannot be guessed; digits stay digits."""
     if isinstance(like, bool) or like is None:
         return like
     if isinstance(like, int):

@@ -14,10 +14,12 @@ from typing import Any, NamedTuple
 
 from typing_extensions import Self
 
-from grader.arena.arena_process import ArenaProcess, Frame, FrameReader
+from grader.arena.admission import MEMINFO, read_numbers
+from grader.arena.arena_process import ArenaProcess
 from grader.arena.control_groups import remove_groups
 from grader.arena.process_environment import Place
-from grader.arena.run_state import Live
+from grader.arena.ros.wire import Frame, FrameReader
+from grader.arena.run_state import RunState
 from grader.errors import ArenaError
 from grader.evidence.events import TOPICS, ActorEvent, ProcessEvent, ScenarioEvent
 from grader.evidence.run import is_grader_node
@@ -61,7 +63,7 @@ class ArenaSession:
         last_run: bool = False,
         on_lateness: Callable[[float], None] = lambda _: None,
     ) -> None:
-        self.live = Live()
+        self.live = RunState()
         self.cpu_s = 0.0
         self.student_cpu_s = 0.0
         self.exit_codes: dict[str, int | None] = {}
@@ -167,7 +169,7 @@ class ArenaSession:
 
     async def finish(self) -> None:
         """Let the arena stop what is left and give its last frames. Raises ArenaError where they do not come, or where
-        a process was killed, and not by the arena: the machine had no memory for it, or somebody ended it."""
+        a process was killed, and not by the arena: the machine had no memory for it, or a person ended it."""
         self.send(do="finish")
         if not await self.wait(lambda: self._done, END_S):
             raise ArenaError("the managed roscore did not end in order", hint="grade again")
@@ -314,9 +316,9 @@ class ArenaSession:
 
 class Killed:
     """The processes of one run that were killed, and not by the arena: by the kernel of a machine without memory, by
-    somebody on it, or by their own program. Those that broke a limit are not among them.
+    a person, or by their own program. Those that broke a limit are not among them.
 
-    Nobody can tell a program that kills itself from one that is killed once. Who is killed in every run, while the
+    A program that kills itself looks like one that is killed once. One that is killed in every run, while the
     machine has memory, has done it itself: nothing in a sandbox can kill the sandbox's own process.
     """
 
@@ -346,7 +348,7 @@ class Killed:
             self._from_outside |= self._sandboxed and record["exit_code"] is None
 
     def first(self, *, last_run: bool) -> str:
-        """The name of one whom the machine may have killed, or nothing."""
+        """Return the name of a process that the machine may have killed, or nothing."""
         own = last_run and not self._from_outside and not self._short_of_memory()
         return "" if own else next((name for name in self._names if name not in self._limited), "")
 
@@ -356,18 +358,10 @@ class Killed:
 
 def _kernel_kills() -> int:
     """How often the kernel of this machine has killed a process for want of memory (Documentation/filesystems/proc)."""
-    return _numbers("/proc/vmstat").get("oom_kill", 0)
+    return read_numbers(Path("/proc/vmstat")).get("oom_kill", 0)
 
 
 def _available() -> float:
     """The part of this machine's memory that can be had."""
-    memory = _numbers("/proc/meminfo")
-    return memory.get("MemAvailable:", 0) / memory.get("MemTotal:", 1)
-
-
-def _numbers(path: str) -> dict[str, int]:
-    try:
-        rows = [line.split() for line in Path(path).read_text().splitlines()]
-    except OSError:
-        return {}
-    return {row[0]: int(row[1]) for row in rows if len(row) > 1 and row[1].isdecimal()}
+    memory = read_numbers(MEMINFO)
+    return memory.get("MemAvailable", 0) / memory.get("MemTotal", 1)

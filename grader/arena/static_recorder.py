@@ -114,6 +114,13 @@ def _texts(facts: PackageFacts) -> list[SourceFile]:
     return [f for f in facts.files if not f.binary and f.link is None and f.path.endswith(ATTACHED_SUFFIXES)]
 
 
+def copy_recorded(recorded: Mapping[str, Path], folder: Path, progress: Progress) -> None:
+    """Copy evidence that stands for a run of its scenario into the recording's folder."""
+    for name, path in recorded.items():
+        shutil.copyfile(path, folder / f"{name}.mcap")
+        progress.step(name, "skipped", STILL_HOLDS)
+
+
 def why_unrun() -> str:
     """Why no node can be run here, "" where one can. Raises RosMissing where ROS is not where it should be."""
     if system():
@@ -147,9 +154,7 @@ class StaticRecorder:
 
     def record_all(self, _meanwhile: Callable[[], None]) -> None:
         """The package's files, and what was recorded before. There is no build to wait for meanwhile."""
-        for name, path in self._recorded.items():
-            shutil.copyfile(path, self.recording.folder / f"{name}.mcap")
-            self._progress.step(name, "skipped", STILL_HOLDS)
+        copy_recorded(self._recorded, self.recording.folder, self._progress)
         self._write_package()
         for name in self._rubric.scenarios:
             if name not in self._recorded:

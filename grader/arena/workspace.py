@@ -53,7 +53,7 @@ _ODD = re.compile(rb"[0-9]{21}|GNU\.sparse")
 
 class Workspace(Record):
     """`built` is the catkin workspace to build (`src/` in it), `repaired` the `src/` that runs; `folder` is the
-    package's folder name in both, `repairs` what was mended, by path. `kept` is for what the build hands over. Files
+    package's folder name in both, `repairs` what was fixed, by path. `kept` is for what the build hands over. Files
     of more than 4 MB are not copied into each run: they lie in `large`, and links lead there; `copied_bytes` is the
     rest."""
 
@@ -166,7 +166,7 @@ def _starts_as_script(path: Path) -> bool:
 
 
 def _repair(path: Path, facts: SourceFile | None) -> Iterator[str]:
-    """Mend what keeps `rosrun` from running a script, and name each thing mended."""
+    """Fix what keeps `rosrun` from running a script, and name each thing that was fixed."""
     if facts is None or path.is_symlink() or not path.is_file():
         return
     if facts.executable is False:

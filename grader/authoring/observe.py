@@ -9,11 +9,11 @@ from statistics import median
 
 from grader.checks.support.console_output import printed_lines, probes_on
 from grader.checks.support.processes import lives
+from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.evidence.inspect import periodic_share, rate_stats
 from grader.evidence.run import Channel, Run
 from grader.model.record import Record
 
-SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
 SYSTEM_SERVICES = ("/get_loggers", "/set_logger_level")
 INTEGER_TYPES = frozenset(f"std_msgs/{u}Int{bits}" for u in ("", "U") for bits in (8, 16, 32, 64))
 ANONYMOUS = re.compile(r"_\d+_\d{9,}$")

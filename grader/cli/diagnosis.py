@@ -19,7 +19,7 @@ from grader.cli.platform_support import elsewhere
 from grader.cli.row import Row
 from grader.cli.sandbox_report import walls
 from grader.errors import RosMissing
-from grader.host_programs import HOST_ENV, LISTS, host_program
+from grader.host_programs import HOST_ENV, LISTS, find_host_program
 from grader.portable import cores, system, user_id
 
 PROGRAMS = {"git": "git", "cmake": "cmake", "make": "make", "c++": "g++"}
@@ -171,7 +171,7 @@ def _amount(name: str, size_bytes: int, least_bytes: int, unit: str) -> Row:
 def _hostname() -> Row:
     """ROS nodes look their own host up; getent has a time limit where the resolver has none."""
     name = socket.gethostname()
-    command = [host_program("getent") or "/usr/bin/getent", "hosts", name]
+    command = [find_host_program("getent") or "/usr/bin/getent", "hosts", name]
     try:
         done = subprocess.run(
             command,

@@ -16,13 +16,13 @@ from grader.arena.static_recorder import why_unrun
 from grader.cli.output import say_beside
 from grader.cli.row import Row
 from grader.errors import GraderError, HostError
-from grader.host_programs import HOST_ENV, host_program
+from grader.host_programs import HOST_ENV, find_host_program
 from grader.portable import user_id
 from grader.report.unwalled import without_sandbox
 from grader.rubric.load import LoadedRubric, needs_ros
 
 if TYPE_CHECKING:
-    from grader.arena.sandbox import Mode
+    from grader.model.submission import SandboxMode
 
 
 PROGRAMS = {"bwrap": "bubblewrap", "setpriv": "util-linux", "prlimit": "util-linux"}
@@ -45,7 +45,7 @@ ROOTS_GROUPS = "in a container: start it with --privileged; in a service: Delega
 def walls() -> Iterator[Row]:
     """A row for each part, then one for what `--sandbox auto` makes of them."""
     yield from map(_program, PROGRAMS)
-    unshare = host_program("unshare") or "unshare"
+    unshare = find_host_program("unshare") or "unshare"
     yield _probe("user namespaces", [unshare, "--user", "--pid", "--fork", "/bin/true"], drop=user_id() == 0)
     yield _probe("network", [sys.executable, "-I", str(NAMESPACES), "/bin/true"], drop=False)
     yield _limits_of_trees()
@@ -55,7 +55,7 @@ def walls() -> Iterator[Row]:
 
 
 def _program(name: str) -> Row:
-    path, package = host_program(name), PROGRAMS[name]
+    path, package = find_host_program(name), PROGRAMS[name]
     if path is None:
         return Row(name=name, state="limited", detail="not found", mend=f"apt-get install {package}")
     return Row(name=name, state="ok", detail=path)
@@ -63,7 +63,7 @@ def _program(name: str) -> Row:
 
 def _probe(name: str, command: Sequence[str], *, drop: bool) -> Row:
     """Whether namespaces of that kind can be made, by the user who needs them."""
-    setpriv = host_program("setpriv") or "setpriv"
+    setpriv = find_host_program("setpriv") or "setpriv"
     nobody = [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if drop else []
     try:
         done = subprocess.run(
@@ -133,7 +133,7 @@ def _mode() -> Row:
 # Says before a command begins that students' code will run without a sandbox.
 
 
-def say_unwalled(mode: Mode, rubric: LoadedRubric | None = None) -> None:
+def say_unwalled(mode: SandboxMode, rubric: LoadedRubric | None = None) -> None:
     """Say it on stderr, where it is so. Nothing of a rubric for which nothing is run; what keeps a sandbox from being
     chosen is said by the grading itself."""
     with suppress(GraderError):

@@ -18,7 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from grader.arena.control_groups import SYSTEMD, find_cgroups, has_memory, own_group
-from grader.host_programs import HOST_ENV, host_program
+from grader.host_programs import HOST_ENV, find_host_program
 from grader.portable import system
 
 LOGINS = "/user.slice/"
@@ -67,7 +67,7 @@ def _environment() -> dict[str, str]:
 
 def _moved() -> bool:
     """Ask, and wait until it is done: the answer says only that it will be."""
-    busctl, pid = host_program("busctl"), os.getpid()
+    busctl, pid = find_host_program("busctl"), os.getpid()
     if busctl is None:
         return False
     scope = f"grader-{pid}-{secrets.token_hex(4)}.scope"

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from grader.host_programs import anywhere, program
+from grader.host_programs import find_user_program, with_absolute_paths
 from grader.intake.credentials import Access, refused, scrubbed
 from grader.portable import kill_group
 
@@ -197,7 +197,7 @@ class Git:
         stderr: IO[bytes] | int,
     ) -> Iterator[subprocess.Popen[bytes]]:
         options = [part for key, value in _QUIET.items() for part in ("-c", f"{key}={value}")]
-        git = program("git")
+        git = find_user_program("git")
         if git is None:
             raise GitMissing("git is not installed")
         try:
@@ -219,7 +219,9 @@ class Git:
 
     def _local_environment(self) -> dict[str, str]:
         """For repositories on this machine: no settings but ours, so no filter, no helper and no network."""
-        kept = {key: value for key, value in anywhere(os.environ).items() if key.upper() in _LOCAL_KEPT}
+        kept = {
+            key: value for key, value in with_absolute_paths(os.environ).items() if key.upper() in _LOCAL_KEPT
+        }
         return {
             **kept,
             **_ASK_NOTHING,
@@ -234,7 +236,7 @@ class Git:
         """For servers: the user's settings hold the credentials, the proxy, perhaps a mirror on this disk."""
         kept = {
             key: value
-            for key, value in anywhere(os.environ).items()
+            for key, value in with_absolute_paths(os.environ).items()
             if not key.startswith("GIT_") or _NETWORK_KEPT.fullmatch(key)
         }
         environment = {**kept, **_ASK_NOTHING, "GIT_ALLOW_PROTOCOL": "https:http:ssh:git:file"}
@@ -280,7 +282,7 @@ def _place(repository: Repository | None) -> tuple[str, ...]:
 def _limits() -> tuple[str, ...]:
     """For git and all that it starts, and git ends when the grader is killed. Where there is no `prlimit`, there is no
     ROS either, nor a sandbox."""
-    setpriv, prlimit = program("setpriv"), program("prlimit")
+    setpriv, prlimit = find_user_program("setpriv"), find_user_program("prlimit")
     if setpriv is None or prlimit is None:
         return ()
     return (
@@ -296,7 +298,7 @@ def _limits() -> tuple[str, ...]:
 
 
 def _configured_ssh(environment: dict[str, str], cwd: Path) -> str:
-    command = [program("git") or "git", "config", "--get", "core.sshCommand"]
+    command = [find_user_program("git") or "git", "config", "--get", "core.sshCommand"]
     found = subprocess.run(
         command,
         cwd=cwd,

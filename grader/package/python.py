@@ -14,7 +14,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.host_programs import anywhere
+from grader.host_programs import with_absolute_paths
 from grader.model.package import Fault, PythonSlip
 from grader.model.record import Record
 from grader.package.python_causes import cause_of
@@ -127,7 +127,7 @@ def _run(folder: Path, paths: list[str], timeout_s: float) -> tuple[SyntaxReport
         try:
             subprocess.run(
                 command,
-                env=anywhere(os.environ),
+                env=with_absolute_paths(os.environ),
                 input=names,
                 stdout=out,
                 stderr=subprocess.DEVNULL,

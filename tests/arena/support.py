@@ -12,7 +12,7 @@ import pytest
 
 from grader.arena.limits import Limits
 from grader.arena.process_environment import Place
-from grader.arena.ros_env import require_ros
+from grader.arena.ros_env import RosInstallation, find_ros
 from grader.arena.sandbox_files import prepare
 from grader.arena.sandbox_probe import choose, why_not
 from grader.arena.scenario import run_scenario
@@ -34,6 +34,12 @@ CMAKE = (
 SCRIPT = "#!/usr/bin/env python3\n"
 RUN_S = 60.0
 needs_sandbox = pytest.mark.skipif(bool(why_not()), reason=f"no sandbox here: {why_not()}")
+
+
+def require_ros() -> RosInstallation:
+    ros = find_ros()
+    assert ros is not None
+    return ros
 
 
 def make_submission(folder: Path, files: Mapping[str, str]) -> Submission:

@@ -135,7 +135,7 @@ TYPE = "std_msgs/String"
         (
             "registerPublisher",
             ("/old", "/t", TYPE, NOBODY),
-            "for /old, a node of old, with an address of nobody",
+            "for /old, a node of old, with an address that no process has",
         ),
         ("registerPublisher", ("/new", "/t", TYPE, NOBODY), ""),
         ("registerPublisher", ("/new", "/t", TYPE, GRADER), "which is not its own"),
@@ -145,7 +145,7 @@ TYPE = "std_msgs/String"
         ("registerPublisher", ("/new", "/my-topic with odd letters ä", TYPE, NEW), ""),
         ("registerService", ("/new", "/s", "rosrpc://127.0.0.1:9", NEW), ""),
         ("registerService", ("/new", "/s", OLD, NEW), "an address of old"),
-        ("subscribeParam", ("/old", NOBODY, "/p"), "with an address of nobody"),
+        ("subscribeParam", ("/old", NOBODY, "/p"), "with an address that no process has"),
         ("unregisterPublisher", ("/old", "/t", OLD), "unregistered /t of /old, a node of old"),
         ("unregisterPublisher", ("/old", "/t", NOBODY), ""),
         ("unregisterPublisher", ("/old", "/t", NEW), ""),

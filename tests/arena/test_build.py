@@ -9,10 +9,10 @@ import pytest
 
 from grader.arena.build import BuildOutcome, build
 from grader.arena.process_environment import Place
-from grader.arena.static_recorder import READ_MAX
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter
+from grader.files import READ_MAX
 from grader.rubric.model import Scenario, Start, Until
 from tests.arena.support import CMAKE, SCRIPT, make_place, run
 

@@ -158,16 +158,16 @@ def kernels() -> Iterator[Path]:
 MOVES = """
 import os, subprocess, sys
 from pathlib import Path
-from grader.arena import delegated
+from grader.arena import control_groups
 group = Path(sys.argv[1])
 (group / "cgroup.procs").write_text(str(os.getpid()))
 child = subprocess.Popen(["/bin/cat"], stdin=subprocess.PIPE)
-mine = delegated._processes(group)
+mine = control_groups._processes(group)
 assert sorted(mine) == sorted([os.getpid(), child.pid]), mine
-assert delegated._all_ours(group, mine)
-assert not delegated._all_ours(group, [*mine, 1]) and not delegated._all_ours(group, [0])
-delegated._make_ready(group)
-assert delegated._processes(group) == []
+assert control_groups._all_ours(group, mine)
+assert not control_groups._all_ours(group, [*mine, 1]) and not control_groups._all_ours(group, [0])
+control_groups._make_ready(group)
+assert control_groups._processes(group) == []
 print(Path("/proc/self/cgroup").read_text(), Path("/proc/{}/cgroup".format(child.pid)).read_text())
 child.kill(), child.wait()
 """

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from grader.host_programs import HOST_ENV, host_program
+from grader.host_programs import HOST_ENV, find_host_program
 
 
 @pytest.fixture(autouse=True)
 def _asked_anew():
-    host_program.cache_clear()
+    find_host_program.cache_clear()
     yield
-    host_program.cache_clear()
+    find_host_program.cache_clear()
 
 
 def test_programs_are_not_found_by_the_path_of_whoever_grades(tmp_path, monkeypatch) -> None:
@@ -21,10 +21,10 @@ def test_programs_are_not_found_by_the_path_of_whoever_grades(tmp_path, monkeypa
         (tmp_path / name).write_text("#!/bin/sh\n")
         (tmp_path / name).chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
-    found = host_program("sh")
+    found = find_host_program("sh")
     assert found is not None
     assert Path(found).parent != tmp_path
-    assert host_program("no-such-program-anywhere") is None
+    assert find_host_program("no-such-program-anywhere") is None
 
 
 def test_the_path_that_is_handed_on_has_no_folder_of_a_user() -> None:

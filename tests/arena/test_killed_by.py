@@ -21,8 +21,8 @@ def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         (tmp_path / "vmstat").write_text(f"nr_free_pages 7\noom_kill {kills}\n")
         (tmp_path / "meminfo").write_text(f"MemTotal: 100 kB\nMemFree: 1 kB\nMemAvailable: {left} kB\nBad\n")
 
-    real = killed_module._numbers
-    monkeypatch.setattr(killed_module, "_numbers", lambda path: real(str(tmp_path / Path(path).name)))
+    real = killed_module.read_numbers
+    monkeypatch.setattr(killed_module, "read_numbers", lambda path: real(tmp_path / path.name))
     says(3, 50)
     return says
 

@@ -6,14 +6,14 @@ from itertools import accumulate
 
 import pytest
 
-from grader.arena.run_state import Live, next_look_s, settled, waiting_for
+from grader.arena.run_state import RunState, describe_wait, find_outcome, next_look_s
 from grader.model.message_rate import RateBounds
 from grader.rubric.model import Until
 
 
-def _live(**topics: tuple[int, float, float]) -> Live:
+def _live(**topics: tuple[int, float, float]) -> RunState:
     """Topics as count, first, last; the run started at 0, its process runs."""
-    live = Live(running={"node"})
+    live = RunState(running={"node"})
     for name, (count, first_s, last_s) in topics.items():
         seen = live.topics["/" + name]
         seen.count, seen.first_s, seen.last_s = count, first_s, last_s
@@ -47,15 +47,15 @@ COUNT = Until(messages={"/a": 10}, silent_s=5, limit_s=60)
         (Until(connected=("/a",)), _live(), 1.0, None),
     ],
 )
-def test_settled(until: Until, live: Live, now_s: float, outcome: str | None) -> None:
-    done = settled(live, until, now_s)
+def test_settled(until: Until, live: RunState, now_s: float, outcome: str | None) -> None:
+    done = find_outcome(live, until, now_s)
     assert (done and done[0]) == outcome
 
 
 def test_ended_comes_before_all_else() -> None:
     live = _live(a=(10, 1.0, 2.0))
     live.running, live.ended = set(), {"node"}
-    assert settled(live, COUNT, 2.0) == ("ended", "")
+    assert find_outcome(live, COUNT, 2.0) == ("ended", "")
 
 
 TEN_HZ = RateBounds(
@@ -71,7 +71,7 @@ def _rated(gaps_s: list[float], *topics: str, chosen: tuple[str, ...] = ("/a",))
     for topic in topics:
         for time_ns in times_ns:
             live.arrived("/" + topic, 1, time_ns)
-    return settled(live, Until(window_s=60, topics=chosen, limit_s=90), 10.0) is not None
+    return find_outcome(live, Until(window_s=60, topics=chosen, limit_s=90), 10.0) is not None
 
 
 @pytest.mark.parametrize(
@@ -122,45 +122,45 @@ def test_heard_waits_only_so_long_after_the_last_line() -> None:
     live, until = _live(), Until(heard=True)
     live.sent("12", 1.0)
     live.printed("nothing of it", 1.5)
-    assert settled(live, until, 3.4) is None
-    assert settled(live, until, 3.6) == ("complete", "")
+    assert find_outcome(live, until, 3.4) is None
+    assert find_outcome(live, until, 3.6) == ("complete", "")
 
 
 def test_a_connection_has_to_last() -> None:
     live, until = _live(), Until(connected=("/a",))
     live.connections({"/a"}, 1.0)
     live.connections({"/a"}, 1.9)
-    assert settled(live, until, 1.9) is None
+    assert find_outcome(live, until, 1.9) is None
     live.connections((), 1.95)
     live.connections({"/a"}, 2.0)
-    assert settled(live, until, 2.5) is None
-    assert settled(live, until, 3.0) == ("complete", "")
+    assert find_outcome(live, until, 2.5) is None
+    assert find_outcome(live, until, 3.0) == ("complete", "")
 
 
 def test_looking_at_the_graph_is_no_change_of_it() -> None:
     live, until = _live(), Until(connected=("/a",), silent_s=6, first_message_s=20)
     for now_s in (1.0, 2.0, 20.9):
         live.graph(["/talker"], {}, now_s, picture={"publishers": {"/a": ["/talker"]}})
-    assert settled(live, until, 20.9) is None
-    assert settled(live, until, 21.1) == ("silent", "the graph has not changed for 20 s")
+    assert find_outcome(live, until, 20.9) is None
+    assert find_outcome(live, until, 21.1) == ("silent", "the graph has not changed for 20 s")
     live.graph(["/talker"], {}, 21.1, picture={"publishers": {"/b": ["/talker"]}})
-    assert settled(live, until, 21.2) is None
+    assert find_outcome(live, until, 21.2) is None
 
 
 def test_messages_are_no_news_of_a_node_that_is_missing() -> None:
     live, until = _live(), Until(nodes=2, alive_s=1, silent_s=6)
     live.graph(["/turtlesim"], {}, 1.0, picture={})
     live.message("/turtle1/pose", 1, 6.9)
-    assert settled(live, until, 6.9) is None
-    assert settled(live, until, 7.1) == ("silent", "nothing happened for 6 s")
+    assert find_outcome(live, until, 6.9) is None
+    assert find_outcome(live, until, 7.1) == ("silent", "nothing happened for 6 s")
     live.graph(["/turtlesim", "/teleop"], {}, 7.1, picture={})
-    assert settled(live, until, 7.2) == ("complete", "")
+    assert find_outcome(live, until, 7.2) == ("complete", "")
 
 
 def test_waiting_is_said_in_words() -> None:
-    assert waiting_for(_live(), WINDOW) == "waiting for the first message on /a"
-    assert waiting_for(_live(a=(3, 1.0, 2.0)), COUNT) == "3 of 10 messages on /a"
-    assert waiting_for(_live(), Until(connected=("/a",))) == "waiting for a connection over /a"
+    assert describe_wait(_live(), WINDOW) == "waiting for the first message on /a"
+    assert describe_wait(_live(a=(3, 1.0, 2.0)), COUNT) == "3 of 10 messages on /a"
+    assert describe_wait(_live(), Until(connected=("/a",))) == "waiting for a connection over /a"
 
 
 def test_next_look_is_never_in_the_past_and_never_far() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.arena.recording import in_order
+from grader.arena.recording import order_runs
 from grader.rubric.model import Rubric, Scenario, Start, Until
 
 
@@ -15,7 +15,7 @@ def order(*rated: str, **scenarios: Scenario) -> tuple[str, ...]:
     """The order of these runs, of which `rated` are to show a rate."""
     about = {"schema": "grader.rubric/1", "id": "r", "title": "r", "version": "1", "package": "p"}
     criteria = [{"id": "c", "title": "c", "points": 1, "check": "manifest"}]
-    return in_order(Rubric.model_validate({**about, "scenarios": scenarios, "criteria": criteria}), rated)
+    return order_runs(Rubric.model_validate({**about, "scenarios": scenarios, "criteria": criteria}), rated)
 
 
 LONG = scenario(window_s=6)

@@ -11,7 +11,7 @@ import pytest
 from grader.arena import sandbox_probe
 from grader.arena.sandbox import system_call_filter
 from grader.errors import ExitCode, HostError, SandboxMissing
-from grader.host_programs import HOST_ENV, host_program
+from grader.host_programs import HOST_ENV, find_host_program
 
 FORBIDDEN = (
     (
@@ -66,8 +66,8 @@ def bwrap(folder: Path, monkeypatch, script: str) -> None:
     path = folder / "bwrap"
     path.write_text(f"#!/bin/sh\n{script}\n")
     path.chmod(path.stat().st_mode | stat.S_IXUSR | stat.S_IXGRP | stat.S_IXOTH)
-    found = {**{name: host_program(name) for name in sandbox_probe.PROGRAMS}, "bwrap": str(path)}
-    monkeypatch.setattr(sandbox_probe, "host_program", found.get)
+    found = {**{name: find_host_program(name) for name in sandbox_probe.PROGRAMS}, "bwrap": str(path)}
+    monkeypatch.setattr(sandbox_probe, "find_host_program", found.get)
     monkeypatch.setattr(sandbox_probe, "NAMESPACES", Path(__file__).parent / "no_network.py")
     monkeypatch.setattr(sandbox_probe, "_drop", list)
 
@@ -111,7 +111,7 @@ def test_what_did_not_answer_is_asked_again(monkeypatch) -> None:
 @pytest.mark.parametrize("name", sandbox_probe.PROGRAMS)
 def test_where_a_program_is_not_installed_grading_goes_without(monkeypatch, name: str) -> None:
     monkeypatch.setattr(
-        sandbox_probe, "host_program", lambda asked: None if asked == name else f"/usr/bin/{asked}"
+        sandbox_probe, "find_host_program", lambda asked: None if asked == name else f"/usr/bin/{asked}"
     )
     assert sandbox_probe.why_not() == f"{name} is not installed"
 

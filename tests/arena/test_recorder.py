@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
-from grader.arena.arena_process import Frame, FrameReader
 from grader.arena.limits import Limits
+from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.session import ARENA
 from grader.checks import CHECKS
 from grader.checks.support.topics import heed_losses, losses

@@ -79,10 +79,10 @@ class Machine:
 @pytest.fixture
 def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     control_groups.find_cgroups.cache_clear()
-    host_programs.host_program.cache_clear()
+    host_programs.find_host_program.cache_clear()
     yield Machine(tmp_path, monkeypatch)
     control_groups.find_cgroups.cache_clear()
-    host_programs.host_program.cache_clear()
+    host_programs.find_host_program.cache_clear()
 
 
 def test_memory_is_held_by_a_scope_of_its_own_afterwards(machine: Machine) -> None:

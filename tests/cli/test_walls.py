@@ -32,7 +32,7 @@ def test_every_part_has_a_row_and_what_is_missing_a_command() -> None:
 @pytest.mark.parametrize(("program", "package"), [("bwrap", "bubblewrap"), ("setpriv", "util-linux")])
 def test_a_program_that_is_not_installed(monkeypatch, program: str, package: str) -> None:
     monkeypatch.setattr(
-        sandbox_report, "host_program", lambda name: None if name == program else f"/usr/bin/{name}"
+        sandbox_report, "find_host_program", lambda name: None if name == program else f"/usr/bin/{name}"
     )
     none = Sandbox(bubblewrap=False, uid=None, reason=f"{program} is not installed")
     monkeypatch.setattr(sandbox_report, "choose", lambda _: none)

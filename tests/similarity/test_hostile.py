@@ -108,7 +108,7 @@ def test_a_pipe_in_the_evidences_place_keeps_nobody_waiting(tmp_path) -> None:
     (tmp_path / "ann" / "evidence").mkdir(parents=True)
     os.mkfifo(tmp_path / "ann" / "evidence" / "package.mcap")
     (one,) = compare({"ann": tmp_path / "ann"}).not_compared
-    assert one.reason == "evidence/package.mcap is no file"
+    assert one.reason == "its evidence cannot be opened: not a regular file"
 
 
 def test_too_many_and_too_large_programs_are_named(tmp_path) -> None:

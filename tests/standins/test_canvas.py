@@ -15,8 +15,8 @@ def _drawn(canvas: Any) -> set[tuple[int, int]]:
 
 
 @pytest.fixture
-def canvas(simulator: Any) -> Any:
-    return simulator.canvas.Canvas(WHITE)
+def canvas(field_module: Any) -> Any:
+    return field_module.Canvas(WHITE)
 
 
 def _box(x0: int, x1: int, y0: int, y1: int) -> set[tuple[int, int]]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.ros_env import RosInstallation, require_ros
+from grader.arena.ros_env import RosInstallation
 from grader.arena.sandbox_files import (
     STANDIN_SOURCES,
     copy_standins,
@@ -18,7 +18,7 @@ from grader.arena.sandbox_files import (
 )
 from grader.cli.diagnosis import _standins
 from grader.rubric.model import Scenario, Start, Until
-from tests.arena.support import make_place, printed, run
+from tests.arena.support import make_place, printed, require_ros, run
 
 ALL = ("rospy_tutorials", "std_srvs", "turtlesim")
 

@@ -13,15 +13,16 @@ from xmlrpc.server import SimpleXMLRPCServer
 
 import pytest
 
-from grader.arena.ros_env import require_ros
 from grader.arena.sandbox_files import BROWSERS, ROS_SIDE
 from grader.arena.session import ARENA
+from tests.arena.support import require_ros
 
 URL = "https://www.e-yantra.org/"
 NOTE = """
 import json, sys
 from guard import Guard
 from master import ARGUMENT_CHARS, ARGUMENTS_MAX, OPENED_MAX, RecordingMaster
+from tests.arena.support import require_ros
 events = []
 class Wire:
     def event(self, topic, record): events.append((topic, record))

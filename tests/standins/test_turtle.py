@@ -16,9 +16,11 @@ PEN = (179, 184, 255)
 class Field:
     """A turtle in the middle of an empty field."""
 
-    def __init__(self, simulator: Any, x: float = MIDDLE_M, y: float = MIDDLE_M, theta: float = 0.0) -> None:
-        self.canvas = simulator.canvas.Canvas(BLUE)
-        self.turtle = simulator.turtle.Turtle(x, y, theta)
+    def __init__(
+        self, field_module: Any, x: float = MIDDLE_M, y: float = MIDDLE_M, theta: float = 0.0
+    ) -> None:
+        self.canvas = field_module.Canvas(BLUE)
+        self.turtle = field_module.Turtle(x, y, theta)
 
     def drive(self, steps: int, *velocities: float) -> tuple[int, ...]:
         """Steps with a command before each; the last colour read."""
@@ -35,8 +37,8 @@ class Field:
 
 
 @pytest.fixture
-def field(simulator: Any) -> Field:
-    return Field(simulator)
+def field(field_module: Any) -> Field:
+    return Field(field_module)
 
 
 @pytest.mark.parametrize(
@@ -85,9 +87,9 @@ def test_speed_counts_both_directions_and_has_no_sign(field: Field) -> None:
     ],
 )
 def test_walls_stop_it_and_say_where(
-    simulator: Any, theta: float, wall: tuple[float, float], seen: tuple[float, float]
+    field_module: Any, theta: float, wall: tuple[float, float], seen: tuple[float, float]
 ) -> None:
-    field = Field(simulator, theta=theta)
+    field = Field(field_module, theta=theta)
     field.drive(200, 2.0, 0.0, 0.0)
     assert field.pose[:2] == pytest.approx(wall, abs=1e-5)
     assert field.turtle.hit == pytest.approx(seen, abs=1e-5)
@@ -150,11 +152,11 @@ def test_the_sensor_reads_the_background_and_then_the_trace(field: Field) -> Non
     assert field.drive(60, -1.0, 0.0, 0.0) == (255, 0, 10)
 
 
-def test_a_pen_that_is_off_draws_nothing_and_keeps_its_colour(simulator: Any, field: Field) -> None:
+def test_a_pen_that_is_off_draws_nothing_and_keeps_its_colour(field_module: Any, field: Field) -> None:
     field.turtle.set_pen((255, 0, 10), 5, off=True)
     field.turtle.teleport_by(2.0, 0.0)
     assert field.drive(60, 1.0, 0.0, 0.0) == BLUE
-    assert field.canvas._pixels == simulator.canvas.Canvas(BLUE)._pixels
+    assert field.canvas._pixels == field_module.Canvas(BLUE)._pixels
     field.turtle.set_pen((1, 2, 3), 0, off=False)
     field.drive(60, 1.0, 0.0, 0.0)
     assert field.drive(30, -1.0, 0.0, 0.0) == (1, 2, 3)

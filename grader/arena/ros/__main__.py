@@ -204,15 +204,15 @@ class Arena:
         self._master.setParam(self._actor.caller_id, "/use_sim_time", True)
         self._actor.advertise(self._master, CLOCK)
         self._clock = Clock(self._actor, command["warp"], command["step_s"])
-        record = {"action": "clock", "actor": "grader", "topic": "/clock", "value": command["warp"]}
-        self._wire.event("/grader/actor", record)
+        self._note_clock(value=command["warp"])
         self._clock.start()
 
     def _rewarp(self, command):
         self._clock.set_warp(command["warp"])
-        record = {"action": "clock", "actor": "grader", "topic": "/clock", "value": command["warp"]}
-        record["detail"] = command["detail"]
-        self._wire.event("/grader/actor", record)
+        self._note_clock(value=command["warp"], detail=command["detail"])
+
+    def _note_clock(self, **fields):
+        self._wire.event("/grader/actor", dict(fields, action="clock", actor="grader", topic="/clock"))
 
     def _hold_clock(self, _command):
         if self._clock:
@@ -245,7 +245,7 @@ class Arena:
         self._end_when_empty()
 
     def _watch_sockets(self):
-        """What sockets hold belongs to nobody: where it is too much, the tree with the most of them is stopped."""
+        """No process is charged for what sockets hold: past the limit, the tree with the most of them is stopped."""
         students = [process for process in self._processes.values() if process.role != "grader"]
         if self._stage and students and buffer_bytes() > self._limits["socket_bytes"]:
             excess = "more than {} MB in sockets".format(self._limits["socket_bytes"] >> 20)

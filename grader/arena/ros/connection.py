@@ -56,7 +56,7 @@ class Connection:
         self._recorder.loop.remove_reader(self.sock)
 
     def _look(self):
-        """Who sends much waits while the grader is behind; all others are read in time."""
+        """A publisher that sends much waits while the grader is behind; all others are read in time."""
         if self._account is not None and self._account.heavy and self._recorder.wire.congested:
             self._falls_behind()
             self._rests()
@@ -66,7 +66,7 @@ class Connection:
             self._recorder.loop.call_later(BREATH_S, self.watch)
 
     def _falls_behind(self):
-        """Its publisher may have to drop messages that nobody takes: whoever judges them should know."""
+        """Note that its publisher may have to drop messages that are not taken: a judge of its rate should know."""
         if not self._behind:
             self._behind = True
             self._recorder.note("behind", self.topic, self.caller_id, messages=self._messages)

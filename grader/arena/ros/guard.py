@@ -141,7 +141,7 @@ class Rules:
             return ""
         owner = self._other_owner(known, caller)
         if owner:
-            return "registered {} for {}, a node of {}, with an address of nobody".format(
+            return "registered {} for {}, a node of {}, with an address that no process has".format(
                 shown(name), shown(node), owner
             )
         return ""

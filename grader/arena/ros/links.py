@@ -37,8 +37,8 @@ class Links:
         self._doubts = {}
 
     def of(self, apis):
-        """The connections between these nodes (addresses by names), all asked side by side: who does not answer in
-        time has none."""
+        """Return the connections between these nodes (addresses by names), all asked side by side: a node that does
+        not answer in time has none."""
         answers = self._ask(apis)
         ties = Ties(self._owners)
         found, doubts = [], []
@@ -55,7 +55,7 @@ class Links:
         return found[:CONNECTIONS_MAX]
 
     def subscribers(self, api, topic):
-        """Whom a publisher itself names."""
+        """Return the subscribers that a publisher itself names."""
         answer = self._answer(api)
         return {said.subscriber for said in answer.serves if said.topic == topic} if answer else set()
 
@@ -66,8 +66,8 @@ class Links:
         return ties.joined(apis[node], apis[said.subscriber], said.transport) is not False
 
     def _is_made_up(self, node, said, apis, answers, ties):
-        """Rather than out of date: who does not answer says nothing, and a publisher that sends nothing does not
-        notice that its subscriber has gone."""
+        """Whether it is not merely out of date: a node that does not answer says nothing, and a publisher that sends
+        nothing does not notice that its subscriber has gone."""
         silent = said.subscriber in apis and said.subscriber not in answers
         return not silent and not ties.half_closed(apis[node])
 

@@ -1,5 +1,5 @@
-"""Namespaces of the arena's own: a network in which nothing but the loopback is up, and mounts that nobody else sees
-(man 7 namespaces).
+"""Namespaces of the arena's own: a network in which nothing but the loopback is up, and mounts that no other process
+sees (man 7 namespaces).
 
 The calling process enters them itself, so there is no helper that could be left behind when a process is killed. Run as
 a script it enters them, mounts what a stage would, and becomes the program that its arguments name.
@@ -40,8 +40,8 @@ PROBED = "/sys"  # in a namespace that ends with the probe
 
 
 def enter_own_namespaces():
-    """For a process of one thread. Who may not make them makes a user namespace for it, with the same user in it.
-    Raises OSError where the machine allows neither."""
+    """Enter them; the process has one thread. A user who may not make them gets a user namespace, with the same user
+    in it. Raises OSError where the machine allows neither."""
     if os.geteuid() == 0:
         _unshare(CLONE_NEWNET | CLONE_NEWNS)
     else:
@@ -61,7 +61,7 @@ def mount_tmpfs(folder, size_bytes, inodes, owner, mode):
 
 
 def unmount(folder):
-    """Now, or as soon as nobody uses it any more."""
+    """Unmount it now, or as soon as it is used no more."""
     _libc().umount2(os.fsencode(folder), MNT_DETACH)
 
 

@@ -167,7 +167,7 @@ class Process:
         return [self.pid, *descendants(self.pid)]
 
     def cpu_used_s(self):
-        """Of all its processes so far, also of what has ended. A control group counts children that nobody waited for,
+        """Of all its processes so far, also of what has ended. A control group also counts children never waited for,
         too, and is asked faster than each process."""
         counted_s = self._groups.cpu_s() if self._groups is not None else None
         if counted_s:
@@ -208,7 +208,7 @@ class Process:
         return None
 
     def _holds_too_much(self, tree, resident):
-        """Where no control group counts what is nobody's resident page: files in memory, and memory that is shared."""
+        """Where no control group counts what is no process's resident page: files in memory, and shared memory."""
         shared, maps = shared_memory(tree)
         written = sum(self._stage.used_bytes(name) for name in self._scratches)
         return resident + written + shared > self._limits["memory_bytes"] or maps > MAPS_MAX

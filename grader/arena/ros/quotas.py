@@ -93,7 +93,8 @@ class Account:
 
 class Pool:
     """Threads that wait for students' nodes. At most `workers_max` jobs at a time, and `each_max` of one key (a
-    process): who never answers takes no more than its own share. Jobs of one key start in order."""
+    process): a node that never answers takes no more than its
+    process's share. Jobs of one key start in order."""
 
     def __init__(self, workers_max=WORKERS_MAX, each_max=EACH_MAX):
         self._workers_max = workers_max
@@ -176,7 +177,7 @@ class Notifications:
         """`marker` is the address of the node that the task speaks to."""
 
         def job():
-            with contextlib.suppress(Exception):  # whatever a node answers, or does not: nobody waits for it
+            with contextlib.suppress(Exception):  # whatever a node answers, or does not, is not waited for
                 task(*args)
 
         large = weight(args, LARGE_BYTES) > LARGE_BYTES

@@ -68,7 +68,7 @@ class Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
         return BoundedSocket(fileno=sock.detach()), address
 
     def process_request(self, request, client_address):
-        """One thread a connection; where there are too many, those make way of whom there are most."""
+        """One thread a connection; where there are too many, those of the process that has most make way."""
         if self._admitted(request) or (self._make_room() and self._admitted(request)):
             super().process_request(request, client_address)
         else:
@@ -118,7 +118,7 @@ class Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
                 self._waiting.pop(request, None)
 
     def slow_down(self, caller, calls=1):
-        """Let no process call so often that nobody else comes through."""
+        """Let no process call so often that others do not come through."""
         pause_s = self._paces[caller.process].wait_s(calls)
         if pause_s > PAUSE_S:
             raise Refused(TOO_LARGE_CODE, "{} calls at once".format(calls))
@@ -275,7 +275,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         self.wfile.flush()
 
     def log_message(self, *_):
-        """Nobody reads it."""
+        """It is not read."""
 
 
 def _ends(request):

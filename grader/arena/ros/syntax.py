@@ -155,7 +155,7 @@ def never_closed(data, line):
 
 
 def slips(tree):
-    """What compiles and is not meant: names that are not called, and questions to somebody at a keyboard."""
+    """What compiles and is not meant: names that are not called, and questions that wait for a keyboard."""
     functions = {n.name for n in ast.walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
     found = []
     for node in ast.walk(tree):
@@ -165,7 +165,7 @@ def slips(tree):
             found.append({"line": node.lineno, "kind": "not-called", "message": message})
         name = asked(node, functions)
         if name:
-            message = "`%s()` waits for somebody to type, and a node that is graded gets no input" % name
+            message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             found.append({"line": node.lineno, "kind": "input", "message": message})
     return sorted(found, key=lambda slip: slip["line"])[:SLIPS_LIMIT]
 

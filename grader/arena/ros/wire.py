@@ -1,4 +1,5 @@
-"""What the arena tells the grader, as frames on one pipe.
+"""What the arena tells the grader, as frames on one pipe: `Wire` writes them, `FrameReader` takes them apart (in the
+grader's own Python).
 
 A frame is `<B I Q`: kind, length of the payload, time in ns; then the payload. Kinds:
     C  a channel opens: JSON {id, topic, callerid, type, md5sum, definition, latching, student}
@@ -25,6 +26,7 @@ WRITE_BYTES = 256 << 10
 CONGESTED_BYTES, QUEUE_BYTES_MAX = 40 << 20, 48 << 20
 GATHER_S = 0.01
 """Messages wait so long for others to be written with them: their times are those of their arrival."""
+FRAME_BYTES_MAX = 24 << 20
 PATIENT = ("/grader/console", "/grader/host")
 
 _offset_ns = time.time_ns() - time.monotonic_ns()
@@ -63,7 +65,7 @@ class Wire:
 
     @property
     def congested(self):
-        """Whether the grader is so far behind that who sends much should wait."""
+        """Whether the grader is so far behind that publishers that send much should wait."""
         return self._bytes > CONGESTED_BYTES
 
     def flush(self):
@@ -147,3 +149,71 @@ class Wire:
         self._idle = False
         if not self._urgent:
             self._came.wait(GATHER_S)
+
+
+class NoFrame(ValueError):
+    """Bytes that no arena sends."""
+
+
+Frame = collections.namedtuple("Frame", "kind time_ns channel datas fields")
+"""`kind` is one of C, M, E, S; `channel` and `datas` (messages) belong to M, `fields` to the others."""
+
+
+class FrameReader:
+    """Bytes in, whole frames out. Raises NoFrame."""
+
+    def __init__(self):
+        self._pieces = []
+        self._size = 0
+        self._needed = HEADER.size
+
+    def feed(self, chunk):
+        """Yield the frames that end in this piece."""
+        self._pieces.append(chunk)
+        self._size += len(chunk)
+        if self._size < self._needed:
+            return
+        data, start = b"".join(self._pieces), 0
+        self._needed = HEADER.size
+        while len(data) - start >= HEADER.size:
+            kind, length, time_ns = HEADER.unpack_from(data, start)
+            if length > FRAME_BYTES_MAX:
+                raise NoFrame("a frame of {} bytes".format(length))
+            end = start + HEADER.size + length
+            if end > len(data):
+                self._needed = end - start
+                break
+            yield _frame(chr(kind), time_ns, data, start + HEADER.size, end)
+            start = end
+        self._pieces = [data[start:]]
+        self._size = len(data) - start
+
+
+def _frame(kind, time_ns, data, start, end):
+    try:
+        if kind == "M":
+            (channel,) = CHANNEL_ID.unpack_from(data[start : min(end, start + CHANNEL_ID.size)])
+            return Frame(kind, time_ns, channel, _messages(data, start + CHANNEL_ID.size, end), {})
+        return Frame(kind, time_ns, 0, [], _fields(data[start:end]))
+    except (struct.error, ValueError, TypeError, RecursionError) as error:
+        raise NoFrame("{}: {}".format(type(error).__name__, error)) from error
+
+
+def _messages(data, start, end):
+    found, unpack_from = [], LENGTH.unpack_from
+    while start < end:
+        (length,) = unpack_from(data, start)
+        start += LENGTH.size
+        found.append(data[start : start + length])
+        start += length
+    if start != end:
+        raise NoFrame("a message that is not whole")
+    return found
+
+
+def _fields(payload):
+    """Halves of surrogate pairs, which no record can hold, become question marks."""
+    fields = json.loads(payload)
+    if b"\\ud" in payload or b"\xed" in payload:
+        fields = json.loads(json.dumps(fields, ensure_ascii=False).encode(errors="replace"))
+    return dict(fields)

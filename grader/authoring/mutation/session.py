@@ -14,12 +14,13 @@ from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.plan import Planned
 from grader.authoring.mutation.solution import Solution
 from grader.authoring.mutation.tree import Tree, unified_diff, write_tree
-from grader.classes.batch.workers import Graded, Job, Sandbox, grade_all
+from grader.classes.batch.workers import Graded, Job, grade_all
 from grader.errors import HostError
 from grader.files import temporary_folder
 from grader.model.mutants import MutantResult, ReferenceResult, RubricTest
 from grader.model.progress import Progress
 from grader.model.result import GradingResult, RubricInfo
+from grader.model.submission import SandboxMode
 from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric
 
@@ -43,7 +44,7 @@ class Plan:
     jobs: int
     out: Path
     keep_all: bool
-    sandbox: Sandbox = "auto"
+    sandbox: SandboxMode = "auto"
 
 
 def run_test(plan: Plan, progress: Progress) -> RubricTest:

@@ -17,7 +17,7 @@ from types import FrameType
 from typing import IO, Any
 
 from grader.classes.batch.job import Job, Outcome
-from grader.host_programs import anywhere, own_module
+from grader.host_programs import module_command, with_absolute_paths
 
 HEAD_BYTES = 8
 LEAVE_S = 30.0  # to end its work in order, once it is told to
@@ -83,8 +83,8 @@ def _lives(process: subprocess.Popen[bytes] | None) -> bool:
 def _started() -> subprocess.Popen[bytes]:
     """In a session of its own: a Ctrl-C on the terminal is its parent's to hand on."""
     return subprocess.Popen(
-        own_module("grader.classes.batch.child"),
-        env=anywhere(os.environ),
+        module_command("grader.classes.batch.child"),
+        env=with_absolute_paths(os.environ),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         start_new_session=True,

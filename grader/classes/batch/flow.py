@@ -15,7 +15,7 @@ from typing import Any, Protocol
 from grader import __version__
 from grader.classes.batch.executor import Hands
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch, write_run
-from grader.classes.batch.job import Job, Outcome, Sandbox
+from grader.classes.batch.job import Job, Outcome
 from grader.classes.batch.selection import check, chosen
 from grader.classes.batch.settled import Settler, rewrite
 from grader.classes.fetching import prefetch
@@ -28,6 +28,7 @@ from grader.intake import safe_name, without_password
 from grader.judging.summary import passed
 from grader.model.batch import MISSING, BatchRun, Counts, CriterionInfo, Entry, Roster, RosterFault, State
 from grader.model.result import RubricInfo
+from grader.model.submission import SandboxMode
 from grader.pipeline import GradeOptions, prepare
 from grader.report.class_page import write_class_page
 from grader.results import finish_killed
@@ -48,7 +49,7 @@ class BatchOptions:
 
     out: Path
     jobs: int
-    sandbox: Sandbox = "auto"
+    sandbox: SandboxMode = "auto"
     static_only: bool = False
     before: datetime | None = None
     only: Sequence[str] = ()

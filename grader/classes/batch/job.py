@@ -12,9 +12,9 @@ from pydantic import Field
 from grader.model.batch import Entry
 from grader.model.record import Record
 from grader.model.result import GradingResult, HandedIn, Override
+from grader.model.submission import SandboxMode
 from grader.rubric.load import LoadedRubric
 
-Sandbox = Literal["auto", "require", "none"]
 OutcomeStatus = Literal["graded", "inconclusive", "error"]
 
 
@@ -30,7 +30,7 @@ class Job(Record):
     entry: Entry
     rubric: LoadedRubric
     out: Path
-    sandbox: Sandbox = "auto"
+    sandbox: SandboxMode = "auto"
     static_only: bool = False
     before: datetime | None = None
     overrides: Mapping[str, Override] = Field(default_factory=dict)

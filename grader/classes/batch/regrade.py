@@ -13,7 +13,6 @@ from grader import __version__
 from grader.classes.batch.executor import Hands
 from grader.classes.batch.flow import BatchOptions, Watcher, alone, described, ids_of, run_batch, write_books
 from grader.classes.batch.folder import BatchFolder, write_run
-from grader.classes.batch.job import Sandbox
 from grader.classes.batch.judging import Judged, judge_all
 from grader.classes.batch.settled import Settler, rewrite
 from grader.classes.overrides import FILE as OVERRIDES
@@ -23,6 +22,7 @@ from grader.files import atomic_write
 from grader.judging.summary import overall_status, total_points
 from grader.model.batch import Entry, Roster
 from grader.model.result import CriterionResult, GradingResult
+from grader.model.submission import SandboxMode
 from grader.report.text import csv_text
 from grader.results import EVIDENCE
 from grader.rubric.load import LoadedRubric
@@ -178,7 +178,7 @@ def run_missing(
     *,
     hands: Hands,
     watcher: Watcher,
-    sandbox: Sandbox,
+    sandbox: SandboxMode,
 ) -> tuple[BatchFolder, tuple[Regraded, ...]]:
     """Grade anew, of the same commits, what has scenarios that were not recorded; gives what `regrade` gives.
 

@@ -6,16 +6,14 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from grader.classes.batch.pool import side_by_side, workers, working
 from grader.errors import GraderError
 from grader.model.progress import Silence, StepState
 from grader.model.result import GradingResult
+from grader.model.submission import SandboxMode
 from grader.pipeline import GradeOptions, grade, prepare
 from grader.rubric.load import load_rubric
-
-Sandbox = Literal["auto", "require", "none"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +24,7 @@ class Job:
     source: Path
     rubric: Path
     out: Path
-    sandbox: Sandbox = "auto"
+    sandbox: SandboxMode = "auto"
 
 
 @dataclass(frozen=True, kw_only=True)

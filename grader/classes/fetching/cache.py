@@ -18,14 +18,13 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from grader.files import lock, wait_for_lock
+from grader.files import lock, open_lock, wait_for_lock
 from grader.portable import CLOEXEC, DIRECTORY, NOFOLLOW, user_id
 
 BYTES_MAX = 4 << 30
 TIDY_EVERY_S = 30.0
 UNFINISHED_S = 3600.0
 _FOLDER = os.O_RDONLY | DIRECTORY | NOFOLLOW | CLOEXEC
-_LOCK = os.O_RDWR | os.O_CREAT | NOFOLLOW | CLOEXEC
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,7 +188,7 @@ def _held(folder: Path, *, wait: bool) -> int | None:
             folder.mkdir(mode=0o700, exist_ok=True)
             if not _is_own(folder):
                 raise PermissionError(f"{folder} is somebody else's")
-            descriptor = os.open(folder / "lock", _LOCK, 0o600)
+            descriptor = open_lock(folder / "lock")
             try:
                 if wait:
                     wait_for_lock(descriptor)

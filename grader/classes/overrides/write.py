@@ -13,9 +13,8 @@ from typing import Any
 from grader.classes.overrides.edit import Fields, edited
 from grader.classes.overrides.read import FORM, SCHEMA_KEY, folder_key
 from grader.errors import Busy, RubricError, UsageError
-from grader.files import atomic_write, lock, unwritable
+from grader.files import atomic_write, lock, open_lock, unwritable
 from grader.model.result import Override
-from grader.portable import CLOEXEC, NOFOLLOW
 from grader.rubric.source import as_map, source_of
 
 WAIT_S, LOOK_S = 30.0, 0.02
@@ -43,8 +42,7 @@ def _alone(path: Path) -> Iterator[None]:
     """Hold the file beside it that all writers lock; it stays, because another one may be waiting for it."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        flags = os.O_RDWR | os.O_CREAT | CLOEXEC | NOFOLLOW
-        descriptor = os.open(path.with_name(f".{path.name}.lock"), flags, 0o666)
+        descriptor = open_lock(path.with_name(f".{path.name}.lock"), public=True)
     except OSError as error:
         raise unwritable(path, error) from error
     try:

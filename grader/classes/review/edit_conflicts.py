@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 
-from grader.files import unwritable
+from grader.files import open_lock, unwritable, wait_for_lock
 from grader.model.result import Override
 
 LOCK = ".review.lock"
@@ -44,12 +43,12 @@ def alike(one: Override | None, other: Override | None) -> bool:
 def reviewing(path: Path) -> Iterator[None]:
     """Hold what all reviews of a class hold while they compare and write: another process may review it, too."""
     try:
-        descriptor = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+        descriptor = open_lock(path / LOCK, public=True)
     except OSError as error:
         raise unwritable(path / LOCK, error) from error
     try:
         with suppress(OSError):  # a file system without locks: whoever shares it has to know what they do
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
+            wait_for_lock(descriptor)
         yield
     finally:
         os.close(descriptor)

@@ -22,7 +22,7 @@ from grader.classes.review.guard import BODY_BYTES, TOKEN_BYTES
 from grader.classes.review.session import Desk
 from grader.errors import HostError, UsageError
 from grader.files import temporary_folder
-from grader.host_programs import anywhere, program
+from grader.host_programs import find_user_program, with_absolute_paths
 
 HOST = "127.0.0.1"
 THREADS = 6
@@ -114,8 +114,8 @@ def git_user() -> str:
     """What git calls the person; empty where it does not."""
     with suppress(OSError, subprocess.SubprocessError, UnicodeDecodeError):
         done = subprocess.run(
-            [program("git") or "/usr/bin/git", "config", "user.name"],
-            env=anywhere(os.environ),
+            [find_user_program("git") or "/usr/bin/git", "config", "user.name"],
+            env=with_absolute_paths(os.environ),
             cwd="/",
             stdin=subprocess.DEVNULL,
             capture_output=True,

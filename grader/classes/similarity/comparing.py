@@ -16,7 +16,7 @@ import grader
 from grader.classes.similarity.request import Request
 from grader.errors import HostError, SubmissionError, UsageError
 from grader.files import temporary_folder
-from grader.host_programs import anywhere, own_module
+from grader.host_programs import module_command, with_absolute_paths
 from grader.intake import Limits
 from grader.intake.archive import unpack
 from grader.model.similarity import Similarity
@@ -82,7 +82,7 @@ def _answer(request: Request, place: Path) -> Similarity:
     said = place / "said"
     with (place / "answer").open("w+b") as answer, said.open("wb") as errors:
         process = subprocess.Popen(
-            own_module("grader.classes.similarity.job"),
+            module_command("grader.classes.similarity.job"),
             env=_environment(),
             stdin=subprocess.PIPE,
             stdout=answer,
@@ -115,7 +115,7 @@ def _failed(code: int, said: Path) -> str:
 def _environment() -> dict[str, str]:
     """Equal texts have equal fingerprints in every run; no threads, which a process that forks must not have."""
     return {
-        **anywhere(os.environ),
+        **with_absolute_paths(os.environ),
         "MPLBACKEND": "Agg",
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",

@@ -11,6 +11,7 @@ from pathlib import Path
 from grader.classes.similarity.languages import GENERATED, Language, language_of
 from grader.errors import EvidenceError
 from grader.evidence.reader import load_run
+from grader.files import open_untrusted
 from grader.model.similarity import NotCompared
 
 PLACE = ("evidence", "package.mcap")
@@ -42,13 +43,10 @@ class Sources:
 def read_submission(name: str, folder: Path) -> Sources:
     """The judged files of the package in `folder/evidence/package.mcap`.
 
-    Raises OSError where there is none, or a link is on the way, EvidenceError where it cannot be read.
+    Raises OSError where there is none, it is no file, or a link is on the way, EvidenceError where it cannot be read.
     """
-    with os.fdopen(_opened(folder), "rb") as file:
-        status = os.fstat(file.fileno())
-        if not stat.S_ISREG(status.st_mode):
-            raise EvidenceError("evidence/package.mcap is no file")
-        if status.st_size > EVIDENCE_BYTES_MAX:
+    with open_untrusted(folder, *PLACE) as file:
+        if os.fstat(file.fileno()).st_size > EVIDENCE_BYTES_MAX:
             raise EvidenceError(f"evidence/package.mcap is larger than {EVIDENCE_BYTES_MAX >> 20} MiB")
         attached = load_run(file).attachments
     return _chosen(name, sorted(attached.items()))
@@ -68,20 +66,6 @@ def read_starter(folder: Path) -> Sources:
     return _chosen(
         "", [(path.relative_to(folder).as_posix(), _head(path)) for path in found[:STARTER_FILES_MAX]]
     )
-
-
-def _opened(folder: Path) -> int:
-    """The evidence's descriptor, with no link on the way from the submission's folder on."""
-    place = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
-    try:
-        for part, kind in zip(PLACE, (os.O_DIRECTORY, os.O_NONBLOCK), strict=True):
-            inner = os.open(part, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC | kind, dir_fd=place)
-            os.close(place)
-            place = inner
-    except OSError:
-        os.close(place)
-        raise
-    return place
 
 
 def _head(path: Path) -> bytes:

@@ -23,7 +23,7 @@ from grader.rubric.load import LoadedRubric, load_rubric, needs_ros
 from grader.untrusted_text import line
 
 if TYPE_CHECKING:
-    from grader.arena.sandbox import Mode
+    from grader.model.submission import SandboxMode
 
 DEFAULT_OUT = Path("grader-results")
 JOBS_PER_CORE = 4
@@ -39,7 +39,7 @@ def run(
     only: list[str] | None = None,
     before: str | None = None,
     static: bool = False,
-    sandbox: Mode = "auto",
+    sandbox: SandboxMode = "auto",
     cluster: str | None = None,
     cluster_insecure: bool = False,
     exchange: str | None = None,

@@ -29,7 +29,7 @@ from grader.rubric.load import LoadedRubric, needs_ros
 from grader.student.git_view import write_staged
 
 if TYPE_CHECKING:
-    from grader.arena.sandbox import Mode
+    from grader.model.submission import SandboxMode
 
 
 def run(
@@ -40,7 +40,7 @@ def run(
     staged: bool = False,
     watch: bool = False,
     out: Path | None = None,
-    sandbox: Mode = "auto",
+    sandbox: SandboxMode = "auto",
     as_json: bool = False,
 ) -> ExitCode:
     """Grade the package at `path` with hidden criteria left out; with `static`, from its files alone.

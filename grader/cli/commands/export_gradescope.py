@@ -14,7 +14,7 @@ from grader.integrations.deliver.settings import Settings
 from grader.rubric.load import load_rubric
 
 if TYPE_CHECKING:
-    from grader.arena.sandbox import Mode
+    from grader.model.submission import SandboxMode
 
 STDOUT = "-"
 
@@ -24,7 +24,7 @@ def run(
     lab: str,
     out: Path | None = None,
     minutes: int = 10,
-    sandbox: Mode = "auto",
+    sandbox: SandboxMode = "auto",
     assume_executable: bool = False,
 ) -> ExitCode:
     """Write the zip to `out`, or into it where it is a folder, or to stdout where it is `-`.

@@ -13,7 +13,7 @@ from grader.integrations.deliver.settings import FILE, Settings
 from grader.rubric.load import load_rubric
 
 if TYPE_CHECKING:
-    from grader.arena.sandbox import Mode
+    from grader.model.submission import SandboxMode
 
 
 def run(
@@ -22,7 +22,7 @@ def run(
     out: Path | None = None,
     image: str = IMAGE,
     minutes: int = 10,
-    sandbox: Mode = "auto",
+    sandbox: SandboxMode = "auto",
     assume_executable: bool = False,
 ) -> ExitCode:
     """Write the folder, or the zip where `out` ends so. Raises UsageError for a folder that holds something else."""

@@ -16,7 +16,7 @@ from grader.intake.recordings import is_recording
 from grader.rubric.load import load_rubric
 
 if TYPE_CHECKING:
-    from grader.arena.sandbox import Mode
+    from grader.model.submission import SandboxMode
 
 DEFAULT_OUT = Path("grader-results")
 
@@ -27,7 +27,7 @@ def run(
     rubric: str,
     out: Path | None = None,
     submission_id: str | None = None,
-    sandbox: Mode = "auto",
+    sandbox: SandboxMode = "auto",
     as_json: bool = False,
 ) -> ExitCode:
     """Grade one submission into `out/<submission id>/` and show the report."""

@@ -6,13 +6,13 @@ import re
 from pathlib import Path
 
 from grader import pipeline
-from grader.arena.sandbox import Mode
 from grader.cli.display import open_progress
 from grader.cli.output import say
 from grader.cli.sandbox_report import say_unwalled
 from grader.cli.select_rubric import only_package
 from grader.errors import ExitCode, UsageError
 from grader.files import check_writable
+from grader.model.submission import SandboxMode
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.model import Criterion, Rubric, Scenario, Start, Until
 
@@ -28,7 +28,7 @@ def run(
     script: list[str],
     launch: list[str],
     seconds: float = 10.0,
-    sandbox: Mode = "auto",
+    sandbox: SandboxMode = "auto",
 ) -> ExitCode:
     """Record the rubric's scenarios, or one made of the scripts and launch files that are named."""
     if rubric is not None and (script or launch):

@@ -20,7 +20,7 @@ from grader.report.text import number
 from grader.rubric.load import load_rubric
 
 if TYPE_CHECKING:
-    from grader.arena.sandbox import Mode
+    from grader.model.submission import SandboxMode
 
 NAMES_SHOWN = 10
 CHANGES_SHOWN = 200
@@ -32,7 +32,7 @@ def run(
     rubric: str | None = None,
     run_missing_too: bool = False,
     jobs: int | None = None,
-    sandbox: Mode = "auto",
+    sandbox: SandboxMode = "auto",
     as_json: bool = False,
 ) -> ExitCode:
     """Judge every submission again and show what changed; with `run_missing_too`, run what was not recorded."""

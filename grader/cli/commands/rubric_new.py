@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 
 from grader import pipeline
-from grader.arena.sandbox import Mode
 from grader.authoring.new import propose_rubric
 from grader.cli.display import open_progress
 from grader.cli.output import say, say_document
@@ -14,6 +13,7 @@ from grader.cli.sandbox_report import say_unwalled
 from grader.cli.select_rubric import only_package
 from grader.errors import ExitCode, UsageError
 from grader.files import atomic_write
+from grader.model.submission import SandboxMode
 from grader.rubric.model import NAME_PATTERN
 
 
@@ -24,7 +24,7 @@ def run(
     rubric_id: str | None = None,
     out: str = "-",
     force: bool = False,
-    sandbox: Mode = "auto",
+    sandbox: SandboxMode = "auto",
 ) -> ExitCode:
     """Run the solution, and write a rubric that asks for what it does. Raises UsageError for a file that exists."""
     name = package or only_package(solution)

@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from grader.arena.sandbox import Mode
 from grader.authoring.mutation.find import find_reference, given_reference, load_solution, mutants_file
 from grader.authoring.mutation.load import load_mutants
 from grader.authoring.mutation.plan import Planned, chosen, plan_all, plan_declared, refuse_unfit
@@ -23,6 +22,7 @@ from grader.cli.sandbox_report import say_unwalled
 from grader.errors import ExitCode
 from grader.files import atomic_write, check_writable
 from grader.model.mutants import RubricTest
+from grader.model.submission import SandboxMode
 from grader.rubric.load import LoadedRubric, load_rubric
 
 SIDE_BY_SIDE = 4  # they wait most of the time; fits two cores
@@ -36,7 +36,7 @@ def run(
     jobs: int = SIDE_BY_SIDE,
     out: Path | None = None,
     write: Path | None = None,
-    sandbox: Mode = "auto",
+    sandbox: SandboxMode = "auto",
     as_json: bool = False,
 ) -> ExitCode:
     """Test, show, and write what was lost to the file `write`, where one is given."""

@@ -6,14 +6,14 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, cast
+from typing import cast
 
 from grader.errors import UsageError
 from grader.integrations.ci.outcome import Outcome
 from grader.integrations.ci.pass_mark import Mark, read_mark
+from grader.model.submission import SandboxMode
 from grader.untrusted_text import line
 
-Mode = Literal["auto", "require", "none"]
 MODES = ("auto", "require", "none")
 YES, NO = {"true", "yes", "on", "1"}, {"", "false", "no", "off", "0"}
 FAILING = (Outcome.BELOW, Outcome.NOT_GRADED, Outcome.INCONCLUSIVE)
@@ -32,7 +32,7 @@ class Settings:
     mark: Mark | None
     fail_on: frozenset[Outcome]
     static: bool
-    sandbox: Mode
+    sandbox: SandboxMode
     out: Path
 
 
@@ -74,10 +74,10 @@ def _yes(text: str) -> bool:
     raise UsageError(f"static: {_quoted(text)} is neither true nor false", hint="write true or false")
 
 
-def _sandbox(text: str) -> Mode:
+def _sandbox(text: str) -> SandboxMode:
     if (text or "auto") not in MODES:
         raise UsageError(f"sandbox: {_quoted(text)} is none", hint=f"write {', '.join(MODES)}")
-    return cast("Mode", text or "auto")
+    return cast("SandboxMode", text or "auto")
 
 
 def _quoted(text: str) -> str:

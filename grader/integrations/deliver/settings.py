@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from grader.errors import InternalError
 from grader.model.record import Record
+from grader.model.submission import SandboxMode
 
 FILE = "grader.json"
 Modes = Literal["lost", "granted"]
@@ -22,7 +23,7 @@ class Settings(Record):
 
     rubric: str
     minutes: int
-    sandbox: Literal["auto", "require", "none"] = "auto"
+    sandbox: SandboxMode = "auto"
     modes: Modes = "lost"
 
     @property

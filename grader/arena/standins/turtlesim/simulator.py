@@ -4,16 +4,12 @@ import threading
 import time
 
 import rospy
+from field import STEP_S, Background, Pace, World
 from geometry_msgs.msg import Twist
 from rosgraph.names import is_legal_name
 from std_srvs.srv import Empty, EmptyResponse
 from turtlesim import srv
 from turtlesim.msg import Color, Pose
-
-from .background import Background
-from .pace import Pace
-from .turtle import STEP_S
-from .world import World
 
 QUEUE = 10
 

@@ -1,4 +1,0 @@
-#!/usr/bin/env python3
-from chatter import listen
-
-listen()

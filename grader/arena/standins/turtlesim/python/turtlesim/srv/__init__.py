@@ -1,3 +1,0 @@
-from standin_messages import define
-
-define(globals())
