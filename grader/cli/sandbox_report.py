@@ -18,7 +18,7 @@ from grader.cli.output import say_beside
 from grader.cli.row import Row
 from grader.errors import GraderError, HostError
 from grader.portable import user_id
-from grader.report.unwalled import without_sandbox
+from grader.report.sentences import without_sandbox
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_ros
 

@@ -18,7 +18,7 @@ from grader.errors import PackageNotFound, SubmissionError
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation, Status
 from grader.report.findings import repository_path
-from grader.report.settled import late_words
+from grader.report.sentences import late_words
 from grader.report.text import line, number
 from grader.report.view import OPEN, not_graded
 from grader.rubric.model import Rubric

@@ -8,11 +8,11 @@ from pathlib import Path
 from grader.files import atomic_write
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
-from grader.report.hidden import without_hidden
 from grader.report.junit import junit
 from grader.report.markdown import markdown_report
 from grader.report.result_json import result_bytes
 from grader.report.text import visible
+from grader.report.view import without_hidden
 from grader.rubric.model import Rubric
 
 CONSOLE_CHARS = 4_000_000

@@ -13,11 +13,9 @@ from collections.abc import Iterator
 from grader.errors import GraderError, PackageNotFound, SubmissionError
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
-from grader.report.hidden import hidden_ids
-from grader.report.settled import decided, decision, late_words, look_again
-from grader.report.summary import missing_hidden, visible_words
+from grader.report.sentences import decided, decision, late_words, look_again, missing_hidden, visible_words
 from grader.report.text import json_text, line, number, text_limit
-from grader.report.view import OPEN, places, points_of
+from grader.report.view import OPEN, hidden_ids, places, points_of
 from grader.rubric.model import Rubric
 
 LIMIT = 1000

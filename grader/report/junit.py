@@ -12,8 +12,15 @@ from grader.model.result import CriterionResult, ErrorInfo, GradingResult, Note
 from grader.model.submission_time import AppliedOverride
 from grader.model.verdict import FileCitation, Status
 from grader.report.findings import repository_path
-from grader.report.noticed import COSTS_NOTHING, NOTICED_TITLE, note_place, note_text
-from grader.report.settled import automatic_words, decision, look_again
+from grader.report.sentences import (
+    COSTS_NOTHING,
+    NOTICED_TITLE,
+    automatic_words,
+    decision,
+    look_again,
+    note_place,
+    note_text,
+)
 from grader.report.text import line, number, text_limit, visible
 from grader.report.view import places, points_of
 

@@ -15,11 +15,16 @@ from grader.judging.summary import OPEN
 from grader.model.result import CriterionResult, GradingResult, Note
 from grader.model.submission_time import AppliedOverride
 from grader.model.verdict import Status
-from grader.report import settled
-from grader.report.noticed import COSTS_NOTHING, NOTICED_TITLE, note_place, note_text
-from grader.report.summary import visible_words
+from grader.report import sentences
+from grader.report.sentences import (
+    COSTS_NOTHING,
+    NOTICED_TITLE,
+    note_place,
+    note_text,
+    visible_words,
+    without_sandbox,
+)
 from grader.report.text import line, number, uncommanded
-from grader.report.unwalled import without_sandbox
 from grader.report.view import Loss, arrange, not_graded, places, points_of
 from grader.rubric.model import Rubric
 
@@ -101,9 +106,9 @@ class Terminal:
         parts: list[RenderableType] = [self._head(result, rubric)]
         unwalled = without_sandbox(result.environment.sandbox)
         parts += [Text(self._show(unwalled), "yellow")] if unwalled else []
-        parts += [Text(self._show(words)) for words in settled.late_words(result)]
+        parts += [Text(self._show(words)) for words in sentences.late_words(result)]
         parts += self._section(
-            settled.DECIDED_TITLE, [self._decision(o, c) for o, c in settled.decided(result)]
+            sentences.DECIDED_TITLE, [self._decision(o, c) for o, c in sentences.decided(result)]
         )
         parts += self._losses("Lost", view.lost)
         if unrun:
@@ -129,9 +134,9 @@ class Terminal:
         return text
 
     def _decision(self, override: AppliedOverride, criterion: CriterionResult) -> RenderableType:
-        head = self._line(criterion, settled.decision(override))
-        again = settled.look_again(override, criterion)
-        rows = [("check", settled.automatic_words(override, criterion)), ("changed", again)]
+        head = self._line(criterion, sentences.decision(override))
+        again = sentences.look_again(override, criterion)
+        rows = [("check", sentences.automatic_words(override, criterion)), ("changed", again)]
         return Group(head, Padding(self._rows(rows), (0, 0, 0, 4)))
 
     def _section(self, title: str, parts: list[RenderableType]) -> list[RenderableType]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from grader.judging.late import lateness
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
 from grader.report.text import number
@@ -120,3 +121,42 @@ def _place(citation: Citation) -> str:
     if citation.from_ns is not None and citation.to_ns is not None and citation.to_ns > citation.from_ns:
         stretch = f", {(citation.to_ns - citation.from_ns) / 1e9:.1f} s"
     return f"{citation.evidence} {citation.topic}{stretch}"
+
+
+# [report.hidden] The student's view of a result: without the criteria that the rubric hides.
+
+
+def hidden_ids(rubric: Rubric) -> frozenset[str]:
+    """The ids of the criteria that `grader check` does not show."""
+    return frozenset(c.id for c in rubric.criteria if c.visibility == "hidden")
+
+
+def without_hidden(result: GradingResult, rubric: Rubric) -> GradingResult:
+    """The result as if the hidden criteria were not in the rubric: points, maximum, status and what being late costs
+    follow, and what people decided about hidden criteria is left out."""
+    hidden = hidden_ids(rubric)
+    shown = tuple(c for c in result.criteria if c.id not in hidden)
+    if len(shown) == len(result.criteria):
+        return result
+    decided = tuple(o for o in result.overrides if o.criterion not in hidden)
+    points = round(sum(c.points for c in shown), rubric.digits)
+    visible = rubric.model_copy(update={"criteria": tuple(c for c in rubric.criteria if c.id not in hidden)})
+    late = lateness(points, visible, result.late) if result.late else None
+    update = {
+        "criteria": shown,
+        "overrides": decided,
+        "late": late,
+        "points": late.points if late else points,
+        "max_points": sum(c.max_points for c in shown),
+        "status": _status(result, shown, {o.criterion for o in decided}),
+    }
+    return result.model_copy(update=update)
+
+
+def _status(result: GradingResult, shown: tuple[CriterionResult, ...], decided: set[str]) -> str:
+    if result.error and any(c.max_points > 0 and c.id not in decided for c in shown):
+        return "error"
+    statuses = {c.status for c in shown if c.max_points > 0}
+    if not statuses or Status.ERROR in statuses:
+        return "error"
+    return "inconclusive" if statuses & {Status.INCONCLUSIVE, Status.MANUAL} else "graded"

@@ -15,7 +15,7 @@ from grader.model.result import CriterionResult, EarlyVerdict
 from grader.model.submission import RecordedSubmission, Submission
 from grader.model.verdict import Status
 from grader.package import read_package
-from grader.report.hidden import hidden_ids
+from grader.report.view import hidden_ids
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_ros, started
 from grader.rubric.rates import rates_of

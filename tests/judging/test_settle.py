@@ -14,8 +14,8 @@ from grader.judging.summary import overall_status, passed, total_points
 from grader.model.result import CriterionResult, ErrorInfo, GradingResult
 from grader.model.submission_time import HandedIn, Override
 from grader.model.verdict import Status
-from grader.report.hidden import without_hidden
 from grader.report.result_json import result_bytes
+from grader.report.view import without_hidden
 from grader.rubric.model import Rubric
 from tests.report.hostile import criterion
 from tests.report.hostile import result as any_result

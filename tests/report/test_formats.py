@@ -26,8 +26,7 @@ from grader.report.annotations import github_annotations
 from grader.report.findings import findings, repository_path
 from grader.report.gradescope import gradescope
 from grader.report.junit import junit
-from grader.report.markdown import BYTES_MAX, markdown_report
-from grader.report.mermaid import EDGES_MAX, PARTS_MAX, mermaid
+from grader.report.markdown import BYTES_MAX, EDGES_MAX, PARTS_MAX, markdown_report, mermaid
 from grader.report.sarif import sarif
 from tests.report import hostile
 from tests.report.hostile import criterion

@@ -12,18 +12,18 @@ import pytest
 from rich.console import Console
 
 from grader.classes.gradebook import Book, Row, write_gradebook
-from grader.classes.gradebook.model import Form
+from grader.classes.gradebook.table import Form
 from grader.model.result import GradingResult
 from grader.model.roster import Entry
 from grader.report.annotations import github_annotations
 from grader.report.code_quality import code_quality
 from grader.report.gradescope import gradescope
-from grader.report.hidden import without_hidden
 from grader.report.junit import junit
 from grader.report.markdown import markdown_report
 from grader.report.result_json import result_bytes
 from grader.report.sarif import sarif
 from grader.report.terminal import open_console, print_report
+from grader.report.view import without_hidden
 from tests.report.hostile import ESCAPES
 from tests.report.worst import COMMANDS, DOCS, FORMULA, LINKS, WIDE, figures, rubric, worst
 

@@ -15,7 +15,7 @@ from grader.model.verdict import Status
 from grader.report.junit import junit
 from grader.report.markdown import markdown_report
 from grader.report.result_json import result_bytes
-from grader.report.settled import late_words
+from grader.report.sentences import late_words
 from grader.report.terminal import open_console, print_report
 from tests.report.hostile import criterion, result, rubric
 

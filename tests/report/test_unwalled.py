@@ -15,10 +15,10 @@ from grader.integrations.deliver import gradescope
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
 from grader.report.class_page.page import write_class_page
-from grader.report.html.report import html_report
+from grader.report.html.page import html_report
 from grader.report.markdown import markdown_report
+from grader.report.sentences import without_sandbox
 from grader.report.terminal import open_console, print_report
-from grader.report.unwalled import without_sandbox
 from grader.rubric.load import LoadedRubric
 from tests.report.class_page.made_up import made_up_rows, made_up_run
 from tests.report.hostile import ESCAPES, result, rubric

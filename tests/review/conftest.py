@@ -12,7 +12,7 @@ from flask import Flask
 from flask.testing import FlaskClient
 
 from grader.classes.review.app import create_app
-from grader.classes.review.follower import Pace
+from grader.classes.review.background import Pace
 from grader.classes.review.session import Desk, open_desk
 from tests.review.a_class import a_class
 

@@ -9,7 +9,7 @@ from datetime import datetime
 import pytest
 
 from grader.classes.batch.flow import alone
-from grader.classes.review.follower import Pace
+from grader.classes.review.background import Pace
 from grader.classes.review.session import open_desk
 from grader.model.submission_time import Override
 from tests.review.a_class import overrides_of, points_of, result_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from threading import Event
 
-from grader.classes.review.follower import Follower, Pace
+from grader.classes.review.background import Follower, Pace
 from grader.errors import Busy
 
 WAIT_S = 60

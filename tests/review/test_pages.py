@@ -9,9 +9,9 @@ import pytest
 
 from grader.classes.overrides import write_override
 from grader.classes.review.app import create_app
-from grader.classes.review.form import author_of
-from grader.classes.review.navigation import place_of
+from grader.classes.review.cards import author_of
 from grader.classes.review.session import open_desk
+from grader.classes.review.submissions import place_of
 from grader.model.roster import RosterFault
 from grader.model.submission_time import Override
 from tests.review.a_class import INCONCLUSIVE, Who, a_class, overrides_of, result_of

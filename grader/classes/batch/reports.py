@@ -18,7 +18,7 @@ from grader.model.result import GradingResult
 from grader.report.html import html_report
 from grader.report.junit import junit
 from grader.report.markdown import markdown_report
-from grader.report.summary import missing_hidden
+from grader.report.sentences import missing_hidden
 from grader.results import RESULT, Results, read_result
 from grader.rubric.load import LoadedRubric
 

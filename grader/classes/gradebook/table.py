@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import csv
+import io
+import re
+from collections.abc import Iterator, Sequence
+from decimal import Decimal
+from typing import Literal, NamedTuple
 
-from grader.classes.gradebook.cells import Cell
-from grader.classes.gradebook.model import Book, Row
+from grader.model.record import Record
 from grader.model.result import GradingResult
+from grader.model.roster import Entry
 from grader.model.submission_time import AppliedOverride
 from grader.model.verdict import Status
+from grader.report.text import csv_text
+from grader.shown import line
 
 BEFORE = ("id", "name", "group", "status", "points", "max_points", "points_before_late", "late")
 AFTER = ("comment", "error")
@@ -79,3 +86,78 @@ def _free(name: str, kind: str, taken: set[str]) -> str:
         number += 1
     taken.add(free.casefold())
     return free
+
+
+# [classes.gradebook.model] What a gradebook is made from.
+
+Form = Literal["csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"]
+FORMS: tuple[Form, ...] = ("csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard")
+
+
+class Row(Record):
+    """One submission of the roster and its result."""
+
+    entry: Entry
+    result: GradingResult
+
+
+class BookCriterion(NamedTuple):
+    id: str
+    title: str
+    max_points: float
+
+
+class Book(Record):
+    """What all rows share: the rubric's `title` and criteria, and the names of the roster's further columns."""
+
+    title: str
+    rubric_id: str
+    max_points: float
+    criteria: tuple[BookCriterion, ...] = ()
+    columns: tuple[str, ...] = ()
+
+
+# [classes.gradebook.cells] What stands in a cell: numbers that stay numbers, and text that is on one line, visible, and no formula.
+
+CELL_CHARS = 10_000
+"""What a cell holds of a longer text; a workbook's may have 32,767 characters."""
+Cell = str | float | None
+
+_NUMBER = re.compile(r"[+-]?\d{1,15}([.,]\d{1,15})?|-", re.ASCII)
+"""A number, or the dash that stands for none."""
+_JOINERS = ("\u200c", "\u200d")
+"""Letters of Persian, Hindi and others need them between them, and nothing is hidden by them."""
+
+
+def number_text(value: float) -> str:
+    """`87.5`, `100`: as every platform reads it."""
+    return format(Decimal(repr(float(value))).normalize(), "f")
+
+
+def visible_text(text: str) -> str:
+    """One visible line. Where letters need joiners between them, those stay."""
+    return _joined(line(text, CELL_CHARS))
+
+
+def harmless(cells: Sequence[Cell]) -> list[str]:
+    """One row as text that no spreadsheet takes for a formula. A number stays as it is written, in text too."""
+    texts = [number_text(cell) if isinstance(cell, int | float) else cell or "" for cell in cells]
+    safe = next(csv.reader(io.StringIO(csv_text([texts]), newline="")), [])
+    return [
+        text if _NUMBER.fullmatch(text) else _joined(harmless)
+        for text, harmless in zip(texts, safe, strict=True)
+    ]
+
+
+def csv_line(cells: Sequence[Cell], *, quoted: bool = False) -> str:
+    """One row of CSV with its line end, made harmless. With `quoted`, every field is in quotation marks."""
+    out = io.StringIO()
+    writer = csv.writer(out, quoting=csv.QUOTE_ALL if quoted else csv.QUOTE_MINIMAL, lineterminator="\r\n")
+    writer.writerow(harmless(cells))
+    return out.getvalue()
+
+
+def _joined(text: str) -> str:
+    for joiner in _JOINERS:
+        text = text.replace(f"\\u{ord(joiner):04x}", joiner)
+    return text

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import datetime
 from importlib.resources import files
+from typing import BinaryIO
 
 from flask import (
     Flask,
@@ -14,6 +15,7 @@ from flask import (
     redirect,
     render_template,
     request,
+    send_file,
     session,
     url_for,
 )
@@ -23,19 +25,22 @@ from werkzeug.exceptions import Forbidden, HTTPException, NotFound
 from werkzeug.wrappers import Response as AnyResponse
 
 from grader.classes.gradebook import Row
-from grader.classes.review.answers import SCRIPT, failed, graders, sent, with_code
-from grader.classes.review.cards import MANUAL, Cards, Draft, card, cards
-from grader.classes.review.edit_conflicts import Conflict, plain
-from grader.classes.review.form import Wrong, author_of, override_of
-from grader.classes.review.guard import FRAMED, guard
-from grader.classes.review.navigation import place_of
-from grader.classes.review.served import REPORTS, evidence_of, open_evidence, open_report, reports_of
-from grader.classes.review.session import Desk
-from grader.classes.review.submissions import FILTERS, Item
+from grader.classes.review.cards import MANUAL, Cards, Draft, Wrong, author_of, card, cards, override_of
+from grader.classes.review.guard import (
+    FRAMED,
+    REPORTS,
+    evidence_of,
+    guard,
+    open_evidence,
+    open_report,
+    reports_of,
+)
+from grader.classes.review.session import Conflict, Desk, plain
+from grader.classes.review.submissions import FILTERS, Item, place_of
 from grader.errors import GraderError, RubricError
 from grader.model.submission_time import Override
 from grader.report.html.shell import environment, style
-from grader.report.html.words import SIGNS
+from grader.report.sentences import SIGNS
 from grader.report.text import number
 
 
@@ -269,3 +274,44 @@ def _now() -> str:
 
 def _own(name: str) -> Markup:
     return Markup(files(__package__).joinpath("look", name).read_text(encoding="utf-8"))  # noqa: S704 - ours
+
+
+# [classes.review.answers] Answers that are no page of the class: files, and what went wrong.
+
+SCRIPT = "X-Asked-By"
+"""The header with which our script asks: it is answered with what changed, as JSON."""
+
+
+def sent(file: BinaryIO | None, mimetype: str, *, download: str = "") -> Response:
+    """A file that is open; under the name `download` it is kept and not shown. Raises NotFound where there is none."""
+    if file is None:
+        raise NotFound("There is no such file.")
+    return send_file(
+        file, mimetype=mimetype, as_attachment=bool(download), download_name=download or None, max_age=0
+    )
+
+
+def with_code(response: Response, code: int) -> Response:
+    """The same answer with another code."""
+    response.status_code = code
+    return response
+
+
+def graders(error: GraderError) -> AnyResponse:
+    """What the grader says is wrong."""
+    return _told(500, "This did not work", f"{error.message}. {error.hint}".strip(), again=False)
+
+
+def failed(error: HTTPException) -> AnyResponse:
+    """Any other answer than a page. After a link of another site, browsers hold back the cookie that they have just
+    been given; the page itself asks once more, and that is no other site's request."""
+    code = error.code or 500
+    title = {403: "Not allowed", 404: "Not found", 413: "Too much text"}.get(code, "This did not work")
+    cross = request.headers.get("Sec-Fetch-Site") == "cross-site"
+    return _told(code, title, error.description or "", again=code == 403 and request.path == "/" and cross)
+
+
+def _told(code: int, title: str, text: str, *, again: bool) -> AnyResponse:
+    if SCRIPT in request.headers:
+        return with_code(jsonify(error=text), code)
+    return Response(render_template("told.html", title=title, text=text, again=again), code)

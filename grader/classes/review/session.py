@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from hashlib import sha256
 from pathlib import Path
 
 from grader.classes.batch.flow import GRADEBOOK, alone, ids_of, write_books
 from grader.classes.batch.folder import BatchFolder, open_batch, write_run
 from grader.classes.batch.settled import Settler, rewrite
 from grader.classes.overrides import FILE, Overrides, read_overrides, write_override
-from grader.classes.review.edit_conflicts import Conflict, alike, mark, plain, reviewing
-from grader.classes.review.follower import Follower, Pace
+from grader.classes.review.background import Follower, Pace
 from grader.classes.review.submissions import Item, Stamp, Submissions, stamp_of
 from grader.errors import Busy, GraderError, UsageError
+from grader.files import unwritable
 from grader.model.batch import State
 from grader.model.result import GradingResult
 from grader.model.submission_time import Override
@@ -223,3 +227,48 @@ class Desk:
         known = {criterion.id for criterion in result.criteria}
         given = {k: v for k, v in overrides.get(item.entry.id, {}).items() if k in known}
         return given != {o.criterion: plain(o) for o in result.overrides}
+
+
+# [classes.review.edit_conflicts] When two people decide the same: what each of them had seen, and the one after the other.
+
+LOCK = ".review.lock"
+
+
+class Conflict(Exception):
+    """Somebody else decided meanwhile: `now` is what stands there, None for nothing."""
+
+    def __init__(self, now: Override | None) -> None:
+        super().__init__("decided meanwhile")
+        self.now = now
+
+
+def mark(override: Override | None) -> str:
+    """What a form carries to say which decision it was made from; empty for none."""
+    return sha256(override.model_dump_json().encode()).hexdigest()[:24] if override else ""
+
+
+def plain(override: Override) -> Override:
+    """What a person wrote of an override that was applied."""
+    return Override(**{name: getattr(override, name) for name in Override.model_fields})
+
+
+def alike(one: Override | None, other: Override | None) -> bool:
+    """Whether both say the same, whenever it was said."""
+    if one is None or other is None:
+        return one is other
+    return one.model_copy(update={"date": None}) == other.model_copy(update={"date": None})
+
+
+@contextmanager
+def reviewing(path: Path) -> Iterator[None]:
+    """Hold what all reviews of a class hold while they compare and write: another process may review it, too."""
+    try:
+        descriptor = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+    except OSError as error:
+        raise unwritable(path / LOCK, error) from error
+    try:
+        with suppress(OSError):  # a file system without locks: whoever shares it has to know what they do
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)

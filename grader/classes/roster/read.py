@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from grader.classes.roster.classroom import is_classroom, refuse_classroom_roster, with_roster_columns
 from grader.classes.roster.entries import entries_of
+from grader.classes.roster.exports import (
+    from_gitlab,
+    is_classroom,
+    refuse_classroom_roster,
+    with_roster_columns,
+)
 from grader.classes.roster.folder import from_folder
-from grader.classes.roster.gitlab import from_gitlab
-from grader.classes.roster.local import OWN_FOLDER, Local
+from grader.classes.roster.sources import OWN_FOLDER, Local
 from grader.classes.roster.table import read_table
 from grader.errors import UsageError
 from grader.model.roster import Roster

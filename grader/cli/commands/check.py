@@ -24,8 +24,8 @@ from grader.intake import safe_name
 from grader.model.git_status import Standing
 from grader.model.progress import Silence
 from grader.model.result import GradingResult
-from grader.report.hidden import hidden_ids, without_hidden
 from grader.report.terminal import open_console
+from grader.report.view import hidden_ids, without_hidden
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_ros
 from grader.student.git_status import write_staged

@@ -26,9 +26,9 @@ from grader.integrations.ci.settings import Settings, read_settings
 from grader.integrations.ci.status_lines import STUDENTS, said_of
 from grader.judging.summary import overall_status, total_points
 from grader.model.result import GradingResult
-from grader.report.hidden import hidden_ids, without_hidden
+from grader.report.sentences import without_sandbox
 from grader.report.terminal import open_console, print_report
-from grader.report.unwalled import without_sandbox
+from grader.report.view import hidden_ids, without_hidden
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 from grader.temporary import temporary_folder

@@ -26,13 +26,13 @@ from grader.report.class_page import salt_in, write_class_page
 from grader.report.classroom import classroom
 from grader.report.code_quality import code_quality
 from grader.report.gradescope import gradescope
-from grader.report.hidden import without_hidden
 from grader.report.html import html_report
 from grader.report.junit import junit
 from grader.report.markdown import markdown_report
 from grader.report.sarif import sarif
-from grader.report.summary import missing_hidden
+from grader.report.sentences import missing_hidden
 from grader.report.terminal import open_console, print_report
+from grader.report.view import without_hidden
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.model import Rubric

@@ -14,7 +14,7 @@ from grader.errors import ExitCode, UsageError
 def run(*, folder: Path, port: int = 0, no_browser: bool = False, author: str | None = None) -> ExitCode:
     """Serve the page until Ctrl-C; `author` stands beside decisions (default: what git calls the person)."""
     require_library()
-    from grader.classes.review.form import Wrong, author_of  # noqa: PLC0415
+    from grader.classes.review.cards import Wrong, author_of  # noqa: PLC0415
     from grader.classes.review.serve import browser, git_user, serve  # noqa: PLC0415
     from grader.classes.review.session import open_desk  # noqa: PLC0415 - an extra: not there everywhere
 

@@ -15,8 +15,8 @@ from grader.integrations.deliver.settings import FILE, Settings
 from grader.integrations.deliver.wheel import system_script, wheel
 from grader.model.result import GradingResult
 from grader.report.gradescope import LIMIT, LOOK, gradescope
+from grader.report.sentences import without_sandbox
 from grader.report.text import line
-from grader.report.unwalled import without_sandbox
 from grader.rubric.load import LoadedRubric
 
 DEFAULT_MINUTES, MOST_MINUTES = 10, 40

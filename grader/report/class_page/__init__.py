@@ -4,7 +4,7 @@ pairs of (Entry, GradingResult), one by one → `lines` → counted (`points`, `
 (`heat`, `histogram`) → `page`
 """
 
-from grader.report.class_page.anonymous import salt_in
+from grader.report.class_page.gather import salt_in
 from grader.report.class_page.page import write_class_page
 
 __all__ = ["salt_in", "write_class_page"]

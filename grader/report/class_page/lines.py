@@ -11,7 +11,7 @@ from grader.model.batch import MISSING, ROSTER, CriterionInfo
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.roster import Entry
 from grader.model.verdict import Status
-from grader.report.unwalled import without_sandbox
+from grader.report.sentences import without_sandbox
 from grader.shown import line
 
 REPORT = "report.html"

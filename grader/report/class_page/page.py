@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import secrets
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -15,20 +16,16 @@ from jinja2 import Template
 from markupsafe import Markup
 
 from grader.files import atomic_write
-from grader.model.batch import BatchRun
+from grader.model.batch import BatchRun, CriterionInfo
 from grader.model.result import GradingResult
 from grader.model.roster import Entry
-from grader.report.class_page.anonymous import SALT_BYTES
-from grader.report.class_page.costs import costs, most_first
-from grader.report.class_page.data import page_data
-from grader.report.class_page.gathered import Gathered, Shared, gather, gather_anonymous
-from grader.report.class_page.heat import heat_map
-from grader.report.class_page.lines import LETTERS, Line, link_to
-from grader.report.class_page.points import histogram, spread
-from grader.report.class_page.timing import span, timing
+from grader.report.class_page.gather import SALT_BYTES, Gathered, Shared, gather, gather_anonymous
+from grader.report.class_page.lines import CHARS, LETTERS, REPORT, Line, link_to
+from grader.report.class_page.statistics import costs, heat_map, histogram, most_first, span, spread, timing
 from grader.report.class_page.todo import todos
 from grader.report.html.shell import environment, policy, script, style
-from grader.report.html.words import SIGNS, count
+from grader.report.sentences import SIGNS, count
+from grader.shown import line
 
 UNWALLED_MAX = 3
 SHARED_MAX, SHARED_FIRST, ALONE_MAX, WORDINGS_MAX = 100, 12, 100, 12
@@ -158,3 +155,49 @@ def _template() -> Template:
 @cache
 def _file(name: str) -> str:
     return files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+# [report.class_page.data] What the page's script reads: JSON that stays inside its element, whatever the texts are.
+
+COLUMNS = ("id", "name", "group", "link", "state", "points", "letters", "earned", "late", "decided", "time")
+
+
+def page_data(
+    lines: Iterable[Line],
+    criteria: Iterable[CriterionInfo],
+    diagnoses: Iterable[Sequence[int]],
+    columns: Iterable[Sequence[int]],
+) -> Markup:
+    """`rows` (each as `COLUMNS` says), `criteria`, and by places in `rows` the members of diagnoses and heat map."""
+    data = {
+        "rows": [_row(one) for one in lines],
+        "criteria": [[line(c.id, CHARS), line(c.title, CHARS), c.max_points] for c in criteria],
+        "diagnoses": [list(members) for members in diagnoses],
+        "heat": [list(column) for column in columns],
+    }
+    return in_script(json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")))
+
+
+def in_script(text: str) -> Markup:
+    """JSON as the content of a `<script>`: nothing in it ends the element or begins another one."""
+    for sign in "<>&\u2028\u2029":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return Markup(text)  # noqa: S704 - what HTML looks for is written out
+
+
+def _row(one: Line) -> list[object]:
+    link = link_to(one)
+    usual = link == f"{one.id}/{REPORT}"
+    return [
+        one.id,
+        one.name,
+        one.group,
+        1 if usual else link or 0,
+        one.state,
+        one.points,
+        one.letters,
+        one.earned or 0,
+        round(one.late_s),
+        [one.decided, one.look_again] if one.decided else 0,
+        round(one.wall_s, 1),
+    ]

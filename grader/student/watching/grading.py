@@ -14,7 +14,7 @@ from grader.faults import Attempt, error_result
 from grader.intake.identity import identify
 from grader.model.progress import Progress
 from grader.model.result import GradingResult, SubmissionInfo, TimingInfo
-from grader.report.hidden import without_hidden
+from grader.report.view import without_hidden
 from grader.results import EVIDENCE
 from grader.rubric.load import LoadedRubric
 from grader.student.watching.loop import Outcome

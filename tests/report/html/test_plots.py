@@ -12,13 +12,18 @@ from lxml import etree
 from markupsafe import Markup
 
 from grader.model.figure import Edge, GraphFigure, RateFigure
-from grader.report.html.drawn import Drawer
-from grader.report.html.plots.axes import ticks
-from grader.report.html.plots.counter import counter_plots, counter_words, wrong_steps
-from grader.report.html.plots.graph import graph_plot, graph_rows
-from grader.report.html.plots.layers import is_bend, layered
-from grader.report.html.plots.path import path_plot, path_words
-from grader.report.html.plots.rate import rate_plots, rate_words
+from grader.report.html.figures import Drawer
+from grader.report.html.graph import graph_plot, graph_rows, is_bend, layered
+from grader.report.html.plots import (
+    counter_plots,
+    counter_words,
+    path_plot,
+    path_words,
+    rate_plots,
+    rate_words,
+    wrong_steps,
+)
+from grader.report.html.svg import ticks
 from tests.report.html.made import EVERY, SCRIPT, counter, graph, rate, way
 
 SVG = "{http://www.w3.org/2000/svg}"

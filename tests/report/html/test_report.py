@@ -21,9 +21,9 @@ from grader.model.result import ErrorInfo, GradingResult, Note
 from grader.model.submission_time import Lateness
 from grader.model.verdict import FileCitation, Status
 from grader.report.html import html_report
-from grader.report.html.report import BYTES_MAX
+from grader.report.html.page import BYTES_MAX
 from grader.report.html.shell import policy, script
-from grader.report.html.words import FAULTS, blame
+from grader.report.sentences import FAULTS, blame
 from grader.report.text import line, visible
 from tests.report.hostile import CRITERIA, criterion, result, rubric
 from tests.report.html.made import SCRIPT, code, console, figures, graph, hostile_figures

@@ -10,9 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from grader.classes.fetching.cache import cache_folder, locked, tidy_now_and_then
+from grader.classes.fetching.mirror import Errand, GivenUp, Patience, bring_up_to_date, place_name
 from grader.classes.fetching.obtain import source_of
-from grader.classes.fetching.retry import GivenUp, Patience
-from grader.classes.fetching.update import Errand, bring_up_to_date, place_name
 from grader.errors import GraderError
 from grader.intake.git import GitFailed
 from grader.model.roster import Entry

@@ -19,11 +19,17 @@ from grader.model.figure import (
     PathFigure,
     RateFigure,
 )
-from grader.report.html.plots.counter import counter_plots, counter_words, wrong_steps
-from grader.report.html.plots.graph import graph_plot, graph_rows
-from grader.report.html.plots.path import path_plot, path_words
-from grader.report.html.plots.rate import rate_plots, rate_words
-from grader.report.html.words import count
+from grader.report.html.graph import graph_plot, graph_rows
+from grader.report.html.plots import (
+    counter_plots,
+    counter_words,
+    path_plot,
+    path_words,
+    rate_plots,
+    rate_words,
+    wrong_steps,
+)
+from grader.report.sentences import count
 from grader.report.text import clip
 
 CONSOLE_FIRST, CONSOLE_LAST = 35, 25
