@@ -5,9 +5,11 @@ from __future__ import annotations
 import errno
 import os
 import secrets
+import shutil
 import sys
 import tempfile
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -55,6 +57,40 @@ def atomic_write(path: Path, data: bytes, *, public: bool = False) -> None:
         if isinstance(error, OSError):
             raise unwritable(path, error) from error
         raise
+
+
+@contextmanager
+def whole_file(target: Path) -> Iterator[Path]:
+    """A new file to write to, beside `target`; it takes its place in the end, flushed to the disk.
+
+    It is for its owner alone, whatever the umask. A link stays a link, and what is no file (`/dev/stdout`, a pipe) gets
+    a copy. Raises OutputError, or HostError where the disk gives out; then `target` is as it was before, and nothing is
+    left beside it.
+    """
+    target = target.resolve() if target.is_symlink() else target
+    special = target.exists() and not target.is_file()
+    folder = Path(tempfile.gettempdir()) if special else target.parent
+    beside = folder / f".{target.name[:80]}.{secrets.token_hex(6)}"
+    try:
+        make_folder(folder)
+        new_file(beside).close()
+        yield beside
+        _place(beside, target, special=special)
+    except OSError as error:
+        raise unwritable(target, error) from error
+    finally:
+        with suppress(OSError):
+            beside.unlink()
+
+
+def _place(beside: Path, target: Path, *, special: bool) -> None:
+    if special:
+        with beside.open("rb") as source, target.open("wb") as place:
+            shutil.copyfileobj(source, place)
+        return
+    with beside.open("rb") as written:
+        os.fsync(written.fileno())
+    beside.replace(target)
 
 
 def new_file(path: Path, *, public: bool = False) -> BinaryIO:

@@ -33,7 +33,7 @@ def write_reports(
     Without `keep_hidden`, hidden criteria are left out and their number said. `docs` has of each check by name the
     sections of its docstring. Raises OutputError.
     """
-    from grader.report.html import html_report  # noqa: PLC0415 - templates are slow to load, and needed here only
+    from grader.report.html.page import html_report  # noqa: PLC0415 - templates are slow to load, and needed here only
 
     shown = result if keep_hidden else without_hidden(result, rubric)
     hidden = len(result.criteria) - len(shown.criteria)

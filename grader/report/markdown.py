@@ -1,4 +1,4 @@
-"""`report.md`: points and what was lost in a line each; details folded. For a file, a comment, a step's summary."""
+"""`report.md`: points and losses in a line each, details folded. For a file, a comment or the summary of a CI step."""
 
 from __future__ import annotations
 
@@ -263,8 +263,6 @@ class _Writer:
 def _counted(title: str, items: Sequence[object]) -> str:
     return f"{title} ({len(items)})"
 
-
-# [report.mermaid] The graph of nodes and topics as a mermaid diagram, which GitHub and GitLab draw.
 
 NAME_CHARS = 60
 PARTS_MAX, EDGES_MAX = 40, 80

@@ -1,4 +1,4 @@
-"""What people decided and what being late cost, in the words of the reports."""
+"""Sentences that several reports share: late work, overrides, notes, a missing sandbox, and the verdict."""
 
 from __future__ import annotations
 
@@ -79,8 +79,6 @@ def decided(result: GradingResult) -> list[tuple[AppliedOverride, CriterionResul
     ]
 
 
-# [report.summary] Sentences that several reports say of a result.
-
 NOT_SETTLED = "some criteria could not be judged; no points are lost for good."
 
 
@@ -106,8 +104,6 @@ def verdict_words(result: GradingResult, rubric: Rubric, hidden: int) -> str:
     return "Passed." if passed(rubric, result) else "Not passed yet."
 
 
-# [report.noticed] What was noticed while it ran, in the words of the reports.
-
 NOTICED_TITLE = "Noticed while it ran"
 COSTS_NOTHING = "No points were taken for any of this."
 
@@ -122,8 +118,6 @@ def note_text(note: Note) -> str:
     """`asked the master to shut down (refused)`."""
     return f"{note.text} ({'refused' if note.kind == 'refused' else 'limited'})"
 
-
-# [report.unwalled] What is said wherever students' code runs without a sandbox: one sentence, made of what a result says of it.
 
 LABEL = re.compile(
     r"none \((?P<reason>.*?)\)(?P<other>, but for an unprivileged user)?(; memory held by [^;]*)?"
@@ -144,8 +138,6 @@ def without_sandbox(label: str) -> str:
     who = "an unprivileged user there" if found["other"] else "the user who grades"
     return f"{why}: students' code runs with all rights of {who}."
 
-
-# [report.html.words] The sentences of a student's report.
 
 SIGNS = {
     Status.PASS: "✓",

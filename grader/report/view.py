@@ -1,4 +1,4 @@
-"""A result put in the order in which it is read: what was lost first, with what it took along."""
+"""A result as it is read: losses first, with what they block; and the student's view, without hidden criteria."""
 
 from __future__ import annotations
 
@@ -121,9 +121,6 @@ def _place(citation: Citation) -> str:
     if citation.from_ns is not None and citation.to_ns is not None and citation.to_ns > citation.from_ns:
         stretch = f", {(citation.to_ns - citation.from_ns) / 1e9:.1f} s"
     return f"{citation.evidence} {citation.topic}{stretch}"
-
-
-# [report.hidden] The student's view of a result: without the criteria that the rubric hides.
 
 
 def hidden_ids(rubric: Rubric) -> frozenset[str]:

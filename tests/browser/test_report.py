@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from grader.checks import CHECKS
-from grader.report.html import html_report
+from grader.report.html.page import html_report
 from tests.browser.conftest import DESKTOP, PHONE
 from tests.report.hostile import ESCAPES, result, rubric
 from tests.report.html.made import SCRIPT, counter, figures, graph, heard, hostile_figures, rate

@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from grader.classes.overrides import write_override
+from grader.classes.overrides.write import write_override
 from grader.classes.review.app import create_app
 from grader.classes.review.cards import author_of
 from grader.classes.review.session import open_desk

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 
-from grader.classes.overrides import write_override
+from grader.classes.overrides.write import write_override
 from grader.classes.review.app import create_app
 from grader.classes.review.session import open_desk
 from grader.model.submission_time import Override

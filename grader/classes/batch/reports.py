@@ -15,7 +15,7 @@ from grader.errors import EvidenceError, GraderError, UsageError
 from grader.files import new_file, unwritable
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
-from grader.report.html import html_report
+from grader.report.html.page import html_report
 from grader.report.junit import junit
 from grader.report.markdown import markdown_report
 from grader.report.sentences import missing_hidden

@@ -1,4 +1,7 @@
-"""A repository's heads and tags in a bare repository of our own, which knows no address and no settings but ours."""
+"""A repository's heads and tags in a bare repository of our own, which knows no address and no settings but ours.
+
+`bring_up_to_date` fetches it once for all who need it; what the network fails at is tried again with `Patience`.
+"""
 
 from __future__ import annotations
 
@@ -172,8 +175,6 @@ def _is_unknown(failure: GitFailed) -> bool:
     return any(sign in failure.stderr.lower() for sign in signs)
 
 
-# [classes.fetching.update] A mirror is brought up to date with its server, once for all who need it.
-
 GIT_TIMEOUT_S = 120.0
 """For everything that git does in one try."""
 
@@ -249,8 +250,6 @@ def place_name(source: Source) -> str:
     """The name of the mirror for a remote source."""
     return name_of(split_address(source.url)[0])
 
-
-# [classes.fetching.retry] What the network failed at is tried again, after a while.
 
 Answer = TypeVar("Answer")
 

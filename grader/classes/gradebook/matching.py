@@ -1,4 +1,4 @@
-"""By what a platform and a roster name the same student."""
+"""Which row of a platform's export belongs to which student: only where there is no doubt."""
 
 from __future__ import annotations
 
@@ -103,9 +103,6 @@ def _turned(name: str) -> str:
     """`lovelace, ada` is `ada lovelace`."""
     last, comma, first = name.partition(",")
     return " ".join(f"{first} {last}".split()) if comma else name
-
-
-# [classes.gradebook.match] Which row of a platform's export is whose: only where there is no doubt.
 
 
 @dataclass(frozen=True, kw_only=True)

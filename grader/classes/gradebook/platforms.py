@@ -1,4 +1,4 @@
-"""Files for platforms made from the roster alone."""
+"""Points for a learning platform: one mark per submission, and a new file to import made from the roster alone."""
 
 from __future__ import annotations
 
@@ -153,9 +153,6 @@ def _missing(roster: _Roster, platform: str, wanted: Sequence[Kind], columns: st
             "give it with --template"
         )
     return remarks
-
-
-# [classes.gradebook.marks] What a learning platform is to be told of each submission: little enough to hold a whole class of it.
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""The rows of the plain gradebook: one a submission, the same in CSV and in a workbook."""
+"""The plain gradebook as rows and cells, the same in CSV and in a workbook. No text in it is a formula."""
 
 from __future__ import annotations
 
@@ -88,8 +88,6 @@ def _free(name: str, kind: str, taken: set[str]) -> str:
     return free
 
 
-# [classes.gradebook.model] What a gradebook is made from.
-
 Form = Literal["csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"]
 FORMS: tuple[Form, ...] = ("csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard")
 
@@ -116,8 +114,6 @@ class Book(Record):
     criteria: tuple[BookCriterion, ...] = ()
     columns: tuple[str, ...] = ()
 
-
-# [classes.gradebook.cells] What stands in a cell: numbers that stay numbers, and text that is on one line, visible, and no formula.
 
 CELL_CHARS = 10_000
 """What a cell holds of a longer text; a workbook's may have 32,767 characters."""

@@ -1,4 +1,4 @@
-"""A platform's own export with our points filled in."""
+"""A platform's own export with our points filled in. All other bytes stay as they were."""
 
 from __future__ import annotations
 
@@ -171,8 +171,6 @@ def _number(text: str) -> float | None:
     return float(f"{found[1]}.{found[2] or 0}") if found else None
 
 
-# [classes.gradebook.columns] Which column of a platform's export is ours, whatever the platform writes behind its title.
-
 _GRADE = {"grade", "bewertung", "note", "calificación", "valutazione"}
 _MAXIMUM = {"maximumgrade", "bestwertung", "notemaximale", "calificaciónmáxima", "valutazionemassima"}
 _REAL = re.compile(r"\((real|points|punkte|points?|réel|brut|real\w*)\)\s*$", re.IGNORECASE)
@@ -241,8 +239,6 @@ def _others(header: Sequence[str], known: dict[str, Kind]) -> str:
     more = f" and {len(names) - SHOWN_MAX} more" if len(names) > SHOWN_MAX else ""
     return f"there are: {', '.join(names[:SHOWN_MAX])}{more}"
 
-
-# [classes.gradebook.sheet] A platform's export, of which every byte stays as it is but the cells that are filled in.
 
 BYTES_MAX = 64 << 20
 _MARKS = (

@@ -12,8 +12,8 @@ from xlsxwriter.format import Format
 from xlsxwriter.worksheet import Worksheet
 
 from grader.classes.gradebook.table import Book, Cell, Row, cells, header, visible_text
-from grader.classes.gradebook.write import whole_file
 from grader.errors import OutputError
+from grader.files import whole_file
 
 WIDTH_MIN, WIDTH_MAX, WIDTH_TEXT = 8, 40, 24
 OPTIONS = {

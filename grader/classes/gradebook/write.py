@@ -1,15 +1,10 @@
-"""A gradebook in any of its forms."""
+"""Write a gradebook in any of its forms."""
 
 from __future__ import annotations
 
 import json
-import os
 import re
-import secrets
-import shutil
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
 
@@ -18,7 +13,7 @@ from grader.classes.gradebook.platforms import fresh, marks_of, remarks_of, want
 from grader.classes.gradebook.table import Book, Form, Row, cells, csv_line, header
 from grader.classes.gradebook.template import fill_template
 from grader.errors import UsageError
-from grader.files import atomic_write, make_folder, new_file, unwritable
+from grader.files import atomic_write, whole_file
 from grader.model.result import GradingResult
 from grader.shown import json_text, steers
 
@@ -78,8 +73,6 @@ def _plain(book: Book, rows: Iterable[Row], target: Path, form: Form) -> None:
         import_module("grader.classes.gradebook.workbook").write_workbook(book, rows, target)
 
 
-# [classes.gradebook.plain] The plain gradebook as CSV, and the results as JSON Lines.
-
 OPTIONAL = {
     name for name, field in GradingResult.model_fields.items() if not (field.is_required() or field.default)
 }
@@ -108,40 +101,3 @@ def json_line(row: Row) -> str:
     if "##" not in text and not any(map(steers, set(text))):
         return text + "\n"
     return re.sub(r"\n *", "", json_text(data)) + "\n"
-
-
-# [classes.gradebook.whole] Files that are written piece by piece, and appear whole or not at all.
-
-
-@contextmanager
-def whole_file(target: Path) -> Iterator[Path]:
-    """A new file to write to, beside `target`; it takes its place in the end, flushed to the disk.
-
-    It is for its owner alone, whatever the umask. A link stays a link, and what is no file (`/dev/stdout`, a pipe) gets
-    a copy. Raises OutputError, or HostError where the disk gives out; then `target` is as it was before, and nothing is
-    left beside it.
-    """
-    target = target.resolve() if target.is_symlink() else target
-    special = target.exists() and not target.is_file()
-    folder = Path(tempfile.gettempdir()) if special else target.parent
-    beside = folder / f".{target.name[:80]}.{secrets.token_hex(6)}"
-    try:
-        make_folder(folder)
-        new_file(beside).close()
-        yield beside
-        _placed(beside, target, special=special)
-    except OSError as error:
-        raise unwritable(target, error) from error
-    finally:
-        with suppress(OSError):
-            beside.unlink()
-
-
-def _placed(beside: Path, target: Path, *, special: bool) -> None:
-    if special:
-        with beside.open("rb") as source, target.open("wb") as place:
-            shutil.copyfileobj(source, place)
-        return
-    with beside.open("rb") as written:
-        os.fsync(written.fileno())
-    beside.replace(target)

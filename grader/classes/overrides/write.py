@@ -1,4 +1,7 @@
-"""One override written into `overrides.yaml`; all else of the file stays as it was written."""
+"""One override written into `overrides.yaml`; everything else in the file stays as it was written.
+
+The text is changed in place by cutting and inserting pieces (`Splice`): writing parsed YAML again would lose comments.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from grader.classes.overrides.read import FORM, SCHEMA, SCHEMA_KEY, folder_key
+from grader.classes.overrides import FORM, SCHEMA, SCHEMA_KEY, folder_key
 from grader.errors import Busy, RubricError, UsageError
 from grader.files import atomic_write, lock, unwritable
 from grader.model.submission_time import Override
@@ -132,8 +135,6 @@ def _plain(data: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in plain.items() if value not in (None, {}) and key != SCHEMA_KEY}
 
 
-# [classes.overrides.edit] The text of `overrides.yaml` with one override put in, changed or taken out.
-
 PLAIN_KEY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.@-]*")
 Fields = dict[str, Any]
 """An override as the file's data have it, what is empty left out."""
@@ -229,8 +230,6 @@ def _key(text: str) -> str:
 def _quoted(text: str) -> str:
     return str(yaml.safe_dump(text, default_style='"', allow_unicode=True, width=10**9)).rstrip("\n")
 
-
-# [classes.overrides.splice] Changes to a YAML file's text, as pieces that are cut out and put in: all else stays as it was written.
 
 Pair = tuple[yaml.Node, yaml.Node]
 

@@ -276,8 +276,6 @@ def _own(name: str) -> Markup:
     return Markup(files(__package__).joinpath("look", name).read_text(encoding="utf-8"))  # noqa: S704 - ours
 
 
-# [classes.review.answers] Answers that are no page of the class: files, and what went wrong.
-
 SCRIPT = "X-Asked-By"
 """The header with which our script asks: it is answered with what changed, as JSON."""
 

@@ -1,4 +1,4 @@
-"""What the page of one submission shows of each criterion, and which come first."""
+"""What the page of a submission shows of each criterion, and the form in which an instructor awards points."""
 
 from __future__ import annotations
 
@@ -143,8 +143,6 @@ def plain(value: float) -> str:
     """As a field of a form has it: no digit is lost."""
     return f"{value:.10f}".rstrip("0").rstrip(".")
 
-
-# [classes.review.form] What a form says, made an override; what is wrong with it in a line for the one who typed it.
 
 POINTS = re.compile(r"\d{1,9}(?:[.,]\d{0,9})?|[.,]\d{1,9}", re.ASCII)
 

@@ -1,4 +1,4 @@
-"""Who may ask: this machine's browser with the token of the address, and forms of our own pages alone."""
+"""Who may ask, and for which files: a browser with the token of the address, forms of our own pages, known names."""
 
 from __future__ import annotations
 
@@ -90,8 +90,6 @@ def _with_headers(response: Response) -> Response:
     response.headers.setdefault("Content-Security-Policy", PAGE)
     return response
 
-
-# [classes.review.served] Files of a submission that the page may show: known names, opened without following any link.
 
 REPORTS = {
     "report.html": "text/html",

@@ -1,4 +1,7 @@
-"""Where decisions are made: each is written into `overrides.yaml` at once, and results and gradebook follow."""
+"""Where decisions are saved: each goes into `overrides.yaml` at once, and results and gradebook follow.
+
+Two people may decide about the same criterion: each decision names the one it was made from, so that none is lost.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,8 @@ from pathlib import Path
 from grader.classes.batch.flow import GRADEBOOK, alone, ids_of, write_books
 from grader.classes.batch.folder import BatchFolder, open_batch, write_run
 from grader.classes.batch.settled import Settler, rewrite
-from grader.classes.overrides import FILE, Overrides, read_overrides, write_override
+from grader.classes.overrides import FILE, Overrides, read_overrides
+from grader.classes.overrides.write import write_override
 from grader.classes.review.background import Follower, Pace
 from grader.classes.review.submissions import Item, Stamp, Submissions, stamp_of
 from grader.errors import Busy, GraderError, UsageError
@@ -228,8 +232,6 @@ class Desk:
         given = {k: v for k, v in overrides.get(item.entry.id, {}).items() if k in known}
         return given != {o.criterion: plain(o) for o in result.overrides}
 
-
-# [classes.review.edit_conflicts] When two people decide the same: what each of them had seen, and the one after the other.
 
 LOCK = ".review.lock"
 

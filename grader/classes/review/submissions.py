@@ -1,4 +1,4 @@
-"""The submissions of a class as the list shows them, read again where a file of theirs has changed."""
+"""The submissions of a class as the list shows them, read again when their files change; filter and search."""
 
 from __future__ import annotations
 
@@ -168,8 +168,6 @@ def stamp_of(path: Path) -> Stamp:
         return None
     return found.st_mtime_ns, found.st_size, found.st_ino
 
-
-# [classes.review.navigation] Where in the class one is: the filter, the words that are looked for, and what comes before and after.
 
 WORDS_CHARS = 100
 

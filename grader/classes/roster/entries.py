@@ -1,4 +1,4 @@
-"""Rows of a table become entries; whatever is wrong with a row is named by its line, all faults at once."""
+"""Rows of a table become entries. Every fault of a row is reported with its line, all of them at once."""
 
 from __future__ import annotations
 
@@ -71,8 +71,6 @@ def _entry(fields: dict[str, str], extra: dict[str, str], where: str, base: Path
     )
 
 
-# [classes.roster.gather] What was found becomes a roster: ids that no two have, and a record for each fault.
-
 ID_BYTES_MAX = 255
 
 
@@ -128,8 +126,6 @@ def _key(submission_id: str) -> str:
     return safe_name(submission_id).casefold() if submission_id else ""
 
 
-# [classes.roster.columns] What the columns of a roster mean, however they are written.
-
 REQUIRED = ("id", "source")
 OPTIONAL = ("ref", "name", "group", "submitted_at", "extension_days")
 KNOWN = (*REQUIRED, *OPTIONAL)
@@ -170,8 +166,6 @@ def near_misses(columns: tuple[str, ...]) -> Iterator[tuple[str, str]]:
 def _plain(column: str) -> str:
     return re.sub(r"[\s-]+", "_", column.casefold())
 
-
-# [classes.roster.times] Times and days as people and programs write them; what could be read in two ways is not read.
 
 EXTENSION_DAYS_MAX = 3660.0
 EXAMPLE = "2026-11-20 23:59"

@@ -1,4 +1,4 @@
-"""What GitHub Classroom exports: the grades of an assignment, which name the repositories."""
+"""Rosters from exports: the grades of a GitHub Classroom assignment (CSV), the projects of a GitLab group (JSON)."""
 
 from __future__ import annotations
 
@@ -60,8 +60,6 @@ def _renamed(fields: Mapping[str, str]) -> dict[str, str]:
     renamed = {COLUMNS.get(column, column): field for column, field in fields.items()}
     return {"id": fields.get("github_username") or fields.get("roster_identifier", ""), **renamed}
 
-
-# [classes.roster.gitlab] The projects of a GitLab group, as its API lists them.
 
 BYTES_MAX = 64 << 20
 ADDRESSES = ("http_url_to_repo", "ssh_url_to_repo")

@@ -1,4 +1,4 @@
-"""A folder with a submission in each of its entries; bulk downloads of Moodle and Canvas are known by their names."""
+"""A folder with a submission in each entry. The names in bulk downloads of Moodle and Canvas are known."""
 
 from __future__ import annotations
 
@@ -123,13 +123,10 @@ def _single_archive(path: Path) -> Path | None:
     return inside[0] if alone and encodable(inside[0].name) else None
 
 
-# [classes.roster.platforms] Whose submission a file is, by the names that Moodle and Canvas give in their bulk downloads.
-#
-# Moodle: `Full Name_1234567_assignsubmission_file` (a folder), or that with `_lab1.zip` behind it (a file); with
-# `onlinetext` where text was handed in; `Participant 1234567` or `Participant_1234567` where names are hidden.
-# Of a team it is the team's name and number. Canvas: `lastnamefirstname_LATE_12345_67890_lab1.zip`, `LATE_` where it was;
-# `LATE_anon_x7Yz2_67890_lab1.zip` where names are hidden; `…_12345_text.html` and `…_12345_link.html` for no files.
-
+# Moodle: `Full Name_1234567_assignsubmission_file` (a folder), with `_lab1.zip` behind it (a file), or `onlinetext` for
+# text; `Participant 1234567` or `Participant_1234567` where names are hidden. A team has its name and number.
+# Canvas: `lastnamefirstname_LATE_12345_67890_lab1.zip`, with `LATE_` if it was late, `LATE_anon_x7Yz2_67890_lab1.zip`
+# where names are hidden; `…_12345_text.html` and `…_12345_link.html` where no file was submitted.
 MOODLE = re.compile(
     r"(?P<name>.+)_(?P<id>\d+)_assignsubmission_(?P<kind>file|onlinetext)(?:_(?P<file>.*))?", re.DOTALL
 )

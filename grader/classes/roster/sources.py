@@ -1,4 +1,7 @@
-"""The sources that a roster names: addresses as they are, paths from the roster's folder."""
+"""What a roster may name: addresses as they are, and paths of this machine that `Local` allows.
+
+Rosters come from web forms, so a student may have written the path.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +15,6 @@ from urllib.parse import unquote
 from grader.errors import GraderError, SubmissionError, UsageError
 from grader.intake.names import brief
 from grader.intake.source import parse_source
-
-# [classes.roster.local] Which paths of this machine a roster may name. Rosters come from web forms: a student may have written the path.
 
 OUT = "leads out of the roster's folder; --allow-local DIR allows another one"
 REFUSED = "is on this machine, and --remote-only takes only what is fetched"

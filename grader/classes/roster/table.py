@@ -1,4 +1,4 @@
-"""CSV as spreadsheets and learning platforms write it: rows with their lines, whatever the delimiter."""
+"""CSV as spreadsheets and learning platforms write it, whatever the encoding and delimiter: rows with their lines."""
 
 from __future__ import annotations
 
@@ -133,8 +133,6 @@ def _text(path: Path) -> str:
         raise UsageError(f"{path}: larger than {BYTES_MAX >> 20} MB: this is no roster")
     return text_of(data, path)
 
-
-# [classes.roster.decode] The text of a file that a spreadsheet may have written, in the encodings that they use.
 
 _MARKS = (  # the longer ones first: UTF-32's begins with UTF-16's
     (codecs.BOM_UTF32_LE, "utf-32"),

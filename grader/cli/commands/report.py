@@ -22,11 +22,12 @@ from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
 from grader.portable import cores
 from grader.report.annotations import github_annotations
-from grader.report.class_page import salt_in, write_class_page
+from grader.report.class_page.gather import salt_in
+from grader.report.class_page.page import write_class_page
 from grader.report.classroom import classroom
 from grader.report.code_quality import code_quality
 from grader.report.gradescope import gradescope
-from grader.report.html import html_report
+from grader.report.html.page import html_report
 from grader.report.junit import junit
 from grader.report.markdown import markdown_report
 from grader.report.sarif import sarif

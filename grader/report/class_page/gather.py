@@ -1,4 +1,4 @@
-"""All submissions of a class, read one by one and kept as the page needs them, with names or without."""
+"""All submissions of a class, read one by one: a line each, and shared diagnoses, with names or under pseudonyms."""
 
 from __future__ import annotations
 
@@ -98,8 +98,6 @@ def _unnamed(line: Line, pseudonym: str, words: frozenset[str]) -> Line:
     return replace(line, id=pseudonym, name="", group="", folder="", why=why, problem=problem)
 
 
-# [report.class_page.diagnoses] Submissions with the same diagnosis: the same criterion, and the same message but for numbers and names.
-
 WORDINGS_MAX = 40
 LOST = {Status.PARTIAL, Status.FAIL}
 
@@ -175,8 +173,6 @@ def _faults(result: GradingResult) -> Iterator[tuple[str, str]]:
             message = said.get(criterion.id, criterion.message)
             yield criterion.id, message or criterion.measured or criterion.title
 
-
-# [report.class_page.anonymous] The page without anybody's name: pseudonyms, and texts without the words that could tell who it is.
 
 SALT = ".anonymous-salt"
 SALT_BYTES = 32

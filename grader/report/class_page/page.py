@@ -1,4 +1,4 @@
-"""`index.html`: one file that needs nothing else. Begin reading at `write_class_page`."""
+"""`index.html`, the page of a class: one file that needs nothing else. Begin reading at `write_class_page`."""
 
 from __future__ import annotations
 
@@ -156,8 +156,6 @@ def _template() -> Template:
 def _file(name: str) -> str:
     return files(__package__).joinpath(name).read_text(encoding="utf-8")
 
-
-# [report.class_page.data] What the page's script reads: JSON that stays inside its element, whatever the texts are.
 
 COLUMNS = ("id", "name", "group", "link", "state", "points", "letters", "earned", "late", "decided", "time")
 

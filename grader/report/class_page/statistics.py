@@ -1,4 +1,4 @@
-"""Which criterion cost most."""
+"""What the class page counts and draws: points, costs of criteria, time, and the heat map."""
 
 from __future__ import annotations
 
@@ -70,8 +70,6 @@ def _add(cost: Cost, line: Line) -> None:
         most = cost.criterion.max_points
         cost.points += max(0.0, most - line.points_of(cost.place, most))
 
-
-# [report.class_page.points] How the points are spread.
 
 BINS_MAX = 20
 STEPS = (0.1, 0.2, 0.25, 0.5, 1, 2, 2.5, 5, 10, 20, 25, 50, 100, 200, 250, 500, 1000)
@@ -174,8 +172,6 @@ def _scale(bins: Sequence[Bin], step: float) -> list[Markup]:
     return [line, *ticks, end]
 
 
-# [report.class_page.timing] How long a batch took.
-
 SLOWEST = 10
 
 
@@ -222,8 +218,6 @@ def span(seconds: float) -> str:
             return f"{whole // size} {name}" + (f" {rest} {smaller}" if rest else "")
     return "0 s"
 
-
-# [report.class_page.heat] The heat map: a row for each criterion, a column for each submission, best first.
 
 ROW = 22
 ONE_EACH_MAX = 500

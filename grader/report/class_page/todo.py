@@ -1,4 +1,4 @@
-"""What a person has to do before all points are settled, and what to type for it."""
+"""What is left to do before all points are settled, and the command for it."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from grader.model.batch import BatchRun
 from grader.report.class_page.lines import CHARS, MESSAGE_CHARS, Line, link_to
 from grader.report.text import html
 from grader.shown import line
-
-# [report.class_page.commands] What to type to go on with a batch.
 
 
 def again(run: BatchRun, out: Path, only: str = "", *, static: bool | None = None) -> Markup:

@@ -1,4 +1,4 @@
-"""A counter's values, with the turns and the wrong steps that the checks `counter-…` see."""
+"""What a check measured, by its own measure: values of a counter, a rate, a path, what a listener heard."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def start_figures(run: Run, params: StartParams) -> Iterator[CounterFigure]:
         marks = [] if known else [(0, f"the first value is {number(count.values[0])}, not {params.start}")]
         steps = [s for s in count.steps[:FIRST_VALUES] if s.change < -1]
         first = range(len(count.values))[:FIRST_VALUES]
-        yield _figure(count, steps, marks, run=run, topic=params.topic, kept=first)
+        yield _counter_figure(count, steps, marks, run=run, topic=params.topic, kept=first)
 
 
 def step_figures(run: Run, params: StepParams) -> Iterator[CounterFigure]:
@@ -68,7 +68,7 @@ def step_figures(run: Run, params: StepParams) -> Iterator[CounterFigure]:
     lost = {s.number for s in found.lost}
     marks = [(s.number, _step_text(s, flood=found.flood, lost=s.number in lost)) for s in found.steps]
     turns = [s for s in count.steps if s.change < -1]
-    yield _figure(count, turns, [] if found.excused else marks, run=run, topic=params.topic)
+    yield _counter_figure(count, turns, [] if found.excused else marks, run=run, topic=params.topic)
 
 
 def wrap_figures(run: Run, package: PackageFacts, params: WrapParams) -> Iterator[CounterFigure]:
@@ -82,7 +82,7 @@ def wrap_figures(run: Run, package: PackageFacts, params: WrapParams) -> Iterato
     verdict, _ = judge_wraps(count, run, package, params)
     if not found.bad and verdict.status is Status.FAIL and not verdict.unjudged:
         marks = [(len(count.values) - 1, verdict.message)]
-    yield _figure(count, found.good, marks, run=run, topic=params.topic)
+    yield _counter_figure(count, found.good, marks, run=run, topic=params.topic)
 
 
 def _step_text(step: Step, *, flood: bool, lost: bool) -> str:
@@ -100,7 +100,7 @@ def _turn_text(step: Step, turns: list[Step], count: Count, run: Run, params: Wr
     return _step_text(step, flood=whose == "flood", lost=True)
 
 
-def _figure(
+def _counter_figure(
     count: Count,
     turns: Sequence[Step],
     marks: Sequence[Mark],
@@ -110,7 +110,9 @@ def _figure(
     kept: range | None = None,
 ) -> CounterFigure:
     shown = [mark for mark in marks[:MARKS_MAX] if _drawable(count.values[mark[0]])]
-    numbers = [i for i in kept or _kept(count, [i for i, _ in shown], turns) if _drawable(count.values[i])]
+    numbers = [
+        i for i in kept or _shown_values(count, [i for i, _ in shown], turns) if _drawable(count.values[i])
+    ]
     places = {number: place for place, number in enumerate(numbers)}
     return CounterFigure(
         topic=named(topic),
@@ -137,7 +139,7 @@ def _drawable(value: float) -> bool:
     return value == value  # noqa: PLR0124 - NaN is not itself
 
 
-def _kept(count: Count, marks: Sequence[int], turns: Sequence[Step]) -> Sequence[int]:
+def _shown_values(count: Count, marks: Sequence[int], turns: Sequence[Step]) -> Sequence[int]:
     """All values, or of many: what is around the marks and the turns, both ends, and a fair choice of the others.
 
     Of very many turns, only the values of the first ones and what is around the marks.
@@ -156,8 +158,6 @@ def _around(numbers: Sequence[int], count: int, every: range) -> Iterator[int]:
     return chain.from_iterable(every[max(0, n - count) : n + count] for n in numbers)
 
 
-# [report.figures.rates] The rate of a topic, as the check `rate` measures it.
-
 PUBLISHERS_MAX = 3
 EXTREMES = 20
 SLICE_NS = 500_000_000
@@ -173,13 +173,13 @@ def rate_figures(run: Run, params: RateParams) -> Iterator[RateFigure]:
     for group in groups:
         found = judged_rhythm(run, params, group)
         if found is not None and found.gaps_ns:
-            yield _figure_rates(run, params, found, group)
+            yield _rate_figure(run, params, found, group)
 
 
-def _figure_rates(run: Run, params: RateParams, found: Rhythm, channels: Sequence[Channel]) -> RateFigure:
+def _rate_figure(run: Run, params: RateParams, found: Rhythm, channels: Sequence[Channel]) -> RateFigure:
     silent = (found.until_ns,) if found.tail_ns else ()
     arrivals = (*found.times_ns[1:], *silent)
-    kept = _kept_rates(found.gaps_ns)
+    kept = _shown_gaps(found.gaps_ns)
     low_ns, high_ns = params.bounds_ns
     return RateFigure(
         topic=named(params.topic),
@@ -198,7 +198,7 @@ def _figure_rates(run: Run, params: RateParams, found: Rhythm, channels: Sequenc
     )
 
 
-def _kept_rates(gaps_ns: Sequence[int]) -> list[int]:
+def _shown_gaps(gaps_ns: Sequence[int]) -> list[int]:
     """The longest and the shortest gaps, the last one, and a fair choice of the others."""
     every = range(len(gaps_ns))
     if len(gaps_ns) <= POINTS_MAX:
@@ -230,9 +230,7 @@ def _late(run: Run, params: RateParams, found: Rhythm) -> list[tuple[int, int]]:
     return stretches or ([(begin_ns, end_ns)] if excused else [])
 
 
-# [report.figures.paths] The way that a robot took, as the check `path` measures it.
-
-AROUND_paths = 20
+NEAR = 20
 CORNERS_MAX = 100
 
 
@@ -244,7 +242,7 @@ def path_figures(run: Run, params: PathParams) -> Iterator[PathFigure]:
     taken = relative(found.path) if params.relative else list(found.path)
     way = params.way
     course = followed(taken, way.points, params.tolerance_m)
-    kept = _kept_paths(taken, course.strayed)
+    kept = _shown_poses(taken, course.strayed)
     yield PathFigure(
         topic=named(params.topic),
         scenario=named(run.scenario),
@@ -261,20 +259,17 @@ def _spot(point: tuple[float, float]) -> tuple[float, float]:
     return round(finite(point[0]), 4), round(finite(point[1]), 4)
 
 
-def _kept_paths(path: Sequence[Pose], strayed: int | None) -> list[int]:
+def _shown_poses(path: Sequence[Pose], strayed: int | None) -> list[int]:
     """Its ends, what is around the place where it strays, and a fair choice of the others where it moves."""
     every = range(len(path))
     spots = [_spot(pose.point) for pose in path]
     moves = [i for i in every[1:] if spots[i] != spots[i - 1]]
-    near = every[max(0, strayed - AROUND_paths) : strayed + AROUND_paths] if strayed is not None else ()
+    near = every[max(0, strayed - NEAR) : strayed + NEAR] if strayed is not None else ()
     own = {every[0], every[-1], *near}
     return sorted({*own, *spread(moves, POINTS_MAX - len(own))})
 
 
-# [report.figures.heard] What a listener was sent, against what it printed, as the check `hears` compares them.
-
 ROWS_MAX = 60
-TEXT_LETTERS_heard = 200
 
 
 def heard_figures(run: Run, params: HearsParams) -> Iterator[HeardFigure]:
@@ -289,7 +284,7 @@ def heard_figures(run: Run, params: HearsParams) -> Iterator[HeardFigure]:
     found = [
         None if not own else find(own[0] if turn is None else turn) for own, turn in _both(places, in_turn)
     ]
-    kept = _kept_heard(found)
+    kept = _shown_probes(found)
     yield HeardFigure(
         scenario=named(run.scenario),
         rows=tuple(_row(run, params.topic, probes[i], found[i]) for i in kept),
@@ -307,7 +302,7 @@ def _both(
 def _row(run: Run, topic: str, probe: Probe, line: Line | None) -> Heard:
     return Heard(
         topic=named(topic),
-        sent=short(probe.value, TEXT_LETTERS_heard),
+        sent=short(probe.value, TEXT_LETTERS),
         at_s=second(run, probe.at_ns),
         heard=None if line is None else _said(line),
         after_s=None if line is None else max(0.0, round((line.at_ns - probe.at_ns) / 1e9, 6)),
@@ -316,10 +311,10 @@ def _row(run: Run, topic: str, probe: Probe, line: Line | None) -> Heard:
 
 def _said(line: Line) -> str:
     """Without what stands between the node's name, which is cut off already, and its words."""
-    return short(" ".join(line.text.split()).removeprefix(": "), TEXT_LETTERS_heard)
+    return short(" ".join(line.text.split()).removeprefix(": "), TEXT_LETTERS)
 
 
-def _kept_heard(found: Sequence[Line | None]) -> list[int]:
+def _shown_probes(found: Sequence[Line | None]) -> list[int]:
     """Of many, the first, and the first that are missing."""
     every = range(len(found))
     if len(every) <= ROWS_MAX:

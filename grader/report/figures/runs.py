@@ -1,4 +1,4 @@
-"""Who published and subscribed to what in a run: the student's nodes, and the programs that run beside them."""
+"""What a run shows whatever was checked: nodes and topics, the console, and the lines of code that a verdict cites."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ def graph_of(run: Run) -> GraphFigure | None:
     kept = [e for e in edges if e.node in shown and e.topic in drawn][:EDGES_MAX]
     return GraphFigure(
         scenario=named(run.scenario),
-        nodes=tuple(map(_name, nodes[:NODES_MAX])),
-        topics=tuple(map(_name, topics[:TOPICS_MAX])),
-        types={_name(t): _name(types[t]) for t in topics[:TOPICS_MAX] if t in types},
-        edges=tuple(Edge(node=_name(e.node), topic=_name(e.topic), publishes=e.publishes) for e in kept),
+        nodes=tuple(map(named, nodes[:NODES_MAX])),
+        topics=tuple(map(named, topics[:TOPICS_MAX])),
+        types={named(t): named(types[t]) for t in topics[:TOPICS_MAX] if t in types},
+        edges=tuple(Edge(node=named(e.node), topic=named(e.topic), publishes=e.publishes) for e in kept),
         left_out=len(nodes) - len(shown) + len(topics) - len(drawn),
     )
 
@@ -88,12 +88,6 @@ def _types(run: Run, states: Sequence[GraphEvent]) -> dict[str, str]:
     return {topic: kind for topic, kind in found.items() if kind not in UNKNOWN}
 
 
-def _name(name: str) -> str:
-    return named(name)
-
-
-# [report.figures.consoles] What the build and the student's processes printed, with times.
-
 FIRST_LINES = LAST_LINES = 100
 LETTERS_MAX = 24_000
 """Of all lines together; where they have more, each is cut shorter."""
@@ -121,8 +115,6 @@ def console_of(run: Run) -> ConsoleFigure | None:
     )
     return ConsoleFigure(scenario=named(run.scenario), lines=lines, left_out=len(printed) - len(kept))
 
-
-# [report.figures.code] The lines of a student's files that a verdict cites, with those around them.
 
 AROUND = 3
 APART_MAX = 4

@@ -1,4 +1,4 @@
-"""Nodes as ellipses, topics as boxes, and arrows between them, as `rqt_graph` draws them."""
+"""The graph of nodes (ellipses) and topics (boxes), laid out in layers from left to right as `rqt_graph` does."""
 
 from __future__ import annotations
 
@@ -132,8 +132,6 @@ def _drawn(arrow: Arrow, layers: Layers, places: dict[str, Place], name: str) ->
             begin = end
     return element("path", d=curve, class_="arrow", marker_end=f"url(#{name}-head)")
 
-
-# [report.html.plots.layers] Nodes and topics in layers from left to right, with as few crossings as a few sweeps find.
 
 Vertex = str
 Arrow = tuple[Vertex, Vertex]

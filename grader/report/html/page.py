@@ -1,4 +1,7 @@
-"""`report.html`: what a student reads. One file that asks nobody for anything."""
+"""`report.html`: what a student reads, in one file that loads nothing else.
+
+`html_report` → `Maker` turns a result into records (`Page`, `Card`) → `templates/report.html` puts them into words.
+"""
 
 from __future__ import annotations
 
@@ -161,8 +164,6 @@ def _sections(result: GradingResult, page: Page) -> Iterator[tuple[str, str]]:
         yield "ran", "What ran"
     yield "about", "About this report"
 
-
-# [report.html.page] A student's report as records: what the templates put into words and order.
 
 T = TypeVar("T")
 Docs = Mapping[str, Mapping[str, str]]

@@ -1,4 +1,4 @@
-"""A counter's values over time: a sawtooth, its wraps marked and its wrong steps circled; a long one zoomed, too."""
+"""Plots of what a check measured, drawn as SVG: counter, path and rate; `…_words` say the same in a sentence."""
 
 from __future__ import annotations
 
@@ -141,11 +141,9 @@ def _wrong(figure: CounterFigure, frame: Frame, at: dict[int, tuple[float, float
         yield text(x + (-8 if end == "end" else 8), above, words, class_="alarm", text_anchor=end)
 
 
-# [report.html.plots.path] The way that a robot took, over the way that it had to take with as much room as it was given.
-
 SIDE = 340.0
 WIDEST = 2.0
-LABELS_MAX_path = 20
+CORNER_LABELS_MAX = 20
 
 
 def path_plot(figure: PathFigure, name: str) -> Markup | None:
@@ -205,7 +203,7 @@ def _corners(figure: PathFigure, corners: list[tuple[float, float]]) -> Iterator
     for i, (x, y) in enumerate(corners):
         passed = i < figure.reached
         yield element("circle", cx=x, cy=y, r=5, class_="corner passed" if passed else "corner")
-        if i < LABELS_MAX_path and (x, y) not in corners[:i]:
+        if i < CORNER_LABELS_MAX and (x, y) not in corners[:i]:
             yield text(x + 8, y - 8, "start" if i == 0 else f"{i}")
 
 
@@ -218,8 +216,6 @@ def _strayed(figure: PathFigure, taken: list[tuple[float, float]]) -> Iterator[M
     end = "end" if x > right - 90 else "start"
     yield text(x + (-13 if end == "end" else 13), y + 4, "too far off", class_="alarm", text_anchor=end)
 
-
-# [report.html.plots.rate] A rate over time with the band in which its mean has to lie, and the histogram of the gaps.
 
 OVER_TIME = (460.0, 230.0)
 HISTOGRAM = (330.0, 230.0)

@@ -1,4 +1,4 @@
-"""Elements of SVG, written as text: every attribute and every text is escaped, numbers are short."""
+"""SVG written as text: elements, whose attributes and texts are all escaped, and a frame with two axes."""
 
 from __future__ import annotations
 
@@ -72,8 +72,6 @@ def _name(key: str) -> str:
 def _value(value: str | float) -> str:
     return html(value) if isinstance(value, str) else short(value)
 
-
-# [report.html.plots.axes] A frame with two axes, and where a value lies in it.
 
 LEFT, RIGHT, TOP, BOTTOM = 46.0, 14.0, 22.0, 40.0
 TICKS = 5

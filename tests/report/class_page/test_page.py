@@ -18,8 +18,8 @@ from grader.model.result import GradingResult
 from grader.model.roster import Entry, RosterFault
 from grader.model.submission_time import AppliedOverride, Automatic
 from grader.model.verdict import Status
-from grader.report.class_page import salt_in, write_class_page
-from grader.report.class_page.gather import pseudonyms
+from grader.report.class_page.gather import pseudonyms, salt_in
+from grader.report.class_page.page import write_class_page
 from tests.report.class_page.made_up import FAULTS, made_up_rows, made_up_run
 
 

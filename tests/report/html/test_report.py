@@ -20,8 +20,7 @@ from grader.model.figure import Figures
 from grader.model.result import ErrorInfo, GradingResult, Note
 from grader.model.submission_time import Lateness
 from grader.model.verdict import FileCitation, Status
-from grader.report.html import html_report
-from grader.report.html.page import BYTES_MAX
+from grader.report.html.page import BYTES_MAX, html_report
 from grader.report.html.shell import policy, script
 from grader.report.sentences import FAULTS, blame
 from grader.report.text import line, visible
