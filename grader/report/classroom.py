@@ -33,15 +33,17 @@ RUN_AGAIN = OPEN - {Status.MANUAL}
 STATUSES = {Status.PASS: "pass", **dict.fromkeys(OPEN, "error")}
 
 
-def classroom(result: GradingResult, rubric: Rubric, *, passed: bool, prefix: str = "") -> str:
-    """One line of base64. `passed` is whether the pass mark is reached, `prefix` the package's folder in the
-    repository."""
+def render_classroom(result: GradingResult, rubric: Rubric, *, passed: bool, prefix: str = "") -> str:
+    """Return one line of base64, with its line end.
+
+    `passed` is whether the pass mark is reached, `prefix` the package's folder in the repository.
+    """
     text = ""
     for limit in LIMITS:
         text = json.dumps(_document(result, rubric, passed, prefix, limit), ensure_ascii=True)
         if len(text) <= JSON_BYTES_MAX:
             break
-    return base64.b64encode(text.encode("ascii")).decode("ascii")
+    return base64.b64encode(text.encode("ascii")).decode("ascii") + "\n"
 
 
 def _document(result: GradingResult, rubric: Rubric, passed: bool, prefix: str, limit: int) -> dict[str, Any]:

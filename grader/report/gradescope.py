@@ -24,7 +24,7 @@ HIDDEN = "after_published"
 LOOK = "A PERSON MUST LOOK"
 
 
-def gradescope(result: GradingResult, rubric: Rubric) -> str:
+def render_gradescope(result: GradingResult, rubric: Rubric) -> str:
     """JSON. Raises GraderError (exit code 3) where nothing could be judged: there must be no file then."""
     counting = [c for c in result.criteria if c.max_points > 0]
     if all(c.status in OPEN for c in counting) and not _students_fault(result):

@@ -55,7 +55,7 @@ DETAILS = (
 )
 
 
-def markdown_report(
+def render_markdown(
     result: GradingResult, rubric: Rubric, *, hidden: int = 0, figures: Figures | None = None
 ) -> str:
     """The report as GitHub's and GitLab's Markdown, at most 60 kB. `hidden` is how many criteria are left out of it.

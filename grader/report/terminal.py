@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable
 from typing import IO
 
@@ -92,6 +93,13 @@ def print_report(
     With `static`, open ones are only counted, as they are where `unrun` says why nothing was run.
     """
     Terminal(console).report(result, rubric, hidden, unrun or ("--static" if static else ""))
+
+
+def render_terminal(result: GradingResult, rubric: Rubric, hidden: int = 0) -> str:
+    """Return the report as it is printed where there is no terminal: without colour, 80 columns wide."""
+    text = io.StringIO()
+    print_report(result, rubric, open_console(text), hidden=hidden)
+    return text.getvalue()
 
 
 class Terminal:

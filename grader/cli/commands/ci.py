@@ -82,7 +82,7 @@ def _graded(settings: Settings) -> Graded:
             result, place = _left(folder, error)
         keep(place, settings.out, rubric.rubric)
     prefix = _prefix(result, Path(source))
-    add_forms(settings.out, result, prefix, rubric.docs)
+    add_forms(settings.out, result, rubric.rubric, prefix, rubric.docs)
     hidden = len(hidden_ids(rubric.rubric))
     print_report(result, rubric.rubric, open_console(sys.stdout), hidden=hidden, static=settings.static)
     return _judged(result, rubric, settings, prefix)

@@ -1,6 +1,6 @@
 """`report.html`: what a student reads, in one file that loads nothing else.
 
-`html_report` → `Maker` turns a result into records (`Page`, `Card`) → `templates/report.html` puts them into words.
+`render_html` → `Maker` turns a result into records (`Page`, `Card`) → `templates/report.html` puts them into words.
 """
 
 from __future__ import annotations
@@ -61,10 +61,15 @@ class Head:
     again: str
 
 
-def html_report(
-    result: GradingResult, rubric: Rubric, figures: Figures, *, hidden: int = 0, docs: Docs | None = None
+def render_html(
+    result: GradingResult,
+    rubric: Rubric,
+    figures: Figures | None = None,
+    *,
+    hidden: int = 0,
+    docs: Docs | None = None,
 ) -> str:
-    """The whole page, at most `BYTES_MAX` long. `hidden` is how many criteria are left out of `result`.
+    """Return the whole page, at most `BYTES_MAX` long. `hidden` is how many criteria are left out of `result`.
 
     `docs` has the sections of the checks' docstrings.
     """
@@ -72,7 +77,7 @@ def html_report(
     head = _head(result, rubric, view, hidden)
     page = ""
     for detail in DETAILS:
-        made = Maker(result, rubric, figures, docs or {}, detail).page(view)
+        made = Maker(result, rubric, figures or Figures(), docs or {}, detail).page(view)
         page = _rendered(result, rubric, head, made, detail.text)
         if len(page.encode("utf-8", "backslashreplace")) <= BYTES_MAX:
             break

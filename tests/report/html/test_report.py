@@ -20,7 +20,7 @@ from grader.model.figure import Figures
 from grader.model.result import ErrorInfo, GradingResult, Note
 from grader.model.submission_time import Lateness
 from grader.model.verdict import FileCitation, Status
-from grader.report.html.page import BYTES_MAX, html_report
+from grader.report.html.page import BYTES_MAX, render_html
 from grader.report.html.shell import policy, script
 from grader.report.sentences import FAULTS, blame
 from grader.report.text import line, visible
@@ -38,7 +38,7 @@ VOID_ADDRESS = re.compile(r"^(#|data:,$)")
 def page(shown: GradingResult | None = None, drawn: Figures | None = None, **how) -> str:
     beside = {"hidden": 0, "docs": DOCS, **how}
     of_rubric = beside.pop("rubric", None) or rubric(scenarios=SCENARIOS)
-    return html_report(shown or result(), of_rubric, figures() if drawn is None else drawn, **beside)
+    return render_html(shown or result(), of_rubric, figures() if drawn is None else drawn, **beside)
 
 
 def parsed(text: str) -> parser.HtmlElement:
