@@ -20,7 +20,7 @@ class Pace:
     again_s: float = 3.0
 
 
-class Follower:
+class BackgroundWriter:
     """Calls `work` in a thread of its own after `changed` was called; `trouble` says why it could not be done."""
 
     def __init__(self, work: Callable[[], None], pace: Pace) -> None:
@@ -31,7 +31,7 @@ class Follower:
         self._closing = False
         self._working = False
         self.trouble = ""
-        self._thread = threading.Thread(target=self._run, name="review-follower", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="review-background", daemon=True)
 
     def start(self) -> None:
         """Begin."""

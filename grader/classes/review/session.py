@@ -18,7 +18,7 @@ from grader.classes.batch.folder import BatchFolder, open_batch, write_run
 from grader.classes.batch.settled import Settler, rewrite
 from grader.classes.overrides import FILE, Overrides, read_overrides
 from grader.classes.overrides.write import write_override
-from grader.classes.review.background import Follower, Pace
+from grader.classes.review.background import BackgroundWriter, Pace
 from grader.classes.review.submissions import Item, Stamp, Submissions, stamp_of
 from grader.errors import Busy, GraderError, UsageError
 from grader.files import unwritable
@@ -36,8 +36,8 @@ OLDER_RESULT = (
 )
 
 
-def open_desk(path: Path, pace: Pace | None = None) -> Desk:
-    """The desk of the class in `path`. Raises UsageError where there is none, and where its rubric has changed,
+def open_session(path: Path, pace: Pace | None = None) -> ReviewSession:
+    """The review of the class in `path`. Raises UsageError where there is none, and where its rubric has changed,
     EvidenceError where a newer grader wrote results in it."""
     batch = open_batch(path)
     batch.refuse_newer()
@@ -48,17 +48,17 @@ def open_desk(path: Path, pace: Pace | None = None) -> Desk:
             f"{run.rubric_source}: the rubric has changed since the class was graded",
             hint=f"grader regrade {path} judges it by the rubric of today; then review it",
         )
-    return Desk(path, rubric, pace or Pace())
+    return ReviewSession(path, rubric, pace or Pace())
 
 
-class Desk:
-    """Safe to use from several threads, and beside other desks and batches of the same class."""
+class ReviewSession:
+    """Safe to use from several threads, and beside other sessions and batches of the same class."""
 
     def __init__(self, path: Path, rubric: LoadedRubric, pace: Pace) -> None:
         self.path, self.rubric = path, rubric
         self._docs = rubric.docs
         self.submissions = Submissions(path)
-        self.follower = Follower(self._follow, pace)
+        self.background = BackgroundWriter(self._follow, pace)
         self._saving, self._writing, self._guard = threading.Lock(), threading.Lock(), threading.Lock()
         self._overrides: tuple[tuple[Stamp, tuple[str, ...]], Overrides] | None = None
         self._pending: set[str] = set()
@@ -67,12 +67,12 @@ class Desk:
 
     def start(self) -> None:
         """Begin to follow; what was decided while nobody reviewed is looked at first."""
-        self.follower.start()
-        self.follower.changed()
+        self.background.start()
+        self.background.changed()
 
     def close(self) -> bool:
         """Write what is left; whether all is written."""
-        return self.follower.close()
+        return self.background.close()
 
     def overrides(self) -> Overrides:
         """What `overrides.yaml` says now. Raises RubricError where it has faults."""
@@ -104,7 +104,7 @@ class Desk:
             self._pending.add(item.key)
             self._books_behind = True
         waits = self._settled_soon(item)
-        self.follower.changed()
+        self.background.changed()
         return waits
 
     def result(self, item: Item, overrides: Overrides) -> GradingResult | None:
@@ -122,7 +122,7 @@ class Desk:
         """Why the files of a submission do not say yet what was decided; empty where they do."""
         with self._guard:
             pending = item.key in self._pending
-        return self.follower.trouble or "its report follows in a moment" if pending else ""
+        return self.background.trouble or "its report follows in a moment" if pending else ""
 
     def batch_runs(self) -> bool:
         """Whether a batch works in the folder just now."""

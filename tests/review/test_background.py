@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from threading import Event
 
-from grader.classes.review.background import Follower, Pace
+from grader.classes.review.background import BackgroundWriter, Pace
 from grader.errors import Busy
 
 WAIT_S = 60
@@ -25,45 +25,45 @@ class Work:
         self.done += 1
 
 
-def followed(work: Work, **pace: float) -> Follower:
-    follower = Follower(work, Pace(**pace))
-    follower.start()
-    return follower
+def followed(work: Work, **pace: float) -> BackgroundWriter:
+    writer = BackgroundWriter(work, Pace(**pace))
+    writer.start()
+    return writer
 
 
 def test_many_changes_close_together_are_one() -> None:
     work = Work()
-    follower = followed(work, quiet_s=0.3)
+    writer = followed(work, quiet_s=0.3)
     for _ in range(100):
-        follower.changed()
-    assert follower.wait(WAIT_S)
+        writer.changed()
+    assert writer.wait(WAIT_S)
     assert work.done == 1
-    follower.close()
+    writer.close()
 
 
 def test_who_never_rests_does_not_put_it_off_for_ever() -> None:
     work = Work()
-    follower = followed(work, quiet_s=3600, latest_s=0.05)
-    follower.changed()
-    assert follower.wait(WAIT_S)
+    writer = followed(work, quiet_s=3600, latest_s=0.05)
+    writer.changed()
+    assert writer.wait(WAIT_S)
     assert work.done == 1
-    follower.close()
+    writer.close()
 
 
 def test_what_fails_is_tried_again() -> None:
     work = Work(failing=3)
-    follower = followed(work, quiet_s=0.01, again_s=0.01)
-    follower.changed()
-    assert follower.wait(WAIT_S)
-    assert (work.done, follower.trouble) == (1, "")
-    follower.close()
+    writer = followed(work, quiet_s=0.01, again_s=0.01)
+    writer.changed()
+    assert writer.wait(WAIT_S)
+    assert (work.done, writer.trouble) == (1, "")
+    writer.close()
 
 
 def test_closing_does_what_is_left_at_once() -> None:
     work = Work()
-    follower = followed(work, quiet_s=3600, latest_s=3600)
-    follower.changed()
-    assert follower.close()
+    writer = followed(work, quiet_s=3600, latest_s=3600)
+    writer.changed()
+    assert writer.close()
     assert work.done == 1
 
 
@@ -75,8 +75,8 @@ def test_closing_with_nothing_left_does_nothing() -> None:
 
 def test_closing_says_what_could_not_be_done() -> None:
     work = Work(failing=1000)
-    follower = followed(work, quiet_s=0.01, again_s=3600)
-    follower.changed()
+    writer = followed(work, quiet_s=0.01, again_s=3600)
+    writer.changed()
     assert work.failed.wait(WAIT_S)
-    assert not follower.close()
-    assert follower.trouble == "another batch works here"
+    assert not writer.close()
+    assert writer.trouble == "another batch works here"
