@@ -15,12 +15,13 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from grader.errors import PackageNotFound, SubmissionError
+from grader.judging.summary import OPEN
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation, Status
 from grader.report.findings import repository_path
 from grader.report.sentences import late_words
 from grader.report.text import line, number
-from grader.report.view import OPEN, not_graded
+from grader.report.view import not_graded
 from grader.rubric.model import Rubric
 
 VERSION = 1

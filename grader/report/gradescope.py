@@ -11,11 +11,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from grader.errors import GraderError, PackageNotFound, SubmissionError
+from grader.judging.summary import OPEN
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.sentences import decided, decision, late_words, look_again, missing_hidden, visible_words
 from grader.report.text import json_text, line, number, text_limit
-from grader.report.view import OPEN, hidden_ids, places, points_of
+from grader.report.view import hidden_ids, places, points_of
 from grader.rubric.model import Rubric
 
 LIMIT = 1000

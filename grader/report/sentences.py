@@ -7,16 +7,16 @@ from collections.abc import Iterator
 from datetime import datetime
 
 from grader.errors import GraderError
-from grader.judging.summary import passed
+from grader.judging.summary import OPEN, passed
 from grader.model.result import CriterionResult, GradingResult, Note
 from grader.model.submission_time import AppliedOverride, Automatic, HandedIn
 from grader.model.verdict import Status
 from grader.report.text import number
-from grader.report.view import OPEN, ReportView, hidden_ids, not_graded
+from grader.report.view import ReportView, hidden_ids, not_graded
 from grader.rubric.model import Rubric
 
 DECIDED_TITLE = "Decided by a person"
-BY = {"roster": "as the roster says", "commit": "the commit's date", "nobody": "nobody says it"}
+BY = {"roster": "as the roster says", "commit": "the commit's date", "nobody": "not known"}
 
 
 def late_words(result: GradingResult) -> tuple[str, ...]:
@@ -33,7 +33,7 @@ def late_words(result: GradingResult) -> tuple[str, ...]:
 
 def _times(known: HandedIn) -> str:
     zone = (known.deadline or known.at).tzinfo if known.at else None
-    at = f"handed in {_time(known.at.astimezone(zone))} ({BY[known.by]})" if known.at else ""
+    at = f"submitted {_time(known.at.astimezone(zone))} ({BY[known.by]})" if known.at else ""
     days = known.extension_days
     extension = f" with {number(days)} {'day' if days == 1 else 'days'} of extension" if days else ""
     deadline = f"deadline {_time(known.deadline)}{extension}" if known.deadline else ""
@@ -153,17 +153,17 @@ MEANINGS = {
     Status.PARTIAL: "partly reached",
     Status.FAIL: "not reached",
     Status.BLOCKED: "could not be judged because something before it was not reached",
-    Status.INCONCLUSIVE: "could not be told this time; no points are lost for good",
+    Status.INCONCLUSIVE: "could not be decided this time; no points are lost for good",
     Status.ERROR: "the grader could not judge it; no points are lost for good",
-    Status.MANUAL: "a person gives these points",
+    Status.MANUAL: "a person awards these points",
 }
 MENDED = frozenset({Status.FAIL, Status.PARTIAL})
-ADVICE = {Status.FAIL: "How to mend it", Status.PARTIAL: "How to mend it", Status.PASS: "Hint"}
+ADVICE = {Status.FAIL: "How to fix it", Status.PARTIAL: "How to fix it", Status.PASS: "Hint"}
 FAULTS = {
-    "submission": "This is about what was handed in: mend it and hand it in again.",
-    "machine": "This is the fault of the machine that graded, not yours. No points are lost for good: "
+    "submission": "The problem is in what was submitted: fix it and submit it again.",
+    "machine": "The grading machine is at fault, not you. No points are lost for good: "
     "it only has to be graded again.",
-    "grader": "This is the grader's own fault, not yours. No points are lost for good: "
+    "grader": "The grader itself is at fault, not you. No points are lost for good: "
     "your teacher can have it graded again.",
 }
 
@@ -199,7 +199,7 @@ def verdict(result: GradingResult, rubric: Rubric, hidden: int) -> tuple[str, st
         return "inconclusive", "Not settled yet"
     if hidden:
         reached = all(c.status is Status.PASS for c in result.criteria if c.max_points > 0)
-        return ("pass", "So far, so good") if reached else ("partial", "There is something to mend")
+        return ("pass", "So far, so good") if reached else ("partial", "There is something to fix")
     return "fail", "Not passed yet"
 
 

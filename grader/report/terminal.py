@@ -20,6 +20,7 @@ from grader.report import sentences
 from grader.report.sentences import (
     COSTS_NOTHING,
     NOTICED_TITLE,
+    SIGNS,
     note_place,
     note_text,
     visible_words,
@@ -42,15 +43,16 @@ STYLES = {
     Status.ERROR: "magenta",
     Status.MANUAL: "cyan",
 }
-MARKS = {
-    Status.PASS: ("✓", "+"),
-    Status.PARTIAL: ("◐", "~"),
-    Status.FAIL: ("✗", "x"),
-    Status.BLOCKED: ("⊘", "-"),
-    Status.INCONCLUSIVE: ("?", "?"),
-    Status.ERROR: ("!", "!"),
-    Status.MANUAL: ("•", "o"),
+PLAIN_MARKS = {
+    Status.PASS: "+",
+    Status.PARTIAL: "~",
+    Status.FAIL: "x",
+    Status.BLOCKED: "-",
+    Status.INCONCLUSIVE: "?",
+    Status.ERROR: "!",
+    Status.MANUAL: "o",
 }
+"""In place of `SIGNS` where an encoding has no ✓."""
 
 
 def open_console(file: IO[str]) -> Console:
@@ -103,11 +105,10 @@ def render_terminal(result: GradingResult, rubric: Rubric, hidden: int = 0) -> s
 
 
 class Terminal:
-    """Prints by the console's own means: `plain` where its encoding has no ✓."""
+    """Prints by the console's own means, in characters that its encoding has."""
 
     def __init__(self, console: Console) -> None:
         self.console = console
-        self.plain = not _has_marks(console.encoding)
 
     def report(self, result: GradingResult, rubric: Rubric, hidden: int, unrun: str) -> None:
         view = arrange(result, rubric)
@@ -187,7 +188,7 @@ class Terminal:
         Where too little room is left for the words, they stand below.
         """
         style = STYLES[criterion.status]
-        name = Text(f"{self._mark(criterion.status)} {self._show(criterion.id)}", style)
+        name = Text(f"{mark(criterion.status, self.console.encoding)} {self._show(criterion.id)}", style)
         status = Text(criterion.status.value, style)
         points = points_of(criterion)
         room = self.console.width - max(name.cell_len, width + 2) - len(points) - len(status) - 6
@@ -219,13 +220,10 @@ class Terminal:
         table.add_column("measured", overflow="fold", ratio=1)
         for c in criteria:
             points = Text(points_of(c))
-            status = Text(f"{self._mark(c.status)} {c.status.value}", STYLES[c.status])
+            status = Text(f"{mark(c.status, self.console.encoding)} {c.status.value}", STYLES[c.status])
             measured = c.measured or (c.title if c.status is Status.PASS else c.message)
             table.add_row(points, status, Text(self._show(c.id)), Text(self._show(measured, MEASURED_LIMIT)))
         return table
-
-    def _mark(self, status: Status) -> str:
-        return MARKS[status][1 if self.plain else 0]
 
     def _show(self, text: str, limit: int = LIMIT) -> str:
         """Harmless, of bounded length, and in characters that the terminal's encoding has."""
@@ -235,12 +233,12 @@ class Terminal:
 
 def mark(status: Status, encoding: str) -> str:
     """The sign of a status, a plain one where the encoding has no ✓."""
-    return MARKS[status][0 if _has_marks(encoding) else 1]
+    return (SIGNS if _has_marks(encoding) else PLAIN_MARKS)[status]
 
 
 def _has_marks(encoding: str) -> bool:
     try:
-        "".join(mark for mark, _ in MARKS.values()).encode(encoding)
+        "".join(SIGNS.values()).encode(encoding)
     except (UnicodeEncodeError, LookupError):
         return False
     return True

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from grader.judging.late import lateness
+from grader.judging.summary import OPEN
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
 from grader.report.text import number
@@ -41,7 +42,6 @@ class ReportView:
 
 
 EXPLAINS = frozenset({Status.FAIL, Status.PARTIAL, Status.BLOCKED})
-OPEN = frozenset({Status.INCONCLUSIVE, Status.ERROR, Status.MANUAL})
 
 
 def arrange(result: GradingResult, rubric: Rubric) -> ReportView:

@@ -216,7 +216,7 @@ def _chosen(
             )
         except NothingInTime as error:
             if mirror.is_cut_off():
-                error.hint += " Its history is cut off (a shallow clone): hand in a whole one."
+                error.hint += " Its history is cut off (a shallow clone): submit a full one."
             raise
     if task.uncommitted:
         note = f"{handed_in.note}; changes that are not committed do not count"

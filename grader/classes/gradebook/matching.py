@@ -147,7 +147,7 @@ def _contradict(ours: Identity, theirs: Identity) -> bool:
 
 def _doubt(rows: set[int], wanted: dict[int, list[int]]) -> str:
     if not rows:
-        return "nobody there has this id, number, login, address or name"
+        return "no row there has this id, number, login, address or name"
     if len(rows) > 1:
         return f"{len(rows)} rows there could be this student"
     (row,) = rows

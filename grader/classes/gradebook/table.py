@@ -9,18 +9,43 @@ from collections.abc import Iterator, Sequence
 from decimal import Decimal
 from typing import Literal, NamedTuple
 
+from grader.judging.summary import OPEN
 from grader.model.record import Record
 from grader.model.result import GradingResult
 from grader.model.roster import Entry
 from grader.model.submission_time import AppliedOverride
-from grader.model.verdict import Status
-from grader.report.text import csv_text
+from grader.report.text import csv_cell
 from grader.shown import line
+
+Form = Literal["csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"]
+FORMS: tuple[Form, ...] = ("csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard")
+
+
+class Row(Record):
+    """One submission of the roster and its result."""
+
+    entry: Entry
+    result: GradingResult
+
+
+class BookCriterion(NamedTuple):
+    id: str
+    title: str
+    max_points: float
+
+
+class Book(Record):
+    """What all rows share: the rubric's `title` and criteria, and the names of the roster's further columns."""
+
+    title: str
+    rubric_id: str
+    max_points: float
+    criteria: tuple[BookCriterion, ...] = ()
+    columns: tuple[str, ...] = ()
+
 
 BEFORE = ("id", "name", "group", "status", "points", "max_points", "points_before_late", "late")
 AFTER = ("comment", "error")
-OPEN = {Status.INCONCLUSIVE, Status.MANUAL, Status.ERROR}
-"""Of a criterion that has no points yet: a person has to look."""
 
 
 def header(book: Book) -> tuple[str, ...]:
@@ -88,33 +113,6 @@ def _free(name: str, kind: str, taken: set[str]) -> str:
     return free
 
 
-Form = Literal["csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"]
-FORMS: tuple[Form, ...] = ("csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard")
-
-
-class Row(Record):
-    """One submission of the roster and its result."""
-
-    entry: Entry
-    result: GradingResult
-
-
-class BookCriterion(NamedTuple):
-    id: str
-    title: str
-    max_points: float
-
-
-class Book(Record):
-    """What all rows share: the rubric's `title` and criteria, and the names of the roster's further columns."""
-
-    title: str
-    rubric_id: str
-    max_points: float
-    criteria: tuple[BookCriterion, ...] = ()
-    columns: tuple[str, ...] = ()
-
-
 CELL_CHARS = 10_000
 """What a cell holds of a longer text; a workbook's may have 32,767 characters."""
 Cell = str | float | None
@@ -136,13 +134,9 @@ def visible_text(text: str) -> str:
 
 
 def harmless(cells: Sequence[Cell]) -> list[str]:
-    """One row as text that no spreadsheet takes for a formula. A number stays as it is written, in text too."""
+    """Return one row as text that no spreadsheet takes for a formula. A number stays as it is written, in text too."""
     texts = [number_text(cell) if isinstance(cell, int | float) else cell or "" for cell in cells]
-    safe = next(csv.reader(io.StringIO(csv_text([texts]), newline="")), [])
-    return [
-        text if _NUMBER.fullmatch(text) else _joined(harmless)
-        for text, harmless in zip(texts, safe, strict=True)
-    ]
+    return [text if _NUMBER.fullmatch(text) else _joined(csv_cell(text)) for text in texts]
 
 
 def csv_line(cells: Sequence[Cell], *, quoted: bool = False) -> str:

@@ -114,7 +114,7 @@ def _data(path: Path, raw: bytes) -> dict[str, Any]:
     if not isinstance(source.data, dict):
         faults.append(source.fault((), "must be a map from submissions to criteria"))
     if faults:
-        raise RubricError(faults, hint="mend it by hand")
+        raise RubricError(faults, hint="fix it by hand")
     return as_map(source.data)
 
 

@@ -210,19 +210,19 @@ class _Views:
             decided, troubles = overrides.get(item.entry.id, {}), self._troubles()
         except RubricError as error:
             decided = {o.criterion: plain(o) for o in row.result.overrides}
-            troubles = ["Nothing can be saved until overrides.yaml is mended:", *error.faults]
+            troubles = ["Nothing can be saved until overrides.yaml is fixed:", *error.faults]
         return row, cards(row, rubric, decided, drafts), troubles
 
     def _troubles(self) -> list[str]:
         found = []
         if self._session.batch_runs():
             found.append(
-                "A batch works in this folder just now. What you decide is kept; reports and gradebook follow "
+                "A batch is running in this folder. What you decide is kept; reports and gradebook follow "
                 "when it has ended."
             )
         if self._session.background.trouble and not found:
             found.append(
-                f"The gradebook is not written yet, it is tried again: {self._session.background.trouble}"
+                f"The gradebook is not written yet; it will be tried again: {self._session.background.trouble}"
             )
         return found
 

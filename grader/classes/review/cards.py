@@ -10,6 +10,7 @@ from datetime import date
 
 from grader.classes.gradebook import Row
 from grader.classes.review.session import mark
+from grader.judging.summary import OPEN
 from grader.model.result import CriterionResult
 from grader.model.submission_time import AUTHOR_CHARS, COMMENT_CHARS, AppliedOverride, Override
 from grader.model.verdict import Status
@@ -18,7 +19,6 @@ from grader.report.text import number
 from grader.rubric.model import Rubric
 
 MANUAL = "manual"
-OPEN = {Status.MANUAL, Status.INCONCLUSIVE, Status.ERROR}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -68,7 +68,9 @@ def guard(app: Flask, *, port: int, token: str) -> None:
 def _enter(token: str) -> AnyResponse:
     """The token of the address for a cookie, and an address without it. Tabs that are open already stay as they are."""
     if not compare_digest(request.args["token"].encode(), token.encode()):
-        raise Forbidden("This address is of another review. Open the one that `grader review` printed last.")
+        raise Forbidden(
+            "This address belongs to another review. Open the one that `grader review` printed last."
+        )
     session.setdefault("csrf", secrets.token_urlsafe(TOKEN_BYTES))
     return redirect("/", 303)
 
@@ -77,10 +79,10 @@ def _check_form() -> None:
     """Whether a request that changes something comes from a page of ours."""
     origin = request.headers.get("Origin")
     if origin is not None and origin != f"http://{request.headers['Host'].lower()}":
-        raise Forbidden("This form is not of this page.")
+        raise Forbidden("This form does not belong to this page.")
     if not compare_digest(request.form.get("csrf", "").encode(), str(session["csrf"]).encode()):
         raise Forbidden(
-            "This form is of another review. Go back, copy what you typed, and load the page anew."
+            "This form belongs to another review. Go back, copy what you typed, and reload the page."
         )
 
 

@@ -32,7 +32,7 @@ PATIENCE_S = 0.3
 OTHER_RUBRIC = "the class has been graded by another rubric since: end this review and start it again"
 
 OLDER_RESULT = (
-    "the submission was judged by another rubric: it counts when `grader regrade` has judged it anew"
+    "the submission was judged by another rubric: it counts when `grader regrade` has judged it again"
 )
 
 
@@ -144,7 +144,7 @@ class ReviewSession:
             with alone(self.path):
                 return self._settle({item.key})
         except Busy:
-            return "a batch works in this folder just now: the report follows when it has ended"
+            return "a batch is running in this folder: the report follows when it has ended"
         except GraderError as error:
             return error.message
         finally:

@@ -76,7 +76,7 @@ def _named(files: list[tuple[Path, Named]]) -> Found:
     path, named = (taken or files)[0]
     where, name = printable(path.name), f"{named.name}-{named.id}"
     if not taken:
-        fault = "only text or a link was handed in" if named.is_text else "neither a folder nor an archive"
+        fault = "only text or a link was submitted" if named.is_text else "neither a folder nor an archive"
         return Found(where=where, id=name, faults=(fault,))
     if len(taken) > 1:
         more = listing([other.name for other, _ in taken[1:]])

@@ -97,7 +97,7 @@ KINDS = (
     _Kind(
         anchor="inconclusive",
         title="Inconclusive",
-        advice="It could not be told this time, so nobody loses points by it. Grade only these again:",
+        advice="These could not be decided this time, so they cost no points. Grade only these again:",
         holds=lambda found: found.state == "inconclusive",
         text=lambda found: found.why,
         command=lambda run, out: again(run, out, "inconclusive", static=False),
@@ -105,15 +105,15 @@ KINDS = (
     _Kind(
         anchor="error",
         title="Could not be graded",
-        advice="What is wrong with a submission is for its student to mend. Then run only these again:",
+        advice="What is wrong with a submission is for its student to fix. Then run only these again:",
         holds=lambda found: found.problem is not None and not found.problem.roster,
         text=_problem,
         command=lambda run, out: again(run, out, "failed"),
     ),
     _Kind(
         anchor="manual",
-        title="Points that a person gives",
-        advice="All that can be checked is checked. Give the points in your browser:",
+        title="Points that a person awards",
+        advice="Everything that can be checked is checked. Award the points in your browser:",
         holds=lambda found: found.state == "manual",
         text=lambda _: "",
         command=lambda _, out: review(out),

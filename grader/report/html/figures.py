@@ -174,7 +174,7 @@ def _graph(figure: GraphFigure, name: str) -> Drawn:
     plot = graph_plot(figure, name)
     alone = [node for node in figure.nodes if node not in {edge.node for edge in figure.edges}]
     words = f"{count(len(figure.nodes), 'node')}, {count(len(figure.topics), 'topic')}."
-    words += f" Joined with no topic: {', '.join(alone[:10])}." if alone else ""
+    words += f" Connected to no topic: {', '.join(alone[:10])}." if alone else ""
     return Drawn(
         name=name,
         kind="graph",
@@ -206,7 +206,7 @@ def _path(figure: PathFigure, name: str) -> Drawn:
     return Drawn(
         name=name,
         kind="path",
-        title=f"The way of {figure.topic}, seen from above",
+        title=f"The path of {figure.topic}, seen from above",
         words=path_words(figure),
         points=len(figure.points),
         plots=[plot] if plot else [],

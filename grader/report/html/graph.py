@@ -44,8 +44,8 @@ def graph_rows(figure: GraphFigure) -> Iterator[tuple[str, str, str, str]]:
         yield (
             topic,
             figure.types.get(topic, ""),
-            ", ".join(publishers) or "nobody",
-            ", ".join(listeners) or "nobody",
+            ", ".join(publishers) or "none",
+            ", ".join(listeners) or "none",
         )
 
 

@@ -13,6 +13,7 @@ from typing import TypeVar
 
 from markupsafe import Markup, escape
 
+from grader.judging.summary import OPEN
 from grader.model.figure import Figure, Figures
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation
@@ -29,7 +30,7 @@ from grader.report.sentences import (
     without_sandbox,
 )
 from grader.report.text import line, number
-from grader.report.view import OPEN, Loss, ReportView, arrange, hidden_ids, not_graded, places, points_of
+from grader.report.view import Loss, ReportView, arrange, hidden_ids, not_graded, places, points_of
 from grader.rubric.model import Rubric
 
 

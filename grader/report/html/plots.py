@@ -43,7 +43,7 @@ def counter_words(figure: CounterFigure) -> str:
         return f"No number was seen on {figure.topic}."
     low, high = min(figure.values), max(figure.values)
     words = f"{figure.topic}: values from {number(low)} to {number(high)}, the first is {number(figure.values[0])}. "
-    words += f"It {_times(len(figure.wraps))} as it should"
+    words += f"It {_times(len(figure.wraps))} correctly"
     shown = ", ".join(_step(figure, i) for i in figure.wraps[:TEXTS_MAX] if i)
     words += f" ({shown}{', …' if len(figure.wraps) > TEXTS_MAX else ''})" if shown else ""
     wrong = len(figure.wrong) + figure.more_wrong
@@ -162,15 +162,15 @@ def path_plot(figure: PathFigure, name: str) -> Markup | None:
     children += _corners(figure, corners)
     children += _strayed(figure, taken)
     size = (frame.width, frame.height)
-    return drawing(name, size, f"The way of {figure.topic}, seen from above", path_words(figure), *children)
+    return drawing(name, size, f"The path of {figure.topic}, seen from above", path_words(figure), *children)
 
 
 def path_words(figure: PathFigure) -> str:
     """What the plot shows, in words."""
-    words = f"{figure.topic} passed {figure.reached} of {len(figure.corners)} corners in their order; "
-    words += f"{number(figure.tolerance_m)} m off the way are allowed"
+    words = f"{figure.topic} passed {figure.reached} of {len(figure.corners)} corners in order; "
+    words += f"{number(figure.tolerance_m)} m off the path is allowed"
     if figure.strayed is None:
-        return f"{words}, and it kept to that."
+        return f"{words} and it stayed within that."
     x, y = figure.points[figure.strayed]
     return f"{words}. It is too far off for the first time at x {number(x, 2)}, y {number(y, 2)}."
 
@@ -236,7 +236,7 @@ def rate_words(figure: RateFigure) -> str:
     if not figure.gaps_s:
         return f"Too few messages on {figure.topic} to draw a rate."
     gaps = figure.gaps_s
-    mean = f"{number(figure.mean_hz, 2)} Hz in the mean" if figure.mean_hz is not None else "no mean"
+    mean = f"{number(figure.mean_hz, 2)} Hz on average" if figure.mean_hz is not None else "no mean"
     words = f"{figure.topic}: {mean}; {_allowed(figure)} (the green band) passes. Each dot is a message. "
     words += f"The gaps between messages are {_ms(min(gaps))} to {_ms(max(gaps))} ms long"
     words += _outside(figure)
@@ -257,7 +257,7 @@ def _outside(figure: RateFigure) -> str:
         return ""
     outside = sum(not low <= gap <= high for gap in figure.gaps_s)
     lie = "lies" if outside == 1 else "lie"
-    return f"; {outside or 'none'} of {len(figure.gaps_s)} {lie} outside of {_ms(low)} to {_ms(high)} ms"
+    return f"; {outside or 'none'} of {len(figure.gaps_s)} {lie} outside {_ms(low)} to {_ms(high)} ms"
 
 
 def _ms(seconds: float) -> str:
@@ -349,7 +349,7 @@ def _histogram(figure: RateFigure, name: str) -> Markup:
     if longer:
         children.append(text(frame.right, TOP - 9, f"{longer} longer, in the last bar", text_anchor="end"))
     words = f"{len(figure.gaps_s)} gaps. {rate_words(figure)}"
-    return drawing(name, HISTOGRAM, f"How long the gaps of {figure.topic} are", words, *children)
+    return drawing(name, HISTOGRAM, f"Gaps between messages on {figure.topic}", words, *children)
 
 
 def _longest(figure: RateFigure) -> float:

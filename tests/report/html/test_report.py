@@ -241,9 +241,9 @@ def test_all_reached_but_late_is_no_congratulation():
 
 def test_only_what_can_be_mended_says_how_to_mend_it():
     document = parsed(page())
-    assert "How to mend it" in words(card(document, "chatter-rate"))
+    assert "How to fix it" in words(card(document, "chatter-rate"))
     for name in ("manifest", "build", "counter-start", "style"):
-        assert "How to mend it" not in words(card(document, name))
+        assert "How to fix it" not in words(card(document, name))
 
 
 def test_it_says_how_to_judge_it_again():
