@@ -13,7 +13,8 @@ from grader.model.result import ErrorInfo
 from grader.report.classroom import JSON_BYTES_MAX, render_classroom
 from grader.report.view import without_hidden
 from tests.ci.reporter import reporter
-from tests.report.hostile import criterion, result, rubric
+from tests.report.hostile import result, rubric
+from tests.support.a_class import criterion
 
 
 def _made(*criteria, passed=False, prefix="", **changes):

@@ -27,10 +27,11 @@ from grader.report.markdown import render_markdown
 from grader.report.result_json import result_bytes, result_text
 from grader.report.terminal import open_console, print_report
 from grader.report.text import line
-from tests.report.hostile import criterion, result, rubric
+from tests.report.hostile import result, rubric
 from tests.report.nasty import STEERING, TEXTS
 from tests.report.test_shown import TO_A_CI
 from tests.report.test_text import FOUND_BY_FORGES, HARMLESS, MARKDOWN, QUICK_ACTION, prose
+from tests.support.a_class import criterion
 
 FIELDS = ("id", "title", "check", "scenario", "message", "expected", "measured", "hint", "reproduce")
 SOME = settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow])

@@ -14,7 +14,8 @@ from grader.model.verdict import Status
 from grader.report.files import write_reports
 from grader.report.result_json import result_bytes
 from grader.report.view import arrange, without_hidden
-from tests.report.hostile import criterion, result, rubric
+from tests.report.hostile import result, rubric
+from tests.support.a_class import criterion
 
 KEYS = [
     "schema",

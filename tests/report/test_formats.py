@@ -29,10 +29,10 @@ from grader.report.junit import render_junit
 from grader.report.markdown import BYTES_MAX, EDGES_MAX, PARTS_MAX, mermaid, render_markdown
 from grader.report.sarif import render_sarif
 from tests.report import hostile
-from tests.report.hostile import criterion
 from tests.report.nasty import STEERING
 from tests.report.test_shown import TO_A_CI
 from tests.report.worst import DOCS, LONG, MERMAID, MORE, TEXTS, figures, rubric, worst
+from tests.support.a_class import criterion
 
 GOLDEN = Path(__file__).parent / "golden"
 JENKINS = Path(__file__).parent.parent / "data" / "schemas" / "junit-10.xsd"

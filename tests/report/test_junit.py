@@ -8,7 +8,8 @@ from lxml import etree
 from grader.model.result import ErrorInfo
 from grader.model.verdict import Status
 from grader.report.junit import render_junit
-from tests.report.hostile import criterion, result
+from tests.report.hostile import result
+from tests.support.a_class import criterion
 
 
 def test_one_case_a_criterion_with_its_outcome_and_points():

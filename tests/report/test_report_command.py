@@ -18,7 +18,8 @@ from grader.report.files import write_reports
 from grader.report.forms import FORMS as REGISTRY
 from grader.results import READY
 from tests.batch.test_regrade import LAB, recorded
-from tests.report.hostile import criterion, result
+from tests.report.hostile import result
+from tests.support.a_class import criterion
 
 REPORTS = ("report.html", "report.md", "junit.xml")
 

@@ -17,7 +17,8 @@ from grader.report.markdown import render_markdown
 from grader.report.result_json import result_bytes
 from grader.report.sentences import late_words
 from grader.report.terminal import open_console, print_report
-from tests.report.hostile import criterion, result, rubric
+from tests.report.hostile import result, rubric
+from tests.support.a_class import criterion
 
 DEADLINE = datetime(2026, 11, 20, 23, 59, tzinfo=timezone(timedelta(hours=1)))
 DEADLINE_WORDS = "deadline 2026-11-20 23:59 UTC+01:00 with 1 day of extension"

@@ -14,7 +14,8 @@ from grader.rubric.model import Rubric
 from grader.student.watching.kept import Kept
 from grader.student.watching.loop import WAIT_S, Outcome, Watched, watch
 from grader.student.watching.snapshot import take_picture
-from tests.report.hostile import criterion, result
+from tests.report.hostile import result
+from tests.support.a_class import criterion
 
 Step = Callable[[], object]
 

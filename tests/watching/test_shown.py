@@ -14,7 +14,8 @@ from grader.model.verdict import Status
 from grader.student.watching.loop import Outcome
 from grader.student.watching.shown import DASH, JsonShown, ScreenShown
 from grader.student.watching.turns import turns
-from tests.report.hostile import ESCAPES, MARKDOWN, RICH, XML, criterion, result, rubric
+from tests.report.hostile import ESCAPES, MARKDOWN, RICH, XML, result, rubric
+from tests.support.a_class import criterion
 
 NOON = datetime(2026, 3, 2, 12, 3, 4, tzinfo=timezone.utc)
 CLEARED = "\x1b[2J\x1b[H"

@@ -24,10 +24,11 @@ from grader.report.html.page import BYTES_MAX, render_html
 from grader.report.html.shell import policy, script
 from grader.report.sentences import FAULTS, blame
 from grader.report.text import line, visible
-from tests.report.hostile import CRITERIA, criterion, result, rubric
+from tests.report.hostile import CRITERIA, result, rubric
 from tests.report.html.made import SCRIPT, code, console, figures, graph, hostile_figures
 from tests.report.nasty import STEERING
 from tests.report.test_every_report import FIELDS, HUGE, SOME, decided, of, results, spoiled
+from tests.support.a_class import criterion
 
 DOCS = {"some-check": {**CHECKS["rate"].sections}}
 GOLDEN = Path(__file__).parent / "golden" / "report.html"
