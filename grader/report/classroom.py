@@ -14,14 +14,13 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from grader.errors import PackageNotFound, SubmissionError
 from grader.judging.summary import OPEN
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation, Status
 from grader.report.findings import repository_path
 from grader.report.sentences import late_words
 from grader.report.text import line, number
-from grader.report.view import not_graded
+from grader.report.view import is_students_fault, not_graded
 from grader.rubric.model import Rubric
 
 VERSION = 1
@@ -62,11 +61,7 @@ def _status(result: GradingResult, passed: bool) -> str:
 
 def _max(result: GradingResult) -> float:
     if not_graded(result):
-        students = result.error is not None and result.error.kind in {
-            SubmissionError.kind,
-            PackageNotFound.kind,
-        }
-        return result.max_points if students else 0
+        return result.max_points if is_students_fault(result) else 0
     if any(c.status in RUN_AGAIN and c.max_points > 0 for c in result.criteria):
         return 0
     return round(sum(c.max_points for c in result.criteria if c.status not in OPEN), 3)

@@ -7,7 +7,7 @@ A new form is one file beside this one with a function that renders it, one entr
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import KW_ONLY, dataclass, field, fields
 from functools import cached_property
 from importlib import import_module
 from inspect import signature
@@ -41,7 +41,7 @@ class Shown:
         return self.load_figures()
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Form:
     """`file` is the usual name of its file, `purpose` one line for the documentation.
 
@@ -51,8 +51,9 @@ class Form:
 
     name: str
     file: str
-    purpose: str
     function: str
+    purpose: str
+    _: KW_ONLY
     cites_lines: bool = False
     """Whether it names files by their place in the repository, for which it needs `prefix`."""
     in_results: bool = False
@@ -67,72 +68,58 @@ class Form:
         return made if isinstance(made, bytes) else made.encode("utf-8", "backslashreplace")
 
 
-FORMS: Mapping[str, Form] = {
-    form.name: form
-    for form in (
-        Form(
-            name="html",
-            file="report.html",
-            purpose="people: `report.html`",
-            function="html.page:render_html",
-            in_results=True,
-        ),
-        Form(
-            name="markdown",
-            file="report.md",
-            purpose="a comment on a merge request, a step's summary: points and losses first, the rest folded, "
-            "at most 60 kB",
-            function="markdown:render_markdown",
-            in_results=True,
-        ),
-        Form(
-            name="terminal",
-            file="terminal.txt",
-            purpose="a terminal or a log, 80 columns wide where no width is known",
-            function="terminal:render_terminal",
-        ),
-        Form(
-            name="junit",
-            file="junit.xml",
-            purpose="test lists of GitLab, Jenkins and others; here with files as the repository has them",
-            function="junit:render_junit",
-            cites_lines=True,
-            in_results=True,
-        ),
-        Form(
-            name="sarif",
-            file="report.sarif",
-            purpose="code scanning and editors: what was lost at a line of a file",
-            function="sarif:render_sarif",
-            cites_lines=True,
-        ),
-        Form(
-            name="code-quality",
-            file="code-quality.json",
-            purpose="the same for GitLab's merge requests",
-            function="code_quality:render_code_quality",
-            cites_lines=True,
-        ),
-        Form(
-            name="annotations",
-            file="annotations.txt",
-            purpose="the same for GitHub: commands that a step prints",
-            function="annotations:render_annotations",
-            cites_lines=True,
-        ),
-        Form(
-            name="gradescope",
-            file="gradescope.json",
-            purpose="Gradescope's `results.json`",
-            function="gradescope:render_gradescope",
-        ),
-        Form(
-            name="classroom",
-            file="classroom.txt",
-            purpose="GitHub Classroom's autograding reporter: a line of base64 for its `<ID>_RESULTS`, always without "
-            "hidden criteria",
-            function="classroom:render_classroom",
-            cites_lines=True,
-        ),
-    )
-}
+_FORMS = (
+    Form("html", "report.html", "html.page:render_html", "people: `report.html`", in_results=True),
+    Form(
+        "markdown",
+        "report.md",
+        "markdown:render_markdown",
+        "a comment on a merge request, a step's summary: points and losses first, the rest folded, at most 60 kB",
+        in_results=True,
+    ),
+    Form(
+        "terminal",
+        "terminal.txt",
+        "terminal:render_terminal",
+        "a terminal or a log, 80 columns wide where no width is known",
+    ),
+    Form(
+        "junit",
+        "junit.xml",
+        "junit:render_junit",
+        "test lists of GitLab, Jenkins and others; here with files as the repository has them",
+        cites_lines=True,
+        in_results=True,
+    ),
+    Form(
+        "sarif",
+        "report.sarif",
+        "sarif:render_sarif",
+        "code scanning and editors: what was lost at a line of a file",
+        cites_lines=True,
+    ),
+    Form(
+        "code-quality",
+        "code-quality.json",
+        "code_quality:render_code_quality",
+        "the same for GitLab's merge requests",
+        cites_lines=True,
+    ),
+    Form(
+        "annotations",
+        "annotations.txt",
+        "annotations:render_annotations",
+        "the same for GitHub: commands that a step prints",
+        cites_lines=True,
+    ),
+    Form("gradescope", "gradescope.json", "gradescope:render_gradescope", "Gradescope's `results.json`"),
+    Form(
+        "classroom",
+        "classroom.txt",
+        "classroom:render_classroom",
+        "GitHub Classroom's autograding reporter: a line of base64 for its `<ID>_RESULTS`, always without "
+        "hidden criteria",
+        cites_lines=True,
+    ),
+)
+FORMS: Mapping[str, Form] = {form.name: form for form in _FORMS}

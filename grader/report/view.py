@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from grader.errors import PackageNotFound, SubmissionError
 from grader.judging.late import lateness
 from grader.judging.summary import OPEN
 from grader.model.result import CriterionResult, GradingResult
@@ -87,6 +88,11 @@ def _folded(losses: list[Loss]) -> tuple[Loss, ...]:
 def not_graded(result: GradingResult) -> bool:
     """Whether it could not be graded, and no person has decided instead."""
     return result.error is not None and result.status == "error"
+
+
+def is_students_fault(result: GradingResult) -> bool:
+    """Whether nothing could be graded because of what was submitted, not because of the machine or the grader."""
+    return result.error is not None and result.error.kind in {SubmissionError.kind, PackageNotFound.kind}
 
 
 def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric) -> str:

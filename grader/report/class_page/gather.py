@@ -20,25 +20,11 @@ from grader.shown import line
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shared:
-    """A diagnosis: `message` as most have it, `wordings` with how often each was said (`more` where there are others).
-
-    `members` are places of submissions. `criterion` is an id, empty for what could not be graded.
-    """
-
-    criterion: str
-    message: str
-    wordings: Sequence[tuple[str, int]]
-    more: bool = False
-    members: Sequence[int]
-
-
-@dataclass(frozen=True, kw_only=True)
 class Gathered:
     """Submissions in the order in which the page shows them, and diagnoses, most members first."""
 
     lines: Sequence[Line]
-    diagnoses: Sequence[Shared]
+    diagnoses: Sequence[Diagnosis]
 
 
 def gather(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]]) -> Gathered:
@@ -47,17 +33,7 @@ def gather(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]]) -> Gather
     for place, (entry, result) in enumerate(rows):
         lines.append(line_of(entry, result, run.criteria))
         diagnoses.add(place, result)
-    shared = [
-        Shared(
-            criterion=found.criterion,
-            message=found.message,
-            wordings=found.wordings.most_common(),
-            more=found.more,
-            members=found.members,
-        )
-        for found in diagnoses.largest_first()
-    ]
-    return Gathered(lines=lines, diagnoses=shared)
+    return Gathered(lines=lines, diagnoses=diagnoses.largest_first())
 
 
 def gather_anonymous(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]], salt: bytes) -> Gathered:
@@ -79,10 +55,9 @@ def gather_anonymous(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]],
         for pseudonym, before in zip(pseudonyms(ids), shuffled, strict=True)
     ]
     diagnoses = [
-        Shared(
+        Diagnosis(
             criterion=found.criterion,
-            message=without_words(found.message, words),
-            wordings=(),
+            wordings=Counter([without_words(found.message, words)]),
             members=sorted(now[member] for member in found.members),
         )
         for found in named.diagnoses

@@ -19,7 +19,7 @@ from grader.files import atomic_write
 from grader.model.batch import BatchRun, CriterionInfo
 from grader.model.result import GradingResult
 from grader.model.roster import Entry
-from grader.report.class_page.gather import SALT_BYTES, Gathered, Shared, gather, gather_anonymous
+from grader.report.class_page.gather import SALT_BYTES, Diagnosis, Gathered, gather, gather_anonymous
 from grader.report.class_page.lines import CHARS, LETTERS, REPORT, Line, link_to
 from grader.report.class_page.statistics import costs, heat_map, histogram, most_first, span, spread, timing
 from grader.report.class_page.todo import todos
@@ -41,7 +41,7 @@ class Listed:
     place: int
     title: str
     worth: float
-    found: Shared
+    found: Diagnosis
 
 
 def write_class_page(
@@ -101,7 +101,7 @@ def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
     return _template().render(parts)
 
 
-def _listed(run: BatchRun, found: Sequence[Shared]) -> tuple[list[Listed], list[Listed]]:
+def _listed(run: BatchRun, found: Sequence[Diagnosis]) -> tuple[list[Listed], list[Listed]]:
     """Diagnoses that several share, and those that one has alone."""
     worth: Mapping[str, Any] = {criterion.id: criterion for criterion in run.criteria}
     shared = [one for one in found if len(one.members) > 1][:SHARED_MAX]
