@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from grader.errors import PackageNotFound, SubmissionError
 from grader.judging.late import lateness
-from grader.judging.summary import OPEN
+from grader.judging.summary import OPEN as OPEN  # noqa: PLC0414 - for rooms that may not see judging
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
 from grader.report.text import number

@@ -69,7 +69,7 @@ def terminal(shown: GradingResult) -> str:
 def test_words_of_being_late():
     assert late_words(settled()) == (
         "87.5 of 100 points before, 70 after: 2 days late (begun days count): 20 % of 87.5 points reached are lost",
-        f"Handed in 2026-11-22 09:00:07 UTC+01:00 (the commit's date), {DEADLINE_WORDS}",
+        f"Submitted 2026-11-22 09:00:07 UTC+01:00 (the commit's date), {DEADLINE_WORDS}",
         "The last commit on main counts",
     )
 
@@ -81,7 +81,7 @@ def test_words_of_being_late():
         ({"late": None, "handed_in": HandedIn(note="the folder as it is")}, ("The folder as it is",)),
         (
             {"late": None, "handed_in": HandedIn(at=DEADLINE, by="roster")},
-            ("Handed in 2026-11-20 23:59 UTC+01:00 (as the roster says)",),
+            ("Submitted 2026-11-20 23:59 UTC+01:00 (as the roster says)",),
         ),
         (
             {"late": Lateness(deadline=DEADLINE, points_before=70, points=70, text="in time")},

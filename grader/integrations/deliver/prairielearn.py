@@ -15,11 +15,10 @@ from grader.integrations.deliver.lab import add_lab
 from grader.integrations.deliver.parcel import Parcel
 from grader.integrations.deliver.settings import FILE, Settings
 from grader.integrations.deliver.wheel import system_script, wheel
-from grader.judging.summary import OPEN
 from grader.model.result import CriterionResult, GradingResult
 from grader.report.sentences import late_words
 from grader.report.text import html, line, number, text_limit
-from grader.report.view import hidden_ids
+from grader.report.view import OPEN, hidden_ids
 from grader.rubric.load import LoadedRubric
 
 DEFAULT_MINUTES, MOST_MINUTES = 10, 10
