@@ -53,7 +53,7 @@ from grader.model.verdict import Status
 from grader.package import read_package
 from grader.portable import wait_for_children
 from grader.report.files import write_reports
-from grader.report.hidden import hidden_ids
+from grader.report.view import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
 from grader.rubric.load import LoadedRubric, needs_package, needs_ros, started
 from grader.rubric.rates import rates_of

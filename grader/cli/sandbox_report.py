@@ -18,7 +18,7 @@ from grader.cli.row import Row
 from grader.errors import GraderError, HostError
 from grader.host_programs import HOST_ENV, find_host_program
 from grader.portable import user_id
-from grader.report.unwalled import without_sandbox
+from grader.report.sentences import without_sandbox
 from grader.rubric.load import LoadedRubric, needs_ros
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ _DATA = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A"})
 _PROPERTY = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A", ":": "%3A", ",": "%2C"})
 
 
-def github_annotations(result: GradingResult, prefix: str = "", *, each_max: int = EACH_MAX) -> str:
+def render_annotations(result: GradingResult, prefix: str = "", *, each_max: int = EACH_MAX) -> str:
     """A line each, the costliest first, `each_max` of each kind at most; the rest is counted in the log.
 
     What has no line of a file is shown at the run itself. `prefix` is the package's folder in the repository.

@@ -14,13 +14,12 @@ import json
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from grader.errors import PackageNotFound, SubmissionError
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation, Status
 from grader.report.findings import repository_path
-from grader.report.settled import late_words
+from grader.report.sentences import late_words
 from grader.report.text import line, number
-from grader.report.view import not_graded
+from grader.report.view import is_students_fault, not_graded
 from grader.rubric.model import Rubric
 
 VERSION = 1
@@ -32,15 +31,17 @@ FINE = 2**30
 STATUSES = {Status.PASS: "pass", **{status: "error" for status in Status if status.is_open}}
 
 
-def classroom(result: GradingResult, rubric: Rubric, *, passed: bool, prefix: str = "") -> str:
-    """One line of base64. `passed` is whether the pass mark is reached, `prefix` the package's folder in the
-    repository."""
+def render_classroom(result: GradingResult, rubric: Rubric, *, passed: bool, prefix: str = "") -> str:
+    """Return one line of base64, with its line end.
+
+    `passed` is whether the pass mark is reached, `prefix` the package's folder in the repository.
+    """
     text = ""
     for limit in LIMITS:
         text = json.dumps(_document(result, rubric, passed, prefix, limit), ensure_ascii=True)
         if len(text) <= JSON_BYTES_MAX:
             break
-    return base64.b64encode(text.encode("ascii")).decode("ascii")
+    return base64.b64encode(text.encode("ascii")).decode("ascii") + "\n"
 
 
 def _document(result: GradingResult, rubric: Rubric, passed: bool, prefix: str, limit: int) -> dict[str, Any]:
@@ -58,11 +59,7 @@ def _status(result: GradingResult, passed: bool) -> str:
 
 def _max(result: GradingResult) -> float:
     if not_graded(result):
-        students = result.error is not None and result.error.kind in {
-            SubmissionError.kind,
-            PackageNotFound.kind,
-        }
-        return result.max_points if students else 0
+        return result.max_points if is_students_fault(result) else 0
     if any(c.status.is_retryable and c.max_points > 0 for c in result.criteria):
         return 0
     return round(sum(c.max_points for c in result.criteria if not c.status.is_open), 3)

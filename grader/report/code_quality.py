@@ -9,7 +9,7 @@ from grader.report.text import json_text
 SEVERITIES = {Severity.ERROR: "major", Severity.WARNING: "minor", Severity.NOTICE: "info"}
 
 
-def code_quality(result: GradingResult, prefix: str = "") -> str:
+def render_code_quality(result: GradingResult, prefix: str = "") -> str:
     """JSON, a list; empty where nothing was lost at a line. `prefix` is the package's folder in the repository."""
     return json_text([_issue(finding) for finding in findings(result, prefix) if finding.places])
 

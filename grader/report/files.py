@@ -8,11 +8,10 @@ from pathlib import Path
 from grader.files import atomic_write
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
-from grader.report.hidden import without_hidden
-from grader.report.junit import junit
-from grader.report.markdown import markdown_report
+from grader.report.forms import FORMS, Shown
 from grader.report.result_json import result_bytes
 from grader.report.text import visible
+from grader.report.view import without_hidden
 from grader.rubric.model import Rubric
 
 CONSOLE_CHARS = 4_000_000
@@ -33,15 +32,17 @@ def write_reports(
     Without `keep_hidden`, hidden criteria are left out and their number said. `docs` has of each check by name the
     sections of its docstring. Raises OutputError.
     """
-    from grader.report.html import html_report  # noqa: PLC0415 - templates are slow to load, and needed here only
-
     shown = result if keep_hidden else without_hidden(result, rubric)
-    hidden = len(result.criteria) - len(shown.criteria)
+    about = Shown(
+        result=shown,
+        rubric=rubric,
+        hidden=len(result.criteria) - len(shown.criteria),
+        docs=docs or {},
+        load_figures=lambda: figures,
+    )
     files = {
         "result.json": result_bytes(shown),
-        "report.html": _encoded(html_report(shown, rubric, figures or Figures(), hidden=hidden, docs=docs)),
-        "report.md": markdown_report(shown, rubric, hidden=hidden, figures=figures).encode(),
-        "junit.xml": junit(shown),
+        **render_files(about),
         "console.log": _console(console).encode(),
     }
     for name, data in files.items():
@@ -49,8 +50,9 @@ def write_reports(
     return tuple(out_dir / name for name in files)
 
 
-def _encoded(text: str) -> bytes:
-    return text.encode("utf-8", "backslashreplace")
+def render_files(shown: Shown) -> dict[str, bytes]:
+    """Return the reports that stand beside every `result.json`, by the names of their files."""
+    return {form.file: form.render(shown) for form in FORMS.values() if form.in_results}
 
 
 def _console(text: str) -> str:

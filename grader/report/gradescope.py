@@ -10,14 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from grader.errors import GraderError, PackageNotFound, SubmissionError
+from grader.errors import GraderError
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
-from grader.report.hidden import hidden_ids
-from grader.report.settled import decided, decision, late_words, look_again
-from grader.report.summary import missing_hidden, visible_words
+from grader.report.sentences import decided, decision, late_words, look_again, missing_hidden, visible_words
 from grader.report.text import json_text, line, number, text_limit
-from grader.report.view import places, points_of
+from grader.report.view import hidden_ids, is_students_fault, places, points_of
 from grader.rubric.model import Rubric
 
 LIMIT = 1000
@@ -26,21 +24,16 @@ HIDDEN = "after_published"
 LOOK = "A PERSON MUST LOOK"
 
 
-def gradescope(result: GradingResult, rubric: Rubric) -> str:
+def render_gradescope(result: GradingResult, rubric: Rubric) -> str:
     """JSON. Raises GraderError (exit code 3) where nothing could be judged: there must be no file then."""
     counting = [c for c in result.criteria if c.max_points > 0]
-    if all(c.status.is_open for c in counting) and not _students_fault(result):
+    if all(c.status.is_open for c in counting) and not is_students_fault(result):
         why = result.error.message if result.error else "no criterion could be judged"
         raise GraderError(
             f"no results.json is written, for nothing was graded: {why}",
             hint="Gradescope then says that the autograder has failed and gives no points: run it again there",
         )
     return json_text(_Writer(result, rubric).document())
-
-
-def _students_fault(result: GradingResult) -> bool:
-    kind = result.error.kind if result.error else ""
-    return kind in {SubmissionError.kind, PackageNotFound.kind}
 
 
 class _Writer:

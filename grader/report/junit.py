@@ -11,8 +11,15 @@ from lxml import etree
 from grader.model.result import AppliedOverride, CriterionResult, ErrorInfo, GradingResult, Note
 from grader.model.verdict import FileCitation, Status
 from grader.report.findings import repository_path
-from grader.report.noticed import COSTS_NOTHING, NOTICED_TITLE, note_place, note_text
-from grader.report.settled import automatic_words, decision, look_again
+from grader.report.sentences import (
+    COSTS_NOTHING,
+    NOTICED_TITLE,
+    automatic_words,
+    decision,
+    look_again,
+    note_place,
+    note_text,
+)
 from grader.report.text import line, number, text_limit, visible
 from grader.report.view import places, points_of
 
@@ -28,7 +35,7 @@ OUTCOME = {
 LIMIT = 2000
 
 
-def junit(result: GradingResult, prefix: str = "") -> bytes:
+def render_junit(result: GradingResult, prefix: str = "") -> bytes:
     """The file's bytes, UTF-8. Among the suite's properties are `points`, `max_points` and each `points:<id>`.
 
     `prefix` is the package's folder in the repository; without it, files are relative to the package.

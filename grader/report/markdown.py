@@ -1,7 +1,8 @@
-"""`report.md`: points and what was lost in a line each; details folded. For a file, a comment, a step's summary."""
+"""`report.md`: points and losses in a line each, details folded. For a file, a comment or the summary of a CI step."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -9,12 +10,20 @@ from typing import TypeVar
 from grader.model.figure import Figures, GraphFigure
 from grader.model.result import CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
-from grader.report import noticed
-from grader.report.mermaid import mermaid
-from grader.report.settled import DECIDED_TITLE, automatic_words, decided, decision, late_words, look_again
-from grader.report.summary import NOT_SETTLED, verdict_words, visible_words
+from grader.report import sentences
+from grader.report.sentences import (
+    DECIDED_TITLE,
+    NOT_SETTLED,
+    automatic_words,
+    decided,
+    decision,
+    late_words,
+    look_again,
+    verdict_words,
+    visible_words,
+    without_sandbox,
+)
 from grader.report.text import line, markdown, markdown_code, number
-from grader.report.unwalled import without_sandbox
 from grader.report.view import Loss, arrange, not_graded, places, points_of
 from grader.rubric.model import Rubric
 
@@ -46,7 +55,7 @@ DETAILS = (
 )
 
 
-def markdown_report(
+def render_markdown(
     result: GradingResult, rubric: Rubric, *, hidden: int = 0, figures: Figures | None = None
 ) -> str:
     """The report as GitHub's and GitLab's Markdown, at most 60 kB. `hidden` is how many criteria are left out of it.
@@ -92,9 +101,11 @@ class _Writer:
         lines += self._listed("What is still open", still)
         if self._detail.folded:
             told = [row for loss in (*lost, *still) for row in self._told(loss)]
-            lines += self._folded("Details, and how to mend it", told)
+            lines += self._folded("Details, and how to fix it", told)
             lines += self._folded(_counted("Advice, costs nothing", view.advice), self._advice(view.advice))
-            lines += self._folded(_counted(noticed.NOTICED_TITLE, result.notes), self._noticed(result.notes))
+            lines += self._folded(
+                _counted(sentences.NOTICED_TITLE, result.notes), self._noticed(result.notes)
+            )
             lines += self._folded("Nodes and topics", self._graphs(graphs) if self._detail.graphs else ())
             lines += self._folded(_counted("All criteria", result.criteria), self._table(result.criteria))
         else:
@@ -187,9 +198,9 @@ class _Writer:
     def _noticed(self, notes: tuple[Note, ...]) -> Iterator[str]:
         if not notes:
             return
-        yield from (noticed.COSTS_NOTHING, "")
+        yield from (sentences.COSTS_NOTHING, "")
         for note in self._first(notes):
-            yield f"- {self._code(noticed.note_place(note))}: {self._text(noticed.note_text(note))}"
+            yield f"- {self._code(sentences.note_place(note))}: {self._text(sentences.note_text(note))}"
         yield from self._more(notes)
         yield ""
 
@@ -251,3 +262,37 @@ class _Writer:
 
 def _counted(title: str, items: Sequence[object]) -> str:
     return f"{title} ({len(items)})"
+
+
+NAME_CHARS = 60
+PARTS_MAX, EDGES_MAX = 40, 80
+# What has a meaning to mermaid nowhere inside of quotes. An underscore or a dot within a word is none for its Markdown.
+_PLAIN = re.compile(r"[A-Za-z0-9/ ]|(?<=[A-Za-z0-9])[_-](?=[A-Za-z0-9])")
+
+
+def mermaid(graph: GraphFigure) -> str:
+    """The diagram's text: round nodes, square topics, arrows from publisher to subscriber.
+
+    Names are written in the characters' numbers wherever they are more than letters: none of them leaves its quotes.
+    """
+    return "\n".join(["flowchart LR", *(f"    {row}" for row in _rows(graph))])
+
+
+def _rows(graph: GraphFigure) -> Iterator[str]:
+    nodes = {name: f"n{i}" for i, name in enumerate(graph.nodes[:PARTS_MAX])}
+    topics = {name: f"t{i}" for i, name in enumerate(graph.topics[:PARTS_MAX])}
+    yield from (f'{key}(["{_label(name)}"])' for name, key in nodes.items())
+    yield from (f'{key}["{_label(name)}"]' for name, key in topics.items())
+    edges = [edge for edge in graph.edges if edge.node in nodes and edge.topic in topics]
+    for edge in edges[:EDGES_MAX]:
+        ends = nodes[edge.node], topics[edge.topic]
+        yield " --> ".join(ends if edge.publishes else reversed(ends))
+    left = graph.left_out + len(graph.nodes) - len(nodes) + len(graph.topics) - len(topics)
+    if left:
+        yield f'more["and {left} more"]'
+
+
+def _label(name: str) -> str:
+    shown = line(name, NAME_CHARS) or "?"
+    plain = {match.start() for match in _PLAIN.finditer(shown)}
+    return "".join(c if i in plain else f"#{ord(c)};" for i, c in enumerate(shown))

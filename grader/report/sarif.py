@@ -19,7 +19,7 @@ Docs = Mapping[str, Mapping[str, str]]
 """Of each check by name the sections of its docstring, by their headings."""
 
 
-def sarif(result: GradingResult, prefix: str = "", *, docs: Docs | None = None) -> str:
+def render_sarif(result: GradingResult, prefix: str = "", *, docs: Docs | None = None) -> str:
     """JSON, one run. `prefix` is the package's folder in the repository, `docs` what the rules' help is made of."""
     found = [finding for finding in findings(result, prefix) if finding.places]
     checks = list(dict.fromkeys(finding.criterion.check for finding in found))

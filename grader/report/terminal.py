@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable
 from typing import IO
 
@@ -13,11 +14,17 @@ from rich.text import Text
 
 from grader.model.result import AppliedOverride, CriterionResult, GradingResult, Note
 from grader.model.verdict import Status
-from grader.report import settled
-from grader.report.noticed import COSTS_NOTHING, NOTICED_TITLE, note_place, note_text
-from grader.report.summary import visible_words
+from grader.report import sentences
+from grader.report.sentences import (
+    COSTS_NOTHING,
+    NOTICED_TITLE,
+    SIGNS,
+    note_place,
+    note_text,
+    visible_words,
+    without_sandbox,
+)
 from grader.report.text import line, number, uncommanded
-from grader.report.unwalled import without_sandbox
 from grader.report.view import Loss, arrange, not_graded, places, points_of
 from grader.rubric.model import Rubric
 
@@ -34,15 +41,16 @@ STYLES = {
     Status.ERROR: "magenta",
     Status.MANUAL: "cyan",
 }
-MARKS = {
-    Status.PASS: ("✓", "+"),
-    Status.PARTIAL: ("◐", "~"),
-    Status.FAIL: ("✗", "x"),
-    Status.BLOCKED: ("⊘", "-"),
-    Status.INCONCLUSIVE: ("?", "?"),
-    Status.ERROR: ("!", "!"),
-    Status.MANUAL: ("•", "o"),
+PLAIN_MARKS = {
+    Status.PASS: "+",
+    Status.PARTIAL: "~",
+    Status.FAIL: "x",
+    Status.BLOCKED: "-",
+    Status.INCONCLUSIVE: "?",
+    Status.ERROR: "!",
+    Status.MANUAL: "o",
 }
+"""In place of `SIGNS` where an encoding has no ✓."""
 
 
 def open_console(file: IO[str]) -> Console:
@@ -87,21 +95,27 @@ def print_report(
     Terminal(console).report(result, rubric, hidden, unrun or ("--static" if static else ""))
 
 
+def render_terminal(result: GradingResult, rubric: Rubric, hidden: int = 0) -> str:
+    """Return the report as it is printed where there is no terminal: without colour, 80 columns wide."""
+    text = io.StringIO()
+    print_report(result, rubric, open_console(text), hidden=hidden)
+    return text.getvalue()
+
+
 class Terminal:
-    """Prints by the console's own means: `plain` where its encoding has no ✓."""
+    """Prints by the console's own means, in characters that its encoding has."""
 
     def __init__(self, console: Console) -> None:
         self.console = console
-        self.plain = not _has_marks(console.encoding)
 
     def report(self, result: GradingResult, rubric: Rubric, hidden: int, unrun: str) -> None:
         view = arrange(result, rubric)
         parts: list[RenderableType] = [self._head(result, rubric)]
         unwalled = without_sandbox(result.environment.sandbox)
         parts += [Text(self._show(unwalled), "yellow")] if unwalled else []
-        parts += [Text(self._show(words)) for words in settled.late_words(result)]
+        parts += [Text(self._show(words)) for words in sentences.late_words(result)]
         parts += self._section(
-            settled.DECIDED_TITLE, [self._decision(o, c) for o, c in settled.decided(result)]
+            sentences.DECIDED_TITLE, [self._decision(o, c) for o, c in sentences.decided(result)]
         )
         parts += self._losses("Lost", view.lost)
         if unrun:
@@ -127,9 +141,9 @@ class Terminal:
         return text
 
     def _decision(self, override: AppliedOverride, criterion: CriterionResult) -> RenderableType:
-        head = self._line(criterion, settled.decision(override))
-        again = settled.look_again(override, criterion)
-        rows = [("check", settled.automatic_words(override, criterion)), ("changed", again)]
+        head = self._line(criterion, sentences.decision(override))
+        again = sentences.look_again(override, criterion)
+        rows = [("check", sentences.automatic_words(override, criterion)), ("changed", again)]
         return Group(head, Padding(self._rows(rows), (0, 0, 0, 4)))
 
     def _section(self, title: str, parts: list[RenderableType]) -> list[RenderableType]:
@@ -172,7 +186,7 @@ class Terminal:
         Where too little room is left for the words, they stand below.
         """
         style = STYLES[criterion.status]
-        name = Text(f"{self._mark(criterion.status)} {self._show(criterion.id)}", style)
+        name = Text(f"{mark(criterion.status, self.console.encoding)} {self._show(criterion.id)}", style)
         status = Text(criterion.status.value, style)
         points = points_of(criterion)
         room = self.console.width - max(name.cell_len, width + 2) - len(points) - len(status) - 6
@@ -204,13 +218,10 @@ class Terminal:
         table.add_column("measured", overflow="fold", ratio=1)
         for c in criteria:
             points = Text(points_of(c))
-            status = Text(f"{self._mark(c.status)} {c.status.value}", STYLES[c.status])
+            status = Text(f"{mark(c.status, self.console.encoding)} {c.status.value}", STYLES[c.status])
             measured = c.measured or (c.title if c.status is Status.PASS else c.message)
             table.add_row(points, status, Text(self._show(c.id)), Text(self._show(measured, MEASURED_LIMIT)))
         return table
-
-    def _mark(self, status: Status) -> str:
-        return MARKS[status][1 if self.plain else 0]
 
     def _show(self, text: str, limit: int = LIMIT) -> str:
         """Harmless, of bounded length, and in characters that the terminal's encoding has."""
@@ -220,12 +231,12 @@ class Terminal:
 
 def mark(status: Status, encoding: str) -> str:
     """The sign of a status, a plain one where the encoding has no ✓."""
-    return MARKS[status][0 if _has_marks(encoding) else 1]
+    return (SIGNS if _has_marks(encoding) else PLAIN_MARKS)[status]
 
 
 def _has_marks(encoding: str) -> bool:
     try:
-        "".join(mark for mark, _ in MARKS.values()).encode(encoding)
+        "".join(SIGNS.values()).encode(encoding)
     except (UnicodeEncodeError, LookupError):
         return False
     return True

@@ -23,6 +23,7 @@ from grader.untrusted_text import clip, json_text, line, text_limit, uncommanded
 
 __all__ = [
     "clip",
+    "csv_cell",
     "csv_text",
     "html",
     "html_address",
@@ -143,14 +144,15 @@ _FORMULA = re.compile(r"(^|;)([\s\"'`]*[=+\-@\uff1d\uff0b\uff0d\uff20\u2212\ufe6
 
 
 def csv_text(rows: Iterable[Sequence[Cell]]) -> str:
-    """The rows as RFC 4180 has them. Numbers stay numbers; text that could be a formula begins with `'`."""
+    """Return the rows as CSV (RFC 4180). Numbers stay numbers; text that could be a formula begins with `'`."""
     out = io.StringIO()
     writer = csv.writer(out, quoting=csv.QUOTE_MINIMAL, lineterminator="\r\n")
-    writer.writerows([_cell(value) for value in row] for row in rows)
+    writer.writerows([csv_cell(value) for value in row] for row in rows)
     return out.getvalue()
 
 
-def _cell(value: Cell) -> str:
+def csv_cell(value: Cell) -> str:
+    """Return a cell's text, harmless in a spreadsheet but not yet quoted for CSV."""
     if value is None:
         return ""
     if not isinstance(value, str):

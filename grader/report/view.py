@@ -1,9 +1,11 @@
-"""A result put in the order in which it is read: what was lost first, with what it took along."""
+"""A result as it is read: losses first, with what they block; and the student's view, without hidden criteria."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from grader.errors import PackageNotFound, SubmissionError
+from grader.judging.settle import lateness
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
 from grader.report.text import number
@@ -84,6 +86,11 @@ def not_graded(result: GradingResult) -> bool:
     return result.error is not None and result.status == "error"
 
 
+def is_students_fault(result: GradingResult) -> bool:
+    """Whether nothing could be graded because of what was submitted, not because of the machine or the grader."""
+    return result.error is not None and result.error.kind in {SubmissionError.kind, PackageNotFound.kind}
+
+
 def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric) -> str:
     """The id of the criterion that a blocked one comes down to; its own id for any other."""
     by_id = {c.id: c for c in result.criteria}
@@ -116,3 +123,39 @@ def _place(citation: Citation) -> str:
     if citation.from_ns is not None and citation.to_ns is not None and citation.to_ns > citation.from_ns:
         stretch = f", {(citation.to_ns - citation.from_ns) / 1e9:.1f} s"
     return f"{citation.evidence} {citation.topic}{stretch}"
+
+
+def hidden_ids(rubric: Rubric) -> frozenset[str]:
+    """The ids of the criteria that `grader check` does not show."""
+    return frozenset(c.id for c in rubric.criteria if c.visibility == "hidden")
+
+
+def without_hidden(result: GradingResult, rubric: Rubric) -> GradingResult:
+    """The result as if the hidden criteria were not in the rubric: points, maximum, status and what being late costs
+    follow, and what people decided about hidden criteria is left out."""
+    hidden = hidden_ids(rubric)
+    shown = tuple(c for c in result.criteria if c.id not in hidden)
+    if len(shown) == len(result.criteria):
+        return result
+    decided = tuple(o for o in result.overrides if o.criterion not in hidden)
+    points = round(sum(c.points for c in shown), rubric.digits)
+    visible = rubric.model_copy(update={"criteria": tuple(c for c in rubric.criteria if c.id not in hidden)})
+    late = lateness(points, visible, result.late) if result.late else None
+    update = {
+        "criteria": shown,
+        "overrides": decided,
+        "late": late,
+        "points": late.points if late else points,
+        "max_points": sum(c.max_points for c in shown),
+        "status": _status(result, shown, {o.criterion for o in decided}),
+    }
+    return result.model_copy(update=update)
+
+
+def _status(result: GradingResult, shown: tuple[CriterionResult, ...], decided: set[str]) -> str:
+    if result.error and any(c.max_points > 0 and c.id not in decided for c in shown):
+        return "error"
+    statuses = {c.status for c in shown if c.max_points > 0}
+    if not statuses or Status.ERROR in statuses:
+        return "error"
+    return "inconclusive" if statuses & {Status.INCONCLUSIVE, Status.MANUAL} else "graded"

@@ -29,10 +29,9 @@ from grader.intake.identity import identify
 from grader.model.package import SourceFile
 from grader.model.progress import Progress
 from grader.model.result import GradingResult, SubmissionInfo
-from grader.model.verdict import Status
 from grader.package.files import read_files
 from grader.package.reading import LEFT_OUT
-from grader.report.hidden import without_hidden
+from grader.report.view import without_hidden
 from grader.rubric.load import LoadedRubric
 
 POLL_S = 0.25
@@ -40,7 +39,6 @@ AGAIN_S = 0.4
 GONE_S = 1.0
 WAIT_S = 5.0
 LOOKS = 3
-UNDECIDED = frozenset({Status.INCONCLUSIVE, Status.ERROR})
 IGNORED_FOLDERS = LEFT_OUT | {
     ".tox", ".venv", ".idea", ".vscode", "node_modules", ".mypy_cache", ".pytest_cache", ".ruff_cache",
     ".hypothesis", "logs", "grader-results",
@@ -121,7 +119,7 @@ class Grading:
                 raise
             result = self._error_result(error)
         self._begun = True
-        undecided = not self.options.static_only and any(c.status in UNDECIDED for c in result.criteria)
+        undecided = not self.options.static_only and any(c.status.is_retryable for c in result.criteria)
         shown = without_hidden(result, self.rubric.rubric)
         if shown.status == "error":
             return Outcome(result=shown, code=ExitCode.NOT_GRADED, undecided=True)

@@ -18,13 +18,12 @@ from grader.classes.batch.folder import open_batch, write_run
 from grader.cli.main import run
 from grader.evidence.reader import load_evidence
 from grader.judging import judge
-from grader.judging.summary import overall_status, total_points
 from grader.model.batch import BatchRun, Entry
-from grader.model.result import EnvironmentInfo, GradingResult, RubricInfo, SubmissionInfo, TimingInfo
 from grader.report.files import write_reports
 from grader.rubric.load import LoadedRubric, load_rubric
 from tests.batch.a_class import CORRECT, RUBRIC, WRONG_NAME, batch, handed_in, lines_of, roster_of, run_of
 from tests.batch.repositories import commit, repository
+from tests.support.a_class import judged_result
 
 RECORDINGS = Path(__file__).parent.parent / "data" / "recordings"
 LAB = Path(__file__).parent.parent.parent / "rubrics" / "leeds-comp3631-lab1.yaml"
@@ -51,16 +50,7 @@ def recorded(out: Path, kinds: dict[str, str]) -> Path:
 
 def write_result(folder: Path, name: str, rubric: LoadedRubric) -> None:
     criteria = judge(rubric.rubric, load_evidence([folder / "evidence"]), rubric.checks)
-    result = GradingResult(
-        submission=SubmissionInfo(id=name, source=f"/gone/{name}", commit=None, digest="0", package="lab1"),
-        rubric=RubricInfo(id=rubric.rubric.id, version=rubric.rubric.version, digest=rubric.digest),
-        status=overall_status(criteria),
-        points=total_points(rubric.rubric, criteria),
-        max_points=rubric.rubric.max_points,
-        criteria=criteria,
-        environment=EnvironmentInfo(grader=__version__, ros="", python="", sandbox=""),
-        timing=TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0),
-    )
+    result = judged_result(name, rubric, criteria)
     write_reports(result, folder, console="kept", rubric=rubric.rubric)
 
 

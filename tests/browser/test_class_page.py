@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader.model.batch import Entry
-from grader.report.class_page import write_class_page
+from grader.report.class_page.page import write_class_page
 from tests.browser.conftest import DESKTOP, PHONE
 from tests.report.class_page.made_up import CRITERIA, FAULTS, made_up_rows, made_up_run
 from tests.report.nasty import PIECES

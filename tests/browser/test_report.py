@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from grader.checks import CHECKS
-from grader.report.html import html_report
+from grader.report.html.page import render_html
 from tests.browser.conftest import DESKTOP, PHONE
 from tests.report.hostile import ESCAPES, result, rubric
 from tests.report.html.made import SCRIPT, counter, figures, graph, heard, hostile_figures, rate
@@ -29,7 +29,7 @@ DOTS = "all => all.map((one) => [one.getAttribute('d').split('M').length - 1, on
 @pytest.fixture(scope="module")
 def written(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
-    text = html_report(
+    text = render_html(
         result(), rubric(scenarios={"real": {"title": "In real time"}}), figures(), hidden=0, docs=DOCS
     )
     path.write_text(text, encoding="utf-8")
@@ -174,7 +174,7 @@ def test_texts_of_others_stay_texts(visit, axe, validate, tmp_path, size) -> Non
     path = tmp_path / "report.html"
     shown = spoiled(of(f"{SCRIPT} {ESCAPES}")).model_copy(update={"error": None})
     shown = shown.model_copy(update={"criteria": (*shown.criteria, *result().criteria)})
-    path.write_text(html_report(shown, rubric(), hostile_figures()), encoding="utf-8")
+    path.write_text(render_html(shown, rubric(), hostile_figures()), encoding="utf-8")
     page = opened(visit(path, size=size))
     assert any(SCRIPT in title for title in page.locator("h3").all_inner_texts())
     assert page.locator("figure").count() >= 8

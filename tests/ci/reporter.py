@@ -22,6 +22,7 @@ class Reported:
 
 def reporter(encoded: str) -> Reported:
     """Read one grader's `result`, as the reporter reads `<RUNNER>_RESULTS`."""
+    encoded = encoded.removesuffix("\n")
     assert len(f"LAB_RESULTS={encoded}") < ENVIRONMENT_BYTES_MAX
     results = json.loads(base64.b64decode(encoded, validate=True).decode("utf-8"))
     assert results["version"] == 1

@@ -10,17 +10,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.model.result import ErrorInfo
-from grader.report.classroom import JSON_BYTES_MAX, classroom
-from grader.report.hidden import without_hidden
+from grader.report.classroom import JSON_BYTES_MAX, render_classroom
+from grader.report.view import without_hidden
 from tests.ci.reporter import reporter
-from tests.report.hostile import criterion, result, rubric
+from tests.report.hostile import result, rubric
+from tests.support.a_class import criterion
 
 
 def _made(*criteria, passed=False, prefix="", **changes):
     points = round(sum(c.points for c in criteria), 3)
     of = sum(c.max_points for c in criteria)
     made = result(**{"criteria": criteria, "points": points, "max_points": of, "status": "graded", **changes})
-    return reporter(classroom(made, rubric(), passed=passed, prefix=prefix))
+    return reporter(render_classroom(made, rubric(), passed=passed, prefix=prefix))
 
 
 def test_points_are_the_sum_of_the_scores():
@@ -85,7 +86,7 @@ def test_hidden_criteria_are_not_in_it():
     lab = rubric()
     hiding = lab.criteria[0].model_copy(update={"id": "b", "visibility": "hidden"})
     lab = lab.model_copy(update={"criteria": (lab.criteria[1].model_copy(update={"id": "a"}), hiding)})
-    seen = reporter(classroom(without_hidden(whole, lab), lab, passed=True))
+    seen = reporter(render_classroom(without_hidden(whole, lab), lab, passed=True))
     assert (seen.points, seen.of, len(seen.tests)) == (40, 40, 1)
 
 
@@ -99,7 +100,7 @@ def test_nothing_of_a_student_commands_the_runner():
 
 def test_the_longest_report_fits_into_a_variable_of_the_environment():
     long = {"message": "m" * 5000, "hint": "\u2603" * 5000, "reproduce": "r" * 5000, "title": "t" * 5000}
-    encoded = classroom(
+    encoded = render_classroom(
         result(criteria=tuple(criterion(f"c{i}", "fail", 0, 1, **long) for i in range(120))),
         rubric(),
         passed=False,

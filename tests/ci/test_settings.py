@@ -10,7 +10,7 @@ from grader.integrations.ci.outcome import Outcome
 from grader.integrations.ci.pass_mark import Mark, needed_words, read_mark, with_mark
 from grader.integrations.ci.settings import FAILING, read_settings
 from grader.rubric.load import load_rubric
-from tests.report.hostile import criterion
+from tests.support.a_class import criterion
 
 
 @pytest.mark.parametrize(

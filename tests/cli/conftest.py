@@ -12,8 +12,9 @@ import pytest
 import grader
 from grader.model.result import GradingResult
 from grader.report.files import write_reports
-from tests.report.hostile import criterion, result
+from tests.report.hostile import result
 from tests.rubric.samples import spoiled
+from tests.support.a_class import criterion
 
 COMMANDS = ("grade", "check", "record", "judge")
 

@@ -19,10 +19,10 @@ from grader.model.result import EarlyVerdict
 from grader.pipeline import GradeOptions, grade
 from grader.rubric.load import load_rubric
 from tests.fixture_runs import ROOT
-from tests.report.hostile import criterion
 from tests.report.nasty import STEERING, TEXTS
 from tests.report.test_shown import TO_A_CI
 from tests.rubric.samples import spoiled
+from tests.support.a_class import criterion
 
 PASSED = EarlyVerdict(criterion=criterion("manifest", "pass", 5, 5, message="names lab1"), final=True)
 FAILED = EarlyVerdict(

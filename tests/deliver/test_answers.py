@@ -16,9 +16,9 @@ from grader.integrations.deliver.settings import FILE, Settings
 from grader.model.result import ErrorInfo
 from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric
-from tests.report.hostile import criterion
 from tests.report.nasty import STEERING
 from tests.report.worst import LONG, MERMAID, rubric, worst
+from tests.support.a_class import criterion
 
 FORMS = {
     "gradescope": (gradescope.place, gradescope.FORM),

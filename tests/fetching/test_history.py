@@ -99,7 +99,7 @@ def test_the_note_says_what_was_done(commits, server):
             "2026-11-01T00:00:00+01:00",
             "in time",
             "commit",
-            "handed in later, 2026-11-01",
+            "submitted later, 2026-11-01",
         ),
         (Rule(before=time(DATES["later"])), "2026-11-01T00:00:00+01:00", "late", "roster", "2 later commits"),
         (
@@ -107,7 +107,7 @@ def test_the_note_says_what_was_done(commits, server):
             "2026-11-01T00:00:00+01:00",
             "late",
             "roster",
-            "when it was handed in, 2026-11-01 00:00 +01:00 as the roster says; 2 later",
+            "when it was submitted, 2026-11-01 00:00 +01:00 as the roster says; 2 later",
         ),
     ],
 )

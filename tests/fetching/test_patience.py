@@ -7,7 +7,7 @@ import time
 import pytest
 
 from grader.classes.fetching import Patience, prefetch
-from grader.classes.fetching.retry import GivenUp, patiently
+from grader.classes.fetching.mirror import GivenUp, patiently
 from grader.errors import SubmissionError, Unreachable
 from grader.intake.explain import explained, may_pass
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch

@@ -6,7 +6,7 @@ import pytest
 
 from grader.model.figure import CodeFigure
 from grader.model.verdict import EvidenceCitation, FileCitation
-from grader.report.figures.code import FIGURES_MAX, LINES_MAX, code_figures
+from grader.report.figures.runs import FIGURES_MAX, LINES_MAX, code_figures
 from tests.checks.examples import runs_of
 
 TEXT = "".join(f"line {number}\n" for number in range(1, 201))

@@ -6,8 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from grader.model.figure import ConsoleFigure, GraphFigure
-from grader.report.figures.consoles import LETTERS_MAX, console_of
-from grader.report.figures.graphs import EDGES_MAX, NODES_MAX, TOPICS_MAX, graph_of
+from grader.report.figures.runs import EDGES_MAX, LETTERS_MAX, NODES_MAX, TOPICS_MAX, console_of, graph_of
 from tests.checks.examples import runs_of
 
 OWN = ("/grader_recorder_0a1b2c3d", "/grader_actor_0a1b2c3d", "/grader_calibration_0a1b2c3d", "/rosout")

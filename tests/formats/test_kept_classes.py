@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.batch.folder import open_batch
-from grader.classes.review.session import open_desk
+from grader.classes.review.session import open_session
 from grader.cli.main import run
 from tests.formats.kept import FOLDER
 
@@ -69,8 +69,8 @@ def test_it_is_reviewed(course: Path) -> None:
     run_json = course / "class" / "run.json"
     said = json.loads(run_json.read_text())
     run_json.write_text(json.dumps(said | {"rubric_source": str(course / "class.yaml")}))
-    desk = open_desk(course / "class")
-    found = {item.key: desk.result(item, desk.overrides()) for item in desk.submissions.items()}
+    review = open_session(course / "class")
+    found = {item.key: review.result(item, review.overrides()) for item in review.submissions.items()}
     assert {name: found[name].points for name in POINTS} == POINTS
 
 

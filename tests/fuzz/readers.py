@@ -21,7 +21,7 @@ from grader.arena.session import ArenaSession
 from grader.arena.workspace import read_archive, read_member
 from grader.authoring.mutation.load import load_mutants
 from grader.classes.gradebook import write_gradebook
-from grader.classes.gradebook.sheet import read_sheet
+from grader.classes.gradebook.template import read_sheet
 from grader.classes.roster import read_roster
 from grader.errors import EvidenceError, GraderError, OutputError, RubricError, SubmissionError, UsageError
 from grader.evidence.decode import Decoder, ServiceType

@@ -4,19 +4,10 @@ from __future__ import annotations
 
 from grader.classes.gradebook import Book, Row
 from grader.model.batch import Entry
-from grader.model.result import (
-    AppliedOverride,
-    Automatic,
-    CriterionResult,
-    EnvironmentInfo,
-    ErrorInfo,
-    GradingResult,
-    Lateness,
-    RubricInfo,
-    SubmissionInfo,
-    TimingInfo,
-)
+from grader.model.result import AppliedOverride, Automatic, CriterionResult, Lateness
 from grader.model.verdict import Status
+from tests.support.a_class import criterion as made_criterion
+from tests.support.a_class import made_result
 
 BOOK = Book(
     title="Lab 1",
@@ -29,21 +20,7 @@ MAXIMA = {"rate": 60.0, "name": 40.0, "advice": 0.0}
 
 
 def criterion(criterion_id: str, points: float, status: Status = Status.PARTIAL) -> CriterionResult:
-    return CriterionResult(
-        id=criterion_id,
-        title=criterion_id,
-        check="rate",
-        scenario=None,
-        status=status,
-        points=points,
-        max_points=MAXIMA[criterion_id],
-        message="",
-        expected="",
-        measured="",
-        hint="",
-        reproduce="",
-        citations=(),
-    )
+    return made_criterion(criterion_id, status, points, MAXIMA[criterion_id])
 
 
 def row(
@@ -53,16 +30,13 @@ def row(
     criteria = [criterion("rate", points - 40), criterion("name", 40.0), criterion("advice", 0.0)]
     if open_:
         criteria = [c if c.id != open_ else criterion(open_, 0, Status.INCONCLUSIVE) for c in criteria]
-    result = GradingResult(
-        submission=SubmissionInfo(id=who, source="s", commit=None, digest="", package="lab1"),
-        rubric=RubricInfo(id="lab1", version="1", digest="d"),
+    result = made_result(
+        who,
+        () if error else tuple(criteria),
         status="error" if error else "inconclusive" if open_ else "graded",
         points=0 if error else points,
         max_points=100,
-        criteria=() if error else tuple(criteria),
-        environment=EnvironmentInfo(grader="", ros="", python="", sandbox=""),
-        timing=TimingInfo(wall_s=0, cpu_s=0, student_cpu_s=0),
-        error=ErrorInfo(kind="submission", message=error, hint="") if error else None,
+        error=error,
     )
     columns = {column.replace("_", " "): text for column, text in extra.items()}
     return Row(entry=Entry(id=who, source="s", name=name, extra=columns), result=result)

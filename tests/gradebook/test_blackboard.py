@@ -39,7 +39,7 @@ def test_the_download_stays_as_it_is(tmp_path: Path, mark: bytes, encoding: str,
     there = f'"Yes"{delimiter}""{delimiter}""\r\n"'
     expected = text.replace(there, f'"Yes"{delimiter}"87.5"{delimiter}""\r\n"').replace('"3"', '"100"')
     assert data == mark + expected.encode(encoding)
-    assert remarks == ["y: not in gc.xls: nobody there has this id, number, login, address or name"]
+    assert remarks == ["y: not in gc.xls: no row there has this id, number, login, address or name"]
 
 
 def test_another_maximum_is_told(tmp_path: Path) -> None:

@@ -58,7 +58,7 @@ def test_the_export_stays_as_it_is_but_for_our_column(tmp_path: Path) -> None:
         "e: no grade (inconclusive: open: rate)",
         "c: EX stays, the 50 points are left out",
         "e: 70.00 is there already, and stays",
-        "nobody (Nobody): not in export.csv: nobody there has this id, number, login, address or name",
+        "nobody (Nobody): not in export.csv: no row there has this id, number, login, address or name",
         "Zuse, Konrad, 15, S5, konrad: in export.csv, without a submission here",
     ]
 
@@ -74,7 +74,7 @@ def test_an_open_grade_is_empty_and_never_zero(tmp_path: Path) -> None:
     ("export", "why"),
     [
         (EXPORT + b'"Lovelace, Ada",17,S9,ada2,L3,,,,\r\n', "2 rows there could be this student"),
-        (EXPORT.replace(b"Lovelace, Ada", b"Lovelace, A."), "nobody there has"),
+        (EXPORT.replace(b"Lovelace, Ada", b"Lovelace, A."), "no row there has"),
     ],
 )
 def test_names_that_are_not_sure_match_nobody(tmp_path: Path, export: bytes, why: str) -> None:

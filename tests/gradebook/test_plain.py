@@ -14,7 +14,7 @@ import openpyxl
 import pytest
 
 from grader.classes.gradebook import Book, Row, write_gradebook
-from grader.classes.gradebook.plain import json_line
+from grader.classes.gradebook.write import json_line
 from grader.errors import OutputError, UsageError
 from grader.model.result import GradingResult
 from tests.gradebook.made import BOOK, late, overridden, row

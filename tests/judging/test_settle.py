@@ -13,11 +13,11 @@ from grader.judging.settle import settle, unsettled
 from grader.judging.summary import overall_status, passed, total_points
 from grader.model.result import CriterionResult, ErrorInfo, GradingResult, HandedIn, Override
 from grader.model.verdict import Status
-from grader.report.hidden import without_hidden
 from grader.report.result_json import result_bytes
+from grader.report.view import without_hidden
 from grader.rubric.model import Rubric
-from tests.report.hostile import criterion
 from tests.report.hostile import result as any_result
+from tests.support.a_class import criterion
 
 DEADLINE = datetime(2026, 11, 20, 23, 59, tzinfo=timezone.utc)
 TWO_DAYS = HandedIn(at=DEADLINE + timedelta(days=1, hours=1), by="commit", deadline=DEADLINE)

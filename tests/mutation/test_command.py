@@ -13,7 +13,8 @@ from grader.classes.batch.workers import Graded
 from grader.cli.main import run
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import ROOT
-from tests.report.hostile import criterion, result
+from tests.report.hostile import result
+from tests.support.a_class import criterion
 
 LAB = "leeds-comp3631-lab1"
 

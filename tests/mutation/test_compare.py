@@ -4,7 +4,7 @@ import pytest
 
 from grader.authoring.mutation.compare import compare, lost_criteria
 from grader.model.result import CriterionResult
-from tests.report.hostile import criterion
+from tests.support.a_class import criterion
 
 
 def criteria(**statuses: str) -> list[CriterionResult]:

@@ -17,8 +17,9 @@ from grader.errors import HostError
 from grader.model.progress import Silence
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import tree_of
-from tests.report.hostile import criterion, result
+from tests.report.hostile import result
 from tests.rubric.samples import spoiled
+from tests.support.a_class import criterion
 
 SCRIPT = "#!/usr/bin/env python\nimport rospy\nrospy.init_node('talker')\nrospy.spin()\n"
 Statuses = dict[str, str]

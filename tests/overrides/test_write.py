@@ -11,7 +11,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from grader.classes.overrides import FILE, read_overrides, write, write_override
+from grader.classes.overrides import FILE, read_overrides, write
+from grader.classes.overrides.write import write_override
 from grader.errors import Busy, OutputError, RubricError, UsageError
 from grader.model.result import Override
 from tests.overrides.samples import IDS, rubric

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from grader.model.result import (
-    CriterionResult,
     EnvironmentInfo,
     GradingResult,
     RubricInfo,
@@ -12,6 +11,7 @@ from grader.model.result import (
 )
 from grader.model.verdict import EvidenceCitation, FileCitation, Status
 from grader.rubric.model import Rubric
+from tests.support.a_class import criterion
 
 NS = 1_700_000_000_000_000_000
 ESCAPES = "\x1b[31mred\x1b]0;title\x07 \u202egnp.exe \u200b \ufeff \x00 \x9b2J"
@@ -50,28 +50,6 @@ REQUIRES = {
     "counter-start": ("talker-node",),
     "counter-wrap": ("talker-node",),
 }
-
-
-def criterion(
-    name: str, status: Status, points: float, max_points: float, **fields: object
-) -> CriterionResult:
-    """A criterion's result with nothing in it but what is given."""
-    data: dict[str, object] = {
-        "id": name,
-        "title": f"title of {name}",
-        "check": "some-check",
-        "scenario": None,
-        "status": status,
-        "points": points,
-        "max_points": max_points,
-        "message": "",
-        "expected": "",
-        "measured": "",
-        "hint": "",
-        "reproduce": "",
-        "citations": (),
-    }
-    return CriterionResult.model_validate({**data, **fields})
 
 
 def result(**changes: object) -> GradingResult:

@@ -32,15 +32,16 @@ from grader.model.result import (
 )
 from grader.model.verdict import EvidenceCitation, FileCitation, Status
 from grader.report.files import write_reports
-from grader.report.junit import junit
-from grader.report.markdown import markdown_report
+from grader.report.junit import render_junit
+from grader.report.markdown import render_markdown
 from grader.report.result_json import result_bytes, result_text
 from grader.report.terminal import open_console, print_report
 from grader.report.text import line
-from tests.report.hostile import criterion, result, rubric
+from tests.report.hostile import result, rubric
 from tests.report.nasty import STEERING, TEXTS
 from tests.report.test_shown import TO_A_CI
 from tests.report.test_text import FOUND_BY_FORGES, HARMLESS, MARKDOWN, QUICK_ACTION, prose
+from tests.support.a_class import criterion
 
 FIELDS = ("id", "title", "check", "scenario", "message", "expected", "measured", "hint", "reproduce")
 SOME = settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow])
@@ -112,9 +113,9 @@ def blocks(source: str) -> list[str]:
 @SOME
 @given(results())
 def test_markdown_holds_nothing_but_the_template(shown):
-    source = markdown_report(shown, rubric())
+    source = render_markdown(shown, rubric())
     plain = spoiled(of("word"), shown.criteria[0].status.value)
-    assert blocks(source) == blocks(markdown_report(plain, rubric()))
+    assert blocks(source) == blocks(render_markdown(plain, rubric()))
     inlines = [token.children for token in MARKDOWN.parse(source) if token.type == "inline"]
     kinds = [token.type for children in inlines for token in children]
     assert kinds.count("strong_open") == 1  # the template's own: look again
@@ -134,15 +135,15 @@ def elements(source: str) -> list[str]:
 @SOME
 @given(results())
 def test_githubs_renderer_makes_nothing_else_of_it(shown):
-    source = markdown_report(shown, rubric())
+    source = render_markdown(shown, rubric())
     plain = spoiled(of("word"), shown.criteria[0].status.value)
-    assert elements(source) == elements(markdown_report(plain, rubric()))
+    assert elements(source) == elements(render_markdown(plain, rubric()))
 
 
 @SOME
 @given(results())
 def test_junit_parses_and_gives_the_visible_text_back(shown):
-    data = junit(shown)
+    data = render_junit(shown)
     expat.ParserCreate().Parse(data, True)
     suite = etree.fromstring(data)[0]
     tags = {element.tag for element in suite.iter()}

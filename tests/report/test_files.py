@@ -12,10 +12,10 @@ from grader.files import atomic_write, check_writable
 from grader.model.result import ErrorInfo
 from grader.model.verdict import Status
 from grader.report.files import write_reports
-from grader.report.hidden import without_hidden
 from grader.report.result_json import result_bytes
-from grader.report.view import arrange
-from tests.report.hostile import criterion, result, rubric
+from grader.report.view import arrange, without_hidden
+from tests.report.hostile import result, rubric
+from tests.support.a_class import criterion
 
 KEYS = [
     "schema",

@@ -22,18 +22,17 @@ from grader.errors import GraderError
 from grader.model.figure import Edge, Figures, GraphFigure
 from grader.model.result import ErrorInfo
 from grader.model.verdict import FileCitation, Status
-from grader.report.annotations import github_annotations
+from grader.report.annotations import render_annotations
 from grader.report.findings import findings, repository_path
-from grader.report.gradescope import gradescope
-from grader.report.junit import junit
-from grader.report.markdown import BYTES_MAX, markdown_report
-from grader.report.mermaid import EDGES_MAX, PARTS_MAX, mermaid
-from grader.report.sarif import sarif
+from grader.report.gradescope import render_gradescope
+from grader.report.junit import render_junit
+from grader.report.markdown import BYTES_MAX, EDGES_MAX, PARTS_MAX, mermaid, render_markdown
+from grader.report.sarif import render_sarif
 from tests.report import hostile
-from tests.report.hostile import criterion
 from tests.report.nasty import STEERING
 from tests.report.test_shown import TO_A_CI
 from tests.report.worst import DOCS, LONG, MERMAID, MORE, TEXTS, figures, rubric, worst
+from tests.support.a_class import criterion
 
 GOLDEN = Path(__file__).parent / "golden"
 JENKINS = Path(__file__).parent.parent / "data" / "schemas" / "junit-10.xsd"
@@ -63,12 +62,12 @@ def test_nothing_in_a_golden_file_steers(name):
 @pytest.mark.parametrize("result", [worst(), worst(error=ErrorInfo(kind="host", message=LONG, hint=MERMAID))])
 def test_junit_is_what_jenkins_takes(result):
     schema = etree.XMLSchema(etree.parse(JENKINS))
-    schema.assertValid(etree.fromstring(junit(result)))
+    schema.assertValid(etree.fromstring(render_junit(result)))
 
 
 @pytest.mark.parametrize("result", [worst(), hostile.result()])
 def test_junit_names_files_where_the_repository_has_them(result):
-    suite = etree.fromstring(junit(result, "ws/src/lab1"))[0]
+    suite = etree.fromstring(render_junit(result, "ws/src/lab1"))[0]
     files = {case.get("file") for case in suite.iter("testcase")} - {None}
     assert "ws/src/lab1/src/numeric_talker.py" in files
     assert not [file for file in files if not file.startswith("ws/src/lab1/") or ".." in file]
@@ -88,12 +87,12 @@ def test_the_gradebook_reads_back_and_none_of_its_cells_is_a_formula():
 
 def test_sarif_keeps_to_its_schema():
     schema = sarif_schema()
-    for text in (kept("report.sarif"), sarif(worst(criteria=()))):
+    for text in (kept("report.sarif"), render_sarif(worst(criteria=()))):
         jsonschema.validate(json.loads(text), schema)
 
 
 def test_sarif_names_rules_and_places_that_stay_inside_the_repository():
-    (run,) = json.loads(sarif(worst(), "ws/src/lab 1", docs=DOCS))["runs"]
+    (run,) = json.loads(render_sarif(worst(), "ws/src/lab 1", docs=DOCS))["runs"]
     rules = run["tool"]["driver"]["rules"]
     uris = [r["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] for r in run["results"]]
     assert uris[0] == "ws/src/lab%201/src/numeric_talker.py"
@@ -175,7 +174,7 @@ def test_annotations_read_back_as_the_runner_reads_them():
 
 def test_of_many_annotations_the_costliest_ten_are_shown():
     many = tuple(criterion(f"c{i:02}", Status.FAIL, 0, i + 1, message="a\nb") for i in range(14))
-    rows = github_annotations(
+    rows = render_annotations(
         hostile.result(criteria=many, points=0, max_points=105, status="graded")
     ).splitlines()
     assert [row.split("=")[1][:3] for row in rows[:10]] == [f"c{i}" for i in range(13, 9, -1)] + [
@@ -186,12 +185,12 @@ def test_of_many_annotations_the_costliest_ten_are_shown():
 
 def test_an_error_is_an_annotation_and_no_points_are_said():
     error = ErrorInfo(kind="host", message="no room: 100 %", hint="make room")
-    text = github_annotations(worst(error=error, status="error", criteria=()))
+    text = render_annotations(worst(error=error, status="error", criteria=()))
     assert text == "::error title=It could not be graded::no room: 100 %25%0Amake room\nnot graded\n"
 
 
 def scope(**changes: object) -> dict:
-    return json.loads(gradescope(worst(**changes), rubric()))
+    return json.loads(render_gradescope(worst(**changes), rubric()))
 
 
 def test_gradescope_has_a_test_for_each_criterion_and_reads_text_as_text():
@@ -268,8 +267,8 @@ def test_markdown_is_folded_and_draws_its_graphs():
 
 def test_runs_with_the_same_graph_share_its_picture():
     assert "In `real`, `again`:" in kept("report.md")
-    assert "```mermaid" not in markdown_report(worst(), rubric())
-    assert "```mermaid" not in markdown_report(
+    assert "```mermaid" not in render_markdown(worst(), rubric())
+    assert "```mermaid" not in render_markdown(
         worst(),
         rubric(),
         figures=Figures(graphs={"x": GraphFigure(scenario="x", nodes=(), topics=(), edges=())}),
@@ -284,7 +283,7 @@ def test_a_run_that_is_for_hidden_criteria_alone_is_not_drawn():
     lab = type(lab).model_validate({**lab.model_dump(by_alias=True), "scenarios": scenarios})
     shown = worst()
     assert {c.scenario for c in shown.criteria} == {None, "real"}
-    source = markdown_report(shown, lab, hidden=1, figures=figures())
+    source = render_markdown(shown, lab, hidden=1, figures=figures())
     assert "In `real`:" in source
     assert "`again`" not in source
 
@@ -294,7 +293,7 @@ def test_a_run_that_is_for_hidden_criteria_alone_is_not_drawn():
 def test_markdown_of_any_result_fits_into_a_comment(text, many):
     fields = dict.fromkeys(("title", "message", "expected", "measured", "hint", "reproduce"), text)
     criteria = tuple(criterion(f"c{i}", Status.FAIL, 0, 1, **fields) for i in range(many))
-    source = markdown_report(worst(criteria=criteria, overrides=()), rubric(), hidden=1, figures=figures())
+    source = render_markdown(worst(criteria=criteria, overrides=()), rubric(), hidden=1, figures=figures())
     assert len(source.encode()) <= BYTES_MAX
     assert source.startswith("# ")
     assert source.count("\n<details>\n") == source.count("\n</details>\n")
@@ -361,5 +360,5 @@ def test_the_worst_result_has_what_it_is_named_for():
 
 def test_the_docs_name_every_form_and_no_other():
     docs = (Path(__file__).parents[2] / "docs" / "how-to" / "reports.md").read_text(encoding="utf-8")
-    assert tuple(re.findall(r"^\| `([a-z][\w-]*)` \|", docs, re.MULTILINE)) == FORMS
+    assert tuple(re.findall(r"^\| `([a-z][\w-]*)` \|", docs, re.MULTILINE)) == tuple(FORMS)
     assert set(re.findall(r"--form (\S+)", docs)) <= set(FORMS)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import unicodedata
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -12,18 +14,13 @@ import pytest
 from rich.console import Console
 
 from grader.classes.gradebook import Book, Row, write_gradebook
-from grader.classes.gradebook.model import Form
+from grader.classes.gradebook.table import Form
 from grader.model.batch import Entry
 from grader.model.result import GradingResult
-from grader.report.annotations import github_annotations
-from grader.report.code_quality import code_quality
-from grader.report.gradescope import gradescope
-from grader.report.hidden import without_hidden
-from grader.report.junit import junit
-from grader.report.markdown import markdown_report
+from grader.report.forms import FORMS, Shown
 from grader.report.result_json import result_bytes
-from grader.report.sarif import sarif
 from grader.report.terminal import open_console, print_report
+from grader.report.view import without_hidden
 from tests.report.hostile import ESCAPES
 from tests.report.worst import COMMANDS, DOCS, FORMULA, LINKS, WIDE, figures, rubric, worst
 
@@ -45,7 +42,7 @@ def terminal(encoding: str, width: int = 80) -> bytes:
     return raw.getvalue()
 
 
-def gradebook(form: Form) -> bytes:
+def gradebook(kind: Form) -> bytes:
     shown = worst()
     criteria = tuple((c.id, c.title, c.max_points) for c in shown.criteria)
     book = Book(
@@ -55,23 +52,34 @@ def gradebook(form: Form) -> bytes:
     entry = Entry(id="ada", source="/home/ada", name=f"{FORMULA} {WIDE}", group=ESCAPES, extra=extra)
     with TemporaryDirectory() as folder:
         place = Path(folder, "book")
-        write_gradebook(book, [Row(entry=entry, result=shown)], place, form)
+        write_gradebook(book, [Row(entry=entry, result=shown)], place, kind)
         return place.read_bytes()
 
 
+def form(name: str) -> bytes:
+    """A form of the registry: as students see it where hidden criteria are left out of it."""
+    own = name in {"markdown", "classroom"}
+    about = Shown(
+        result=student() if own else worst(),
+        rubric=rubric(),
+        hidden=3 if own else 0,
+        prefix="" if name == "junit" else PREFIX,
+        docs=DOCS,
+        load_figures=figures,
+    )
+    return FORMS[name].render(about)
+
+
+OWN_TEST = {"terminal": "terminal.txt", "html": "html/golden/report.html"}
+"""Forms that are rendered below, or in a test of their own."""
 MADE = {
     "gradebook.csv": lambda: gradebook("csv"),
     "results.jsonl": lambda: gradebook("jsonl"),
-    "report.md": lambda: markdown_report(student(), rubric(), hidden=3, figures=figures()).encode(),
-    "junit.xml": lambda: junit(worst()),
     "result.json": lambda: result_bytes(worst()),
     "terminal.txt": lambda: terminal("utf-8"),
     "terminal-60.txt": lambda: terminal("utf-8", 60),
     "terminal-ascii.txt": lambda: terminal("ascii"),
-    "report.sarif": lambda: sarif(worst(), PREFIX, docs=DOCS).encode(),
-    "code-quality.json": lambda: code_quality(worst(), PREFIX).encode(),
-    "annotations.txt": lambda: github_annotations(worst(), PREFIX).encode(),
-    "gradescope.json": lambda: gradescope(worst(), rubric()).encode(),
+    **{each.file: partial(form, name) for name, each in FORMS.items() if name not in OWN_TEST},
 }
 
 
@@ -81,6 +89,12 @@ def test_report_is_as_kept(name):
     if os.environ.get("GRADER_REGENERATE"):
         kept.write_bytes(made)
     assert made.decode() == kept.read_bytes().decode()
+
+
+def test_every_form_is_in_the_documentation() -> None:
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "reports.md"
+    rows = re.findall(r"^\| `([a-z-]+)` \| (.*) \|$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    assert rows[1:] == [(each.name, each.purpose) for each in FORMS.values()]
 
 
 def test_no_golden_file_is_left_over():

@@ -7,12 +7,13 @@ from lxml import etree
 
 from grader.model.result import ErrorInfo
 from grader.model.verdict import Status
-from grader.report.junit import junit
-from tests.report.hostile import criterion, result
+from grader.report.junit import render_junit
+from tests.report.hostile import result
+from tests.support.a_class import criterion
 
 
 def test_one_case_a_criterion_with_its_outcome_and_points():
-    suite = etree.fromstring(junit(result())).find("testsuite")
+    suite = etree.fromstring(render_junit(result())).find("testsuite")
     outcomes = {case.get("name"): [child.tag for child in case][:-1] for case in suite.iter("testcase")}
     assert outcomes == {
         "manifest": [],
@@ -36,13 +37,13 @@ def test_one_case_a_criterion_with_its_outcome_and_points():
 @given(st.text(st.characters(codec="utf-8"), max_size=40), st.sampled_from(list(Status)))
 def test_any_text_is_well_formed(text, status):
     hostile = criterion("c", status, 0, 1, message=text, hint=text, measured=text, title=text)
-    root = etree.fromstring(junit(result(criteria=(hostile,))))
+    root = etree.fromstring(render_junit(result(criteria=(hostile,))))
     assert root.find("testsuite/testcase").get("name") == "c"
 
 
 @pytest.mark.parametrize("character", ["\x00", "\x1b", "\x0b", "\ufffe", "\uffff", "\U0001ffff", "]]>"])
 def test_what_xml_cannot_hold_is_written_out(character):
-    xml = junit(result(criteria=(criterion("c", Status.FAIL, 0, 1, message=f"a{character}b"),)))
+    xml = render_junit(result(criteria=(criterion("c", Status.FAIL, 0, 1, message=f"a{character}b"),)))
     message = etree.fromstring(xml).find("testsuite/testcase/failure").get("message")
     assert message.startswith("a")
     assert message.endswith("b")
@@ -53,6 +54,6 @@ def test_an_error_of_the_whole_grading_is_a_case_of_its_own():
     failed = result(
         criteria=(), status="error", error=ErrorInfo(kind="arena", message="no master", hint="try again")
     )
-    suite = etree.fromstring(junit(failed)).find("testsuite")
+    suite = etree.fromstring(render_junit(failed)).find("testsuite")
     assert suite.get("errors") == "1"
     assert suite.find("testcase/error").get("message") == "no master"

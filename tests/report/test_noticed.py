@@ -8,8 +8,8 @@ import json
 from lxml import etree
 
 from grader.model.result import Note
-from grader.report.junit import junit
-from grader.report.markdown import markdown_report
+from grader.report.junit import render_junit
+from grader.report.markdown import render_markdown
 from grader.report.result_json import result_bytes
 from grader.report.terminal import open_console, print_report
 from tests.report.hostile import result, rubric
@@ -34,13 +34,13 @@ def test_result_json_names_them_last_and_only_where_there_are_any():
 
 
 def test_markdown_has_a_section():
-    text = markdown_report(result(notes=NOTES), rubric())
+    text = render_markdown(result(notes=NOTES), rubric())
     assert (
         f"<summary>Noticed while it ran (2)</summary>\n\n{COSTS_NOTHING}\n\n- `real, talker.py`: asked the master"
         in text
     )
     assert "- `build`: had more than 400 processes (limited)" in text
-    assert "Noticed" not in markdown_report(result(), rubric())
+    assert "Noticed" not in render_markdown(result(), rubric())
 
 
 def test_the_terminal_has_a_section():
@@ -52,11 +52,11 @@ def test_the_terminal_has_a_section():
 
 
 def test_junit_has_it_as_output_of_the_suite():
-    suite = etree.fromstring(junit(result(notes=NOTES)))[0]
+    suite = etree.fromstring(render_junit(result(notes=NOTES)))[0]
     assert suite[-1].tag == "system-out"
     assert suite[-1].text.splitlines() == [
         f"Noticed while it ran. {COSTS_NOTHING}",
         "real, talker.py: asked the master to shut down (refused)",
         "build: had more than 400 processes (limited)",
     ]
-    assert etree.fromstring(junit(result())).find("testsuite/system-out") is None
+    assert etree.fromstring(render_junit(result())).find("testsuite/system-out") is None

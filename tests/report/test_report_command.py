@@ -15,9 +15,11 @@ from grader.cli.prefix import package_prefix
 from grader.model.result import RubricInfo
 from grader.model.verdict import FileCitation, Status
 from grader.report.files import write_reports
+from grader.report.forms import FORMS as REGISTRY
 from grader.results import READY
 from tests.batch.test_regrade import LAB, recorded
-from tests.report.hostile import criterion, result
+from tests.report.hostile import result
+from tests.support.a_class import criterion
 
 REPORTS = ("report.html", "report.md", "junit.xml")
 
@@ -137,6 +139,10 @@ FORMS = {
     "gradescope": "{",
     "classroom": "eyJ2ZXJzaW9uIjogMSwg",
 }
+
+
+def test_each_form_of_the_registry_is_tried():
+    assert set(FORMS) == set(REGISTRY)
 
 
 @pytest.mark.parametrize("form", FORMS)

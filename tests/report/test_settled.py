@@ -11,12 +11,13 @@ from lxml import etree
 
 from grader.model.result import AppliedOverride, Automatic, ErrorInfo, GradingResult, HandedIn, Lateness
 from grader.model.verdict import Status
-from grader.report.junit import junit
-from grader.report.markdown import markdown_report
+from grader.report.junit import render_junit
+from grader.report.markdown import render_markdown
 from grader.report.result_json import result_bytes
-from grader.report.settled import late_words
+from grader.report.sentences import late_words
 from grader.report.terminal import open_console, print_report
-from tests.report.hostile import criterion, result, rubric
+from tests.report.hostile import result, rubric
+from tests.support.a_class import criterion
 
 DEADLINE = datetime(2026, 11, 20, 23, 59, tzinfo=timezone(timedelta(hours=1)))
 DEADLINE_WORDS = "deadline 2026-11-20 23:59 UTC+01:00 with 1 day of extension"
@@ -67,7 +68,7 @@ def terminal(shown: GradingResult) -> str:
 def test_words_of_being_late():
     assert late_words(settled()) == (
         "87.5 of 100 points before, 70 after: 2 days late (begun days count): 20 % of 87.5 points reached are lost",
-        f"Handed in 2026-11-22 09:00:07 UTC+01:00 (the commit's date), {DEADLINE_WORDS}",
+        f"Submitted 2026-11-22 09:00:07 UTC+01:00 (the commit's date), {DEADLINE_WORDS}",
         "The last commit on main counts",
     )
 
@@ -79,7 +80,7 @@ def test_words_of_being_late():
         ({"late": None, "handed_in": HandedIn(note="the folder as it is")}, ("The folder as it is",)),
         (
             {"late": None, "handed_in": HandedIn(at=DEADLINE, by="roster")},
-            ("Handed in 2026-11-20 23:59 UTC+01:00 (as the roster says)",),
+            ("Submitted 2026-11-20 23:59 UTC+01:00 (as the roster says)",),
         ),
         (
             {"late": Lateness(deadline=DEADLINE, points_before=70, points=70, text="in time")},
@@ -92,7 +93,7 @@ def test_words_where_nothing_was_lost(changes, words):
 
 
 def test_markdown_says_it_below_the_points():
-    text = markdown_report(settled(), rubric())
+    text = render_markdown(settled(), rubric())
     assert text.startswith("# 70 of 100 points\n\n87.5 of 100 points before, 70 after: 2 days late")
     assert "\n\nThe last commit on main counts\n\n" in text
     section = text[text.index("## Decided by a person") : text.index("## What was lost")]
@@ -118,7 +119,7 @@ def test_the_terminal_says_it_below_the_points():
 
 
 def test_junit_has_it_as_properties_and_in_the_output():
-    suite = etree.fromstring(junit(settled()))[0]
+    suite = etree.fromstring(render_junit(settled()))[0]
     values = {p.get("name"): p.get("value") for p in suite.iterfind("properties/property")}
     assert (values["points"], values["points_before"], values["late"]) == ("70", "87.5", LATE.text)
     style, rate, build = [
@@ -132,7 +133,7 @@ def test_junit_has_it_as_properties_and_in_the_output():
 
 
 def test_nothing_of_it_where_nobody_decided():
-    for text in (markdown_report(result(), rubric()), terminal(result()), junit(result()).decode()):
+    for text in (render_markdown(result(), rubric()), terminal(result()), render_junit(result()).decode()):
         assert "ecided" not in text
         assert "late" not in text
 
@@ -149,13 +150,13 @@ def test_a_long_comment_stays_whole_in_a_result_of_many_criteria():
 
 def test_a_hint_is_no_advice_where_a_person_has_decided():
     right = CRITERIA[1].model_copy(update={"status": Status.PASS, "points": 10})
-    assert "sleep less" not in markdown_report(settled(criteria=(CRITERIA[0], right, CRITERIA[2])), rubric())
+    assert "sleep less" not in render_markdown(settled(criteria=(CRITERIA[0], right, CRITERIA[2])), rubric())
 
 
 def test_what_a_person_graded_in_the_graders_place_is_graded():
     error = ErrorInfo(kind="submission", message="no package in it", hint="hand in a package")
-    text = markdown_report(settled(error=error), rubric())
+    text = render_markdown(settled(error=error), rubric())
     assert text.startswith("# 70 of 100 points\n")
     assert "It could not be graded automatically:\n\nno package in it\n\nhand in a package\n" in text
     assert "## What was lost" in text
-    assert markdown_report(settled(error=error, status="error"), rubric()).startswith("# Not graded\n")
+    assert render_markdown(settled(error=error, status="error"), rubric()).startswith("# Not graded\n")

@@ -15,10 +15,10 @@ from grader.integrations.deliver import gradescope
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
 from grader.report.class_page.page import write_class_page
-from grader.report.html.report import html_report
-from grader.report.markdown import markdown_report
+from grader.report.html.page import render_html
+from grader.report.markdown import render_markdown
+from grader.report.sentences import without_sandbox
 from grader.report.terminal import open_console, print_report
-from grader.report.unwalled import without_sandbox
 from grader.rubric.load import LoadedRubric
 from tests.report.class_page.made_up import made_up_rows, made_up_run
 from tests.report.hostile import ESCAPES, result, rubric
@@ -66,12 +66,12 @@ def test_the_sentence_is_made_of_what_the_result_says(said: str, sentence: str) 
     assert without_sandbox(said) == sentence
 
 
-@pytest.mark.parametrize("shown", [markdown_report, html_report, None], ids=["markdown", "html", "terminal"])
+@pytest.mark.parametrize("shown", [render_markdown, render_html, None], ids=["markdown", "html", "terminal"])
 def test_reports_say_it_before_anything_that_was_lost(shown) -> None:
     def text(of: GradingResult) -> str:
         if shown is None:
             return terminal(of)
-        more = () if shown is markdown_report else (Figures(),)
+        more = () if shown is render_markdown else (Figures(),)
         return shown(of, rubric(), *more).replace("&#39;", "'").replace("\\", "")
 
     lost = re.compile('What was lost|<h2 id="lost"|Lost ')
@@ -83,10 +83,10 @@ def test_reports_say_it_before_anything_that_was_lost(shown) -> None:
 
 def test_what_a_result_says_of_its_sandbox_is_shown_and_not_obeyed() -> None:
     hostile = graded(label(f"<b>{ESCAPES}</b>"))
-    page = html_report(hostile, rubric(), Figures())
+    page = render_html(hostile, rubric(), Figures())
     assert 'id="unwalled"' in page
     assert "<b>" not in page
-    assert "\x1b" not in page + markdown_report(hostile, rubric()) + terminal(hostile)
+    assert "\x1b" not in page + render_markdown(hostile, rubric()) + terminal(hostile)
 
 
 def test_the_page_of_a_class_says_how_many(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from grader.model.result import AppliedOverride, Automatic, GradingResult, Laten
 from grader.model.verdict import FileCitation, Status
 from grader.rubric.model import Rubric
 from tests.report import hostile
-from tests.report.hostile import criterion
+from tests.support.a_class import criterion
 
 SCRIPT = "</script><script>alert(1)</script> <!-- --> </details></summary> <img src=x onerror=alert(1)>"
 COMMANDS = "::error file=a,line=1::owned ##[error]x ##vso[task.complete] ##teamcity[y] %0A::stop-commands::t"

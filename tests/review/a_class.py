@@ -17,21 +17,13 @@ from grader.classes.batch.folder import BatchFolder, write_run
 from grader.evidence.reader import load_evidence
 from grader.intake import safe_name
 from grader.judging import judge
-from grader.judging.summary import overall_status, total_points
 from grader.model.batch import BatchRun, Entry, RosterFault
-from grader.model.result import (
-    CriterionResult,
-    EnvironmentInfo,
-    ErrorInfo,
-    GradingResult,
-    RubricInfo,
-    SubmissionInfo,
-    TimingInfo,
-)
+from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.figures import figures_of
 from grader.report.files import write_reports
 from grader.rubric.load import LoadedRubric, load_rubric
+from tests.support.a_class import judged_result
 
 ROOT = Path(__file__).parent.parent.parent
 LAB = ROOT / "rubrics" / "leeds-comp3631-lab1.yaml"
@@ -142,19 +134,7 @@ def _write(folder: Path, who: Who, rubric: LoadedRubric, judged: tuple[Criterion
     if who.error:
         lost = {"status": Status.ERROR, "points": 0.0, "message": "not judged", "measured": ""}
         found = tuple(c.model_copy(update=lost) for c in found)
-    result = GradingResult(
-        submission=SubmissionInfo(
-            id=safe_name(who.id), source="/gone", commit=None, digest="0", package="lab1"
-        ),
-        rubric=RubricInfo(id=rubric.rubric.id, version=rubric.rubric.version, digest=rubric.digest),
-        status="error" if who.error else overall_status(found),
-        points=total_points(rubric.rubric, found),
-        max_points=rubric.rubric.max_points,
-        criteria=found,
-        environment=EnvironmentInfo(grader=__version__, ros="", python="", sandbox=""),
-        timing=TimingInfo(wall_s=12.5, cpu_s=1.0, student_cpu_s=1.0),
-        error=ErrorInfo(kind="submission", message=who.error, hint="hand it in again") if who.error else None,
-    )
+    result = judged_result(safe_name(who.id), rubric, found, source="/gone", wall_s=12.5, error=who.error)
     runs = load_evidence([folder / "evidence"]) if who.evidence else {}
     figures = figures_of(rubric.rubric, runs, found)
     write_reports(result, folder, console="", rubric=rubric.rubric, figures=figures, docs=rubric.docs)

@@ -1,4 +1,4 @@
-"""A class, its desk, and a browser that has come in with the token."""
+"""A class, its review, and a browser that has come in with the token."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from flask import Flask
 from flask.testing import FlaskClient
 
 from grader.classes.review.app import create_app
-from grader.classes.review.follower import Pace
-from grader.classes.review.session import Desk, open_desk
+from grader.classes.review.background import Pace
+from grader.classes.review.session import ReviewSession, open_session
 from tests.review.a_class import a_class
 
 PORT = 8123
@@ -35,17 +35,17 @@ def out(made_class, tmp_path) -> Path:
 
 
 @pytest.fixture
-def desk(out) -> Iterator[Desk]:
-    """Its desk, which follows at once."""
-    desk = open_desk(out, QUICK)
-    desk.start()
-    yield desk
-    desk.close()
+def review(out) -> Iterator[ReviewSession]:
+    """Its review, which follows at once."""
+    review = open_session(out, QUICK)
+    review.start()
+    yield review
+    review.close()
 
 
 @pytest.fixture
-def app(desk) -> Flask:
-    return create_app(desk, port=PORT, token=TOKEN, author="A. Miller")
+def app(review) -> Flask:
+    return create_app(review, port=PORT, token=TOKEN, author="A. Miller")
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ from datetime import datetime
 import pytest
 
 from grader.classes.batch.flow import alone
-from grader.classes.review.follower import Pace
-from grader.classes.review.session import open_desk
+from grader.classes.review.background import Pace
+from grader.classes.review.session import open_session
 from grader.model.result import Override
 from tests.review.a_class import overrides_of, points_of, result_of
 from tests.review.conftest import QUICK
@@ -34,12 +34,12 @@ def test_points_of_a_manual_criterion_are_saved_at_once(page, out) -> None:
     assert points_of(out, "ada", "style") == 7.5
 
 
-def test_reports_follow_at_once_and_the_books_soon(page, out, desk) -> None:
+def test_reports_follow_at_once_and_the_books_soon(page, out, review) -> None:
     before = result_of(out, "ada").points
     page.save("ada", "style", points="10", comment="")
     assert result_of(out, "ada").points == before + 10
     assert "A. Miller" in (out / "ada" / "report.md").read_text()
-    assert desk.follower.wait(WAIT_S)
+    assert review.background.wait(WAIT_S)
     with (out / "gradebook.csv").open(encoding="utf-8-sig", newline="") as file:
         rows = {row["id"]: row for row in csv.DictReader(file)}
     assert float(rows["ada"]["points"]) == before + 10
@@ -172,13 +172,13 @@ def test_comments_in_the_file_stay(page, out) -> None:
     assert "# after talking to her" in text
 
 
-def test_what_was_decided_by_hand_meanwhile_is_settled_when_the_review_begins(out, app, desk) -> None:
-    desk.close()
+def test_what_was_decided_by_hand_meanwhile_is_settled_when_the_review_begins(out, app, review) -> None:
+    review.close()
     (out / "overrides.yaml").write_text("ada:\n  style: {points: 2}\n")
 
-    again = open_desk(out, QUICK)
+    again = open_session(out, QUICK)
     again.start()
-    assert again.follower.wait(WAIT_S)
+    assert again.background.wait(WAIT_S)
     again.close()
     assert points_of(out, "ada", "style") == 2
 
@@ -197,8 +197,8 @@ def test_what_is_not_graded_yet_keeps_its_points_for_later(page, out) -> None:
     assert not (out / "gus").exists()
 
 
-def test_while_a_batch_works_decisions_are_kept_and_applied_when_it_has_ended(page, out, desk) -> None:
-    assert desk.follower.wait(WAIT_S)
+def test_while_a_batch_works_decisions_are_kept_and_applied_when_it_has_ended(page, out, review) -> None:
+    assert review.background.wait(WAIT_S)
     form = page.form("ada", "style")
     with alone(out):
         answer = page.send("ada", "style", form, script=True, points="6")
@@ -206,27 +206,27 @@ def test_while_a_batch_works_decisions_are_kept_and_applied_when_it_has_ended(pa
         assert overrides_of(out)["ada"]["style"]["points"] == 6
         assert points_of(out, "ada", "style") == 0
         assert "6 of 10" in page.text("/s/ada/")
-    assert desk.follower.wait(WAIT_S)
+    assert review.background.wait(WAIT_S)
     assert points_of(out, "ada", "style") == 6
 
 
 def test_closing_writes_what_is_left(out) -> None:
 
-    desk = open_desk(out, Pace(quiet_s=3600, latest_s=3600))
-    desk.start()
-    item = desk.submissions.item("ada")
+    review = open_session(out, Pace(quiet_s=3600, latest_s=3600))
+    review.start()
+    item = review.submissions.item("ada")
     assert item is not None
 
-    desk.save(item, "style", Override(points=3), "")
+    review.save(item, "style", Override(points=3), "")
     before = (out / "gradebook.csv").read_bytes()
-    assert desk.close()
+    assert review.close()
     assert (out / "gradebook.csv").read_bytes() != before
 
 
-def test_the_batchs_own_times_stay(page, out, desk) -> None:
+def test_the_batchs_own_times_stay(page, out, review) -> None:
     before = json.loads((out / "run.json").read_text())
     page.save("ada", "style", points="3")
-    assert desk.follower.wait(WAIT_S)
+    assert review.background.wait(WAIT_S)
     after = json.loads((out / "run.json").read_text())
     assert after["ended_at"] == before["ended_at"]
     assert after["state"] == "complete"
@@ -246,21 +246,21 @@ def test_a_review_beside_a_batch_that_is_ended_without_a_decision_leaves_nothing
     run = json.loads((out / "run.json").read_text())
     (out / "run.json").write_text(json.dumps(run | {"state": "running"}))
     (out / "gradebook.csv").unlink()
-    desk = open_desk(out, QUICK)
+    review = open_session(out, QUICK)
     with alone(out):
-        assert desk.batch_runs()
-        desk.start()
-        assert desk.close()
-    assert not desk.batch_runs()
+        assert review.batch_runs()
+        review.start()
+        assert review.close()
+    assert not review.batch_runs()
 
 
-def test_who_changes_their_mind_quickly_gets_the_last_of_it(page, out, desk) -> None:
+def test_who_changes_their_mind_quickly_gets_the_last_of_it(page, out, review) -> None:
     form = page.form("ada", "style")
     for points in range(1, 11):
         answer = page.send("ada", "style", form, script=True, points=str(points))
         assert answer.status_code == 200
         form["seen"] = answer.json["seen"]
-    assert desk.follower.wait(WAIT_S)
+    assert review.background.wait(WAIT_S)
     assert overrides_of(out)["ada"]["style"]["points"] == 10
     assert points_of(out, "ada", "style") == 10
     assert ",10," in (out / "gradebook.csv").read_text()

@@ -211,7 +211,7 @@ def test_other_reports_are_plain_text(page) -> None:
         assert page.client.get(f"/s/ada/report/{name}").headers["Content-Type"] == "text/plain; charset=utf-8"
 
 
-def test_no_log_says_the_token(page, caplog, capfd, desk, monkeypatch) -> None:
+def test_no_log_says_the_token(page, caplog, capfd, review, monkeypatch) -> None:
     caplog.set_level(logging.DEBUG)
     page.client.get(f"/?token={TOKEN}x")
     page.client.get(f"/?token={TOKEN}")
@@ -219,7 +219,7 @@ def test_no_log_says_the_token(page, caplog, capfd, desk, monkeypatch) -> None:
     def broken() -> None:
         raise RuntimeError("broken")
 
-    monkeypatch.setattr(desk.submissions, "items", broken)
+    monkeypatch.setattr(review.submissions, "items", broken)
     assert page.client.get(f"/?show=all&token={TOKEN}", follow_redirects=True).status_code == 500
     said = caplog.text + "".join(capfd.readouterr())
     assert "broken" in said

@@ -7,11 +7,11 @@ import re
 
 import pytest
 
-from grader.classes.overrides import write_override
+from grader.classes.overrides.write import write_override
 from grader.classes.review.app import create_app
-from grader.classes.review.form import author_of
-from grader.classes.review.navigation import place_of
-from grader.classes.review.session import open_desk
+from grader.classes.review.cards import author_of
+from grader.classes.review.session import open_session
+from grader.classes.review.submissions import place_of
 from grader.model.batch import RosterFault
 from grader.model.result import Override
 from tests.review.a_class import INCONCLUSIVE, Who, a_class, overrides_of, result_of
@@ -91,9 +91,9 @@ def test_hostile_names_stay_text(tmp_path) -> None:
     )
     faults = (RosterFault(where="roster.csv:9", id="../fault", text=HOSTILE),)
     out = a_class(tmp_path / "out", whos, faults)
-    desk = open_desk(out, QUICK)
-    desk.start()
-    page = Page(create_app(desk, port=PORT, token=TOKEN, author=author_of(HOSTILE)))
+    review = open_session(out, QUICK)
+    review.start()
+    page = Page(create_app(review, port=PORT, token=TOKEN, author=author_of(HOSTILE)))
     keys = rows(page.text("/"))
     assert len(keys) == 3
     for path in ["/", *(f"/s/{key}/" for key in keys), f"/?q={HOSTILE[:20]}"]:
@@ -104,7 +104,7 @@ def test_hostile_names_stay_text(tmp_path) -> None:
     for key in keys:
         assert re.fullmatch(r"[\w.-]+", key)
         assert page.save(key, "style", points="2", comment=HOSTILE).status_code == 303
-    assert desk.close()
+    assert review.close()
     assert set(overrides_of(out)) == {HOSTILE, "a b/../../c?d#e%2f", "../fault"}
     assert not (tmp_path / "fault").exists()
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 
-from grader.classes.overrides import write_override
+from grader.classes.overrides.write import write_override
 from grader.classes.review.app import create_app
-from grader.classes.review.session import open_desk
+from grader.classes.review.session import open_session
 from grader.model.result import Override
 from tests.review.a_class import overrides_of
 from tests.review.conftest import PORT, QUICK, TOKEN, Page
@@ -93,7 +93,7 @@ def test_of_many_at_once_one_wins_and_all_others_are_told(app, out) -> None:
 
 def test_two_reviews_of_one_class_do_not_lose_anything(page, out) -> None:
 
-    second = open_desk(out, QUICK)
+    second = open_session(out, QUICK)
     second.start()
     other = Page(create_app(second, port=PORT, token=TOKEN, author="Kim"))
     mine, theirs = page.form("ada", "style"), other.form("ada", "style")

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.roster import read_roster
-from grader.classes.roster.platforms import Named, platform_name
+from grader.classes.roster.folder import Named, platform_name
 from grader.errors import UsageError
 from grader.model.batch import RosterFault
 from tests.roster.helpers import ids, said
@@ -109,7 +109,7 @@ def test_canvas_one_archive_among_the_files_of_a_student(tmp_path: Path) -> None
             id="x-7",
             text="not the only one of this student, there is x_7_9_b.zip: leave one there",
         ),
-        RosterFault(where="z_10_link.html", id="z-10", text="only text or a link was handed in"),
+        RosterFault(where="z_10_link.html", id="z-10", text="only text or a link was submitted"),
         RosterFault(where="z_9_1_talker.py", id="z-9", text="neither a folder nor an archive"),
     )
 
@@ -134,7 +134,7 @@ def test_moodle_folders(tmp_path: Path) -> None:
         ("Participant-15", "Participant 15", f"{tmp_path}/Participant_15_assignsubmission_file/lab1.tar.gz"),
     ]
     assert [entry.extra["Moodle id"] for entry in roster.entries] == ["12", "13", "14", "15"]
-    assert said(roster) == ["Dan_16_assignsubmission_onlinetext: only text or a link was handed in"]
+    assert said(roster) == ["Dan_16_assignsubmission_onlinetext: only text or a link was submitted"]
     assert roster.faults[0].id == "Dan-16"
 
 

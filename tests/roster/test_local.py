@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from grader.classes.roster import Local, read_roster, sources
-from grader.classes.roster import local as local_module
-from grader.classes.roster.local import OUT, REFUSED
+from grader.classes.roster import sources as local_module
+from grader.classes.roster.sources import OUT, REFUSED
 from grader.errors import UsageError
 from grader.intake.source import parse_source
 from tests.roster.helpers import ids, read, said

@@ -7,7 +7,7 @@ from datetime import datetime, timedelta, timezone
 
 import pytest
 
-from grader.classes.roster.times import parse_days, parse_time, time_fault
+from grader.classes.roster.entries import parse_days, parse_time, time_fault
 
 UTC = timezone.utc
 

@@ -30,7 +30,7 @@ from grader.model.batch import MISSING, BatchRun, Counts, CriterionInfo, Entry, 
 from grader.model.result import RubricInfo
 from grader.model.submission import SandboxMode
 from grader.pipeline import GradeOptions, prepare
-from grader.report.class_page import write_class_page
+from grader.report.class_page.page import write_class_page
 from grader.results import finish_killed
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric

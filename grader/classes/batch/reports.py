@@ -13,12 +13,10 @@ from grader.classes.batch.pool import side_by_side, workers, working
 from grader.classes.batch.settled import figures_in
 from grader.errors import EvidenceError, GraderError, UsageError
 from grader.files import new_file, unwritable
-from grader.model.figure import Figures
 from grader.model.result import GradingResult
-from grader.report.html import html_report
-from grader.report.junit import junit
-from grader.report.markdown import markdown_report
-from grader.report.summary import missing_hidden
+from grader.report.files import render_files
+from grader.report.forms import Shown
+from grader.report.sentences import missing_hidden
 from grader.results import RESULT, Results, read_result
 from grader.rubric.load import LoadedRubric
 
@@ -56,7 +54,14 @@ def write_one(folder: Path, rubric: LoadedRubric) -> GradingResult:
     result_in(folder, rubric)  # before anything is made there
     with Results(folder) as results:
         result = result_in(folder, rubric)
-        made = _files(result, rubric, figures_in(folder, result, rubric.rubric))
+        shown = Shown(
+            result=result,
+            rubric=rubric.rubric,
+            hidden=missing_hidden(result, rubric.rubric),
+            docs=rubric.docs,
+            load_figures=lambda: figures_in(folder, result, rubric.rubric),
+        )
+        made = render_files(shown)
         try:
             for name, data in made.items():
                 with new_file(results.new / name) as file:
@@ -83,17 +88,6 @@ def result_in(folder: Path, rubric: LoadedRubric | None = None) -> GradingResult
         message = f"{folder}: a result of {result.rubric.id}, not of {rubric.rubric.id}"
         raise UsageError(message, hint="give the rubric that it was graded by with --rubric")
     return result
-
-
-def _files(result: GradingResult, rubric: LoadedRubric, figures: Figures | None) -> dict[str, bytes]:
-    hidden = missing_hidden(result, rubric.rubric)
-    page = html_report(result, rubric.rubric, figures or Figures(), hidden=hidden, docs=rubric.docs)
-    text = markdown_report(result, rubric.rubric, hidden=hidden, figures=figures)
-    return {
-        "report.html": page.encode("utf-8", "backslashreplace"),
-        "report.md": text.encode(),
-        "junit.xml": junit(result),
-    }
 
 
 def _written(rubric: LoadedRubric, folder: Path) -> Written:

@@ -183,7 +183,7 @@ def _by_commit(found: Found, branch: str, limit: Limit, submitted: datetime | No
     at = _beside(found.commit.at, limit.at)
     text = f"commit {found.commit.hash[:7]} of {at} is the last one on {printable(branch)} before {limit}"
     if submitted is not None:
-        text += f"; the roster says that it was handed in later, {shown(submitted)}"
+        text += f"; the roster says that it was submitted later, {shown(submitted)}"
     return f"{text}{_later_ones(found.later)}; {BY_COMMIT}"
 
 
@@ -193,12 +193,12 @@ def _by_roster(
     before = f", before {limit}" if limit else ""
     if found is None:
         return (
-            f"{tip} is the last one on {printable(branch)}; the roster says that it was handed in {shown(submitted)}"
+            f"{tip} is the last one on {printable(branch)}; the roster says that it was submitted {shown(submitted)}"
             f"{before}, and all commits are dated later than that: its author's clock may be wrong"
         )
     at = _beside(found.commit.at, submitted)
     return (
-        f"commit {found.commit.hash[:7]} of {at} is the last one on {printable(branch)} when it was handed in, "
+        f"commit {found.commit.hash[:7]} of {at} is the last one on {printable(branch)} when it was submitted, "
         f"{shown(submitted)} as the roster says{before}{_later_ones(found.later)}"
     )
 

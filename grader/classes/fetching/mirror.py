@@ -1,17 +1,27 @@
-"""A repository's heads and tags in a bare repository of our own, which knows no address and no settings but ours."""
+"""A repository's heads and tags in a bare repository of our own, which knows no address and no settings but ours.
+
+`bring_up_to_date` fetches it once for all who need it; what the network fails at is tried again with `Patience`.
+"""
 
 from __future__ import annotations
 
 import os
+import random
 import re
 import shutil
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
+from grader.classes.fetching.cache import Failure, Place, State, name_of
 from grader.classes.fetching.history import Commit, read_commit
-from grader.intake.git import Git, GitFailed, Repository
+from grader.errors import SubmissionError
+from grader.intake.credentials import split_address
+from grader.intake.explain import explained, may_pass
+from grader.intake.git import Git, GitFailed, GitTimeout, Repository
 from grader.intake.refs import Wanted, parse_refs
 from grader.intake.repository import ask
 from grader.intake.source import Source
@@ -163,3 +173,133 @@ def _is_unknown(failure: GitFailed) -> bool:
         "upload-pack",
     )
     return any(sign in failure.stderr.lower() for sign in signs)
+
+
+GIT_TIMEOUT_S = 120.0
+"""For everything that git does in one try."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Errand:
+    """What to bring here. What was fetched after `since` (seconds since 1970) need not be fetched again."""
+
+    source: Source
+    since: float
+    patience: Patience
+
+
+def bring_up_to_date(place: Place, errand: Errand, room: Path) -> tuple[Mirror, Listing]:
+    """The mirror in `place`, as the server has it now, or had it after `errand.since`.
+
+    Raises GivenUp, or GitFailed where the mirror may be damaged as well.
+    """
+    state = place.state()
+    mirror = Mirror(source=errand.source, path=place.mirror, room=room, git=git_in(room))
+    if state is not None and errand.since <= state.fetched_at <= time.time() + 1:
+        place.used()
+        return mirror, Listing(state.listing)
+    if (failure := place.failure()) and errand.since <= failure.at <= time.time() + 1:
+        kind = GitTimeout if failure.timeout else GitFailed
+        raise GivenUp(kind(failure.said), failure.tries)
+    if state is None:
+        place.clear()
+
+    def ask() -> tuple[Mirror, Listing, float]:
+        fresh = replace(mirror, git=git_in(room))
+        asked_at = time.time()
+        listing = _listing(fresh)
+        if listing.refs and (state is None or listing.text != state.listing):
+            place.incomplete()
+            fresh.fetch(listing)
+        return fresh, listing, asked_at
+
+    try:
+        asked, listing, asked_at = patiently(ask, errand.patience)
+    except GivenUp as problem:
+        if may_pass(problem.failure):
+            place.failed(_without_address(problem, errand.source))
+        raise
+    if listing.refs:
+        place.complete(State(fetched_at=asked_at, listing=listing.text))
+    return asked, listing
+
+
+def _without_address(problem: GivenUp, source: Source) -> Failure:
+    """For the cache, in which no address is written down."""
+    said = problem.failure.stderr.replace(split_address(source.url)[0], "…") if source.remote else ""
+    timeout = isinstance(problem.failure, GitTimeout)
+    return Failure(at=time.time(), said=said, tries=problem.tries, timeout=timeout)
+
+
+def _listing(mirror: Mirror) -> Listing:
+    """Raises GivenUp where asking again does not help: that is no fault of the mirror's."""
+    try:
+        return mirror.listing()
+    except GitFailed as failure:
+        if may_pass(failure):
+            raise
+        raise GivenUp(failure, 1) from None
+
+
+def git_in(room: Path) -> Git:
+    """git with all its time before it."""
+    return Git(room / "git-home", timeout_s=GIT_TIMEOUT_S)
+
+
+def place_name(source: Source) -> str:
+    """The name of the mirror for a remote source."""
+    return name_of(split_address(source.url)[0])
+
+
+Answer = TypeVar("Answer")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Patience:
+    """How often something is tried, and how long it waits before: `wait_s`, then `growth` times as long each time.
+
+    Each wait is up to half longer or shorter, so that a class does not come back to its server all at once.
+    """
+
+    tries: int = 3
+    wait_s: float = 1.0
+    growth: float = 4.0
+    sleep: Callable[[float], None] = time.sleep
+    chance: Callable[[], float] = random.random
+
+    def wait(self, failed: int) -> None:
+        """After that many failures."""
+        self.sleep(self.wait_s * self.growth ** (failed - 1) * (0.5 + self.chance()))
+
+
+class GivenUp(Exception):
+    """What may pass did not, as often as it was tried."""
+
+    def __init__(self, failure: GitFailed, tries: int) -> None:
+        super().__init__(failure.stderr)
+        self.failure = failure
+        self.tries = tries
+
+
+def patiently(ask: Callable[[], Answer], patience: Patience) -> Answer:
+    """The answer of `ask`. Raises GivenUp, or the GitFailed that no waiting would help."""
+    failed = 0
+    while True:
+        try:
+            return ask()
+        except GitFailed as failure:
+            failed += 1
+            if not may_pass(failure):
+                raise
+            if failed >= patience.tries:
+                raise GivenUp(failure, failed) from None
+        patience.wait(failed)
+
+
+def error_of(problem: GitFailed | GivenUp, source: Source) -> SubmissionError:
+    """The error to raise, which says how often it was tried."""
+    if isinstance(problem, GitFailed):
+        return explained(problem, source)
+    error = explained(problem.failure, source)
+    again = f" (tried {problem.tries} times)" if problem.tries > 1 else ""
+    return type(error)(f"{error.message}{again}", hint=error.hint)

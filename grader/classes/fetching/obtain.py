@@ -12,9 +12,18 @@ from pathlib import Path
 
 from grader.classes.fetching.cache import Place, cache_folder, locked, tidy_now_and_then
 from grader.classes.fetching.history import Commit, NothingInTime, Rule, choose, not_chosen
-from grader.classes.fetching.mirror import Listing, Mirror
-from grader.classes.fetching.retry import GivenUp, Patience, error_of, patiently
-from grader.classes.fetching.update import Errand, bring_up_to_date, git_in, place_name
+from grader.classes.fetching.mirror import (
+    Errand,
+    GivenUp,
+    Listing,
+    Mirror,
+    Patience,
+    bring_up_to_date,
+    error_of,
+    git_in,
+    patiently,
+    place_name,
+)
 from grader.errors import OutputError, SubmissionError
 from grader.intake import unreadable
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
@@ -207,7 +216,7 @@ def _chosen(
             )
         except NothingInTime as error:
             if mirror.is_cut_off():
-                error.hint += " Its history is cut off (a shallow clone): hand in a whole one."
+                error.hint += " Its history is cut off (a shallow clone): submit a full one."
             raise
     if task.uncommitted:
         note = f"{handed_in.note}; changes that are not committed do not count"

@@ -1,16 +1,49 @@
-"""The rows of the plain gradebook: one a submission, the same in CSV and in a workbook."""
+"""The plain gradebook as rows and cells, the same in CSV and in a workbook. No text in it is a formula."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import csv
+import io
+import re
+from collections.abc import Iterator, Sequence
+from decimal import Decimal
+from typing import Literal, NamedTuple
 
-from grader.classes.gradebook.cells import Cell
-from grader.classes.gradebook.model import Book, Row
+from grader.model.batch import Entry
+from grader.model.record import Record
 from grader.model.result import AppliedOverride, GradingResult
+from grader.report.text import csv_cell
+from grader.untrusted_text import line
+
+Form = Literal["csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"]
+FORMS: tuple[Form, ...] = ("csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard")
+
+
+class Row(Record):
+    """One submission of the roster and its result."""
+
+    entry: Entry
+    result: GradingResult
+
+
+class BookCriterion(NamedTuple):
+    id: str
+    title: str
+    max_points: float
+
+
+class Book(Record):
+    """What all rows share: the rubric's `title` and criteria, and the names of the roster's further columns."""
+
+    title: str
+    rubric_id: str
+    max_points: float
+    criteria: tuple[BookCriterion, ...] = ()
+    columns: tuple[str, ...] = ()
+
 
 BEFORE = ("id", "name", "group", "status", "points", "max_points", "points_before_late", "late")
 AFTER = ("comment", "error")
-"""Of a criterion that has no points yet: a person has to look."""
 
 
 def header(book: Book) -> tuple[str, ...]:
@@ -76,3 +109,43 @@ def _free(name: str, kind: str, taken: set[str]) -> str:
         number += 1
     taken.add(free.casefold())
     return free
+
+
+CELL_CHARS = 10_000
+"""What a cell holds of a longer text; a workbook's may have 32,767 characters."""
+Cell = str | float | None
+
+_NUMBER = re.compile(r"[+-]?\d{1,15}([.,]\d{1,15})?|-", re.ASCII)
+"""A number, or the dash that stands for none."""
+_JOINERS = ("\u200c", "\u200d")
+"""Letters of Persian, Hindi and others need them between them, and nothing is hidden by them."""
+
+
+def number_text(value: float) -> str:
+    """`87.5`, `100`: as every platform reads it."""
+    return format(Decimal(repr(float(value))).normalize(), "f")
+
+
+def visible_text(text: str) -> str:
+    """One visible line. Where letters need joiners between them, those stay."""
+    return _joined(line(text, CELL_CHARS))
+
+
+def harmless(cells: Sequence[Cell]) -> list[str]:
+    """Return one row as text that no spreadsheet takes for a formula. A number stays as it is written, in text too."""
+    texts = [number_text(cell) if isinstance(cell, int | float) else cell or "" for cell in cells]
+    return [text if _NUMBER.fullmatch(text) else _joined(csv_cell(text)) for text in texts]
+
+
+def csv_line(cells: Sequence[Cell], *, quoted: bool = False) -> str:
+    """One row of CSV with its line end, made harmless. With `quoted`, every field is in quotation marks."""
+    out = io.StringIO()
+    writer = csv.writer(out, quoting=csv.QUOTE_ALL if quoted else csv.QUOTE_MINIMAL, lineterminator="\r\n")
+    writer.writerow(harmless(cells))
+    return out.getvalue()
+
+
+def _joined(text: str) -> str:
+    for joiner in _JOINERS:
+        text = text.replace(f"\\u{ord(joiner):04x}", joiner)
+    return text

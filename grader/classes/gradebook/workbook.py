@@ -11,11 +11,9 @@ from xlsxwriter.exceptions import XlsxWriterException
 from xlsxwriter.format import Format
 from xlsxwriter.worksheet import Worksheet
 
-from grader.classes.gradebook.cells import Cell, visible_text
-from grader.classes.gradebook.model import Book, Row
-from grader.classes.gradebook.table import cells, header
-from grader.classes.gradebook.whole import whole_file
+from grader.classes.gradebook.table import Book, Cell, Row, cells, header, visible_text
 from grader.errors import OutputError
+from grader.files import whole_file
 
 WIDTH_MIN, WIDTH_MAX, WIDTH_TEXT = 8, 40, 24
 OPTIONS = {

@@ -1,17 +1,23 @@
-"""One override written into `overrides.yaml`; all else of the file stays as it was written."""
+"""One override written into `overrides.yaml`; everything else in the file stays as it was written.
+
+The text is changed in place by cutting and inserting pieces (`Splice`): writing parsed YAML again would lose comments.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from copy import deepcopy
+from decimal import Decimal
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from grader.classes.overrides.edit import Fields, edited
-from grader.classes.overrides.read import FORM, SCHEMA_KEY, folder_key
+import yaml
+
+from grader.classes.overrides import FORM, SCHEMA, SCHEMA_KEY, folder_key
 from grader.errors import Busy, RubricError, UsageError
 from grader.files import atomic_write, lock, open_lock, unwritable
 from grader.model.result import Override
@@ -106,7 +112,7 @@ def _data(path: Path, raw: bytes) -> dict[str, Any]:
     if not isinstance(source.data, dict):
         faults.append(source.fault((), "must be a map from submissions to criteria"))
     if faults:
-        raise RubricError(faults, hint="mend it by hand")
+        raise RubricError(faults, hint="fix it by hand")
     return as_map(source.data)
 
 
@@ -125,3 +131,170 @@ def _plain(data: dict[str, Any]) -> dict[str, Any]:
     """Without what is empty, which means nothing; the schema's line may be there or not."""
     plain = {key: _plain(value) if isinstance(value, dict) else value for key, value in data.items()}
     return {key: value for key, value in plain.items() if value not in (None, {}) and key != SCHEMA_KEY}
+
+
+PLAIN_KEY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.@-]*")
+Fields = dict[str, Any]
+"""An override as the file's data have it, what is empty left out."""
+
+
+def edited(text: str, before: Mapping[str, Any], key: str, criterion: str, fields: Fields | None) -> str:
+    """`before` are the text's data, `key` is what the submission is called there; None takes the override out.
+
+    Where the text uses what this does not know (anchors, say), the new one may hold other data than it should.
+    """
+    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    if not isinstance(root, yaml.MappingNode):
+        return text if fields is None else spliced(text, [_first(text, key, criterion, fields)])
+    submission = _pair(root, key)
+    if submission is None:
+        return text if fields is None else spliced(text, [_added(text, root, key, _entry(criterion, fields))])
+    if fields is None:
+        return spliced(text, _without(text, root, submission, criterion))
+    now = as_map(before.get(key)).get(criterion)
+    return spliced(text, _with(text, submission, now, criterion, fields))
+
+
+def _without(text: str, root: yaml.MappingNode, submission: Pair, criterion: str) -> list[Splice]:
+    of = submission[1]
+    found = _pair(of, criterion)
+    if found is None or not isinstance(of, yaml.MappingNode):
+        return []
+    return [drop_pair(text, of, found) if len(of.value) > 1 else drop_pair(text, root, submission)]
+
+
+def _with(text: str, submission: Pair, now: object, criterion: str, fields: Fields) -> list[Splice]:
+    of, entry = submission[1], _entry(criterion, fields)
+    if not isinstance(of, yaml.MappingNode):
+        return [set_value(text, submission, f"{{{entry}}}")]
+    found = _pair(of, criterion)
+    return _updated(text, found, now, fields) if found else [add_pairs(text, of, [entry])]
+
+
+def _pair(node: yaml.Node, key: str) -> Pair | None:
+    pairs = node.value if isinstance(node, yaml.MappingNode) else []
+    return next(((k, v) for k, v in pairs if isinstance(k, yaml.ScalarNode) and k.value == key), None)
+
+
+def _first(text: str, key: str, criterion: str, fields: Fields) -> Splice:
+    """The first override of a file that is empty, or holds comments only."""
+    lines = [f"{_key(key)}:", f"  {_entry(criterion, fields)}"]
+    return block_lines(text, len(text), 0, lines if text.strip() else [f"{SCHEMA_KEY}: {SCHEMA}", *lines])
+
+
+def _added(text: str, root: yaml.MappingNode, key: str, entry: str) -> Splice:
+    """One more submission."""
+    if root.flow_style or not root.value:
+        return add_pairs(text, root, [f"{_key(key)}: {{{entry}}}"])
+    return add_pairs(text, root, [f"{_key(key)}:", f"  {entry}"])
+
+
+def _updated(text: str, found: Pair, now: object, fields: Fields) -> list[Splice]:
+    """Only what changed, so that comments inside of it stay; the whole where something is to go."""
+    node, current = found[1], as_map(now)
+    gone = [name for name in Override.model_fields if current.get(name) is not None and name not in fields]
+    if not isinstance(node, yaml.MappingNode) or not node.value or gone:
+        return [set_value(text, found, _flow(fields))]
+    splices, new = [], []
+    for name, value in fields.items():
+        pair = _pair(node, name)
+        if pair is None:
+            new.append(f"{name}: {_scalar(name, value)}")
+        elif current.get(name) != value:
+            splices.append(set_value(text, pair, _scalar(name, value)))
+    return [*splices, add_pairs(text, node, new)] if new else splices
+
+
+def _entry(criterion: str, fields: Fields) -> str:
+    return f"{_key(criterion)}: {_flow(fields)}"
+
+
+def _flow(fields: Fields) -> str:
+    return "{" + ", ".join(f"{name}: {_scalar(name, value)}" for name, value in fields.items()) + "}"
+
+
+def _scalar(name: str, value: object) -> str:
+    if name == "points":
+        return f"{Decimal(repr(value)).normalize():f}"
+    return str(value) if name == "date" else _quoted(str(value))
+
+
+def _key(text: str) -> str:
+    """Plain where every reader of YAML takes it for a text."""
+    plain = PLAIN_KEY.fullmatch(text) and yaml.safe_load(text) == text
+    return text if plain else _quoted(text)
+
+
+def _quoted(text: str) -> str:
+    return str(yaml.safe_dump(text, default_style='"', allow_unicode=True, width=10**9)).rstrip("\n")
+
+
+Pair = tuple[yaml.Node, yaml.Node]
+
+
+class Splice(NamedTuple):
+    """`text` takes the place of what stands from `start` to `end`, counted in characters."""
+
+    start: int
+    end: int
+    text: str
+
+
+def spliced(text: str, splices: Iterable[Splice]) -> str:
+    """The text with all of these made; they do not overlap."""
+    for start, end, piece in sorted(splices, reverse=True):
+        text = text[:start] + piece + text[end:]
+    return text
+
+
+def end_of(text: str, node: yaml.Node) -> int:
+    """Where what is written of a node ends, without the comments and blank lines that follow."""
+    if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
+        last = node.value[-1]
+        key, value = last if isinstance(last, tuple) else (last, last)
+        return max(end_of(text, key), end_of(text, value))
+    return len(text[: node.end_mark.index].rstrip())
+
+
+def set_value(text: str, pair: Pair, written: str) -> Splice:
+    """`written` in place of the pair's value."""
+    start = pair[1].start_mark.index
+    end = max(start, end_of(text, pair[1]))
+    return Splice(start, end, written if end > start else f" {written}")
+
+
+def add_pairs(text: str, node: yaml.MappingNode, written: list[str]) -> Splice:
+    """These pairs at the end of a map, in its own style."""
+    if not node.value:
+        return Splice(node.end_mark.index - 1, node.end_mark.index - 1, ", ".join(written))
+    end = end_of(text, node) if not node.flow_style else _end_of_pair(text, node.value[-1])
+    if node.flow_style:
+        return Splice(end, end, "".join(f", {pair}" for pair in written))
+    return block_lines(text, end, node.value[0][0].start_mark.column, written)
+
+
+def block_lines(text: str, after: int, column: int, written: list[str]) -> Splice:
+    """Lines below the one in which `after` lies."""
+    line_end = "\r\n" if "\r\n" in text else "\n"
+    newline = text.find("\n", after)
+    lines = "".join(f"{' ' * column}{line}{line_end}" for line in written)
+    if newline < 0:
+        apart = line_end if text and not text.endswith("\n") else ""
+        return Splice(len(text), len(text), apart + lines)
+    return Splice(newline + 1, newline + 1, lines)
+
+
+def drop_pair(text: str, node: yaml.MappingNode, pair: Pair) -> Splice:
+    """Nothing in place of a pair: its lines in a map of lines, the pair and a comma in a map in braces."""
+    start, end = pair[0].start_mark.index, _end_of_pair(text, pair)
+    if not node.flow_style:
+        newline = text.find("\n", end)
+        return Splice(text.rfind("\n", 0, start) + 1, len(text) if newline < 0 else newline + 1, "")
+    place = next(i for i, other in enumerate(node.value) if other[0] is pair[0])
+    if place + 1 < len(node.value):
+        return Splice(start, node.value[place + 1][0].start_mark.index, "")
+    return Splice(_end_of_pair(text, node.value[place - 1]) if place else start, end, "")
+
+
+def _end_of_pair(text: str, pair: Pair) -> int:
+    return max(end_of(text, pair[0]), end_of(text, pair[1]))

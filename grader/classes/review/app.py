@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import datetime
 from importlib.resources import files
+from typing import BinaryIO
 
 from flask import (
     Flask,
@@ -14,6 +15,7 @@ from flask import (
     redirect,
     render_template,
     request,
+    send_file,
     session,
     url_for,
 )
@@ -23,19 +25,22 @@ from werkzeug.exceptions import Forbidden, HTTPException, NotFound
 from werkzeug.wrappers import Response as AnyResponse
 
 from grader.classes.gradebook import Row
-from grader.classes.review.answers import SCRIPT, failed, graders, sent, with_code
-from grader.classes.review.cards import MANUAL, Cards, Draft, card, cards
-from grader.classes.review.edit_conflicts import Conflict, plain
-from grader.classes.review.form import Wrong, author_of, override_of
-from grader.classes.review.guard import FRAMED, guard
-from grader.classes.review.navigation import place_of
-from grader.classes.review.served import REPORTS, evidence_of, open_evidence, open_report, reports_of
-from grader.classes.review.session import Desk
-from grader.classes.review.submissions import FILTERS, Item
+from grader.classes.review.cards import MANUAL, Cards, Draft, Wrong, author_of, card, cards, override_of
+from grader.classes.review.guard import (
+    FRAMED,
+    REPORTS,
+    evidence_of,
+    guard,
+    open_evidence,
+    open_report,
+    reports_of,
+)
+from grader.classes.review.session import Conflict, ReviewSession, plain
+from grader.classes.review.submissions import FILTERS, Item, place_of
 from grader.errors import GraderError, RubricError
 from grader.model.result import Override
 from grader.report.html.shell import environment, style
-from grader.report.html.words import SIGNS
+from grader.report.sentences import SIGNS
 from grader.report.text import number
 
 
@@ -50,18 +55,18 @@ class _Pages(Flask):
     }
 
 
-def create_app(desk: Desk, *, port: int, token: str, author: str) -> Flask:
-    """The application for `desk`, to be reached at 127.0.0.1 and that port by those who know the token.
+def create_app(review: ReviewSession, *, port: int, token: str, author: str) -> Flask:
+    """The application for `review`, to be reached at 127.0.0.1 and that port by those who know the token.
 
     `author` stands beside decisions until somebody says another name in the page.
     """
     app = _Pages(__name__, static_folder=None)
-    app.extensions["desk"] = desk
+    app.extensions["review"] = review
     guard(app, port=port, token=token)
     app.jinja_env.filters.update(number=number, verbatim=escape)
     app.jinja_env.globals.update(SIGNS=SIGNS, FILTERS=FILTERS)
     app.context_processor(lambda: {"csrf": session.get("csrf", ""), "author": _author(author)})
-    view = _Views(desk, author)
+    view = _Views(review, author)
     app.add_url_rule("/", view_func=view.listing)
     app.add_url_rule("/author", view_func=view.name, methods=["POST"])
     app.add_url_rule("/look.css", view_func=view.look)
@@ -78,16 +83,16 @@ def create_app(desk: Desk, *, port: int, token: str, author: str) -> Flask:
 class _Views:
     """One function an address."""
 
-    def __init__(self, desk: Desk, author: str) -> None:
-        self._desk, self._default_author = desk, author
+    def __init__(self, review: ReviewSession, author: str) -> None:
+        self._session, self._default_author = review, author
 
     def listing(self) -> str:
         """All submissions, or those that a filter shows."""
-        items = self._desk.submissions.items()
+        items = self._session.submissions.items()
         place = place_of(items, request.args)
         return render_template(
             "list.html",
-            run=self._desk.submissions.batch().run,
+            run=self._session.submissions.batch().run,
             place=place,
             items=place.shown,
             troubles=self._troubles(),
@@ -104,14 +109,14 @@ class _Views:
     def decide(self, key: str, criterion: str) -> AnyResponse:
         """Put a decision into `overrides.yaml`, change it, or take it out."""
         item = self._item(key)
-        asked = next((c for c in self._desk.rubric.rubric.criteria if c.id == criterion), None)
+        asked = next((c for c in self._session.rubric.rubric.criteria if c.id == criterion), None)
         if asked is None:
             raise NotFound("The rubric has no such criterion.")
         form = request.form
         typed = Draft(points=form.get("points", ""), comment=form.get("comment", ""))
         try:
             override = self._wanted(asked.points, manual=asked.check == MANUAL)
-            waits = self._desk.save(item, criterion, override, form.get("seen", ""))
+            waits = self._session.save(item, criterion, override, form.get("seen", ""))
         except Conflict:
             return self._not_saved(item, criterion, _draft(typed, conflict=True), 409)
         except Wrong as wrong:
@@ -131,7 +136,7 @@ class _Views:
             raise Forbidden(str(wrong)) from wrong
         if SCRIPT in request.headers:
             return jsonify(author=session["author"], said=f"saved {_now()}")
-        item = self._desk.submissions.item(request.form.get("key", ""))
+        item = self._session.submissions.item(request.form.get("key", ""))
         keep = place_of((), request.form).kept
         return redirect(
             url_for("submission", key=item.key, **keep) if item else url_for("listing", **keep), 303
@@ -140,14 +145,14 @@ class _Views:
     def report(self, key: str, name: str) -> Response:
         """One of the reports, for the frame in the page."""
         item = self._item(key)
-        response = sent(open_report(self._desk.path / item.key, name), REPORTS.get(name, ""))
+        response = sent(open_report(self._session.path / item.key, name), REPORTS.get(name, ""))
         response.headers["Content-Security-Policy"] = FRAMED
         return response
 
     def evidence(self, key: str, name: str) -> Response:
         """A recording, to be kept."""
         item = self._item(key)
-        file = open_evidence(self._desk.path / item.key, name)
+        file = open_evidence(self._session.path / item.key, name)
         return sent(file, "application/octet-stream", download=f"{item.key}-{name}")
 
     def look(self) -> Response:
@@ -159,7 +164,7 @@ class _Views:
         return Response(_own("review.js"), mimetype="text/javascript")
 
     def _item(self, key: str) -> Item:
-        item = self._desk.submissions.item(key)
+        item = self._session.submissions.item(key)
         if item is None:
             raise NotFound("The class has no such submission.")
         return item
@@ -178,16 +183,16 @@ class _Views:
 
     def _page(self, item: Item, drafts: Mapping[str, Draft]) -> str:
         row, found, troubles = self._row(item, drafts)
-        folder = self._desk.path / item.key
+        folder = self._session.path / item.key
         there = reports_of(folder)
         return render_template(
             "submission.html",
-            run=self._desk.submissions.batch().run,
+            run=self._session.submissions.batch().run,
             item=item,
             row=row,
             cards=found,
-            place=place_of(self._desk.submissions.items(), request.values, at=item.key),
-            waits=self._desk.waits(item),
+            place=place_of(self._session.submissions.items(), request.values, at=item.key),
+            waits=self._session.waits(item),
             troubles=troubles,
             report=next((name for name in ("report.html", "report.md") if name in there), ""),
             files=[name for name in there if name not in {"report.html", "result.json"}],
@@ -196,28 +201,28 @@ class _Views:
 
     def _row(self, item: Item, drafts: Mapping[str, Draft]) -> tuple[Row, Cards, list[str]]:
         """The submission as it counts now, its cards, and what is in the way of saving."""
-        row = self._desk.submissions.row(item.key) or Row(entry=item.entry, result=None)
-        rubric = self._desk.rubric.rubric
+        row = self._session.submissions.row(item.key) or Row(entry=item.entry, result=None)
+        rubric = self._session.rubric.rubric
         try:
-            overrides = self._desk.overrides()
-            result = self._desk.result(item, overrides)
+            overrides = self._session.overrides()
+            result = self._session.result(item, overrides)
             row = row.model_copy(update={"result": result}) if result else row
             decided, troubles = overrides.get(item.entry.id, {}), self._troubles()
         except RubricError as error:
             decided = {o.criterion: plain(o) for o in row.result.overrides}
-            troubles = ["Nothing can be saved until overrides.yaml is mended:", *error.faults]
+            troubles = ["Nothing can be saved until overrides.yaml is fixed:", *error.faults]
         return row, cards(row, rubric, decided, drafts), troubles
 
     def _troubles(self) -> list[str]:
         found = []
-        if self._desk.batch_runs():
+        if self._session.batch_runs():
             found.append(
-                "A batch works in this folder just now. What you decide is kept; reports and gradebook follow "
+                "A batch is running in this folder. What you decide is kept; reports and gradebook follow "
                 "when it has ended."
             )
-        if self._desk.follower.trouble and not found:
+        if self._session.background.trouble and not found:
             found.append(
-                f"The gradebook is not written yet, it is tried again: {self._desk.follower.trouble}"
+                f"The gradebook is not written yet; it will be tried again: {self._session.background.trouble}"
             )
         return found
 
@@ -230,7 +235,7 @@ class _Views:
     def _saved(self, item: Item, criterion: str, waits: str) -> AnyResponse:
         at = _now()
         go_on = request.form.get("do") == "next"
-        place = place_of(self._desk.submissions.items(), request.form, at=item.key)
+        place = place_of(self._session.submissions.items(), request.form, at=item.key)
         if SCRIPT in request.headers:
             to = url_for("submission", key=place.after, **place.kept) if go_on and place.after else ""
             said = f"saved {at}" + (f"; {waits}" if waits else "")
@@ -243,8 +248,8 @@ class _Views:
     def _parts(self, item: Item, criterion: str, draft: Draft | None) -> dict[str, object]:
         """What of a card changes, as a script puts it in place."""
         row, _, _ = self._row(item, {})
-        decided = self._desk.overrides().get(item.entry.id, {})
-        one = card(row, self._desk.rubric.rubric, criterion, decided, {criterion: draft} if draft else {})
+        decided = self._session.overrides().get(item.entry.id, {})
+        one = card(row, self._session.rubric.rubric, criterion, decided, {criterion: draft} if draft else {})
         return {
             "head": str(get_template_attribute("parts.html", "head")(one)),
             "notes": str(get_template_attribute("parts.html", "notes")(one)),
@@ -269,3 +274,42 @@ def _now() -> str:
 
 def _own(name: str) -> Markup:
     return Markup(files(__package__).joinpath("look", name).read_text(encoding="utf-8"))  # noqa: S704 - ours
+
+
+SCRIPT = "X-Asked-By"
+"""The header with which our script asks: it is answered with what changed, as JSON."""
+
+
+def sent(file: BinaryIO | None, mimetype: str, *, download: str = "") -> Response:
+    """A file that is open; under the name `download` it is kept and not shown. Raises NotFound where there is none."""
+    if file is None:
+        raise NotFound("There is no such file.")
+    return send_file(
+        file, mimetype=mimetype, as_attachment=bool(download), download_name=download or None, max_age=0
+    )
+
+
+def with_code(response: Response, code: int) -> Response:
+    """The same answer with another code."""
+    response.status_code = code
+    return response
+
+
+def graders(error: GraderError) -> AnyResponse:
+    """What the grader says is wrong."""
+    return _told(500, "This did not work", f"{error.message}. {error.hint}".strip(), again=False)
+
+
+def failed(error: HTTPException) -> AnyResponse:
+    """Any other answer than a page. After a link of another site, browsers hold back the cookie that they have just
+    been given; the page itself asks once more, and that is no other site's request."""
+    code = error.code or 500
+    title = {403: "Not allowed", 404: "Not found", 413: "Too much text"}.get(code, "This did not work")
+    cross = request.headers.get("Sec-Fetch-Site") == "cross-site"
+    return _told(code, title, error.description or "", again=code == 403 and request.path == "/" and cross)
+
+
+def _told(code: int, title: str, text: str, *, again: bool) -> AnyResponse:
+    if SCRIPT in request.headers:
+        return with_code(jsonify(error=text), code)
+    return Response(render_template("told.html", title=title, text=text, again=again), code)

@@ -1,15 +1,18 @@
-"""What the page of one submission shows of each criterion, and which come first."""
+"""What the page of a submission shows of each criterion, and the form in which an instructor awards points."""
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date
 
 from grader.classes.gradebook import Row
-from grader.classes.review.edit_conflicts import mark
-from grader.model.result import AppliedOverride, CriterionResult, Override
+from grader.classes.review.session import mark
+from grader.model.result import AUTHOR_CHARS, COMMENT_CHARS, AppliedOverride, CriterionResult, Override
 from grader.model.verdict import Status
-from grader.report.html.words import SIGNS
+from grader.report.sentences import SIGNS
 from grader.report.text import number
 from grader.rubric.model import Rubric
 
@@ -137,3 +140,42 @@ def verdict(status: Status, points: float, most: float) -> str:
 def plain(value: float) -> str:
     """As a field of a form has it: no digit is lost."""
     return f"{value:.10f}".rstrip("0").rstrip(".")
+
+
+POINTS = re.compile(r"\d{1,9}(?:[.,]\d{0,9})?|[.,]\d{1,9}", re.ASCII)
+
+
+class Wrong(Exception):
+    """What was typed cannot be taken; the message says why."""
+
+
+def override_of(points: str, comment: str, author: str, *, most: float, reason: bool) -> Override:
+    """Raises Wrong. A `reason` is asked for where a check has judged."""
+    text = points.strip()
+    if not text:
+        raise Wrong("How many points?")
+    if not POINTS.fullmatch(text):
+        raise Wrong("Points are a number, such as 7 or 2.5.")
+    value = float(text.replace(",", "."))
+    if value > most:
+        raise Wrong(f"It has at most {number(most)} points.")
+    written = clean(comment)
+    if len(written) > COMMENT_CHARS:
+        raise Wrong(f"At most {COMMENT_CHARS} characters, please: there are {len(written)}.")
+    if reason and not written:
+        raise Wrong("Say why: the student sees the reason beside the points.")
+    return Override(points=value, comment=written, author=author, date=date.today())  # noqa: DTZ011 - the person's day
+
+
+def author_of(text: str) -> str:
+    """Raises Wrong."""
+    written = " ".join(clean(text).split())
+    if len(written) > AUTHOR_CHARS:
+        raise Wrong(f"A name has at most {AUTHOR_CHARS} characters.")
+    return written
+
+
+def clean(text: str) -> str:
+    """Line ends as they are in files, and no control characters."""
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").strip()
+    return "".join(c for c in lines if c in "\n\t" or unicodedata.category(c) not in {"Cc", "Cs"})

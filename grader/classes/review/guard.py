@@ -1,13 +1,20 @@
-"""Who may ask: this machine's browser with the token of the address, and forms of our own pages alone."""
+"""Who may ask, and for which files: a browser with the token of the address, forms of our own pages, known names."""
 
 from __future__ import annotations
 
+import os
+import re
 import secrets
+import stat
 from hmac import compare_digest
+from pathlib import Path
+from typing import BinaryIO
 
 from flask import Flask, Response, redirect, request, session
 from werkzeug.exceptions import Forbidden
 from werkzeug.wrappers import Response as AnyResponse
+
+from grader.results import EVIDENCE
 
 TOKEN_BYTES = 24
 BODY_BYTES = 64 << 10
@@ -61,7 +68,9 @@ def guard(app: Flask, *, port: int, token: str) -> None:
 def _enter(token: str) -> AnyResponse:
     """The token of the address for a cookie, and an address without it. Tabs that are open already stay as they are."""
     if not compare_digest(request.args["token"].encode(), token.encode()):
-        raise Forbidden("This address is of another review. Open the one that `grader review` printed last.")
+        raise Forbidden(
+            "This address belongs to another review. Open the one that `grader review` printed last."
+        )
     session.setdefault("csrf", secrets.token_urlsafe(TOKEN_BYTES))
     return redirect("/", 303)
 
@@ -70,10 +79,10 @@ def _check_form() -> None:
     """Whether a request that changes something comes from a page of ours."""
     origin = request.headers.get("Origin")
     if origin is not None and origin != f"http://{request.headers['Host'].lower()}":
-        raise Forbidden("This form is not of this page.")
+        raise Forbidden("This form does not belong to this page.")
     if not compare_digest(request.form.get("csrf", "").encode(), str(session["csrf"]).encode()):
         raise Forbidden(
-            "This form is of another review. Go back, copy what you typed, and load the page anew."
+            "This form belongs to another review. Go back, copy what you typed, and reload the page."
         )
 
 
@@ -82,3 +91,65 @@ def _with_headers(response: Response) -> Response:
         response.headers[name] = value
     response.headers.setdefault("Content-Security-Policy", PAGE)
     return response
+
+
+REPORTS = {
+    "report.html": "text/html",
+    "report.md": "text/plain",
+    "console.log": "text/plain",
+    "junit.xml": "text/plain",
+    "result.json": "text/plain",
+}
+NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,150}")
+FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+FILE = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+LISTED_MAX = 200
+
+
+def open_report(folder: Path, name: str) -> BinaryIO | None:
+    """One of `REPORTS`; None where there is none, or it is no file."""
+    return _open(folder, (), name) if name in REPORTS else None
+
+
+def open_evidence(folder: Path, name: str) -> BinaryIO | None:
+    """A file of the evidence; None where there is none, or it is no file."""
+    return _open(folder, (EVIDENCE,), name) if NAME.fullmatch(name) else None
+
+
+def reports_of(folder: Path) -> list[str]:
+    """Those of `REPORTS` that are there."""
+    return [name for name in REPORTS if _exists(open_report(folder, name))]
+
+
+def evidence_of(folder: Path) -> list[tuple[str, int]]:
+    """The names and sizes in bytes of what `open_evidence` opens."""
+    try:
+        entries = [entry for entry in os.scandir(folder / EVIDENCE) if NAME.fullmatch(entry.name)]
+        files = [entry for entry in entries if entry.is_file(follow_symlinks=False)]
+        return sorted((entry.name, entry.stat(follow_symlinks=False).st_size) for entry in files)[:LISTED_MAX]
+    except OSError:
+        return []
+
+
+def _exists(file: BinaryIO | None) -> bool:
+    if file is not None:
+        file.close()
+    return file is not None
+
+
+def _open(folder: Path, below: tuple[str, ...], name: str) -> BinaryIO | None:
+    descriptors: list[int] = []
+    try:
+        descriptors.append(os.open(folder, FOLDER))
+        for part in below:
+            descriptors.append(os.open(part, FOLDER, dir_fd=descriptors[-1]))
+        file = os.open(name, FILE, dir_fd=descriptors[-1])
+    except OSError:
+        return None
+    finally:
+        for descriptor in descriptors:
+            os.close(descriptor)
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
+        return None
+    return os.fdopen(file, "rb")

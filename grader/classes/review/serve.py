@@ -19,7 +19,7 @@ from waitress.server import create_server
 
 from grader.classes.review.app import create_app
 from grader.classes.review.guard import BODY_BYTES, TOKEN_BYTES
-from grader.classes.review.session import Desk
+from grader.classes.review.session import ReviewSession
 from grader.errors import HostError, UsageError
 from grader.files import temporary_folder
 from grader.host_programs import find_user_program, with_absolute_paths
@@ -29,8 +29,8 @@ THREADS = 6
 GIT_S = 5
 
 
-def serve(desk: Desk, *, port: int, author: str, opened: Callable[[str], None]) -> bool:
-    """Serve `desk` until interrupted; `opened` is given the address with its token. Port 0 is any that is free.
+def serve(review: ReviewSession, *, port: int, author: str, opened: Callable[[str], None]) -> bool:
+    """Serve `review` until interrupted; `opened` is given the address with its token. Port 0 is any that is free.
 
     Gives whether all that follows a decision is written. Raises UsageError where the port cannot be had.
     """
@@ -38,7 +38,7 @@ def serve(desk: Desk, *, port: int, author: str, opened: Callable[[str], None]) 
         token = secrets.token_urlsafe(TOKEN_BYTES)
         number = listening.getsockname()[1]
         server = create_server(
-            create_app(desk, port=number, token=token, author=author),
+            create_app(review, port=number, token=token, author=author),
             sockets=[listening],
             threads=THREADS,
             ident=None,
@@ -46,7 +46,7 @@ def serve(desk: Desk, *, port: int, author: str, opened: Callable[[str], None]) 
             max_request_header_size=2 * BODY_BYTES,
             clear_untrusted_proxy_headers=True,
         )
-        desk.start()
+        review.start()
         try:
             opened(f"http://{HOST}:{number}/?token={token}")
             server.run()
@@ -54,7 +54,7 @@ def serve(desk: Desk, *, port: int, author: str, opened: Callable[[str], None]) 
             pass
         finally:
             server.close()
-            done = desk.close()
+            done = review.close()
     return done
 
 

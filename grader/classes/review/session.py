@@ -1,19 +1,27 @@
-"""Where decisions are made: each is written into `overrides.yaml` at once, and results and gradebook follow."""
+"""Where decisions are saved: each goes into `overrides.yaml` at once, and results and gradebook follow.
+
+Two people may decide about the same criterion: each decision names the one it was made from, so that none is lost.
+"""
 
 from __future__ import annotations
 
+import fcntl
+import os
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from hashlib import sha256
 from pathlib import Path
 
 from grader.classes.batch.flow import GRADEBOOK, alone, ids_of, write_books
 from grader.classes.batch.folder import BatchFolder, open_batch, write_run
 from grader.classes.batch.settled import Settler, rewrite
-from grader.classes.overrides import FILE, Overrides, read_overrides, write_override
-from grader.classes.review.edit_conflicts import Conflict, alike, mark, plain, reviewing
-from grader.classes.review.follower import Follower, Pace
+from grader.classes.overrides import FILE, Overrides, read_overrides
+from grader.classes.overrides.write import write_override
+from grader.classes.review.background import BackgroundWriter, Pace
 from grader.classes.review.submissions import Item, Stamp, Submissions, stamp_of
 from grader.errors import Busy, GraderError, UsageError
+from grader.files import unwritable
 from grader.model.batch import State
 from grader.model.result import GradingResult, Override
 from grader.results import RESULT, read_result
@@ -23,12 +31,12 @@ PATIENCE_S = 0.3
 OTHER_RUBRIC = "the class has been graded by another rubric since: end this review and start it again"
 
 OLDER_RESULT = (
-    "the submission was judged by another rubric: it counts when `grader regrade` has judged it anew"
+    "the submission was judged by another rubric: it counts when `grader regrade` has judged it again"
 )
 
 
-def open_desk(path: Path, pace: Pace | None = None) -> Desk:
-    """The desk of the class in `path`. Raises UsageError where there is none, and where its rubric has changed,
+def open_session(path: Path, pace: Pace | None = None) -> ReviewSession:
+    """The review of the class in `path`. Raises UsageError where there is none, and where its rubric has changed,
     EvidenceError where a newer grader wrote results in it."""
     batch = open_batch(path)
     batch.refuse_newer()
@@ -39,17 +47,17 @@ def open_desk(path: Path, pace: Pace | None = None) -> Desk:
             f"{run.rubric_source}: the rubric has changed since the class was graded",
             hint=f"grader regrade {path} judges it by the rubric of today; then review it",
         )
-    return Desk(path, rubric, pace or Pace())
+    return ReviewSession(path, rubric, pace or Pace())
 
 
-class Desk:
-    """Safe to use from several threads, and beside other desks and batches of the same class."""
+class ReviewSession:
+    """Safe to use from several threads, and beside other sessions and batches of the same class."""
 
     def __init__(self, path: Path, rubric: LoadedRubric, pace: Pace) -> None:
         self.path, self.rubric = path, rubric
         self._docs = rubric.docs
         self.submissions = Submissions(path)
-        self.follower = Follower(self._follow, pace)
+        self.background = BackgroundWriter(self._follow, pace)
         self._saving, self._writing, self._guard = threading.Lock(), threading.Lock(), threading.Lock()
         self._overrides: tuple[tuple[Stamp, tuple[str, ...]], Overrides] | None = None
         self._pending: set[str] = set()
@@ -58,12 +66,12 @@ class Desk:
 
     def start(self) -> None:
         """Begin to follow; what was decided while nobody reviewed is looked at first."""
-        self.follower.start()
-        self.follower.changed()
+        self.background.start()
+        self.background.changed()
 
     def close(self) -> bool:
         """Write what is left; whether all is written."""
-        return self.follower.close()
+        return self.background.close()
 
     def overrides(self) -> Overrides:
         """What `overrides.yaml` says now. Raises RubricError where it has faults."""
@@ -95,7 +103,7 @@ class Desk:
             self._pending.add(item.key)
             self._books_behind = True
         waits = self._settled_soon(item)
-        self.follower.changed()
+        self.background.changed()
         return waits
 
     def result(self, item: Item, overrides: Overrides) -> GradingResult | None:
@@ -113,7 +121,7 @@ class Desk:
         """Why the files of a submission do not say yet what was decided; empty where they do."""
         with self._guard:
             pending = item.key in self._pending
-        return self.follower.trouble or "its report follows in a moment" if pending else ""
+        return self.background.trouble or "its report follows in a moment" if pending else ""
 
     def batch_runs(self) -> bool:
         """Whether a batch works in the folder just now."""
@@ -135,7 +143,7 @@ class Desk:
             with alone(self.path):
                 return self._settle({item.key})
         except Busy:
-            return "a batch works in this folder just now: the report follows when it has ended"
+            return "a batch is running in this folder: the report follows when it has ended"
         except GraderError as error:
             return error.message
         finally:
@@ -222,3 +230,46 @@ class Desk:
         known = {criterion.id for criterion in result.criteria}
         given = {k: v for k, v in overrides.get(item.entry.id, {}).items() if k in known}
         return given != {o.criterion: plain(o) for o in result.overrides}
+
+
+LOCK = ".review.lock"
+
+
+class Conflict(Exception):
+    """Somebody else decided meanwhile: `now` is what stands there, None for nothing."""
+
+    def __init__(self, now: Override | None) -> None:
+        super().__init__("decided meanwhile")
+        self.now = now
+
+
+def mark(override: Override | None) -> str:
+    """What a form carries to say which decision it was made from; empty for none."""
+    return sha256(override.model_dump_json().encode()).hexdigest()[:24] if override else ""
+
+
+def plain(override: Override) -> Override:
+    """What a person wrote of an override that was applied."""
+    return Override(**{name: getattr(override, name) for name in Override.model_fields})
+
+
+def alike(one: Override | None, other: Override | None) -> bool:
+    """Whether both say the same, whenever it was said."""
+    if one is None or other is None:
+        return one is other
+    return one.model_copy(update={"date": None}) == other.model_copy(update={"date": None})
+
+
+@contextmanager
+def reviewing(path: Path) -> Iterator[None]:
+    """Hold what all reviews of a class hold while they compare and write: another process may review it, too."""
+    try:
+        descriptor = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
+    except OSError as error:
+        raise unwritable(path / LOCK, error) from error
+    try:
+        with suppress(OSError):  # a file system without locks: whoever shares it has to know what they do
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)

@@ -1,7 +1,50 @@
-"""Who handed in what: a CSV file, a folder of submissions, or an export of GitHub Classroom or GitLab."""
+"""Who submitted what: a CSV file, a folder of submissions, or an export of GitHub Classroom or GitLab.
 
-from grader.classes.roster.local import Local
-from grader.classes.roster.read import read_roster
+`read_roster` gives a `Roster`: entries, and every fault with its line. Nothing is fetched or opened here.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from grader.classes.roster.entries import entries_of
+from grader.classes.roster.exports import (
+    from_gitlab,
+    is_classroom,
+    refuse_classroom_roster,
+    with_roster_columns,
+)
+from grader.classes.roster.folder import from_folder
+from grader.classes.roster.sources import OWN_FOLDER, Local
+from grader.classes.roster.table import read_table
+from grader.errors import UsageError
 from grader.model.batch import Entry, Roster
 
 __all__ = ["Entry", "Local", "Roster", "read_roster"]
+
+
+def read_roster(path: Path, local: Local = OWN_FOLDER) -> Roster:
+    """Every submission that the roster names, and every fault that it has, in the order of lines.
+
+    `path` is a CSV file with the columns `id,source[,ref][,name][,group][,submitted_at][,extension_days]`, an export of
+    GitHub Classroom (CSV) or of a GitLab group (the JSON of its projects), or a folder with a submission in each of its
+    entries. `local` says which paths of this machine it may name: any other is a fault, and nothing there is opened.
+    Raises UsageError where it is none of these, or names no submission at all.
+    """
+    if path.is_dir():
+        roster = from_folder(path, local)
+    elif path.suffix.lower() in {".json", ".ndjson", ".jsonl"}:
+        roster = from_gitlab(path, local)
+    else:
+        roster = _from_table(path, local)
+    if not roster.entries and not roster.faults:
+        raise UsageError(
+            f"{path}: no submission in it", hint="each is a row with id and source, or an entry of a folder"
+        )
+    return roster
+
+
+def _from_table(path: Path, local: Local) -> Roster:
+    table = read_table(path)
+    refuse_classroom_roster(table, path)
+    return entries_of(with_roster_columns(table) if is_classroom(table) else table, path, local)

@@ -1,13 +1,14 @@
-"""A folder with a submission in each of its entries; bulk downloads of Moodle and Canvas are known by their names."""
+"""A folder with a submission in each entry. The names in bulk downloads of Moodle and Canvas are known."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
-from grader.classes.roster.gather import Found, columns_of, gather
-from grader.classes.roster.local import REFUSED, Local, local_fault
-from grader.classes.roster.platforms import Named, platform_name
+from grader.classes.roster.entries import Found, columns_of, gather
+from grader.classes.roster.sources import REFUSED, Local, local_fault
 from grader.errors import UsageError
 from grader.intake.names import archive_stem, encodable, is_archive_name, listing, printable
 from grader.model.batch import Entry, Roster
@@ -75,7 +76,7 @@ def _named(files: list[tuple[Path, Named]]) -> Found:
     path, named = (taken or files)[0]
     where, name = printable(path.name), f"{named.name}-{named.id}"
     if not taken:
-        fault = "only text or a link was handed in" if named.is_text else "neither a folder nor an archive"
+        fault = "only text or a link was submitted" if named.is_text else "neither a folder nor an archive"
         return Found(where=where, id=name, faults=(fault,))
     if len(taken) > 1:
         more = listing([other.name for other, _ in taken[1:]])
@@ -120,3 +121,60 @@ def _single_archive(path: Path) -> Path | None:
         return None
     alone = len(inside) == 1 and inside[0].is_file() and is_archive_name(inside[0].name)
     return inside[0] if alone and encodable(inside[0].name) else None
+
+
+# Moodle: `Full Name_1234567_assignsubmission_file` (a folder), with `_lab1.zip` behind it (a file), or `onlinetext` for
+# text; `Participant 1234567` or `Participant_1234567` where names are hidden. A team has its name and number.
+# Canvas: `lastnamefirstname_LATE_12345_67890_lab1.zip`, with `LATE_` if it was late, `LATE_anon_x7Yz2_67890_lab1.zip`
+# where names are hidden; `…_12345_text.html` and `…_12345_link.html` where no file was submitted.
+MOODLE = re.compile(
+    r"(?P<name>.+)_(?P<id>\d+)_assignsubmission_(?P<kind>file|onlinetext)(?:_(?P<file>.*))?", re.DOTALL
+)
+MOODLE_BLIND = re.compile(
+    r"(?P<name>\w+) (?P<id>\d+)_assignsubmission_(?P<kind>file|onlinetext)(?:_(?P<file>.*))?", re.DOTALL
+)
+CANVAS = re.compile(
+    r"(?P<name>[\w-]+?)_(?P<late>LATE_)?(?P<id>\d+)_(?:\d+_(?P<file>.+)|(?P<text>text|link)\.html)", re.DOTALL
+)
+CANVAS_BLIND = re.compile(
+    r"(?P<late>LATE_)?(?P<name>anon)_(?P<id>[A-Za-z0-9]{5})_(?:\d+_(?P<file>.+)|(?P<text>text|link)\.html)",
+    re.DOTALL,
+)
+BLIND = {"Participant", "Teilnehmer", "Teilnehmerin", "Participante", "Partecipante"}
+
+
+class Named(NamedTuple):
+    """`id` is the platform's number for the student (Canvas) or the submission (Moodle); `file` as handed in.
+
+    `is_blind`: the platform hides who it is; Canvas has other ids then.
+    """
+
+    platform: str
+    id: str
+    name: str
+    file: str
+    late: bool = False
+    is_text: bool = False
+    is_blind: bool = False
+
+
+def platform_name(name: str) -> Named | None:
+    """What a file's or folder's name says; None where no platform made it."""
+    if found := MOODLE.fullmatch(name) or MOODLE_BLIND.fullmatch(name):
+        is_text = found["kind"] == "onlinetext"
+        blind = found["name"] in BLIND
+        return Named(
+            "Moodle", found["id"], found["name"], found["file"] or "", is_text=is_text, is_blind=blind
+        )
+    blind_canvas = CANVAS_BLIND.fullmatch(name)
+    if found := blind_canvas or CANVAS.fullmatch(name):
+        return Named(
+            "Canvas",
+            found["id"],
+            found["name"],
+            found["file"] or "",
+            late=bool(found["late"]),
+            is_text=bool(found["text"]),
+            is_blind=blind_canvas is not None,
+        )
+    return None

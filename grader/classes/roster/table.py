@@ -1,7 +1,8 @@
-"""CSV as spreadsheets and learning platforms write it: rows with their lines, whatever the delimiter."""
+"""CSV as spreadsheets and learning platforms write it, whatever the encoding and delimiter: rows with their lines."""
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import re
@@ -9,7 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from grader.classes.roster.decode import text_of
 from grader.errors import UsageError
 from grader.intake.names import is_archive_name
 
@@ -132,3 +132,43 @@ def _text(path: Path) -> str:
     if data is None:
         raise UsageError(f"{path}: larger than {BYTES_MAX >> 20} MB: this is no roster")
     return text_of(data, path)
+
+
+_MARKS = (  # the longer ones first: UTF-32's begins with UTF-16's
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+_WORKBOOKS = {b"PK\x03\x04": "an Excel or LibreOffice workbook", b"\xd0\xcf\x11\xe0": "an old Excel workbook"}
+_SAVE = "save it as CSV UTF-8 (in Excel: 'CSV UTF-8', not 'CSV')"
+
+
+def text_of(data: bytes, path: Path) -> str:
+    """UTF-8, with or without its mark, or UTF-16. Raises UsageError with the line of what is neither."""
+    workbook = next((what for magic, what in _WORKBOOKS.items() if data.startswith(magic)), None)
+    if workbook:
+        raise UsageError(f"{path}: this is {workbook}, no CSV", hint=_SAVE)
+    encoding = _encoding(data)
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        named = encoding.removesuffix("-sig").removesuffix("-le").removesuffix("-be").upper()
+        raise UsageError(f"{path}:{line}: no {named} text", hint=_SAVE) from error
+
+
+def _encoding(data: bytes) -> str:
+    """By the mark at the beginning; UTF-16 without one has a zero in every second byte of plain text."""
+    marked = next((name for mark, name in _MARKS if data.startswith(mark)), None)
+    if marked:
+        return marked
+    head = data[:1000]
+    for start, name in ((1, "utf-16-le"), (0, "utf-16-be")):
+        if (
+            len(head) >= 4
+            and head[start::2].count(0) > len(head) * 0.4
+            and head[1 - start :: 2].count(0) == 0
+        ):
+            return name
+    return "utf-8-sig"

@@ -11,7 +11,7 @@ from grader.classes.batch.flow import GRADEBOOK, INDEX, RESULTS, BatchOptions, r
 from grader.classes.batch.folder import BatchFolder
 from grader.classes.batch.needs_attention import notable
 from grader.classes.roster import Local, read_roster
-from grader.classes.roster.times import parse_time
+from grader.classes.roster.entries import parse_time
 from grader.cli.class_display import open_class_display
 from grader.cli.inherited_limits import make_room
 from grader.cli.output import say, say_beside, say_json

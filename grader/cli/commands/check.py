@@ -23,8 +23,8 @@ from grader.files import check_writable, temporary_folder
 from grader.intake import safe_name
 from grader.model.progress import Progress, Silence
 from grader.model.result import GradingResult, Standing
-from grader.report.hidden import hidden_ids, without_hidden
 from grader.report.terminal import open_console
+from grader.report.view import hidden_ids, without_hidden
 from grader.rubric.load import LoadedRubric, needs_ros
 from grader.student.git_view import write_staged
 

@@ -27,9 +27,9 @@ from grader.integrations.ci.settings import Settings, read_settings
 from grader.integrations.ci.status_lines import STUDENTS, said_of
 from grader.judging.summary import overall_status, total_points
 from grader.model.result import GradingResult
-from grader.report.hidden import hidden_ids, without_hidden
+from grader.report.sentences import without_sandbox
 from grader.report.terminal import open_console, print_report
-from grader.report.unwalled import without_sandbox
+from grader.report.view import hidden_ids, without_hidden
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 
@@ -82,7 +82,7 @@ def _graded(settings: Settings) -> Graded:
             result, place = _left(folder, error)
         keep(place, settings.out, rubric.rubric)
     prefix = _prefix(result, Path(source))
-    add_forms(settings.out, result, prefix, rubric.docs)
+    add_forms(settings.out, result, rubric.rubric, prefix, rubric.docs)
     hidden = len(hidden_ids(rubric.rubric))
     print_report(result, rubric.rubric, open_console(sys.stdout), hidden=hidden, static=settings.static)
     return _judged(result, rubric, settings, prefix)

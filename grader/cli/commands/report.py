@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from grader.classes.batch.flow import INDEX
@@ -17,28 +16,20 @@ from grader.cli.output import say, say_beside
 from grader.cli.prefix import package_prefix
 from grader.errors import EvidenceError, ExitCode, UsageError
 from grader.files import atomic_write
-from grader.model.figure import Figures
 from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
 from grader.portable import cores
-from grader.report.annotations import github_annotations
-from grader.report.class_page import salt_in, write_class_page
-from grader.report.classroom import classroom
-from grader.report.code_quality import code_quality
-from grader.report.gradescope import gradescope
-from grader.report.hidden import without_hidden
-from grader.report.html import html_report
-from grader.report.junit import junit
-from grader.report.markdown import markdown_report
-from grader.report.sarif import sarif
-from grader.report.summary import missing_hidden
+from grader.report.class_page.gather import salt_in
+from grader.report.class_page.page import write_class_page
+from grader.report.forms import FORMS, Shown
+from grader.report.sentences import missing_hidden
 from grader.report.terminal import open_console, print_report
+from grader.report.view import without_hidden
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.model import Rubric
 
 STDOUT = "-"
-OF_LINES = ("junit", "sarif", "code-quality", "annotations", "classroom")
 NAMES_SHOWN = 5
 
 
@@ -150,8 +141,17 @@ def _one(
         hidden = missing_hidden(shown, rubric.rubric)
         print_report(shown, rubric.rubric, open_console(sys.stdout), hidden=hidden)
         return ExitCode.PASSED
-    where = _prefix(result, prefix) if form in OF_LINES else ""
-    data = _made(form, shown, rubric, where, lambda: figures_in(folder, shown, rubric.rubric))
+    where = _prefix(result, prefix) if FORMS[form].cites_lines else ""
+    about = Shown(
+        result=shown,
+        rubric=rubric.rubric,
+        hidden=missing_hidden(shown, rubric.rubric),
+        prefix=where,
+        passed=_passed(shown, rubric.rubric),
+        docs=rubric.docs,
+        load_figures=lambda: figures_in(folder, shown, rubric.rubric),
+    )
+    data = FORMS[form].render(about)
     if out == STDOUT:
         sys.stdout.buffer.write(data)
     else:
@@ -170,34 +170,5 @@ def _prefix(result: GradingResult, given: str | None) -> str:
     return found or ""
 
 
-def _made(
-    form: str,
-    result: GradingResult,
-    rubric: LoadedRubric,
-    prefix: str,
-    figures: Callable[[], Figures | None],
-) -> bytes:
-    """The report in that form. Only those that show figures have the evidence read."""
-    lab = rubric.rubric
-    hidden = missing_hidden(result, lab)
-    makers: dict[str, Callable[[], str]] = {
-        "html": lambda: html_report(result, lab, figures() or Figures(), hidden=hidden, docs=rubric.docs),
-        "markdown": lambda: markdown_report(result, lab, hidden=hidden, figures=figures()),
-        "sarif": lambda: sarif(result, prefix, docs=rubric.docs),
-        "code-quality": lambda: code_quality(result, prefix),
-        "annotations": lambda: github_annotations(result, prefix),
-        "gradescope": lambda: gradescope(result, lab),
-        "classroom": lambda: f"{classroom(result, lab, passed=_passed(result, lab), prefix=prefix)}\n",
-        "terminal": lambda: _printed(result, rubric, hidden),
-    }
-    return junit(result, prefix) if form == "junit" else makers[form]().encode("utf-8", "backslashreplace")
-
-
 def _passed(result: GradingResult, rubric: Rubric) -> bool:
     return result.status != "error" and exit_code(result.criteria, rubric) is ExitCode.PASSED
-
-
-def _printed(result: GradingResult, rubric: LoadedRubric, hidden: int) -> str:
-    text = io.StringIO()
-    print_report(result, rubric.rubric, open_console(text), hidden=hidden)
-    return text.getvalue()

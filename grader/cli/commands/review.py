@@ -14,15 +14,15 @@ from grader.errors import ExitCode, UsageError
 def run(*, folder: Path, port: int = 0, no_browser: bool = False, author: str | None = None) -> ExitCode:
     """Serve the page until Ctrl-C; `author` stands beside decisions (default: what git calls the person)."""
     require_library()
-    from grader.classes.review.form import Wrong, author_of  # noqa: PLC0415
+    from grader.classes.review.cards import Wrong, author_of  # noqa: PLC0415
     from grader.classes.review.serve import browser, git_user, serve  # noqa: PLC0415
-    from grader.classes.review.session import open_desk  # noqa: PLC0415 - an extra: not there everywhere
+    from grader.classes.review.session import open_session  # noqa: PLC0415 - an extra: not there everywhere
 
     try:
         name = author_of(git_user() if author is None else author)
     except Wrong as error:
         raise UsageError(f"--author: {error}") from error
-    desk = open_desk(folder)
+    review = open_session(folder)
     with ExitStack() as stack:
 
         def opened(address: str) -> None:
@@ -31,12 +31,12 @@ def run(*, folder: Path, port: int = 0, no_browser: bool = False, author: str | 
             say("Only this machine reaches it, and only with this address. Ctrl-C ends it.")
             sys.stdout.flush()  # whoever reads it from a pipe needs the address now
 
-        done = serve(desk, port=port, author=name, opened=opened)
+        done = serve(review, port=port, author=name, opened=opened)
     if done:
         say("Ended. Everything is saved and written.")
         return ExitCode.PASSED
     say(
-        f"Ended. What you decided is in overrides.yaml; the gradebook is not written: {desk.follower.trouble}"
+        f"Ended. What you decided is in overrides.yaml; the gradebook is not written: {review.background.trouble}"
     )
     say(f"  hint: when that is over, grader regrade {folder} writes it")
     return ExitCode.NOT_GRADED

@@ -7,10 +7,7 @@ from pathlib import Path
 
 from grader.cli.parsing.exit_codes import REPORT_EXIT_CODES
 from grader.cli.parsing.options import rubric_option
-
-FORMS = (
-    "html", "markdown", "terminal", "junit", "sarif", "code-quality", "annotations", "gradescope", "classroom"
-)  # fmt: skip
+from grader.report.forms import FORMS
 
 
 def add_report(report: argparse.ArgumentParser) -> None:
@@ -24,7 +21,7 @@ def add_report(report: argparse.ArgumentParser) -> None:
     )
     rubric_option(report, required=False)
     report.add_argument(
-        "--form", choices=FORMS, default="", help="this one alone (default: all files of DIR)"
+        "--form", choices=tuple(FORMS), default="", help="this one alone (default: all files of DIR)"
     )
     report.add_argument("--out", metavar="FILE", default="", help="where that one goes (default: -, stdout)")
     report.add_argument(

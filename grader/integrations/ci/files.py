@@ -9,15 +9,15 @@ from pathlib import Path
 from grader.errors import OutputError
 from grader.files import atomic_write, make_folder
 from grader.model.result import GradingResult
-from grader.report.code_quality import code_quality
-from grader.report.junit import junit
-from grader.report.sarif import sarif
+from grader.report.forms import FORMS, Shown
 from grader.rubric.model import Rubric
 
+WITH_LINES = ("junit", "code-quality", "sarif")
+"""Forms that are rendered once more, or only here, with files as the repository has them."""
 OURS = frozenset(
     {
-        "code-quality.json", "console.log", "evidence", "grader.env", "junit.xml", "report.html", "report.md",
-        "report.sarif", "result.json",
+        "console.log", "evidence", "grader.env", "result.json", *(FORMS[name].file for name in WITH_LINES),
+        *(form.file for form in FORMS.values() if form.in_results),
     }
 )  # fmt: skip
 SECTION = "== "
@@ -58,11 +58,13 @@ def keep(made: Path, out: Path, rubric: Rubric) -> None:
         raise OutputError(f"{out} cannot be written: {error.strerror}", hint="make room there") from error
 
 
-def add_forms(out: Path, result: GradingResult, prefix: str, docs: dict[str, dict[str, str]]) -> None:
+def add_forms(
+    out: Path, result: GradingResult, rubric: Rubric, prefix: str, docs: dict[str, dict[str, str]]
+) -> None:
     """The reports that know files by their place in the repository. Raises OutputError."""
-    atomic_write(out / "junit.xml", junit(result, prefix))
-    atomic_write(out / "code-quality.json", code_quality(result, prefix).encode())
-    atomic_write(out / "report.sarif", sarif(result, prefix, docs=docs).encode("utf-8", "backslashreplace"))
+    shown = Shown(result=result, rubric=rubric, prefix=prefix, docs=docs)
+    for name in WITH_LINES:
+        atomic_write(out / FORMS[name].file, FORMS[name].render(shown))
 
 
 def _hidden_scenarios(rubric: Rubric) -> frozenset[str]:

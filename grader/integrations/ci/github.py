@@ -14,8 +14,8 @@ from pathlib import Path
 
 from grader.errors import GraderError, OutputError
 from grader.integrations.ci.outcome import TITLES, Graded, Outcome, of_error
-from grader.report.annotations import EACH_MAX, github_annotation, github_annotations
-from grader.report.classroom import classroom
+from grader.report.annotations import EACH_MAX, github_annotation, render_annotations
+from grader.report.classroom import render_classroom
 from grader.report.findings import Severity
 from grader.report.text import line, markdown, number
 
@@ -44,7 +44,7 @@ class GitHub:
         told = graded.result.model_copy(update={"error": None})  # it is said here, with whose fault it is
         said = "\n".join(part for part in (graded.said, graded.hint) if part)
         _print(github_annotation(_severity(graded), TITLES[graded.outcome], said))
-        _print(github_annotations(told, graded.prefix, each_max=EACH_MAX - 1))
+        _print(render_annotations(told, graded.prefix, each_max=EACH_MAX - 1))
         report = graded.folder / "report.md"
         text = report.read_text(encoding="utf-8") if report.is_file() else ""
         self._add(self._summary, f"{_heading(graded.outcome, graded.said)}\n\n{text}\n")
@@ -83,7 +83,7 @@ class GitHub:
 def _values(graded: Graded) -> dict[str, str]:
     counted = graded.outcome is not Outcome.NOT_GRADED
     passed = graded.outcome is Outcome.PASSED
-    encoded = classroom(graded.counted, graded.rubric, passed=passed, prefix=graded.prefix)
+    encoded = render_classroom(graded.counted, graded.rubric, passed=passed, prefix=graded.prefix).rstrip()
     report = graded.folder / "report.html"
     return {
         "points": number(graded.counted.points) if counted else "",

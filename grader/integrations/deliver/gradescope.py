@@ -14,9 +14,9 @@ from grader.integrations.deliver.parcel import Parcel
 from grader.integrations.deliver.settings import FILE, Settings
 from grader.integrations.deliver.wheel import system_script, wheel
 from grader.model.result import GradingResult
-from grader.report.gradescope import LIMIT, LOOK, gradescope
+from grader.report.gradescope import LIMIT, LOOK, render_gradescope
+from grader.report.sentences import without_sandbox
 from grader.report.text import line
-from grader.report.unwalled import without_sandbox
 from grader.rubric.load import LoadedRubric
 
 DEFAULT_MINUTES, MOST_MINUTES = 10, 40
@@ -44,7 +44,7 @@ def place(root: Path) -> Place:
 
 def graded(result: GradingResult, rubric: LoadedRubric) -> dict[str, Any]:
     """Raises GraderError where the machine kept everything from being graded."""
-    document: dict[str, Any] = json.loads(gradescope(result, rubric.rubric))
+    document: dict[str, Any] = json.loads(render_gradescope(result, rubric.rubric))
     about = result.environment
     unwalled = line(without_sandbox(about.sandbox), LIMIT)
     document["extra_data"] = {

@@ -16,9 +16,9 @@ from grader.integrations.deliver.parcel import Parcel
 from grader.integrations.deliver.settings import FILE, Settings
 from grader.integrations.deliver.wheel import system_script, wheel
 from grader.model.result import CriterionResult, GradingResult
-from grader.report.hidden import hidden_ids
-from grader.report.settled import late_words
+from grader.report.sentences import late_words
 from grader.report.text import html, line, number, text_limit
+from grader.report.view import hidden_ids
 from grader.rubric.load import LoadedRubric
 
 DEFAULT_MINUTES, MOST_MINUTES = 10, 10

@@ -10,7 +10,7 @@ from urllib.parse import quote
 from grader.model.batch import MISSING, ROSTER, CriterionInfo, Entry
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
-from grader.report.unwalled import without_sandbox
+from grader.report.sentences import without_sandbox
 from grader.untrusted_text import line
 
 REPORT = "report.html"

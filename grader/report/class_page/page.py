@@ -1,7 +1,8 @@
-"""`index.html`: one file that needs nothing else. Begin reading at `write_class_page`."""
+"""`index.html`, the page of a class: one file that needs nothing else. Begin reading at `write_class_page`."""
 
 from __future__ import annotations
 
+import json
 import secrets
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -15,19 +16,15 @@ from jinja2 import Template
 from markupsafe import Markup
 
 from grader.files import atomic_write
-from grader.model.batch import BatchRun, Entry
+from grader.model.batch import BatchRun, CriterionInfo, Entry
 from grader.model.result import GradingResult
-from grader.report.class_page.anonymous import SALT_BYTES
-from grader.report.class_page.costs import costs, most_first
-from grader.report.class_page.data import page_data
-from grader.report.class_page.gathered import Gathered, Shared, gather, gather_anonymous
-from grader.report.class_page.heat import heat_map
-from grader.report.class_page.lines import LETTERS, Line, link_to
-from grader.report.class_page.points import histogram, spread
-from grader.report.class_page.timing import span, timing
+from grader.report.class_page.gather import SALT_BYTES, Diagnosis, Gathered, gather, gather_anonymous
+from grader.report.class_page.lines import CHARS, LETTERS, REPORT, Line, link_to
+from grader.report.class_page.statistics import costs, heat_map, histogram, most_first, span, spread, timing
 from grader.report.class_page.todo import todos
 from grader.report.html.shell import environment, policy, script, style
-from grader.report.html.words import SIGNS, count
+from grader.report.sentences import SIGNS, count
+from grader.untrusted_text import line
 
 UNWALLED_MAX = 3
 SHARED_MAX, SHARED_FIRST, ALONE_MAX, WORDINGS_MAX = 100, 12, 100, 12
@@ -43,7 +40,7 @@ class Listed:
     place: int
     title: str
     worth: float
-    found: Shared
+    found: Diagnosis
 
 
 def write_class_page(
@@ -103,7 +100,7 @@ def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
     return _template().render(parts)
 
 
-def _listed(run: BatchRun, found: Sequence[Shared]) -> tuple[list[Listed], list[Listed]]:
+def _listed(run: BatchRun, found: Sequence[Diagnosis]) -> tuple[list[Listed], list[Listed]]:
     """Diagnoses that several share, and those that one has alone."""
     worth: Mapping[str, Any] = {criterion.id: criterion for criterion in run.criteria}
     shared = [one for one in found if len(one.members) > 1][:SHARED_MAX]
@@ -157,3 +154,47 @@ def _template() -> Template:
 @cache
 def _file(name: str) -> str:
     return files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+COLUMNS = ("id", "name", "group", "link", "state", "points", "letters", "earned", "late", "decided", "time")
+
+
+def page_data(
+    lines: Iterable[Line],
+    criteria: Iterable[CriterionInfo],
+    diagnoses: Iterable[Sequence[int]],
+    columns: Iterable[Sequence[int]],
+) -> Markup:
+    """`rows` (each as `COLUMNS` says), `criteria`, and by places in `rows` the members of diagnoses and heat map."""
+    data = {
+        "rows": [_row(one) for one in lines],
+        "criteria": [[line(c.id, CHARS), line(c.title, CHARS), c.max_points] for c in criteria],
+        "diagnoses": [list(members) for members in diagnoses],
+        "heat": [list(column) for column in columns],
+    }
+    return in_script(json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")))
+
+
+def in_script(text: str) -> Markup:
+    """JSON as the content of a `<script>`: nothing in it ends the element or begins another one."""
+    for sign in "<>&\u2028\u2029":
+        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    return Markup(text)  # noqa: S704 - what HTML looks for is written out
+
+
+def _row(one: Line) -> list[object]:
+    link = link_to(one)
+    usual = link == f"{one.id}/{REPORT}"
+    return [
+        one.id,
+        one.name,
+        one.group,
+        1 if usual else link or 0,
+        one.state,
+        one.points,
+        one.letters,
+        one.earned or 0,
+        round(one.late_s),
+        [one.decided, one.look_again] if one.decided else 0,
+        round(one.wall_s, 1),
+    ]

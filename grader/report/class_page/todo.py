@@ -1,7 +1,8 @@
-"""What a person has to do before all points are settled, and what to type for it."""
+"""What is left to do before all points are settled, and the command for it."""
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,9 +10,35 @@ from pathlib import Path
 from markupsafe import Markup
 
 from grader.model.batch import BatchRun
-from grader.report.class_page.commands import again, review
 from grader.report.class_page.lines import CHARS, MESSAGE_CHARS, Line, link_to
+from grader.report.text import html
 from grader.untrusted_text import line
+
+
+def again(run: BatchRun, out: Path, only: str = "", *, static: bool | None = None) -> Markup:
+    """The batch once more, from any folder; `only` as `--only` has it. `static` if not as it was."""
+    roster = Path(run.roster)
+    words = ["grader", "batch", str(roster.absolute() if roster.exists() else roster)]
+    words += ["--rubric", run.rubric_source or run.rubric.id, "--out", str(out.absolute())]
+    words += ["--static"] if (run.static_only if static is None else static) else []
+    words += ["--before", run.before.isoformat()] if run.before else []
+    words += [word for folder in run.allow_local for word in ("--allow-local", folder)]
+    words += ["--remote-only"] if run.remote_only else []
+    words += ["--cluster", run.cluster] if run.cluster else []
+    words += ["--cluster-insecure"] if run.cluster_insecure else []
+    words += ["--only", only] if only else []
+    return _typed(words)
+
+
+def review(out: Path) -> Markup:
+    """Where a person gives points."""
+    return _typed(["grader", "review", str(out.absolute())])
+
+
+def _typed(words: list[str]) -> Markup:
+    """Whole, however long it is."""
+    return Markup(html(shlex.join(words)))  # noqa: S704 - escaped
+
 
 SHOWN_MAX = 200
 
@@ -70,7 +97,7 @@ KINDS = (
     _Kind(
         anchor="inconclusive",
         title="Inconclusive",
-        advice="It could not be told this time, so nobody loses points by it. Grade only these again:",
+        advice="These could not be decided this time, so they cost no points. Grade only these again:",
         holds=lambda found: found.state == "inconclusive",
         text=lambda found: found.why,
         command=lambda run, out: again(run, out, "inconclusive", static=False),
@@ -78,15 +105,15 @@ KINDS = (
     _Kind(
         anchor="error",
         title="Could not be graded",
-        advice="What is wrong with a submission is for its student to mend. Then run only these again:",
+        advice="What is wrong with a submission is for its student to fix. Then run only these again:",
         holds=lambda found: found.problem is not None and not found.problem.roster,
         text=_problem,
         command=lambda run, out: again(run, out, "failed"),
     ),
     _Kind(
         anchor="manual",
-        title="Points that a person gives",
-        advice="All that can be checked is checked. Give the points in your browser:",
+        title="Points that a person awards",
+        advice="Everything that can be checked is checked. Award the points in your browser:",
         holds=lambda found: found.state == "manual",
         text=lambda _: "",
         command=lambda _, out: review(out),

@@ -17,13 +17,15 @@ from grader.judging.facts import PACKAGE_RUN, Facts, try_facts
 from grader.model.figure import Figure, Figures
 from grader.model.result import CriterionResult
 from grader.model.verdict import Verdict
-from grader.report.figures.code import code_figures
-from grader.report.figures.consoles import console_of
-from grader.report.figures.counters import start_figures, step_figures, wrap_figures
-from grader.report.figures.graphs import graph_of
-from grader.report.figures.heard import heard_figures
-from grader.report.figures.paths import path_figures
-from grader.report.figures.rates import rate_figures
+from grader.report.figures.measurements import (
+    heard_figures,
+    path_figures,
+    rate_figures,
+    start_figures,
+    step_figures,
+    wrap_figures,
+)
+from grader.report.figures.runs import code_figures, console_of, graph_of
 from grader.rubric.model import Criterion, Rubric
 
 FIGURES_MAX = 4

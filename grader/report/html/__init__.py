@@ -1,6 +1,1 @@
 """The student's report as one HTML page, and the look that all pages share."""
-
-from grader.report.html.page import Docs
-from grader.report.html.report import html_report
-
-__all__ = ["Docs", "html_report"]

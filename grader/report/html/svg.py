@@ -1,8 +1,10 @@
-"""Elements of SVG, written as text: every attribute and every text is escaped, numbers are short."""
+"""SVG written as text: elements, whose attributes and texts are all escaped, and a frame with two axes."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 from markupsafe import Markup
 
@@ -69,3 +71,79 @@ def _name(key: str) -> str:
 
 def _value(value: str | float) -> str:
     return html(value) if isinstance(value, str) else short(value)
+
+
+LEFT, RIGHT, TOP, BOTTOM = 46.0, 14.0, 22.0, 40.0
+TICKS = 5
+TINY = 1e-12
+
+
+@dataclass(frozen=True, kw_only=True)
+class Frame:
+    """`width` and `height` in pixels of the drawing; the other values are those at its edges."""
+
+    width: float
+    height: float
+    x_low: float
+    x_high: float
+    y_low: float
+    y_high: float
+
+    @property
+    def right(self) -> float:
+        return self.width - RIGHT
+
+    @property
+    def bottom(self) -> float:
+        return self.height - BOTTOM
+
+    def x(self, value: float) -> float:
+        """The pixel of a value; one outside of the frame lies on its edge."""
+        share = (value - self.x_low) / ((self.x_high - self.x_low) or 1.0)
+        return LEFT + min(max(share, 0.0), 1.0) * (self.right - LEFT)
+
+    def y(self, value: float) -> float:
+        """As `x`, from the bottom up."""
+        share = (value - self.y_low) / ((self.y_high - self.y_low) or 1.0)
+        return self.bottom - min(max(share, 0.0), 1.0) * (self.bottom - TOP)
+
+    def box(self, x: tuple[float, float], y: tuple[float, float], **attributes: str | float) -> Markup:
+        """A rectangle between values, at least a pixel wide and high."""
+        left, right = self.x(x[0]), self.x(x[1])
+        top, bottom = self.y(y[1]), self.y(y[0])
+        return element(
+            "rect",
+            x=left,
+            y=top,
+            width=max(right - left, 1.0),
+            height=max(bottom - top, 1.0),
+            **attributes,
+        )
+
+    def axes(self, x_label: str, y_label: str) -> list[Markup]:
+        """Lines across at the ticks, their numbers, and what they are numbers of."""
+        parts = []
+        for value in ticks(self.y_low, self.y_high):
+            y = self.y(value)
+            parts.append(element("line", x1=LEFT, x2=self.right, y1=y, y2=y, class_="grid"))
+            parts.append(text(LEFT - 6, y + 4, number(value), text_anchor="end"))
+        for value in ticks(self.x_low, self.x_high):
+            x = self.x(value)
+            parts.append(element("line", x1=x, x2=x, y1=self.bottom, y2=self.bottom + 4, class_="axis"))
+            parts.append(text(x, self.bottom + 17, number(value), text_anchor="middle"))
+        parts.append(element("line", x1=LEFT, x2=self.right, y1=self.bottom, y2=self.bottom, class_="axis"))
+        parts.append(text(self.right, self.height - 6, x_label, text_anchor="end"))
+        parts.append(text(2, 13, y_label))
+        return parts
+
+
+def ticks(low: float, high: float, count: int = TICKS) -> list[float]:
+    """About `count` round values from `low` to `high`: 0, 0.5, 1 …"""
+    span = high - low
+    if span < TINY or not math.isfinite(span):
+        return []
+    rough = span / count
+    size = 10.0 ** math.floor(math.log10(rough))
+    step = next(factor * size for factor in (1, 2, 5, 10) if factor * size >= rough)
+    first = math.ceil(low / step - 1e-9)
+    return [i * step for i in range(first, math.floor(high / step + 1e-9) + 1)]

@@ -11,15 +11,13 @@ from grader.model.result import (
     AppliedOverride,
     Automatic,
     CriterionResult,
-    EnvironmentInfo,
     ErrorInfo,
     GradingResult,
     Lateness,
     RubricInfo,
-    SubmissionInfo,
-    TimingInfo,
 )
 from grader.model.verdict import Status
+from tests.support.a_class import criterion, made_result
 
 RUBRIC = RubricInfo(id="leeds-comp3631-lab1", version="1.2", digest="0" * 64)
 STARTED = datetime(2026, 11, 21, 18, 0, tzinfo=timezone.utc)
@@ -132,20 +130,9 @@ def _criterion(
         x=chance.choice(("talker", "numeric_talker", "lab1", "pub")), n=chance.randrange(2, 9)
     )
     status = Status.PARTIAL if partly else Status.FAIL if lost else Status.PASS
-    return CriterionResult(
-        id=name,
-        title=title,
-        check=name,
-        scenario=None,
-        status=status,
-        points=most / 2 if partly else 0.0 if lost else most,
-        max_points=most,
-        message=message if lost else "as it should be",
-        expected="",
-        measured="",
-        hint="",
-        reproduce="",
-        citations=(),
+    points = most / 2 if partly else 0.0 if lost else most
+    return criterion(
+        name, status, points, most, title=title, check=name, message=message if lost else "as it should be"
     )
 
 
@@ -192,17 +179,9 @@ def _result(
     entry: Entry, criteria: tuple[CriterionResult, ...], chance: random.Random | None
 ) -> GradingResult:
     wall_s = round(chance.lognormvariate(2.2, 0.4), 3) if chance else 0.0
-    return GradingResult(
-        submission=SubmissionInfo(
-            id=entry.id, source=entry.source, commit=f"{hash_of(entry):040x}", digest="", package="lab1"
-        ),
-        rubric=RUBRIC,
-        status="graded",
-        points=0.0,
-        max_points=sum(most for _, _, most, _ in CRITERIA),
-        criteria=criteria,
-        environment=EnvironmentInfo(grader="0.1.0", ros="noetic", python="3.11", sandbox="bwrap"),
-        timing=TimingInfo(wall_s=wall_s, cpu_s=wall_s / 8, student_cpu_s=wall_s / 4),
+    commit = f"{hash_of(entry):040x}"
+    return made_result(
+        entry.id, criteria, source=entry.source, commit=commit, wall_s=wall_s, rubric=RUBRIC, points=0.0
     )
 
 

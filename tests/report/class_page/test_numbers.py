@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from grader.report.class_page.costs import costs, most_first
 from grader.report.class_page.lines import Line, line_of
-from grader.report.class_page.points import spread
-from grader.report.class_page.timing import span, timing
+from grader.report.class_page.statistics import costs, most_first, span, spread, timing
 from grader.report.class_page.todo import todos
 from tests.report.class_page.made_up import made_up_rows, made_up_run
 

@@ -12,13 +12,18 @@ from lxml import etree
 from markupsafe import Markup
 
 from grader.model.figure import Edge, GraphFigure, RateFigure
-from grader.report.html.drawn import Drawer
-from grader.report.html.plots.axes import ticks
-from grader.report.html.plots.counter import counter_plots, counter_words, wrong_steps
-from grader.report.html.plots.graph import graph_plot, graph_rows
-from grader.report.html.plots.layers import is_bend, layered
-from grader.report.html.plots.path import path_plot, path_words
-from grader.report.html.plots.rate import rate_plots, rate_words
+from grader.report.html.figures import Drawer
+from grader.report.html.graph import graph_plot, graph_rows, is_bend, layered
+from grader.report.html.plots import (
+    counter_plots,
+    counter_words,
+    path_plot,
+    path_words,
+    rate_plots,
+    rate_words,
+    wrong_steps,
+)
+from grader.report.html.svg import ticks
 from tests.report.html.made import EVERY, SCRIPT, counter, graph, rate, way
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -68,8 +73,8 @@ def test_a_rate_has_its_dots_band_mean_and_late_stretches():
     assert len(classed(gaps, "column")) == 1
     assert len(classed(gaps, "bound")) == 2
     words = rate_words(rate())
-    assert "5 Hz in the mean; 9.5 to 10.5 Hz (the green band) passes" in words
-    assert "30 of 30 lie outside of 50 to 150 ms" in words
+    assert "5 Hz on average; 9.5 to 10.5 Hz (the green band) passes" in words
+    assert "30 of 30 lie outside 50 to 150 ms" in words
     assert "late 1 time" in words
 
 
@@ -102,7 +107,7 @@ def test_a_counter_is_a_sawtooth_with_wraps_marked_and_wrong_steps_circled_and_z
     assert classed(close, "dots")[0].get("d").count("M") == 13
     assert {"126", "127", "2"} <= set(texts(close))
     assert list(wrong_steps(counter())) == ["1, at 25.6 s: after 127 comes 1"]
-    assert "wraps once as it should (127 → 0); 1 step is wrong" in counter_words(counter())
+    assert "wraps once correctly (127 → 0); 1 step is wrong" in counter_words(counter())
 
 
 def test_points_that_are_left_out_break_the_line():
@@ -150,7 +155,7 @@ def test_a_graph_has_ellipses_for_nodes_and_boxes_for_topics_from_left_to_right(
     assert "std_msgs/String" in texts(plot)
     assert list(graph_rows(graph())) == [
         ("/chatter", "std_msgs/String", "/talker", "/listener"),
-        ("/numeric_chatter", "", "/talker", "nobody"),
+        ("/numeric_chatter", "", "/talker", "none"),
     ]
 
 
@@ -205,7 +210,7 @@ def test_a_way_shows_the_room_the_corners_and_where_it_strays():
     assert "too far off" in texts(plot)
     assert "passed 2 of 5 corners" in path_words(way())
     assert "x 2.9, y 1" in path_words(way())
-    assert "kept to that" in path_words(way(strayed=None))
+    assert "stayed within that" in path_words(way(strayed=None))
 
 
 def test_a_robot_that_stood_still_can_be_drawn():

@@ -19,15 +19,15 @@ from grader.errors import GraderError
 from grader.model.figure import Figures
 from grader.model.result import ErrorInfo, GradingResult, Lateness, Note
 from grader.model.verdict import FileCitation, Status
-from grader.report.html import html_report
-from grader.report.html.report import BYTES_MAX
+from grader.report.html.page import BYTES_MAX, render_html
 from grader.report.html.shell import policy, script
-from grader.report.html.words import FAULTS, blame
+from grader.report.sentences import FAULTS, blame
 from grader.report.text import line, visible
-from tests.report.hostile import CRITERIA, criterion, result, rubric
+from tests.report.hostile import CRITERIA, result, rubric
 from tests.report.html.made import SCRIPT, code, console, figures, graph, hostile_figures
 from tests.report.nasty import STEERING
 from tests.report.test_every_report import FIELDS, HUGE, SOME, decided, of, results, spoiled
+from tests.support.a_class import criterion
 
 DOCS = {"some-check": {**CHECKS["rate"].sections}}
 GOLDEN = Path(__file__).parent / "golden" / "report.html"
@@ -38,7 +38,7 @@ VOID_ADDRESS = re.compile(r"^(#|data:,$)")
 def page(shown: GradingResult | None = None, drawn: Figures | None = None, **how) -> str:
     beside = {"hidden": 0, "docs": DOCS, **how}
     of_rubric = beside.pop("rubric", None) or rubric(scenarios=SCENARIOS)
-    return html_report(shown or result(), of_rubric, figures() if drawn is None else drawn, **beside)
+    return render_html(shown or result(), of_rubric, figures() if drawn is None else drawn, **beside)
 
 
 def parsed(text: str) -> parser.HtmlElement:
@@ -241,9 +241,9 @@ def test_all_reached_but_late_is_no_congratulation():
 
 def test_only_what_can_be_mended_says_how_to_mend_it():
     document = parsed(page())
-    assert "How to mend it" in words(card(document, "chatter-rate"))
+    assert "How to fix it" in words(card(document, "chatter-rate"))
     for name in ("manifest", "build", "counter-start", "style"):
-        assert "How to mend it" not in words(card(document, name))
+        assert "How to fix it" not in words(card(document, name))
 
 
 def test_it_says_how_to_judge_it_again():

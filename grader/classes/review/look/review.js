@@ -47,7 +47,7 @@ const send = async (form, submitter) => {
     if (body.get("do") === "remove" && typed(form) === before) form.querySelectorAll("input[type=text], textarea").forEach((field) => { field.value = ""; });
     if (body.get("do") === "remove" || typed(form) === before) settle(form);
     told(form, answer.said);
-    if (answer.author !== undefined) document.querySelector(".author").textContent = answer.author || "nobody";
+    if (answer.author !== undefined) document.querySelector(".author").textContent = answer.author || "no name";
     const anew = document.getElementById("anew");
     if (anew && answer.head !== undefined) anew.hidden = false;
     if (answer.go && !unsaved().length) window.location.assign(answer.go);

@@ -1,0 +1,239 @@
+"""Points for a learning platform: one mark per submission, and a new file to import made from the roster alone."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from grader.classes.gradebook.matching import Kind, Platform, kinds
+from grader.classes.gradebook.table import (
+    Book,
+    Row,
+    comment,
+    criterion_points,
+    csv_line,
+    error_text,
+    late_text,
+    number_text,
+)
+from grader.model.batch import Entry
+from grader.model.result import GradingResult
+from grader.report.text import html
+
+Made = tuple[Iterator[str], list[str]]
+NONE = "-"
+"""What Moodle takes for no grade. An empty field would be 0 in a new grade item."""
+MOODLE_MAX = 100.0
+
+
+def fresh(
+    platform: Platform, marks: Sequence[Mark], wanted: Sequence[Wanted], columns: Sequence[str]
+) -> Made:
+    """The lines of the file, and remarks. `columns` are the roster's further ones."""
+    made: dict[Platform, Callable[[Sequence[Mark], Sequence[Wanted], _Roster], Made]] = {
+        "canvas": _canvas,
+        "moodle": _moodle,
+        "blackboard": _blackboard,
+    }
+    return made[platform](marks, wanted, _Roster(columns, platform))
+
+
+class _Roster:
+    """The further columns, by what they say of a student."""
+
+    def __init__(self, columns: Sequence[str], platform: Platform) -> None:
+        self.known = kinds(columns, platform)
+
+    def has(self, *wanted: Kind) -> bool:
+        return any(kind in wanted for kind in self.known.values())
+
+    def text(self, entry: Entry, *wanted: Kind) -> str:
+        """The first field that says any of these."""
+        for kind in wanted:
+            for column, found in self.known.items():
+                if found == kind and entry.extra.get(column):
+                    return entry.extra[column]
+        return ""
+
+
+def _canvas(marks: Sequence[Mark], wanted: Sequence[Wanted], roster: _Roster) -> Made:
+    remarks = _missing(
+        roster,
+        "Canvas",
+        ("platform", "number", "login", "email"),
+        "column 'SIS User ID', 'SIS Login ID' or 'Canvas id'",
+        "SIS Login ID",
+    )
+    remarks.append(
+        "Canvas makes a new assignment of each column: with --template it fills in one that is there"
+    )
+
+    def lines() -> Iterator[str]:
+        yield csv_line(
+            ["Student", "ID", "SIS User ID", "SIS Login ID", "Section", *(column.title for column in wanted)]
+        )
+        yield csv_line(["    Points Possible", "", "", "", "", *(column.max_points for column in wanted)])
+        for mark in marks:
+            entry = mark.entry
+            known = [roster.text(entry, "platform"), roster.text(entry, "number")]
+            login = roster.text(entry, "login", "email") or ("" if any(known) else entry.id)
+            yield csv_line(
+                [entry.name or entry.id, *known, login, roster.text(entry, "section"), *mark.points]
+            )
+
+    return lines(), remarks
+
+
+def _moodle(marks: Sequence[Mark], wanted: Sequence[Wanted], roster: _Roster) -> Made:
+    """By one column that every row has: Moodle takes a row without it for one more of the student before."""
+    names: dict[Kind, str] = {"email": "Email address", "login": "Username", "number": "ID number"}
+    filled = Counter(kind for mark in marks for kind in names if roster.text(mark.entry, kind))
+    kind = max(names, key=lambda kind: filled[kind])
+    by_id = not filled[kind]
+    header = "Username" if by_id else names[kind]
+    remarks = _missing(
+        roster,
+        "Moodle",
+        ("email", "login", "number"),
+        "column 'Email address', 'Username' or 'ID number'",
+        "Username",
+    )
+    found = [(mark, mark.entry.id if by_id else roster.text(mark.entry, kind)) for mark in marks]
+    remarks += [f"{mark.entry.id}: left out, without {header}" for mark, who in found if not who]
+    if any(points is not None and points > MOODLE_MAX for mark in marks for points in mark.points):
+        remarks.append("Moodle refuses the whole file for points above 100, unless its grades are unlimited")
+
+    def lines() -> Iterator[str]:
+        yield csv_line([header, "Full name", *(column.title for column in wanted), "Feedback"])
+        for mark, who in found:
+            if who:
+                points = [NONE if points is None else points for points in mark.points]
+                yield csv_line([who, mark.entry.name, *points, html(mark.comment)])
+
+    return lines(), remarks
+
+
+def _blackboard(marks: Sequence[Mark], wanted: Sequence[Wanted], roster: _Roster) -> Made:
+    remarks = _missing(roster, "Blackboard", ("login",), "column 'Username'", "Username")
+    remarks.append(
+        "Blackboard makes a column of text of each new column: with --template it fills in one that is there"
+    )
+
+    def lines() -> Iterator[str]:
+        titles = [f"{column.title} [Total Pts: {number_text(column.max_points)} Score]" for column in wanted]
+        yield csv_line(["Last Name", "First Name", "Username", "Student ID", *titles], quoted=True)
+        for mark in marks:
+            entry = mark.entry
+            who = [roster.text(entry, "login") or entry.id, roster.text(entry, "number")]
+            yield csv_line([*_names(entry, roster), *who, *mark.points], quoted=True)
+
+    return lines(), remarks
+
+
+def _names(entry: Entry, roster: _Roster) -> tuple[str, str]:
+    """Last and first name."""
+    last, first = roster.text(entry, "last"), roster.text(entry, "first")
+    if last or first:
+        return last, first
+    if "," in entry.name:
+        last, _, first = entry.name.partition(",")
+    else:
+        first, _, last = entry.name.rpartition(" ")
+    return last.strip(), first.strip()
+
+
+def _missing(roster: _Roster, platform: str, wanted: Sequence[Kind], columns: str, instead: str) -> list[str]:
+    if roster.has(*wanted):
+        return []
+    remarks = [f"the roster has no {columns}, by which {platform} finds students: ids stand as {instead}"]
+    if platform == "Moodle" and roster.has("platform"):
+        remarks.append(
+            "the numbers of a bulk download are those of Moodle's offline grading worksheet: "
+            "give it with --template"
+        )
+    return remarks
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """A column of points. `title` is what a new one is called, `names` what one that is there may be called."""
+
+    title: str
+    names: tuple[str, ...]
+    max_points: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mark:
+    """`points` by column, None where they are open; `open` says why. `late_cost` is what being late cost.
+
+    `comment` is for the student.
+    """
+
+    entry: Entry
+    points: tuple[float | None, ...]
+    open: str = ""
+    comment: str = ""
+    late_cost: float = 0.0
+
+
+def wanted_columns(book: Book, column: str, *, per_criterion: bool) -> tuple[Wanted, ...]:
+    """One column for the points, or one for each criterion that is worth any."""
+    base = column or book.title
+    if not per_criterion:
+        names = (column,) if column else (book.title, book.rubric_id)
+        return (Wanted(title=base, names=names, max_points=book.max_points),)
+    worth = [criterion for criterion in book.criteria if criterion.max_points > 0]
+    titles = [criterion.title for criterion in worth]
+    return tuple(
+        Wanted(
+            title=f"{base} - {c.title}" + (f" ({c.id})" if titles.count(c.title) > 1 else ""),
+            names=(f"{base} - {c.title}", f"{base} - {c.id}", c.id)
+            if titles.count(c.title) == 1
+            else (f"{base} - {c.title} ({c.id})", f"{base} - {c.id}", c.id),
+            max_points=c.max_points,
+        )
+        for c in worth
+    )
+
+
+def marks_of(book: Book, rows: Iterable[Row], *, per_criterion: bool) -> list[Mark]:
+    """Every row's mark. Of a result of status `error` no points count, of an inconclusive one those that are sure."""
+    worth = [criterion.id for criterion in book.criteria if criterion.max_points > 0]
+    return [_mark(row, worth if per_criterion else None) for row in rows]
+
+
+def remarks_of(marks: Sequence[Mark], *, per_criterion: bool) -> Iterator[str]:
+    """Whose points are open, and whose criteria do not say what being late cost."""
+    for mark in marks:
+        if mark.open:
+            yield f"{mark.entry.id}: no grade ({mark.open})"
+    late = [mark.entry.id for mark in marks if mark.late_cost]
+    if per_criterion and late:
+        yield f"criteria are without what being late cost: {', '.join(late)}"
+
+
+def _mark(row: Row, worth: Sequence[str] | None) -> Mark:
+    result, late = row.result, row.result.late
+    cost = late.points_before - late.points if late else 0.0
+    return Mark(
+        entry=row.entry,
+        points=_points(result, worth),
+        open=_open(result),
+        comment="; ".join(text for text in (late_text(result), comment(result)) if text),
+        late_cost=cost,
+    )
+
+
+def _points(result: GradingResult, worth: Sequence[str] | None) -> tuple[float | None, ...]:
+    if worth is None:
+        return (result.points if result.status == "graded" else None,)
+    if result.status == "error":
+        return (None,) * len(worth)
+    found = criterion_points(result)
+    return tuple(found.get(criterion) for criterion in worth)
+
+
+def _open(result: GradingResult) -> str:
+    return "" if result.status == "graded" else f"{result.status}: {error_text(result)}".rstrip(": ")

@@ -1,0 +1,342 @@
+"""A platform's own export with our points filled in. All other bytes stay as they were."""
+
+from __future__ import annotations
+
+import codecs
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from grader.classes.gradebook.matching import (
+    Identity,
+    Kind,
+    Platform,
+    entry_identity,
+    kinds,
+    match,
+    plain,
+    row_identity,
+)
+from grader.classes.gradebook.platforms import Mark, Wanted
+from grader.classes.gradebook.table import harmless, number_text
+from grader.errors import UsageError
+
+KEPT = {"EX", "N/A"}
+"""What Canvas writes for who is excused, and for who has not got the assignment."""
+_POSTING = re.compile(r"\s*(Muted|Manual Posting.*)?\s*", re.IGNORECASE | re.DOTALL)
+
+
+@dataclass(kw_only=True)
+class _Work:
+    """`places` are the columns that are filled in, in the order of `wanted`; `maximum` is Moodle's own column of it."""
+
+    platform: Platform
+    sheet: Sheet
+    known: dict[str, Kind]
+    wanted: Sequence[Wanted]
+    places: list[int] = field(default_factory=list)
+    maximum: int | None = None
+    remarks: list[str] = field(default_factory=list)
+
+
+def fill_template(
+    template: Path, platform: Platform, marks: Sequence[Mark], wanted: Sequence[Wanted], *, named: bool
+) -> tuple[bytes, list[str]]:
+    """The export with the points of whoever is found in it, every other byte as it was; and remarks.
+
+    Raises UsageError where the file is none of this platform's exports, or where it is not clear which column is ours.
+    """
+    sheet = read_sheet(template)
+    known = kinds(sheet.header, platform)
+    if not set(known.values()) - {"section"}:
+        raise UsageError(
+            f"{template}: no column says whose row it is; there are: {', '.join(sheet.header)[:300]}",
+            hint="give the platform's own export of its gradebook",
+        )
+    work = _Work(platform=platform, sheet=sheet, known=known, wanted=wanted)
+    students = [record for record in sheet.records[1:] if _is_student(record)]
+    _find_columns(work, named=named)
+    work.remarks += _maxima(work, students)
+    theirs = [_identity(record, work) for record in students]
+    found = match([entry_identity(mark.entry, platform) for mark in marks], theirs)
+    for place, mark in enumerate(marks):
+        if place in found.rows:
+            _fill(work, students[found.rows[place]], mark)
+        else:
+            who = f"{mark.entry.id} ({mark.entry.name})" if mark.entry.name else mark.entry.id
+            work.remarks.append(f"{who}: not in {template.name}: {found.doubtful[place]}")
+    work.remarks += _left(work, students, theirs, set(found.rows.values()))
+    return sheet.to_bytes(), work.remarks
+
+
+def _is_student(record: Record) -> bool:
+    values = [record.value(column) for column in range(len(record.cells))]
+    return "Points Possible" not in values[0] and not all(_POSTING.fullmatch(value) for value in values)
+
+
+def _identity(record: Record, work: _Work) -> Identity:
+    return row_identity(_fields(record, work), work.known)
+
+
+def _fields(record: Record, work: _Work) -> dict[str, str]:
+    return {name: record.value(column) for column, name in enumerate(work.sheet.header) if name in work.known}
+
+
+def _find_columns(work: _Work, *, named: bool) -> None:
+    header = work.sheet.header
+    worksheet = worksheet_columns(header, work.known) if work.platform == "moodle" else None
+    if worksheet and not named:
+        if len(work.wanted) > 1:
+            raise UsageError(
+                f"{work.sheet.path}: an offline grading worksheet has one grade for the whole",
+                hint="leave out --per-criterion, or give an export of the grader report",
+            )
+        work.places, work.maximum = [worksheet[0]], worksheet[1]
+        return
+    whole = len(work.wanted) == 1
+    for wanted in work.wanted:
+        place = find_column(header, wanted, work.platform, work.known, named=named and whole)
+        work.places.append(_added(work, wanted) if place is None else place)
+
+
+def _added(work: _Work, wanted: Wanted) -> int:
+    """A new column at the end of every row."""
+    place = len(work.sheet.header)
+    points = number_text(wanted.max_points)
+    (name,) = harmless([new_header(wanted, work.platform, points)])
+    for number, record in enumerate(work.sheet.records):
+        if record.is_empty:
+            continue
+        record.cells += [""] * (place - len(record.cells))
+        text = name if number == 0 else points if "Points Possible" in record.value(0) else ""
+        record.cells.append(work.sheet.written(text) if text else "")
+    made = {
+        "canvas": "Canvas makes a new assignment of it",
+        "moodle": "map it to a new grade item",
+        "blackboard": "Blackboard makes a column of text of it: better make the column there, and export again",
+    }
+    work.remarks.append(f"no column is called {wanted.title}: it is added at the end; {made[work.platform]}")
+    return place
+
+
+def _maxima(work: _Work, students: Sequence[Record]) -> Iterator[str]:
+    """Where the platform counts to another maximum, points stay as they are: that is for a person to settle."""
+    for wanted, place in zip(work.wanted, work.places, strict=True):
+        said = _maximum(work, students, place)
+        if said is not None and abs(said - wanted.max_points) > 1e-6:
+            yield (
+                f"{work.sheet.header[place]}: the platform has a maximum of {number_text(said)} points, "
+                f"the rubric {number_text(wanted.max_points)}: points are written as the rubric gives them"
+            )
+
+
+def _maximum(work: _Work, students: Sequence[Record], place: int) -> float | None:
+    if work.platform == "blackboard":
+        return maximum_in(work.sheet.header[place])
+    if work.maximum is not None:
+        return next((_number(record.value(work.maximum)) for record in students), None)
+    possible = (record for record in work.sheet.records if "Points Possible" in record.value(0))
+    return next((_number(record.value(place)) for record in possible), None)
+
+
+def _fill(work: _Work, record: Record, mark: Mark) -> None:
+    for place, points in zip(work.places, mark.points, strict=True):
+        record.cells += [""] * (place + 1 - len(record.cells))
+        there = record.value(place).strip()
+        if points is None:
+            if there not in {"", "-"}:
+                work.remarks.append(f"{mark.entry.id}: {there} is there already, and stays")
+        elif work.platform == "canvas" and there.upper() in KEPT:
+            work.remarks.append(
+                f"{mark.entry.id}: {there} stays, the {number_text(points)} points are left out"
+            )
+        elif _number(there) != points:
+            record.cells[place] = work.sheet.written(number_text(points), record.cells[place])
+
+
+def _left(
+    work: _Work, students: Sequence[Record], theirs: Sequence[Identity], taken: set[int]
+) -> Iterator[str]:
+    """Whoever is in the export only."""
+    for place, (record, identity) in enumerate(zip(students, theirs, strict=True)):
+        fields = _fields(record, work)
+        named = [fields[name] for name, kind in work.known.items() if kind != "section" and fields.get(name)]
+        if place not in taken and identity.name != "test student":
+            yield f"{', '.join(named) or 'a row without a name'}: in {work.sheet.path.name}, without a submission here"
+
+
+def _number(text: str) -> float | None:
+    found = re.fullmatch(r"\s*(-?\d{1,12})(?:[.,](\d{1,12}))?\s*", text, re.ASCII)
+    return float(f"{found[1]}.{found[2] or 0}") if found else None
+
+
+_GRADE = {"grade", "bewertung", "note", "calificación", "valutazione"}
+_MAXIMUM = {"maximumgrade", "bestwertung", "notemaximale", "calificaciónmáxima", "valutazionemassima"}
+_REAL = re.compile(r"\((real|points|punkte|points?|réel|brut|real\w*)\)\s*$", re.IGNORECASE)
+_OTHER = re.compile(r"\((feedback|percentage|letter|prozentsatz|buchstabe)\)\s*$", re.IGNORECASE)
+SHOWN_MAX = 12
+
+
+def find_column(
+    header: Sequence[str], wanted: Wanted, platform: Platform, known: dict[str, Kind], *, named: bool
+) -> int | None:
+    """Its place; None where there is none. With `named`, the instructor has said what it is called.
+
+    Raises UsageError where several columns could be it, or none is what was named.
+    """
+    exact = [place for place, name in enumerate(header) if name.strip() in wanted.names]
+    meant = {plain(name) for name in wanted.names}
+    near = [
+        place
+        for place, name in enumerate(header)
+        if name not in known and not _OTHER.search(name) and meant & _titles(name, platform)
+    ]
+    near = [place for place in near if _REAL.search(header[place])] or near if len(near) > 1 else near
+    found = exact or near
+    if len(found) > 1:
+        raise UsageError(
+            f"several columns could be {wanted.title}: {', '.join(header[place] for place in found)}",
+            hint="say which one with --column",
+        )
+    if not found and named:
+        raise UsageError(f"no column {wanted.title} in the template", hint=_others(header, known))
+    return found[0] if found else None
+
+
+def worksheet_columns(header: Sequence[str], known: dict[str, Kind]) -> tuple[int, int | None] | None:
+    """The places of the grade and of its maximum in Moodle's offline grading worksheet; None where it is none."""
+    plains = [plain(name) for name in header]
+    grade = next((place for place, name in enumerate(plains) if name in _GRADE), None)
+    if grade is None or "platform" not in known.values():
+        return None
+    return grade, next((place for place, name in enumerate(plains) if name in _MAXIMUM), None)
+
+
+def maximum_in(header: str) -> float | None:
+    """Blackboard says in a column's name how many points it has."""
+    found = re.search(r"\[Total Pts: (?:up to )?([\d.]+)", header)
+    return float(found[1]) if found and found[1].count(".") < 2 else None
+
+
+def new_header(wanted: Wanted, platform: Platform, points: str) -> str:
+    """What a column is called that the platform does not have yet."""
+    return f"{wanted.title} [Total Pts: {points} Score]" if platform == "blackboard" else wanted.title
+
+
+def _titles(name: str, platform: Platform) -> set[str]:
+    """What the column may be called without what the platform adds."""
+    if platform == "canvas":
+        return {plain(re.sub(r"\s*\(\d+\)\s*$", "", name))}
+    if platform == "blackboard":
+        return {plain(re.sub(r"\s*\[Total Pts:.*$|\s*\|\s*\d+\s*$", "", name))}
+    bare = re.sub(r"\s*\([^()]*\)\s*$", "", name)
+    return {plain(bare), plain(bare.partition(":")[2]) or plain(bare)}
+
+
+def _others(header: Sequence[str], known: dict[str, Kind]) -> str:
+    names = [name for name in header if name.strip() and name not in known]
+    more = f" and {len(names) - SHOWN_MAX} more" if len(names) > SHOWN_MAX else ""
+    return f"there are: {', '.join(names[:SHOWN_MAX])}{more}"
+
+
+BYTES_MAX = 64 << 20
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+_EXPORT = "export it from the platform as CSV, and do not save it from a spreadsheet"
+
+
+@dataclass(kw_only=True)
+class Record:
+    """The cells of one row as they are written, quotation marks too, and the line end behind them."""
+
+    cells: list[str]
+    end: str
+
+    def value(self, column: int) -> str:
+        """What a cell says; empty where the row has no such cell."""
+        return _value(self.cells[column]) if column < len(self.cells) else ""
+
+    @property
+    def is_empty(self) -> bool:
+        return not any(cell.strip() for cell in self.cells)
+
+
+@dataclass(kw_only=True)
+class Sheet:
+    """`mark` are the bytes before the text, `delimiter` is what stands between cells."""
+
+    path: Path
+    mark: bytes
+    encoding: str
+    delimiter: str
+    records: list[Record]
+
+    @property
+    def header(self) -> list[str]:
+        """The columns' names, as they are written."""
+        return [_value(cell) for cell in self.records[0].cells]
+
+    def written(self, text: str, instead: str = "") -> str:
+        """A cell that says `text`, in quotation marks where the cell before had them, or else every column's name."""
+        quoted = instead.startswith('"') if instead else all(c.startswith('"') for c in self.records[0].cells)
+        if quoted or any(sign in text for sign in (self.delimiter, '"', "\r", "\n")):
+            return '"' + text.replace('"', '""') + '"'
+        return text
+
+    def to_bytes(self) -> bytes:
+        """The whole file."""
+        text = "".join(self.delimiter.join(record.cells) + record.end for record in self.records)
+        return self.mark + text.encode(self.encoding)
+
+
+def read_sheet(path: Path) -> Sheet:
+    """Raises UsageError for what is no table of text."""
+    try:
+        data = path.read_bytes() if path.stat().st_size <= BYTES_MAX else b""
+    except OSError as error:
+        raise UsageError(
+            f"{path}: cannot be read: {error.strerror}", hint="give the platform's export"
+        ) from error
+    if not data or data.startswith(b"PK\x03\x04"):
+        raise UsageError(f"{path}: this is no export as CSV", hint=_EXPORT)
+    mark, encoding = next(((mark, name) for mark, name in _MARKS if data.startswith(mark)), (b"", "utf-8"))
+    try:
+        text = data[len(mark) :].decode(encoding)
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path}: no {encoding.upper()} text", hint=_EXPORT) from error
+    first = re.sub(r'"[^"]*"', "", re.split(r"[\r\n]", text, maxsplit=1)[0])
+    delimiter = max((",", ";", "\t"), key=first.count)
+    sheet = Sheet(
+        path=path,
+        mark=mark,
+        encoding=encoding,
+        delimiter=delimiter,
+        records=list(_records(text, delimiter)),
+    )
+    if not any(name.strip() for name in sheet.header):
+        raise UsageError(f"{path}:1: no columns are named", hint=_EXPORT)
+    return sheet
+
+
+def _records(text: str, delimiter: str) -> Iterator[Record]:
+    """Whatever is there becomes a cell; joined again, the records are the same text."""
+    cell = re.compile(
+        rf'("[^"]*(?:""[^"]*)*"[^{delimiter}\r\n]*|[^{delimiter}\r\n]*)({delimiter}|\r\n|\n|\r|\Z)'
+    )
+    cells: list[str] = []
+    for found in cell.finditer(text):
+        cells.append(found[1])
+        if found[2] == delimiter:
+            continue
+        if found[2] or len(cells) > 1 or cells[0]:
+            yield Record(cells=cells, end=found[2])
+        cells = []
+
+
+def _value(cell: str) -> str:
+    cell = cell.strip()
+    return cell[1:-1].replace('""', '"') if len(cell) > 1 and cell[0] == cell[-1] == '"' else cell

@@ -1,0 +1,223 @@
+"""All submissions of a class, read one by one: a line each, and shared diagnoses, with names or under pseudonyms."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import secrets
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from grader.files import atomic_write
+from grader.model.batch import MISSING, ROSTER, BatchRun, Entry
+from grader.model.result import GradingResult
+from grader.model.verdict import Status
+from grader.report.class_page.lines import MESSAGE_CHARS, Line, line_of
+from grader.untrusted_text import line
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gathered:
+    """Submissions in the order in which the page shows them, and diagnoses, most members first."""
+
+    lines: Sequence[Line]
+    diagnoses: Sequence[Diagnosis]
+
+
+def gather(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]]) -> Gathered:
+    """In the roster's order, by name."""
+    lines, diagnoses = [], Diagnoses()
+    for place, (entry, result) in enumerate(rows):
+        lines.append(line_of(entry, result, run.criteria))
+        diagnoses.add(place, result)
+    return Gathered(lines=lines, diagnoses=diagnoses.largest_first())
+
+
+def gather_anonymous(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]], salt: bytes) -> Gathered:
+    """By pseudonyms, in an order that depends on `salt`; nothing in it tells who anybody is."""
+    names, ids = Names(), []
+
+    def read() -> Iterable[tuple[Entry, GradingResult]]:
+        for entry, result in rows:
+            names.add(entry, result.submission.commit)
+            ids.append(entry.id)
+            yield entry, result
+
+    named = gather(run, read())
+    words = names.told()
+    shuffled = order(ids, salt)
+    now = {before: place for place, before in enumerate(shuffled)}
+    lines = [
+        _unnamed(named.lines[before], pseudonym, words)
+        for pseudonym, before in zip(pseudonyms(ids), shuffled, strict=True)
+    ]
+    diagnoses = [
+        Diagnosis(
+            criterion=found.criterion,
+            wordings=Counter([without_words(found.message, words)]),
+            members=sorted(now[member] for member in found.members),
+        )
+        for found in named.diagnoses
+    ]
+    return Gathered(lines=lines, diagnoses=diagnoses)
+
+
+def _unnamed(line: Line, pseudonym: str, words: frozenset[str]) -> Line:
+    problem = line.problem
+    if problem is not None:
+        problem = replace(problem, message=without_words(problem.message, words), hint="")
+    why = without_words(line.why, words)
+    return replace(line, id=pseudonym, name="", group="", folder="", why=why, problem=problem)
+
+
+WORDINGS_MAX = 40
+LOST = {Status.PARTIAL, Status.FAIL}
+
+_NAME = re.compile(
+    r"(?:[\w.~@+-]*/)+[\w.~@+-]*|\b[\w-]+\.(?:py|cpp|cc|c|h|hpp|xml|launch|txt|sh|msg|srv|ya?ml)\b"
+)
+_QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"|\u2018[^\u2019]*\u2019|\u201c[^\u201d]*\u201d|`[^`]*`")
+_NUMBER = re.compile(r"(?<![\w.])[+-]?\d+(?:[.,]\d+)*(?:e[+-]?\d+)?", re.ASCII)
+_LIST = re.compile(r"(?P<one>…|N)(?:(?:, | and | or |, and )(?P=one))+")
+
+
+def reduced(message: str) -> str:
+    """A message without what is one submission's own: names and quoted words are `…`, numbers are `N`."""
+    text = _QUOTED.sub("…", message)
+    text = _NAME.sub("…", text)
+    text = _NUMBER.sub("N", text)
+    return " ".join(_LIST.sub(r"\g<one>", text).split())
+
+
+@dataclass(kw_only=True)
+class Diagnosis:
+    """One fault that many may share: `members` are the places of its submissions, `wordings` what it was called (`more`
+    where there are others). `criterion` is an id, empty for what could not be graded."""
+
+    criterion: str
+    members: list[int] = field(default_factory=list)
+    wordings: Counter[str] = field(default_factory=Counter)
+    more: bool = False
+
+    @property
+    def message(self) -> str:
+        """As most of them have it."""
+        return self.wordings.most_common(1)[0][0]
+
+    def add(self, place: int, message: str) -> None:
+        """One more submission."""
+        self.members.append(place)
+        if message in self.wordings or len(self.wordings) < WORDINGS_MAX:
+            self.wordings[message] += 1
+        else:
+            self.more = True
+
+
+class Diagnoses:
+    """Groups what is added to it."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[str, str], Diagnosis] = {}
+
+    def add(self, place: int, result: GradingResult) -> None:
+        """All faults of one submission. What only follows from another fault (`blocked`) is none of its own."""
+        for criterion, message in _faults(result):
+            text = line(message, MESSAGE_CHARS)
+            key = criterion, reduced(text)
+            found = self._found.setdefault(key, Diagnosis(criterion=criterion))
+            found.add(place, text)
+
+    def largest_first(self) -> list[Diagnosis]:
+        """All of them; those of one size in the order in which they were found."""
+        return sorted(self._found.values(), key=lambda found: -len(found.members))
+
+
+def _faults(result: GradingResult) -> Iterator[tuple[str, str]]:
+    """Of each criterion what the check said, or why nothing could be graded, with no criterion. What a person decided
+    keeps the words of the check."""
+    if result.error is not None:
+        if result.error.kind not in {MISSING, ROSTER}:
+            yield "", result.error.message
+        return
+    said = {override.criterion: override.automatic.message for override in result.overrides}
+    for criterion in result.criteria:
+        if criterion.status in LOST:
+            message = said.get(criterion.id, criterion.message)
+            yield criterion.id, message or criterion.measured or criterion.title
+
+
+SALT = ".anonymous-salt"
+SALT_BYTES = 32
+LEFT_OUT = "…"
+WORD_CHARS = 3
+PREFIXES = ("S", "P", "X", "No. ", "Anon. ")
+
+_WORDS = re.compile(r"[^\W_]+")
+
+
+def salt_in(folder: Path) -> bytes:
+    """The folder's own secret: pages made with it call everybody the same each time. Made where there is none.
+
+    Raises OutputError where it cannot be written.
+    """
+    path = folder / SALT
+    try:
+        salt = path.read_bytes()
+    except OSError:
+        salt = b""
+    if len(salt) >= SALT_BYTES:
+        return salt
+    salt = secrets.token_bytes(SALT_BYTES)
+    atomic_write(path, salt)
+    return salt
+
+
+def order(ids: Sequence[str], salt: bytes) -> list[int]:
+    """The places of `ids`, shuffled: the same for the same salt."""
+    keyed = [hashlib.blake2b(name.encode("utf-8", "surrogatepass"), key=salt).digest() for name in ids]
+    return sorted(range(len(ids)), key=lambda place: keyed[place])
+
+
+def pseudonyms(ids: Sequence[str]) -> list[str]:
+    """`S001`, `S002`, …, in a form that no id has."""
+    taken = [name.casefold() for name in ids]
+    free = (p for p in PREFIXES if not any(re.match(rf"{re.escape(p.casefold())}\d", name) for name in taken))
+    prefix = next(free, PREFIXES[-1])
+    digits = max(3, len(str(len(ids))))
+    return [f"{prefix}{number:0{digits}}" for number in range(1, len(ids) + 1)]
+
+
+class Names:
+    """Knows the words of everybody's id, name, group and source, and takes them out of texts."""
+
+    def __init__(self) -> None:
+        self._own: set[str] = set()
+        self._sources: Counter[str] = Counter()
+        self._count = 0
+
+    def add(self, entry: Entry, commit: str | None) -> None:
+        """One submission's."""
+        self._count += 1
+        self._own.update(_words(entry.id, entry.name, entry.group, commit or ""))
+        self._sources.update(set(_words(entry.source, entry.ref or "")))
+
+    def told(self) -> frozenset[str]:
+        """The words that could tell somebody: of sources not those that most have (`home`, `submissions`)."""
+        most = max(1, self._count // 2)
+        return frozenset(self._own).union(word for word, times in self._sources.items() if times <= most)
+
+
+def without_words(text: str, words: frozenset[str]) -> str:
+    """`text` with `…` for each of the words, and for names of files, what is quoted, and numbers."""
+    return _WORDS.sub(lambda found: LEFT_OUT if found[0].casefold() in words else found[0], reduced(text))
+
+
+def _words(*texts: str) -> Iterable[str]:
+    return (
+        word
+        for text in texts
+        for found in _WORDS.findall(text)
+        if len(word := found.casefold()) >= WORD_CHARS
+    )

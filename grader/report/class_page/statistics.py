@@ -1,0 +1,292 @@
+"""What the class page counts and draws: points, costs of criteria, time, and the heat map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from statistics import fmean, median
+
+from markupsafe import Markup
+
+from grader.model.batch import BatchRun, CriterionInfo
+from grader.report.class_page.lines import LETTERS, Line
+from grader.report.html import svg
+from grader.report.text import number
+
+
+@dataclass(kw_only=True)
+class Cost:
+    """What one criterion cost all submissions that were judged. `partly`, `failed` and `blocked` count them; `open`
+    those whose points are not settled yet."""
+
+    place: int
+    criterion: CriterionInfo
+    judged: int = 0
+    points: float = 0.0
+    partly: int = 0
+    failed: int = 0
+    blocked: int = 0
+    open: int = 0
+
+    @property
+    def lost(self) -> int:
+        """How many submissions lost points by it, or would have if it were worth any."""
+        return self.partly + self.failed + self.blocked
+
+    @property
+    def share(self) -> float:
+        """How many of those that were judged, in percent."""
+        return 100 * self.lost / self.judged if self.judged else 0.0
+
+
+def costs(lines: Iterable[Line], criteria: Sequence[CriterionInfo]) -> list[Cost]:
+    """Of each criterion, in the rubric's order."""
+    found = [Cost(place=place, criterion=criterion) for place, criterion in enumerate(criteria)]
+    for line in lines:
+        if line.judged:
+            for cost in found:
+                _add(cost, line)
+    return found
+
+
+def most_first(found: Iterable[Cost]) -> list[Cost]:
+    """Those that cost anything: most points first, then what most submissions lost."""
+    return sorted(
+        (cost for cost in found if cost.lost), key=lambda cost: (-cost.points, -cost.lost, cost.place)
+    )
+
+
+def _add(cost: Cost, line: Line) -> None:
+    letter = line.letters[cost.place]
+    if letter == "n":
+        return
+    cost.judged += 1
+    cost.partly += letter == "a"
+    cost.failed += letter == "f"
+    cost.blocked += letter == "b"
+    cost.open += letter in "iem"
+    if letter in "afb":
+        most = cost.criterion.max_points
+        cost.points += max(0.0, most - line.points_of(cost.place, most))
+
+
+BINS_MAX = 20
+STEPS = (0.1, 0.2, 0.25, 0.5, 1, 2, 2.5, 5, 10, 20, 25, 50, 100, 200, 250, 500, 1000)
+WIDTH, HEIGHT, LEFT, BOTTOM, TOP = 520, 330, 8, 24, 20
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bin:
+    """`count` submissions with `low` to less than `high` points; the last bin has those with `high`, too."""
+
+    low: float
+    high: float
+    count: int
+
+    @property
+    def words(self) -> str:
+        return f"{number(self.low)} to {number(self.high)} points: {self.count}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spread:
+    """Of all submissions that were judged."""
+
+    count: int
+    mean: float
+    median: float
+    best: float
+    full: int
+    none: int
+    bins: tuple[Bin, ...]
+
+
+def spread(points: Sequence[float], most: float) -> Spread | None:
+    """None where nothing was judged."""
+    if not points:
+        return None
+    return Spread(
+        count=len(points),
+        mean=fmean(points),
+        median=median(points),
+        best=max(points),
+        full=sum(value >= most for value in points),
+        none=sum(value <= 0 for value in points),
+        bins=_bins(points, max(most, *points)),
+    )
+
+
+def _bins(points: Iterable[float], most: float) -> tuple[Bin, ...]:
+    width = next((step for step in STEPS if step * BINS_MAX >= most), most / BINS_MAX) if most > 0 else 1.0
+    last = max(1, math.ceil(most / width - 1e-9)) - 1
+    counts = [0] * (last + 1)
+    for value in points:
+        counts[min(last, max(0, math.floor(value / width + 1e-9)))] += 1
+    return tuple(
+        Bin(low=place * width, high=min(most, (place + 1) * width) if most > 0 else width, count=count)
+        for place, count in enumerate(counts)
+    )
+
+
+def histogram(found: Spread) -> Markup:
+    """The bins as bars, each with its number above it and its points below."""
+    bins = found.bins
+    highest = max(one.count for one in bins)
+    step = (WIDTH - 2 * LEFT) / len(bins)
+    room = HEIGHT - BOTTOM - TOP
+    bars = []
+    for place, one in enumerate(bins):
+        x, height = LEFT + place * step, room * one.count / highest
+        bars.append(
+            svg.element(
+                "rect",
+                svg.element("title", svg.escaped(one.words)),
+                class_="pile",
+                x=x + 1,
+                y=TOP + room - height,
+                width=max(1.0, step - 2),
+                height=height,
+            )
+        )
+        if one.count:
+            middle = x + step / 2
+            bars.append(svg.text(middle, TOP + room - height - 4, str(one.count), text_anchor="middle"))
+    words = "; ".join(one.words for one in bins if one.count)
+    title = f"Points of {found.count} submissions"
+    return svg.drawing("histogram", (WIDTH, HEIGHT), title, words, *bars, *_scale(bins, step))
+
+
+def _scale(bins: Sequence[Bin], step: float) -> list[Markup]:
+    """The line below the bars, and where each second or fifth bar begins."""
+    every = 1 if len(bins) <= 10 else 2
+    y = HEIGHT - BOTTOM
+    line = svg.element("path", d=f"M{LEFT} {y}H{WIDTH - LEFT}", class_="axis")
+    ticks = [
+        svg.text(
+            LEFT + place * step, y + 16, number(bins[place].low), text_anchor="middle" if place else "start"
+        )
+        for place in range(0, len(bins), every)
+    ]
+    end = svg.text(WIDTH - LEFT, y + 16, number(bins[-1].high), text_anchor="end")
+    return [line, *ticks, end]
+
+
+SLOWEST = 10
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timing:
+    """Seconds. `wall_s` is None while the batch goes on. `slowest` are places of submissions, with their time."""
+
+    wall_s: float | None
+    mean_s: float
+    median_s: float
+    slowest: tuple[tuple[int, float], ...]
+    done: int
+
+
+def timing(run: BatchRun, lines: Sequence[Line]) -> Timing | None:
+    """None where no submission was timed."""
+    timed = [(place, line.wall_s) for place, line in enumerate(lines) if line.wall_s > 0]
+    if not timed:
+        return None
+    seconds = [wall_s for _, wall_s in timed]
+    ended = run.ended_at
+    return Timing(
+        wall_s=(ended - run.started_at).total_seconds() if ended else None,
+        mean_s=fmean(seconds),
+        median_s=median(seconds),
+        slowest=tuple(sorted(timed, key=lambda one: (-one[1], one[0]))[:SLOWEST]),
+        done=len(timed),
+    )
+
+
+def span(seconds: float) -> str:
+    """`0.4 s`, `48 s`, `12 min 3 s`, `2 h 5 min`, `3 days 4 h`."""
+    if seconds < 59.5:
+        return f"{seconds:.1f} s" if seconds < 9.95 else f"{seconds:.0f} s"
+    whole = round(seconds)
+    for size, unit, part, smaller in (
+        (86_400, "days", 3600, "h"),
+        (3600, "h", 60, "min"),
+        (60, "min", 1, "s"),
+    ):
+        if whole >= size:
+            rest = whole % size // part
+            name = "day" if unit == "days" and whole // size == 1 else unit
+            return f"{whole // size} {name}" + (f" {rest} {smaller}" if rest else "")
+    return "0 s"
+
+
+ROW = 22
+ONE_EACH_MAX = 500
+COLUMNS_MAX = 120
+TICK = 64
+WIDTHS = ((40, 22), (60, 15), (120, 7), (160, 5), (225, 4), (304, 3), (ONE_EACH_MAX, 2))
+"""Up to so many submissions, a column is so wide."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeatMap:
+    """`columns` are the places of the submissions in each column: one each, or a group of those with about as many
+    points. `step` and `row` are the size of a cell."""
+
+    drawing: Markup
+    columns: Sequence[Sequence[int]]
+    step: int
+    row: int = ROW
+    letters: str = ""
+    """The statuses that it has cells of."""
+
+    @property
+    def grouped(self) -> bool:
+        return any(len(column) > 1 for column in self.columns)
+
+
+def heat_map(lines: Sequence[Line], criteria: Sequence[CriterionInfo]) -> HeatMap | None:
+    """None where nothing was judged."""
+    order = sorted((p for p, line in enumerate(lines) if line.judged), key=lambda place: -lines[place].points)
+    if not order or not criteria:
+        return None
+    columns = _columns(order)
+    step = next((width for most, width in WIDTHS if len(columns) <= most), WIDTHS[-1][1])
+    rows = [
+        svg.element("g", *_cells(lines, place, columns, step), transform=f"translate(0 {place * ROW})")
+        for place in range(len(criteria))
+    ]
+    size = (max(len(columns) * step, 40), len(criteria) * ROW + 20)
+    words = f"{len(criteria)} criteria by {len(order)} submissions, most points first."
+    ticks = _ticks(lines, columns, step, len(criteria) * ROW + 15)
+    drawing = svg.drawing("heat-map", size, "Heat map", words, *rows, *ticks)
+    there = {letter for place in order for letter in lines[place].letters}
+    letters = "".join(letter for letter in LETTERS.values() if letter in there)
+    return HeatMap(drawing=drawing, columns=columns, step=step, letters=letters)
+
+
+def _columns(order: Sequence[int]) -> list[Sequence[int]]:
+    if len(order) <= ONE_EACH_MAX:
+        return [(place,) for place in order]
+    ends = [len(order) * i // COLUMNS_MAX for i in range(COLUMNS_MAX + 1)]
+    return [order[ends[i] : ends[i + 1]] for i in range(COLUMNS_MAX)]
+
+
+def _cells(lines: Sequence[Line], row: int, columns: Sequence[Sequence[int]], step: int) -> Iterator[Markup]:
+    width = step - 1 if step >= 6 else step
+    for i, column in enumerate(columns):
+        letters = [lines[place].letters[row] for place in column]
+        class_ = letters[0] if len(letters) == 1 else _shade(letters)
+        yield svg.element("rect", class_=f"cell {class_}", x=i * step, width=width, height=ROW - 2)
+
+
+def _shade(letters: Sequence[str]) -> str:
+    """`q0` where nobody lost anything, to `q5` where all did."""
+    lost = sum(letter in "afb" for letter in letters)
+    return f"q{-(-5 * lost // len(letters))}"
+
+
+def _ticks(lines: Sequence[Line], columns: Sequence[Sequence[int]], step: int, y: float) -> Iterator[Markup]:
+    """The points of the submission above, wherever there is room."""
+    for x in range(0, len(columns) * step - TICK // 2, TICK):
+        points = lines[columns[x // step][0]].points
+        yield svg.text(x, y, number(points), class_="label tick")

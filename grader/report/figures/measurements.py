@@ -1,0 +1,327 @@
+"""What a check measured, by its own measure: values of a counter, a rate, a path, what a listener heard."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator, Sequence
+from itertools import chain
+
+from grader.checks.counter import StartParams, StepParams, begins_with, missed_the_first
+from grader.checks.hears import HearsParams
+from grader.checks.path import PathParams
+from grader.checks.rate import RateParams, judged_rhythm, sleeps_explain, was_late
+from grader.checks.support.console_output import (
+    Line,
+    Probe,
+    chosen,
+    line_finder,
+    places_of,
+    printed_lines,
+    probes_on,
+)
+from grader.checks.support.counters import (
+    Count,
+    Step,
+    WrapParams,
+    bad_turn_message,
+    counts,
+    judge_wraps,
+    longest,
+    turns_of,
+    whose_turn,
+    wrong_steps,
+)
+from grader.checks.support.geometry import Pose, followed, relative, track
+from grader.checks.support.lateness import lateness
+from grader.checks.support.text import listed, number
+from grader.evidence.run import Channel, Run
+from grader.model.figure import POINTS_MAX, CounterFigure, Heard, HeardFigure, PathFigure, RateFigure
+from grader.model.message_rate import Rhythm
+from grader.model.package import PackageFacts
+from grader.model.verdict import Status
+from grader.report.figures.bounds import finite, named, second, short, spread
+
+FIRST_VALUES = 40
+MARKS_MAX = 40
+TURNS_MAX = 60
+AROUND = 4
+TEXT_LETTERS = 200
+
+Mark = tuple[int, str]
+"""A value's number, from 0, and what is wrong with it."""
+
+
+def start_figures(run: Run, params: StartParams) -> Iterator[CounterFigure]:
+    """The beginning of the publisher that came first."""
+    for count in counts(run, params.topic)[:1]:
+        right = begins_with(count, params.start) or run.foreign
+        known = right or missed_the_first(run, params.topic, count)
+        marks = [] if known else [(0, f"the first value is {number(count.values[0])}, not {params.start}")]
+        steps = [s for s in count.steps[:FIRST_VALUES] if s.change < -1]
+        first = range(len(count.values))[:FIRST_VALUES]
+        yield _counter_figure(count, steps, marks, run=run, topic=params.topic, kept=first)
+
+
+def step_figures(run: Run, params: StepParams) -> Iterator[CounterFigure]:
+    """The publisher that sent most."""
+    count = longest(run, params.topic)
+    if count is None:
+        return
+    found = wrong_steps(count, run, maximum=params.maximum, rate_hz=params.rate_hz)
+    lost = {s.number for s in found.lost}
+    marks = [(s.number, _step_text(s, flood=found.flood, lost=s.number in lost)) for s in found.steps]
+    turns = [s for s in count.steps if s.change < -1]
+    yield _counter_figure(count, turns, [] if found.excused else marks, run=run, topic=params.topic)
+
+
+def wrap_figures(run: Run, package: PackageFacts, params: WrapParams) -> Iterator[CounterFigure]:
+    """The publisher that sent most."""
+    count = longest(run, params.topic)
+    if count is None:
+        return
+    found = turns_of(count, run, params)
+    goes_on = (s for s in found.bad if not (s.before > params.maximum and s.change > 0))
+    marks = [(s.number, _turn_text(s, found.every, count, run, params)) for s in goes_on]
+    verdict, _ = judge_wraps(count, run, package, params)
+    if not found.bad and verdict.status is Status.FAIL and not verdict.unjudged:
+        marks = [(len(count.values) - 1, verdict.message)]
+    yield _counter_figure(count, found.good, marks, run=run, topic=params.topic)
+
+
+def _step_text(step: Step, *, flood: bool, lost: bool) -> str:
+    comes = f"after {number(step.before)} comes {number(step.after)}"
+    if flood or lost:
+        why = "a flood: its publisher drops values" if flood else "lost on the way, with a gap in time"
+        return f"{comes} ({why})"
+    return comes
+
+
+def _turn_text(step: Step, turns: list[Step], count: Count, run: Run, params: WrapParams) -> str:
+    whose = whose_turn(step, count, run, params)
+    if whose == "program":
+        return bad_turn_message(step, turns, params)
+    return _step_text(step, flood=whose == "flood", lost=True)
+
+
+def _counter_figure(
+    count: Count,
+    turns: Sequence[Step],
+    marks: Sequence[Mark],
+    *,
+    run: Run,
+    topic: str,
+    kept: range | None = None,
+) -> CounterFigure:
+    shown = [mark for mark in marks[:MARKS_MAX] if _drawable(count.values[mark[0]])]
+    numbers = [
+        i for i in kept or _shown_values(count, [i for i, _ in shown], turns) if _drawable(count.values[i])
+    ]
+    places = {number: place for place, number in enumerate(numbers)}
+    return CounterFigure(
+        topic=named(topic),
+        publisher=named(count.callerid or "an unnamed node"),
+        scenario=named(run.scenario),
+        times_s=tuple(second(run, count.times_ns[i]) for i in numbers),
+        values=tuple(_whole(finite(count.values[i])) for i in numbers),
+        numbers=tuple(numbers),
+        wraps=tuple(places[s.number] for s in turns if s.number in places),
+        wrong=tuple(places[i] for i, _ in shown),
+        texts=tuple(short(text, TEXT_LETTERS) for _, text in shown),
+        more_wrong=len(marks) - len(shown),
+        messages=len(count.values),
+    )
+
+
+def _whole(value: float) -> float:
+    """Whole numbers as such: 127 rather than 127.0."""
+    return int(value) if value == int(value) else value
+
+
+def _drawable(value: float) -> bool:
+    """What is no number at all has no place; what is infinite is drawn as the largest."""
+    return value == value  # noqa: PLR0124 - NaN is not itself
+
+
+def _shown_values(count: Count, marks: Sequence[int], turns: Sequence[Step]) -> Sequence[int]:
+    """All values, or of many: what is around the marks and the turns, both ends, and a fair choice of the others.
+
+    Of very many turns, only the values of the first ones and what is around the marks.
+    """
+    every = range(len(count.values))
+    if len(every) <= POINTS_MAX:
+        return every
+    begin = every[: turns[TURNS_MAX].number] if len(turns) > TURNS_MAX else every
+    breaks = _around([s.number for s in turns[:TURNS_MAX]], 1, begin)
+    kept = {begin[0], begin[-1], *_around(marks, AROUND, every), *breaks}
+    return sorted({*kept, *spread(begin, POINTS_MAX - len(kept))})
+
+
+def _around(numbers: Sequence[int], count: int, every: range) -> Iterator[int]:
+    """These values and so many before and behind each; of a step, that is from `count` before to `count` - 1 behind."""
+    return chain.from_iterable(every[max(0, n - count) : n + count] for n in numbers)
+
+
+PUBLISHERS_MAX = 3
+EXTREMES = 20
+SLICE_NS = 500_000_000
+SLICES_MAX = 30
+
+
+def rate_figures(run: Run, params: RateParams) -> Iterator[RateFigure]:
+    """All publishers of the student's together, as they are judged; then each of them, where there are several."""
+    if run.clock != "real":
+        return
+    channels = [c for c in run.student_channels(params.topic) if c.messages]
+    groups = [channels, *([c] for c in channels[:PUBLISHERS_MAX] if len(channels) > 1)]
+    for group in groups:
+        found = judged_rhythm(run, params, group)
+        if found is not None and found.gaps_ns:
+            yield _rate_figure(run, params, found, group)
+
+
+def _rate_figure(run: Run, params: RateParams, found: Rhythm, channels: Sequence[Channel]) -> RateFigure:
+    silent = (found.until_ns,) if found.tail_ns else ()
+    arrivals = (*found.times_ns[1:], *silent)
+    kept = _shown_gaps(found.gaps_ns)
+    low_ns, high_ns = params.bounds_ns
+    return RateFigure(
+        topic=named(params.topic),
+        publisher=named(listed(c.publisher for c in channels)),
+        scenario=named(run.scenario),
+        times_s=tuple(second(run, arrivals[i]) for i in kept),
+        gaps_s=tuple(round(found.gaps_ns[i] / 1e9, 6) for i in kept),
+        mean_hz=round(found.mean_hz, 4) or None,
+        low_hz=finite(params.low_hz),
+        high_hz=finite(params.high_hz),
+        gap_low_s=finite(low_ns / 1e9),
+        gap_high_s=finite(high_ns / 1e9),
+        late=tuple((second(run, a), second(run, b)) for a, b in _late(run, params, found)),
+        messages=len(found.times_ns),
+        ends_silent=bool(silent),
+    )
+
+
+def _shown_gaps(gaps_ns: Sequence[int]) -> list[int]:
+    """The longest and the shortest gaps, the last one, and a fair choice of the others."""
+    every = range(len(gaps_ns))
+    if len(gaps_ns) <= POINTS_MAX:
+        return list(every)
+    extremes = {
+        *heapq.nlargest(EXTREMES, every, key=gaps_ns.__getitem__),
+        *heapq.nsmallest(EXTREMES, every, key=gaps_ns.__getitem__),
+        every[-1],
+    }
+    return sorted({*extremes, *spread(every, POINTS_MAX - len(extremes))})
+
+
+def _late(run: Run, params: RateParams, found: Rhythm) -> list[tuple[int, int]]:
+    """Stretches in which the machine was late, by the measure of the check; all of it where only the whole tells."""
+    begin_ns, end_ns = found.times_ns[0], found.until_ns
+    whole = lateness(run, begin_ns, end_ns)
+    if whole is None:
+        return []
+    size_ns = max(SLICE_NS, (end_ns - begin_ns) // SLICES_MAX + 1)
+    stretches: list[tuple[int, int]] = []
+    for from_ns in range(begin_ns, end_ns, size_ns):
+        to_ns = min(from_ns + size_ns, end_ns)
+        late = lateness(run, from_ns, to_ns)
+        if late is None or not was_late(late, params):
+            continue
+        joined = stretches and stretches[-1][1] == from_ns
+        stretches = [*stretches[:-1], (stretches[-1][0], to_ns)] if joined else [*stretches, (from_ns, to_ns)]
+    excused = was_late(whole, params) or sleeps_explain(found, whole, params)
+    return stretches or ([(begin_ns, end_ns)] if excused else [])
+
+
+NEAR = 20
+CORNERS_MAX = 100
+
+
+def path_figures(run: Run, params: PathParams) -> Iterator[PathFigure]:
+    """Seen from its start where the points are."""
+    found = track(run, params.topic, params.hold_s)
+    if found is None or not found.path:
+        return
+    taken = relative(found.path) if params.relative else list(found.path)
+    way = params.way
+    course = followed(taken, way.points, params.tolerance_m)
+    kept = _shown_poses(taken, course.strayed)
+    yield PathFigure(
+        topic=named(params.topic),
+        scenario=named(run.scenario),
+        points=tuple(_spot(taken[i].point) for i in kept),
+        corners=tuple(map(_spot, way.points[:CORNERS_MAX])),
+        tolerance_m=finite(params.tolerance_m),
+        reached=course.reached,
+        strayed=None if course.strayed is None else kept.index(course.strayed),
+        messages=sum(len(c.messages) for c in run.channels if c.topic == params.topic and not c.by_grader),
+    )
+
+
+def _spot(point: tuple[float, float]) -> tuple[float, float]:
+    return round(finite(point[0]), 4), round(finite(point[1]), 4)
+
+
+def _shown_poses(path: Sequence[Pose], strayed: int | None) -> list[int]:
+    """Its ends, what is around the place where it strays, and a fair choice of the others where it moves."""
+    every = range(len(path))
+    spots = [_spot(pose.point) for pose in path]
+    moves = [i for i in every[1:] if spots[i] != spots[i - 1]]
+    near = every[max(0, strayed - NEAR) : strayed + NEAR] if strayed is not None else ()
+    own = {every[0], every[-1], *near}
+    return sorted({*own, *spread(moves, POINTS_MAX - len(own))})
+
+
+ROWS_MAX = 60
+
+
+def heard_figures(run: Run, params: HearsParams) -> Iterator[HeardFigure]:
+    """Nothing where nobody can tell what was printed of what."""
+    probes = probes_on(run, params.topic)
+    lines = printed_lines(run)
+    places = places_of(run, probes, lines, params.template) if probes else None
+    if places is None:
+        return
+    in_turn = chosen(places)
+    find = line_finder(probes, lines, params.template)
+    found = [
+        None if not own else find(own[0] if turn is None else turn) for own, turn in _both(places, in_turn)
+    ]
+    kept = _shown_probes(found)
+    yield HeardFigure(
+        scenario=named(run.scenario),
+        rows=tuple(_row(run, params.topic, probes[i], found[i]) for i in kept),
+        left_out=len(probes) - len(kept),
+        out_of_order=all(places) and None in in_turn,
+    )
+
+
+def _both(
+    places: Sequence[tuple[int, ...]], in_turn: Sequence[int | None]
+) -> Iterator[tuple[tuple[int, ...], int | None]]:
+    return zip(places, in_turn, strict=True)
+
+
+def _row(run: Run, topic: str, probe: Probe, line: Line | None) -> Heard:
+    return Heard(
+        topic=named(topic),
+        sent=short(probe.value, TEXT_LETTERS),
+        at_s=second(run, probe.at_ns),
+        heard=None if line is None else _said(line),
+        after_s=None if line is None else max(0.0, round((line.at_ns - probe.at_ns) / 1e9, 6)),
+    )
+
+
+def _said(line: Line) -> str:
+    """Without what stands between the node's name, which is cut off already, and its words."""
+    return short(" ".join(line.text.split()).removeprefix(": "), TEXT_LETTERS)
+
+
+def _shown_probes(found: Sequence[Line | None]) -> list[int]:
+    """Of many, the first, and the first that are missing."""
+    every = range(len(found))
+    if len(every) <= ROWS_MAX:
+        return list(every)
+    missing = [i for i in every if found[i] is None][: ROWS_MAX // 2]
+    others = [i for i in every if i not in set(missing)]
+    return sorted([*missing, *others[: ROWS_MAX - len(missing)]])

@@ -1,0 +1,231 @@
+"""Figures made ready for the page: drawn as SVG, or as rows for a table, with the same said in words beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+from markupsafe import Markup
+
+from grader.model.figure import (
+    CodeFigure,
+    ConsoleFigure,
+    ConsoleLine,
+    CounterFigure,
+    Figure,
+    GraphFigure,
+    Heard,
+    HeardFigure,
+    PathFigure,
+    RateFigure,
+)
+from grader.report.html.graph import graph_plot, graph_rows
+from grader.report.html.plots import (
+    counter_plots,
+    counter_words,
+    path_plot,
+    path_words,
+    rate_plots,
+    rate_words,
+    wrong_steps,
+)
+from grader.report.sentences import count
+from grader.report.text import clip
+
+CONSOLE_FIRST, CONSOLE_LAST = 35, 25
+LINE_CHARS = 500
+TITLE_CHARS = 200
+HEARD_MAX = 60
+GRAPH_ROWS_MAX = 100
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawn:
+    """`name` is its id on the page, `points` how many points, rows or lines it has. `same_as` is the id of an earlier
+    figure that shows the same; then nothing else is drawn. `left_out` says what is not shown, of a console after
+    `gap_at` lines."""
+
+    name: str
+    kind: str
+    title: str
+    words: str = ""
+    points: int = 0
+    plots: Sequence[Markup] = ()
+    rows: Sequence[object] = ()
+    notes: Sequence[str] = ()
+    gap_at: int = 0
+    left_out: str = ""
+    same_as: str = ""
+
+
+@dataclass(kw_only=True)
+class Drawer:
+    """Draws each figure once; `console_chars` is how much of all consoles may still be shown."""
+
+    console_chars: int
+    _seen: list[tuple[Figure, Drawn]] = field(default_factory=list)
+
+    def draw(self, figure: Figure) -> Drawn:
+        """The figure made ready, or where it was drawn before."""
+        earlier = next((drawn for seen, drawn in self._seen if seen == figure), None)
+        if earlier is not None:
+            return Drawn(name="", kind=figure.kind, title=earlier.title, same_as=earlier.name)
+        name = f"figure-{len(self._seen) + 1}"
+        try:
+            drawn = self._drawn(figure, name)
+        except Exception:  # noqa: BLE001 - no report hangs on a picture
+            drawn = Drawn(name=name, kind=figure.kind, title="This picture could not be drawn")
+        drawn = replace(drawn, title=clip(drawn.title, TITLE_CHARS))
+        self._seen.append((figure, drawn))
+        return drawn
+
+    def _drawn(self, figure: Figure, name: str) -> Drawn:
+        if isinstance(figure, ConsoleFigure):
+            return self._console(figure, name)
+        return DRAWN[figure.kind](figure, name)
+
+    def _console(self, figure: ConsoleFigure, name: str) -> Drawn:
+        first, last = self._room(figure.lines)
+        shown = [*figure.lines[:first], *figure.lines[len(figure.lines) - last :]]
+        errors = sum(printed.stream == "stderr" for printed in figure.lines)
+        left = figure.left_out + len(figure.lines) - len(shown)
+        lines = count(len(figure.lines) + figure.left_out, "line")
+        return Drawn(
+            name=name,
+            kind="console",
+            title=f"What was printed: {lines}, {errors or 'none'} of them on stderr",
+            points=len(shown),
+            rows=shown,
+            gap_at=first if left else len(shown),
+            left_out=f"{count(left, 'line is', 'lines are')} left out here; console.log has them."
+            if left
+            else "",
+        )
+
+    def _room(self, lines: tuple[ConsoleLine, ...]) -> tuple[int, int]:
+        """How many of the first and of the last lines are shown."""
+        first, last = len(lines), 0
+        if len(lines) > CONSOLE_FIRST + CONSOLE_LAST:
+            first, last = CONSOLE_FIRST, CONSOLE_LAST
+        for number, line in enumerate([*lines[:first], *lines[len(lines) - last :]]):
+            self.console_chars -= min(len(line.text), LINE_CHARS) + 30
+            if self.console_chars < 0:
+                return min(first, number), max(0, number - first)
+        return first, last
+
+
+def _rate(figure: RateFigure, name: str) -> Drawn:
+    return Drawn(
+        name=name,
+        kind="rate",
+        title=f"The rate of {figure.topic}, published by {figure.publisher}",
+        words=rate_words(figure),
+        points=len(figure.gaps_s),
+        plots=rate_plots(figure, name),
+        left_out=_thinned(len(figure.gaps_s), figure.messages - 1),
+    )
+
+
+def _counter(figure: CounterFigure, name: str) -> Drawn:
+    return Drawn(
+        name=name,
+        kind="counter",
+        title=f"The numbers on {figure.topic}, published by {figure.publisher}",
+        words=counter_words(figure),
+        points=len(figure.values),
+        plots=counter_plots(figure, name),
+        notes=tuple(wrong_steps(figure)),
+        left_out=_thinned(len(figure.values), figure.messages),
+    )
+
+
+def _thinned(shown: int, there: int) -> str:
+    return f"{shown} of {there} messages are shown." if there > shown else ""
+
+
+def _heard(figure: HeardFigure, name: str) -> Drawn:
+    missed = [row for row in figure.rows if row.heard is None]
+    rows = _first(figure.rows, missed)
+    many = len(figure.rows)
+    said = f"{many - len(missed)} of {count(many, 'message')} {'was' if many == 1 else 'were'} printed."
+    if figure.out_of_order:
+        said += " All of them came, but not in the order in which they were sent."
+    return Drawn(
+        name=name,
+        kind="heard",
+        title="What was sent to your listener, and what it printed",
+        words=said,
+        points=len(rows),
+        rows=rows,
+        left_out=_thinned(len(rows), many + figure.left_out),
+    )
+
+
+def _first(rows: tuple[Heard, ...], missed: list[Heard]) -> list[Heard]:
+    """In their order; of too many, those that were missed come before those that were heard."""
+    if len(rows) <= HEARD_MAX:
+        return list(rows)
+    kept = {id(row) for row in [*missed, *(row for row in rows if row.heard is not None)][:HEARD_MAX]}
+    return [row for row in rows if id(row) in kept]
+
+
+def _graph(figure: GraphFigure, name: str) -> Drawn:
+    rows = list(graph_rows(figure))
+    plot = graph_plot(figure, name)
+    alone = [node for node in figure.nodes if node not in {edge.node for edge in figure.edges}]
+    words = f"{count(len(figure.nodes), 'node')}, {count(len(figure.topics), 'topic')}."
+    words += f" Connected to no topic: {', '.join(alone[:10])}." if alone else ""
+    return Drawn(
+        name=name,
+        kind="graph",
+        title="Nodes and topics, as rqt_graph draws them",
+        words=words,
+        points=len(figure.nodes) + len(figure.topics),
+        plots=[plot] if plot else [],
+        rows=rows[:GRAPH_ROWS_MAX],
+        left_out=f"{figure.left_out} more are not shown." if figure.left_out else "",
+    )
+
+
+def _code(figure: CodeFigure, name: str) -> Drawn:
+    marked = ", ".join(str(i) for i in figure.marked[:5])
+    return Drawn(
+        name=name,
+        kind="code",
+        title=f"{figure.file}, line {marked}" if marked else figure.file,
+        points=len(figure.lines),
+        rows=[
+            (number, text, number in figure.marked)
+            for number, text in enumerate(figure.lines, start=figure.first_line)
+        ],
+    )
+
+
+def _path(figure: PathFigure, name: str) -> Drawn:
+    plot = path_plot(figure, name)
+    return Drawn(
+        name=name,
+        kind="path",
+        title=f"The path of {figure.topic}, seen from above",
+        words=path_words(figure),
+        points=len(figure.points),
+        plots=[plot] if plot else [],
+        left_out=_thinned(len(figure.points), figure.messages),
+    )
+
+
+DRAWN: dict[str, Callable[..., Drawn]] = {
+    "rate": _rate,
+    "counter": _counter,
+    "heard": _heard,
+    "graph": _graph,
+    "code": _code,
+    "path": _path,
+}
+
+
+def code_places(figures: Iterable[Figure]) -> frozenset[tuple[str, int]]:
+    """The lines that are shown with the code around them."""
+    return frozenset(
+        (figure.file, line) for figure in figures if isinstance(figure, CodeFigure) for line in figure.marked
+    )

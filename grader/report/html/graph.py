@@ -1,0 +1,240 @@
+"""The graph of nodes (ellipses) and topics (boxes), laid out in layers from left to right as `rqt_graph` does."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from markupsafe import Markup
+
+from grader.model.figure import GraphFigure
+from grader.report.html.svg import drawing, element, text
+
+MOST = 40
+HEIGHT, ROW, COLUMN_GAP, EDGE = 44.0, 66.0, 56.0, 14.0
+LETTER, SMALL_LETTER = 8.2, 6.6
+NAME_CHARS = 32
+Place = tuple[float, float, float]
+
+
+def graph_plot(figure: GraphFigure, name: str) -> Markup | None:
+    """The drawing; None for one that nobody could read: then the list beside it says all."""
+    vertices = [f"n{node}" for node in figure.nodes] + [f"t{topic}" for topic in figure.topics]
+    if not vertices or len(vertices) > MOST or not figure.edges:
+        return None
+    known = set(vertices)
+    arrows = [arrow for arrow in map(_arrow, _edges(figure)) if known.issuperset(arrow)]
+    layers = layered(vertices, arrows)
+    places, size = _places(layers, figure)
+    children = [_heads(name)]
+    children += [_drawn(arrow, layers, places, name) for arrow in layers.routes]
+    children += [part for vertex in vertices for part in _shape(vertex, places[vertex], figure)]
+    words = f"{len(figure.nodes)} nodes and {len(figure.topics)} topics; the table says who publishes and who listens."
+    return drawing(name, size, "Nodes (ellipses) and topics (boxes)", words, *children)
+
+
+def graph_rows(figure: GraphFigure) -> Iterator[tuple[str, str, str, str]]:
+    """The same as rows: the topic, its type, who publishes, who listens."""
+    for topic in figure.topics:
+        edges = [edge for edge in figure.edges if edge.topic == topic]
+        publishers = dict.fromkeys(edge.node for edge in edges if edge.publishes)
+        listeners = dict.fromkeys(edge.node for edge in edges if not edge.publishes)
+        yield (
+            topic,
+            figure.types.get(topic, ""),
+            ", ".join(publishers) or "none",
+            ", ".join(listeners) or "none",
+        )
+
+
+def _edges(figure: GraphFigure) -> Iterator[tuple[str, str, bool]]:
+    return ((edge.node, edge.topic, edge.publishes) for edge in figure.edges)
+
+
+def _arrow(edge: tuple[str, str, bool]) -> Arrow:
+    node, topic, publishes = f"n{edge[0]}", f"t{edge[1]}", edge[2]
+    return (node, topic) if publishes else (topic, node)
+
+
+def _clipped(name: str) -> str:
+    return name if len(name) <= NAME_CHARS else f"{name[: NAME_CHARS - 1]}…"
+
+
+def _width(vertex: str, figure: GraphFigure) -> float:
+    if is_bend(vertex):
+        return 0.0
+    name = LETTER * len(_clipped(vertex[1:]))
+    if vertex[0] == "n":
+        return max(72.0, name * 1.15 + 34)
+    return max(72.0, name + 22, SMALL_LETTER * len(_clipped(figure.types.get(vertex[1:], ""))) + 22)
+
+
+def _places(layers: Layers, figure: GraphFigure) -> tuple[dict[str, Place], tuple[float, float]]:
+    """The middle and the width of each vertex, and the size of the whole."""
+    tallest = max(len(column) for column in layers.columns)
+    places: dict[str, Place] = {}
+    left = EDGE
+    for column in layers.columns:
+        wide = max(_width(vertex, figure) for vertex in column)
+        above = (tallest - len(column)) * ROW / 2 + EDGE + HEIGHT / 2
+        for row, vertex in enumerate(column):
+            places[vertex] = (left + wide / 2, above + row * ROW, _width(vertex, figure))
+        left += wide + COLUMN_GAP
+    return places, (left - COLUMN_GAP + EDGE, (tallest - 1) * ROW + HEIGHT + 2 * EDGE + 10)
+
+
+def _shape(vertex: str, place: Place, figure: GraphFigure) -> list[Markup]:
+    x, y, width = place
+    name = text(x, y + 5, _clipped(vertex[1:]), class_="name", text_anchor="middle")
+    if vertex[0] == "n":
+        return [element("ellipse", cx=x, cy=y, rx=width / 2, ry=HEIGHT / 2, class_="node"), name]
+    box = element("rect", x=x - width / 2, y=y - HEIGHT / 2, width=width, height=HEIGHT, class_="topic")
+    kind = _clipped(figure.types.get(vertex[1:], ""))
+    if not kind:
+        return [box, name]
+    name = text(x, y - 1, _clipped(vertex[1:]), class_="name", text_anchor="middle")
+    return [box, name, text(x, y + 15, kind, text_anchor="middle")]
+
+
+def _heads(name: str) -> Markup:
+    head = element("path", d="M0 0L10 5L0 10z", class_="head")
+    marker = element(
+        "marker",
+        head,
+        id=f"{name}-head",
+        viewBox="0 0 10 10",
+        refX=9,
+        refY=5,
+        markerWidth=7,
+        markerHeight=7,
+        orient="auto",
+    )
+    return element("defs", marker)
+
+
+def _drawn(arrow: Arrow, layers: Layers, places: dict[str, Place], name: str) -> Markup:
+    """A curve to the right through all that it passes; one that leads back hangs below."""
+    route = layers.routes[arrow]
+    stops = [places[vertex] for vertex in route]
+    if arrow in layers.back:
+        (x2, y2, _), (x1, y1, _) = stops[0], stops[-1]
+        half, low = HEIGHT / 2, max(y1, y2) + HEIGHT / 2 + 22
+        curve = f"M{x1:.1f} {y1 + half:.1f}C{x1:.1f} {low:.1f} {x2:.1f} {low:.1f} {x2:.1f} {y2 + half:.1f}"
+    else:
+        begin = (stops[0][0] + stops[0][2] / 2, stops[0][1])
+        curve = f"M{begin[0]:.1f} {begin[1]:.1f}"
+        for x, y, width in stops[1:]:
+            end = (x - width / 2, y)
+            middle = (begin[0] + end[0]) / 2
+            curve += f"C{middle:.1f} {begin[1]:.1f} {middle:.1f} {end[1]:.1f} {end[0]:.1f} {end[1]:.1f}"
+            begin = end
+    return element("path", d=curve, class_="arrow", marker_end=f"url(#{name}-head)")
+
+
+Vertex = str
+Arrow = tuple[Vertex, Vertex]
+SWEEPS = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layers:
+    """`columns` from left to right, each from the top down. `routes` has for each arrow all that it passes: its
+    ends, and a place (`""` in front of its name) in each column between. Arrows that lead back are routed forwards.
+    """
+
+    columns: tuple[tuple[Vertex, ...], ...]
+    routes: dict[Arrow, tuple[Vertex, ...]]
+    back: frozenset[Arrow]
+
+
+def layered(vertices: Sequence[Vertex], arrows: Sequence[Arrow]) -> Layers:
+    """Every arrow leads to the right, but for those that close a circle. `arrows` join `vertices`."""
+    back = _closing(vertices, arrows)
+    forward = {arrow: (arrow[::-1] if arrow in back else arrow) for arrow in dict.fromkeys(arrows)}
+    depth = _depths(vertices, list(forward.values()))
+    columns: list[list[Vertex]] = [[] for _ in range(max(depth.values(), default=0) + 1)]
+    for vertex in vertices:
+        columns[depth[vertex]].append(vertex)
+    routes: dict[Arrow, tuple[Vertex, ...]] = {}
+    for number, (arrow, (begin, end)) in enumerate(forward.items()):
+        between = [f"\0{number}.{column}" for column in range(depth[begin] + 1, depth[end])]
+        for place, column in zip(between, range(depth[begin] + 1, depth[end]), strict=True):
+            columns[column].append(place)
+        routes[arrow] = (begin, *between, end)
+    _order(columns, list(routes.values()))
+    return Layers(columns=tuple(map(tuple, columns)), routes=routes, back=frozenset(back))
+
+
+def is_bend(vertex: Vertex) -> bool:
+    """Whether it is only a place that an arrow passes."""
+    return vertex.startswith("\0")
+
+
+def _closing(vertices: Sequence[Vertex], arrows: Sequence[Arrow]) -> set[Arrow]:
+    """The arrows that close a circle, met depth first, from where nothing leads to."""
+    following: dict[Vertex, list[Vertex]] = defaultdict(list)
+    reached = set()
+    for begin, end in arrows:
+        following[begin].append(end)
+        reached.add(end)
+    closing: set[Arrow] = set()
+    done: set[Vertex] = set()
+    for root in sorted(vertices, key=lambda vertex: vertex in reached):
+        trail, on_trail = [(root, iter(following[root]))], {root}
+        while trail and root not in done:
+            vertex, rest = trail[-1]
+            for end in rest:
+                if end in on_trail:
+                    closing.add((vertex, end))
+                elif end not in done:
+                    trail.append((end, iter(following[end])))
+                    on_trail.add(end)
+                    break
+            else:
+                trail.pop()
+                on_trail.discard(vertex)
+                done.add(vertex)
+    return closing
+
+
+def _depths(vertices: Sequence[Vertex], arrows: Sequence[Arrow]) -> dict[Vertex, int]:
+    """The longest way from the left; what nothing leads to stands just before what it leads to."""
+    depth = dict.fromkeys(vertices, 0)
+    for _ in vertices:
+        moved = False
+        for begin, end in arrows:
+            if depth[end] <= depth[begin]:
+                depth[end] = depth[begin] + 1
+                moved = True
+        if not moved:
+            break
+    reached = {end for _, end in arrows}
+    for vertex in vertices:
+        ends = [depth[end] for begin, end in arrows if begin == vertex]
+        if vertex not in reached and ends:
+            depth[vertex] = min(ends) - 1
+    return depth
+
+
+def _order(columns: list[list[Vertex]], routes: list[tuple[Vertex, ...]]) -> None:
+    """Each vertex near the middle of those that it is joined with, to the right and back again."""
+    before: dict[Vertex, list[Vertex]] = defaultdict(list)
+    after: dict[Vertex, list[Vertex]] = defaultdict(list)
+    for route in routes:
+        for left, right in pairwise(route):
+            before[right].append(left)
+            after[left].append(right)
+    for sweep in range(SWEEPS):
+        rightwards = sweep % 2 == 0
+        order = columns[1:] if rightwards else columns[-2::-1]
+        joined = before if rightwards else after
+        place = {v: i / len(column) for column in columns for i, v in enumerate(column)}
+        for column in order:
+            middle = {
+                v: sum(place[u] for u in joined[v]) / len(joined[v]) if joined[v] else place[v]
+                for v in column
+            }
+            column.sort(key=middle.__getitem__)
+            place |= {v: i / len(column) for i, v in enumerate(column)}

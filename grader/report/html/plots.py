@@ -1,0 +1,368 @@
+"""Plots of what a check measured, drawn as SVG: counter, path and rate; `…_words` say the same in a sentence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from markupsafe import Markup
+
+from grader.model.figure import CounterFigure, PathFigure, RateFigure
+from grader.report.html.svg import BOTTOM, LEFT, RIGHT, TOP, Frame, dots, drawing, element, path, text
+from grader.report.sentences import count
+from grader.report.text import number
+
+WHOLE = (760.0, 240.0)
+CLOSE = (760.0, 220.0)
+MANY = 40
+AROUND = 6
+LABELS_MAX = 12
+TEXTS_MAX = 3
+FAR = 10**15
+"""Larger values are drawn at the edge: the frame has no more digits."""
+
+
+def counter_plots(figure: CounterFigure, name: str) -> list[Markup]:
+    """The whole of it, and where it is long the surroundings of the first wrong step, or of the first wrap."""
+    count = len(figure.values)
+    if count < 2:
+        return []
+    drawn = [_plot(figure, name, range(count), WHOLE, f"{figure.topic} over time")]
+    around = (*figure.wrong[:1], *figure.wraps[:1])
+    if count > MANY and around:
+        first = max(0, around[0] - AROUND)
+        near = range(first, min(count, around[0] + AROUND + 1))
+        what = "wrong step" if figure.wrong else "wrap"
+        drawn.append(_plot(figure, f"{name}-close", near, CLOSE, f"{figure.topic} around the first {what}"))
+    return drawn
+
+
+def counter_words(figure: CounterFigure) -> str:
+    """What the plot shows, in words."""
+    if not figure.values:
+        return f"No number was seen on {figure.topic}."
+    low, high = min(figure.values), max(figure.values)
+    words = f"{figure.topic}: values from {number(low)} to {number(high)}, the first is {number(figure.values[0])}. "
+    words += f"It {_times(len(figure.wraps))} correctly"
+    shown = ", ".join(_step(figure, i) for i in figure.wraps[:TEXTS_MAX] if i)
+    words += f" ({shown}{', …' if len(figure.wraps) > TEXTS_MAX else ''})" if shown else ""
+    wrong = len(figure.wrong) + figure.more_wrong
+    return words + (
+        f"; {wrong} {'step is' if wrong == 1 else 'steps are'} wrong." if wrong else "; no step is wrong."
+    )
+
+
+def wrong_steps(figure: CounterFigure) -> Iterator[str]:
+    """`1, at 12.8 s: …`, as the circles are numbered; the first few."""
+    texts = (*figure.texts, *[""] * len(figure.wrong))
+    for index, (i, said) in enumerate(zip(figure.wrong[:LABELS_MAX], texts, strict=False), start=1):
+        yield f"{index}, at {number(figure.times_s[i], 2)} s: {said or _step(figure, i)}"
+    more = len(figure.wrong) - LABELS_MAX
+    if more > 0 or figure.more_wrong:
+        yield f"… and {max(more, 0) + figure.more_wrong} more"
+
+
+def _times(count: int) -> str:
+    return {0: "never wraps", 1: "wraps once", 2: "wraps twice"}.get(count, f"wraps {count} times")
+
+
+def _step(figure: CounterFigure, i: int) -> str:
+    value = number(figure.values[i])
+    return f"{number(figure.values[i - 1])} → {value}" if i else f"{value} comes first"
+
+
+def _plot(figure: CounterFigure, name: str, shown: range, size: tuple[float, float], title: str) -> Markup:
+    values = [float(max(-FAR, min(FAR, figure.values[i]))) for i in shown]
+    times = [figure.times_s[i] for i in shown]
+    low, high = min(values), max(values)
+    if size == WHOLE:
+        low, high = min(low, 0.0), max(high, 1.0)
+    pad = (high - low) * 0.14 or 1.0
+    frame = Frame(
+        width=size[0],
+        height=size[1],
+        x_low=times[0],
+        x_high=times[-1],
+        y_low=low - (pad if low != 0 else 0),
+        y_high=high + pad,
+    )
+    points = [(frame.x(t), frame.y(v)) for t, v in zip(times, values, strict=True)]
+    at = dict(zip(shown, points, strict=True))
+    few = len(points) <= MANY
+    named = len(points) <= 2 * AROUND + 1
+    children = frame.axes("seconds since the run began", "value")
+    children += _wraps(figure, frame, at)
+    children.append(element("path", d="".join(map(path, _whole(figure, at))), class_="line"))
+    children.append(element("path", d=dots(points), class_="dots" if few else "dots small"))
+    if named:
+        children += [
+            text(x, y - 9, number(figure.values[i]), text_anchor="middle")
+            for i, (x, y) in at.items()
+            if i not in figure.wrong
+        ]
+    children += _wrong(figure, frame, at)
+    return drawing(name, size, title, counter_words(figure), *children)
+
+
+def _whole(figure: CounterFigure, at: dict[int, tuple[float, float]]) -> Iterator[list[tuple[float, float]]]:
+    """The points in pieces, broken where values between them are left out."""
+    numbers = figure.numbers or range(len(figure.values))
+    piece: list[tuple[float, float]] = []
+    for i, point in at.items():
+        if piece and numbers[i] != numbers[i - 1] + 1:
+            yield piece
+            piece = []
+        piece.append(point)
+    yield piece
+
+
+def _wraps(figure: CounterFigure, frame: Frame, at: dict[int, tuple[float, float]]) -> Iterator[Markup]:
+    for i in figure.wraps:
+        if i not in at:
+            continue
+        x, y = at[i]
+        yield element("line", x1=x, x2=x, y1=TOP, y2=frame.bottom, class_="wrap")
+        yield element("path", d=f"M{x:.1f} {y - 6:.1f}l5 6l-5 6l-5 -6z", class_="wrap-mark")
+        if len(figure.wraps) <= LABELS_MAX // 2 and i not in figure.wrong:
+            end = "end" if x > frame.right - 90 else "start"
+            yield text(x + (-5 if end == "end" else 5), TOP - 7, f"wrap {_step(figure, i)}", text_anchor=end)
+
+
+def _wrong(figure: CounterFigure, frame: Frame, at: dict[int, tuple[float, float]]) -> Iterator[Markup]:
+    for index, i in enumerate(figure.wrong[:LABELS_MAX], start=1):
+        if i not in at:
+            continue
+        x, y = at[i]
+        yield element("circle", cx=x, cy=y, r=10, class_="wrong")
+        turns = i == 0 or abs(figure.values[i] - figure.values[i - 1]) != 1
+        words = f"{index}: {_step(figure, i)}" if turns and len(figure.wrong) <= TEXTS_MAX else str(index)
+        end = "end" if x > frame.right - 110 else "start"
+        above = y - 24 if y - 24 > TOP else y + 28
+        yield text(x + (-8 if end == "end" else 8), above, words, class_="alarm", text_anchor=end)
+
+
+SIDE = 340.0
+WIDEST = 2.0
+CORNER_LABELS_MAX = 20
+
+
+def path_plot(figure: PathFigure, name: str) -> Markup | None:
+    """Seen from above, as wide as it is high for the same metres; None for a robot that stood still."""
+    if len(figure.points) < 2 and not figure.corners:
+        return None
+    frame, scale = _frame(figure)
+    corners = [(frame.x(x), frame.y(y)) for x, y in figure.corners]
+    children = frame.axes("metres", "metres")
+    if len(corners) > 1:
+        room = max(2 * figure.tolerance_m * scale, 2.0)
+        children.append(element("path", d=path(corners), class_="room", stroke_width=room))
+        children.append(element("path", d=path(corners), class_="way"))
+    taken = [(frame.x(x), frame.y(y)) for x, y in figure.points]
+    children.append(element("path", d=path(taken), class_="line strong-line"))
+    children += _corners(figure, corners)
+    children += _strayed(figure, taken)
+    size = (frame.width, frame.height)
+    return drawing(name, size, f"The path of {figure.topic}, seen from above", path_words(figure), *children)
+
+
+def path_words(figure: PathFigure) -> str:
+    """What the plot shows, in words."""
+    words = f"{figure.topic} passed {figure.reached} of {len(figure.corners)} corners in order; "
+    words += f"{number(figure.tolerance_m)} m off the path is allowed"
+    if figure.strayed is None:
+        return f"{words} and it stayed within that."
+    x, y = figure.points[figure.strayed]
+    return f"{words}. It is too far off for the first time at x {number(x, 2)}, y {number(y, 2)}."
+
+
+def _frame(figure: PathFigure) -> tuple[Frame, float]:
+    """The frame, and how many pixels a metre has in it."""
+    spots = (*figure.points, *figure.corners)
+    x_low, x_high = _edges([x for x, _ in spots], figure.tolerance_m)
+    y_low, y_high = _edges([y for _, y in spots], figure.tolerance_m)
+    wide, high = x_high - x_low, y_high - y_low
+    scale = SIDE / max(high, wide / WIDEST)
+    frame = Frame(
+        width=LEFT + RIGHT + max(wide * scale, SIDE / 2),
+        height=TOP + BOTTOM + max(high * scale, SIDE / 4),
+        x_low=x_low,
+        x_high=x_low + max(wide, SIDE / 2 / scale),
+        y_low=y_low,
+        y_high=y_low + max(high, SIDE / 4 / scale),
+    )
+    return frame, scale
+
+
+def _edges(values: list[float], room: float) -> tuple[float, float]:
+    low, high = min(values), max(values)
+    pad = max(room, 0.08 * (high - low), 0.05)
+    return low - pad, high + pad
+
+
+def _corners(figure: PathFigure, corners: list[tuple[float, float]]) -> Iterator[Markup]:
+    for i, (x, y) in enumerate(corners):
+        passed = i < figure.reached
+        yield element("circle", cx=x, cy=y, r=5, class_="corner passed" if passed else "corner")
+        if i < CORNER_LABELS_MAX and (x, y) not in corners[:i]:
+            yield text(x + 8, y - 8, "start" if i == 0 else f"{i}")
+
+
+def _strayed(figure: PathFigure, taken: list[tuple[float, float]]) -> Iterator[Markup]:
+    if figure.strayed is None:
+        return
+    x, y = taken[figure.strayed]
+    yield element("circle", cx=x, cy=y, r=10, class_="wrong")
+    right = max(spot[0] for spot in taken)
+    end = "end" if x > right - 90 else "start"
+    yield text(x + (-13 if end == "end" else 13), y + 4, "too far off", class_="alarm", text_anchor=end)
+
+
+OVER_TIME = (460.0, 230.0)
+HISTOGRAM = (330.0, 230.0)
+BINS = 30
+TOO_FAR = 3.0
+"""So many times the bound: what lies farther is drawn at the edge."""
+
+
+def rate_plots(figure: RateFigure, name: str) -> list[Markup]:
+    """Both plots; none where there is no gap."""
+    if not figure.gaps_s:
+        return []
+    return [_over_time(figure, f"{name}-rate"), _histogram(figure, f"{name}-gaps")]
+
+
+def rate_words(figure: RateFigure) -> str:
+    """What the plots show, in words."""
+    if not figure.gaps_s:
+        return f"Too few messages on {figure.topic} to draw a rate."
+    gaps = figure.gaps_s
+    mean = f"{number(figure.mean_hz, 2)} Hz on average" if figure.mean_hz is not None else "no mean"
+    words = f"{figure.topic}: {mean}; {_allowed(figure)} (the green band) passes. Each dot is a message. "
+    words += f"The gaps between messages are {_ms(min(gaps))} to {_ms(max(gaps))} ms long"
+    words += _outside(figure)
+    if figure.ends_silent:
+        words += "; the last one is the silence at the end"
+    if figure.late:
+        words += f". The grading machine itself was late {count(len(figure.late), 'time')} (hatched)"
+    return words + "."
+
+
+def _allowed(figure: RateFigure) -> str:
+    return f"{number(figure.low_hz, 2)} to {number(figure.high_hz, 2)} Hz"
+
+
+def _outside(figure: RateFigure) -> str:
+    low, high = figure.gap_low_s, figure.gap_high_s
+    if low is None or high is None:
+        return ""
+    outside = sum(not low <= gap <= high for gap in figure.gaps_s)
+    lie = "lies" if outside == 1 else "lie"
+    return f"; {outside or 'none'} of {len(figure.gaps_s)} {lie} outside {_ms(low)} to {_ms(high)} ms"
+
+
+def _ms(seconds: float) -> str:
+    return number(seconds * 1000, 1)
+
+
+def _over_time(figure: RateFigure, name: str) -> Markup:
+    rates = [1 / gap if gap > 0 else math.inf for gap in figure.gaps_s]
+    frame = Frame(
+        width=OVER_TIME[0],
+        height=OVER_TIME[1],
+        x_low=0,
+        x_high=max(figure.times_s) or 1.0,
+        y_low=0,
+        y_high=_top(rates, figure),
+    )
+    across = (frame.x_low, frame.x_high)
+    children = [_hatching(name)]
+    children.append(frame.box(across, (figure.low_hz, figure.high_hz), class_="band"))
+    children += [
+        frame.box(stretch, (0, frame.y_high), fill=f"url(#{name}-late)", class_="late")
+        for stretch in figure.late
+    ]
+    children += frame.axes("seconds since the run began", "Hz")
+    points = [(frame.x(t), frame.y(r)) for t, r in zip(figure.times_s, rates, strict=True)]
+    children.append(element("path", d=dots(points), class_="dots"))
+    children.append(
+        text(frame.x(0) + 5, frame.y(figure.high_hz) - 5, f"{_allowed(figure)} passes", class_="good")
+    )
+    children += _mean(frame, figure.mean_hz)
+    beyond = sum(rate > frame.y_high for rate in rates)
+    if beyond:
+        children.append(text(frame.right, TOP - 9, f"{beyond} above the edge", text_anchor="end"))
+    return drawing(name, OVER_TIME, f"Rate of {figure.topic} over time", rate_words(figure), *children)
+
+
+def _top(rates: Sequence[float], figure: RateFigure) -> float:
+    """The highest rate, but not where a few messages that came together would flatten all others."""
+    most = TOO_FAR * max(figure.high_hz, figure.mean_hz or 0.0)
+    return 1.2 * max(figure.high_hz, figure.mean_hz or 0.0, min(max(rates), most))
+
+
+def _mean(frame: Frame, mean_hz: float | None) -> list[Markup]:
+    if mean_hz is None:
+        return []
+    y = frame.y(mean_hz)
+    return [
+        element("line", x1=frame.x(frame.x_low), x2=frame.right, y1=y, y2=y, class_="mean"),
+        text(
+            frame.right - 4,
+            y - 7 if y > 2 * TOP else y + 17,
+            f"mean {number(mean_hz, 2)} Hz",
+            class_="strong",
+            text_anchor="end",
+        ),
+    ]
+
+
+def _hatching(name: str) -> Markup:
+    line = element("path", d="M0 8L8 0", class_="hatch")
+    return element(
+        "defs",
+        element("pattern", line, id=f"{name}-late", width=8, height=8, patternUnits="userSpaceOnUse"),
+    )
+
+
+def _histogram(figure: RateFigure, name: str) -> Markup:
+    longest = _longest(figure)
+    counts = [0] * BINS
+    for gap in figure.gaps_s:
+        counts[min(int(gap / longest * BINS), BINS - 1)] += 1
+    frame = Frame(
+        width=HISTOGRAM[0],
+        height=HISTOGRAM[1],
+        x_low=0,
+        x_high=longest * 1000,
+        y_low=0,
+        y_high=1.15 * max(counts),
+    )
+    width = frame.x_high / BINS
+    children = _gap_bounds(figure, frame)
+    children += frame.axes("milliseconds from message to message", "messages")
+    children += [
+        frame.box((i * width, (i + 1) * width), (0, count), class_="column")
+        for i, count in enumerate(counts)
+        if count
+    ]
+    longer = sum(gap > longest for gap in figure.gaps_s)
+    if longer:
+        children.append(text(frame.right, TOP - 9, f"{longer} longer, in the last bar", text_anchor="end"))
+    words = f"{len(figure.gaps_s)} gaps. {rate_words(figure)}"
+    return drawing(name, HISTOGRAM, f"Gaps between messages on {figure.topic}", words, *children)
+
+
+def _longest(figure: RateFigure) -> float:
+    bound = figure.gap_high_s or 2 / figure.low_hz
+    return 1.1 * max(1.2 * bound, min(max(figure.gaps_s), TOO_FAR * bound))
+
+
+def _gap_bounds(figure: RateFigure, frame: Frame) -> list[Markup]:
+    if figure.gap_low_s is None or figure.gap_high_s is None:
+        return []
+    low, high = figure.gap_low_s * 1000, figure.gap_high_s * 1000
+    edges = (frame.x(low), frame.x(high))
+    return [
+        frame.box((low, high), (0, frame.y_high), class_="band"),
+        *(element("line", x1=x, x2=x, y1=TOP, y2=frame.bottom, class_="bound") for x in edges),
+    ]

@@ -1,1 +1,0 @@
-"""Plots as SVG, drawn here: no script is needed to see them."""

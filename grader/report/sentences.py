@@ -1,0 +1,249 @@
+"""Sentences that several reports share: late work, overrides, notes, a missing sandbox, and the verdict."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from datetime import datetime
+
+from grader.errors import GraderError
+from grader.judging.summary import passed
+from grader.model.result import AppliedOverride, Automatic, CriterionResult, GradingResult, HandedIn, Note
+from grader.model.verdict import Status
+from grader.report.text import number
+from grader.report.view import ReportView, hidden_ids, not_graded
+from grader.rubric.model import Rubric
+
+DECIDED_TITLE = "Decided by a person"
+BY = {"roster": "as the roster says", "commit": "the commit's date", "nobody": "not known"}
+
+
+def late_words(result: GradingResult) -> tuple[str, ...]:
+    """Lines that say what being late cost, when it was handed in, and which commit counts; none where nobody asked."""
+    late, known = result.late, result.late or result.handed_in
+    if known is None:
+        return ()
+    cost = late.text if late else ""
+    if late and late.points != late.points_before:
+        before = f"{number(late.points_before)} of {number(result.max_points)} points before"
+        cost = f"{before}, {number(late.points)} after: {late.text}"
+    return tuple(words[:1].upper() + words[1:] for words in (cost, _times(known), known.note) if words)
+
+
+def _times(known: HandedIn) -> str:
+    zone = (known.deadline or known.at).tzinfo if known.at else None
+    at = f"submitted {_time(known.at.astimezone(zone))} ({BY[known.by]})" if known.at else ""
+    days = known.extension_days
+    extension = f" with {number(days)} {'day' if days == 1 else 'days'} of extension" if days else ""
+    deadline = f"deadline {_time(known.deadline)}{extension}" if known.deadline else ""
+    return ", ".join(words for words in (at, deadline) if words)
+
+
+def _time(time: datetime) -> str:
+    """`2026-11-20 23:59 UTC+01:00`; seconds only where there are any."""
+    clock = f"{time:%Y-%m-%d %H:%M:%S}".removesuffix(":00")
+    offset = f"{time:%z}"
+    return f"{clock} UTC{offset[:3]}:{offset[3:5]}"
+
+
+def decision(override: AppliedOverride) -> str:
+    """`by A. Miller, 2026-11-02: clear names`, as far as it is known."""
+    who = ", ".join(part for part in (override.author or "a person", str(override.date or "")) if part)
+    return f"by {who}{': ' if override.comment else ''}{override.comment}"
+
+
+def automatic_words(override: AppliedOverride, criterion: CriterionResult) -> str:
+    """`fail 0/10: 5 Hz, not 10 Hz`."""
+    message = override.automatic.message
+    return _said(override.automatic, criterion) + (f": {message}" if message else "")
+
+
+def look_again(override: AppliedOverride, criterion: CriterionResult) -> str:
+    """Why a person should look again; empty where the check says what it said then."""
+    if not override.changed:
+        return ""
+    now, then = _said(override.automatic, criterion), _said(override.was, criterion)
+    return f"the check now says {now}, it said {then} when this was decided: look again"
+
+
+def _said(automatic: Automatic, criterion: CriterionResult) -> str:
+    return f"{automatic.status.value} {number(automatic.points)}/{number(criterion.max_points)}"
+
+
+def decided(result: GradingResult) -> list[tuple[AppliedOverride, CriterionResult]]:
+    """What was decided about which criterion, in the rubric's order."""
+    by_id = {criterion.id: criterion for criterion in result.criteria}
+    return [
+        (override, by_id[override.criterion]) for override in result.overrides if override.criterion in by_id
+    ]
+
+
+NOT_SETTLED = "some criteria could not be judged; no points are lost for good."
+
+
+def missing_hidden(result: GradingResult, rubric: Rubric) -> int:
+    """How many of the rubric's hidden criteria are not in the result: it is the student's view of it."""
+    return len(hidden_ids(rubric) - {c.id for c in result.criteria})
+
+
+def visible_words(result: GradingResult, hidden: int) -> str:
+    """`12 visible checks passed; 5 more run at grading.`; empty where nothing is `hidden`."""
+    if not hidden:
+        return ""
+    good, many = sum(c.status is Status.PASS for c in result.criteria), len(result.criteria)
+    seen = f"{many} visible {'check' if many == 1 else 'checks'}"
+    said = f"{seen} passed" if good == many else f"{good} of {seen} passed"
+    return f"{said}; {hidden} more {'runs' if hidden == 1 else 'run'} at grading."
+
+
+def verdict_words(result: GradingResult, rubric: Rubric, hidden: int) -> str:
+    """`Passed.` or `Not passed yet.`; empty where that is not known: something is open, or `hidden`."""
+    if hidden or not_graded(result) or result.status != "graded":
+        return ""
+    return "Passed." if passed(rubric, result) else "Not passed yet."
+
+
+NOTICED_TITLE = "Noticed while it ran"
+COSTS_NOTHING = "No points were taken for any of this."
+
+
+def note_place(note: Note) -> str:
+    """`build`, or the scenario's name; with the process or node, where it is known."""
+    run = "build" if note.scenario == "package" else note.scenario
+    return f"{run}, {note.actor}" if note.actor else run
+
+
+def note_text(note: Note) -> str:
+    """`asked the master to shut down (refused)`."""
+    return f"{note.text} ({'refused' if note.kind == 'refused' else 'limited'})"
+
+
+LABEL = re.compile(
+    r"none \((?P<reason>.*?)\)(?P<other>, but for an unprivileged user)?(; memory held by [^;]*)?"
+)
+"""As `arena.sandbox.Sandbox.label` words it, and earlier graders did."""
+ASKED = "--sandbox none"
+
+
+def without_sandbox(label: str) -> str:
+    """Of `environment.sandbox`: the sentence, or nothing where there was a sandbox, or nothing was run."""
+    found = LABEL.fullmatch(label)
+    if found is None:
+        return ""
+    if found["reason"] == ASKED:
+        why = f"The sandbox is switched off ({ASKED})"
+    else:
+        why = f"The grading machine has no sandbox ({found['reason']})"
+    who = "an unprivileged user there" if found["other"] else "the user who grades"
+    return f"{why}: students' code runs with all rights of {who}."
+
+
+SIGNS = {
+    Status.PASS: "✓",
+    Status.PARTIAL: "◐",
+    Status.FAIL: "✗",
+    Status.BLOCKED: "⊘",
+    Status.INCONCLUSIVE: "?",
+    Status.ERROR: "!",
+    Status.MANUAL: "•",
+}
+MEANINGS = {
+    Status.PASS: "reached",
+    Status.PARTIAL: "partly reached",
+    Status.FAIL: "not reached",
+    Status.BLOCKED: "could not be judged because something before it was not reached",
+    Status.INCONCLUSIVE: "could not be decided this time; no points are lost for good",
+    Status.ERROR: "the grader could not judge it; no points are lost for good",
+    Status.MANUAL: "a person awards these points",
+}
+MENDED = frozenset({Status.FAIL, Status.PARTIAL})
+ADVICE = {Status.FAIL: "How to fix it", Status.PARTIAL: "How to fix it", Status.PASS: "Hint"}
+FAULTS = {
+    "submission": "The problem is in what was submitted: fix it and submit it again.",
+    "machine": "The grading machine is at fault, not you. No points are lost for good: "
+    "it only has to be graded again.",
+    "grader": "The grader itself is at fault, not you. No points are lost for good: "
+    "your teacher can have it graded again.",
+}
+
+
+def blame(kind: str) -> str:
+    """Whose fault an error of this kind is: `submission`, `machine` or `grader`."""
+    return next((found.blame for found in _kinds(GraderError) if found.kind == kind), "grader")
+
+
+def _kinds(error: type[GraderError]) -> Iterator[type[GraderError]]:
+    yield error
+    for below in error.__subclasses__():
+        yield from _kinds(below)
+
+
+def count_points(value: float) -> str:
+    """`1 point`, `2.5 points`."""
+    return f"{number(value)} {'point' if value == 1 else 'points'}"
+
+
+def count(many: int, one: str, more: str = "") -> str:
+    """`1 thing`, `3 things`."""
+    return f"{many} {one if many == 1 else more or one + 's'}"
+
+
+def verdict(result: GradingResult, rubric: Rubric, hidden: int) -> tuple[str, str]:
+    """Whether it passed as a status of the page and in a few words."""
+    if not_graded(result):
+        return "error", "Not graded"
+    if not hidden and passed(rubric, result):
+        return "pass", "Passed"
+    if result.status != "graded":
+        return "inconclusive", "Not settled yet"
+    if hidden:
+        reached = all(c.status is Status.PASS for c in result.criteria if c.max_points > 0)
+        return ("pass", "So far, so good") if reached else ("partial", "There is something to fix")
+    return "fail", "Not passed yet"
+
+
+def pass_mark(result: GradingResult, rubric: Rubric, hidden: int) -> str:
+    """What it takes to pass."""
+    if rubric.pass_mark is None:
+        return f"To pass, every {'visible ' if hidden else ''}criterion that counts has to be reached."
+    mark = f"To pass, it takes {count_points(rubric.pass_mark)} of {number(rubric.max_points)}"
+    if not_graded(result):
+        return f"{mark}."
+    if hidden:
+        return f"{mark}, those of criteria that run at grading included."
+    missing = rubric.pass_mark - result.points
+    return (
+        f"{mark}: {count_points(missing)} {'is' if missing == 1 else 'are'} missing."
+        if missing > 0
+        else f"{mark}."
+    )
+
+
+def in_short(result: GradingResult, view: ReportView) -> str:
+    """What was lost, in one or two sentences."""
+    lost = sum(loss.points for loss in view.lost)
+    if not_graded(result):
+        return "Nothing could be judged."
+    late = result.late.points_before - result.late.points if result.late else 0.0
+    if lost <= 0 and late <= 0 and not view.open:
+        return "Nothing was lost: every criterion that counts is reached. Well done!"
+    said = [] if late > 0 else ["Nothing was lost."]
+    if lost > 0:
+        costs = "costs" if len(view.lost) == 1 else "cost"
+        said = [f"{count(len(view.lost), 'thing')} {costs} you {count_points(lost)}."]
+    if len(view.lost) > 1:
+        said.append(f"The first one alone is worth {count_points(view.lost[0].points)}.")
+    if late > 0:
+        said.append(f"Being late costs you {count_points(late)}.")
+    if view.open:
+        still = sum(loss.points for loss in view.open)
+        said.append(f"{count_points(still)} {'is' if still == 1 else 'are'} still open.")
+    return " ".join(said)
+
+
+def lost_words(criterion: CriterionResult, blocked: float) -> str:
+    """`10 points lost, and 25 more in what it holds back`; points that are open are not lost."""
+    own = criterion.max_points - criterion.points
+    state = "still open" if criterion.status.is_open else "lost"
+    said = f"{count_points(own)} {state}" if own else "costs nothing itself"
+    return f"{said}, and {number(blocked)} more in what it holds back" if blocked else said
