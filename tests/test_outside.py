@@ -48,7 +48,7 @@ def marker(tmp_path, monkeypatch) -> Path:
     return marker
 
 
-@pytest.mark.parametrize("module", ["grader.classes.batch.child", "grader.classes.similarity.job"])
+@pytest.mark.parametrize("module", ["grader.workers", "grader.classes.similarity.compare"])
 def test_a_process_of_the_grader_imports_nothing_from_the_folder_that_it_is_started_in(
     module, marker
 ) -> None:

@@ -38,7 +38,7 @@ STARTS = {
     ),
     "arena/ros_env.py:_from_setup": Start("base", "'/'", "nothing: ROS's own setup.bash"),
     "arena/template.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
-    "classes/batch/child.py:_started": Start(
+    "workers.py:_started": Start(
         "anywhere(os.environ)", None, "nothing: jobs come through a pipe, as JSON"
     ),
     "cli/diagnosis.py:_hostname": Start("HOST_ENV", "'/'", "nothing"),
@@ -60,7 +60,7 @@ STARTS = {
         "anywhere(os.environ)", None, "its source files, which are parsed and not run"
     ),
     "classes/review/serve.py:git_user": Start("anywhere(os.environ)", "'/'", "nothing"),
-    "classes/similarity/comparing.py:_answer": Start(
+    "classes/similarity/run.py:_answer": Start(
         "_environment()", None, "its source files, which are read and not run"
     ),
 }

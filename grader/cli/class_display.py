@@ -14,9 +14,9 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from grader.classes.batch.flow import Watcher
 from grader.classes.batch.job import Outcome
 from grader.classes.batch.progress import Course
+from grader.classes.batch.run import Watcher
 from grader.report.text import number
 from grader.shown import line
 

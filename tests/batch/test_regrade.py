@@ -13,8 +13,8 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from grader import __version__
-from grader.classes.batch.flow import described
 from grader.classes.batch.folder import open_batch, write_run
+from grader.classes.batch.run import described
 from grader.cli.main import run
 from grader.evidence.reader import load_evidence
 from grader.judging import judge

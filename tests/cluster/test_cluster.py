@@ -8,9 +8,9 @@ from pathlib import Path
 import dask.config
 import pytest
 
-from grader.classes.batch.executor import Processes
+from grader.classes.batch.job import Processes
 from grader.classes.cluster import ClusterHands
-from grader.classes.cluster.hands import EXCHANGE
+from grader.classes.cluster.executor import EXCHANGE
 from grader.errors import HostError
 from tests.cluster.clusters import Cluster, cluster, kill
 from tests.cluster.jobs import ids, jobs_for, verdicts

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.cluster import ClusterHands, connecting
-from grader.classes.cluster.address import check_address
+from grader.classes.cluster import ClusterHands, connect
+from grader.classes.cluster.connect import check_address
 from grader.errors import HostError, UsageError
 from tests.cluster.jobs import jobs_for
 
@@ -76,7 +76,7 @@ def _refusal(address: str, out: Path) -> HostError:
 
 
 def test_where_nothing_answers_one_line_says_so(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(connecting, "CONNECT_S", 0.5)
+    monkeypatch.setattr(connect, "CONNECT_S", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as closed:
         address = f"tcp://127.0.0.1:{closed.getsockname()[1]}"
     assert f"no Dask scheduler answers at {address}" in _refusal(address, tmp_path / "out").message
@@ -89,7 +89,7 @@ def test_where_nothing_answers_one_line_says_so(tmp_path: Path, monkeypatch) -> 
     "says", [b"SSH-2.0-OpenSSH_9.2p1\r\n", b"HTTP/1.1 400 Bad Request\r\n\r\n", b"\0" * 64]
 )
 def test_where_something_else_answers_one_line_says_so(says: bytes, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(connecting, "CONNECT_S", 2.0)
+    monkeypatch.setattr(connect, "CONNECT_S", 2.0)
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.cluster import ClusterHands
-from grader.classes.cluster.hands import EXCHANGE
+from grader.classes.cluster.executor import EXCHANGE
 from grader.errors import HostError
 from tests.cluster.clusters import ROOT, Cluster, children_of, cluster, kill, lives, until
 from tests.cluster.jobs import ids, jobs_for, named_job, verdicts

@@ -15,8 +15,7 @@ from typing import Any
 import pytest
 from distributed.security import Security
 
-from grader.classes.cluster.address import LOCAL
-from grader.classes.cluster.connecting import connected
+from grader.classes.cluster.connect import LOCAL, connected
 from tests.cluster.sockets import listening_ports, tree_of
 
 KEY = b"PRIVATE KEY"

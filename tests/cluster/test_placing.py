@@ -10,8 +10,7 @@ import pytest
 from grader.classes.batch.job import Job, Outcome
 from grader.classes.cluster import placing
 from grader.classes.cluster.errands import Report
-from grader.classes.cluster.exchange import Exchange, Parcel
-from grader.classes.cluster.parcels import pack
+from grader.classes.cluster.exchange import Exchange, Parcel, pack
 from grader.classes.cluster.placing import ParcelLost, place
 from grader.errors import Busy
 from grader.results import Results

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.cluster import remote
+from grader.classes.cluster import worker
 from grader.classes.cluster.errands import Errand
 from grader.classes.cluster.exchange import Exchange
 from tests.cluster.clusters import children_of, until
@@ -24,7 +24,7 @@ def exchange(tmp_path: Path) -> Iterator[Exchange]:
     made = Exchange(str(tmp_path / "exchange"))
     made.make()
     yield made
-    asyncio.run(remote.dismiss(WORD))
+    asyncio.run(worker.dismiss(WORD))
 
 
 def _errand(exchange: Exchange, tmp_path: Path, *, source: str = "", seen: bool = True) -> Errand:
@@ -35,7 +35,7 @@ def _errand(exchange: Exchange, tmp_path: Path, *, source: str = "", seen: bool 
 
 
 def test_it_leaves_one_parcel_and_nothing_in_the_batchs_folder(exchange: Exchange, tmp_path: Path) -> None:
-    report = remote._report(_errand(exchange, tmp_path), lambda: True)
+    report = worker._report(_errand(exchange, tmp_path), lambda: True)
     assert report.outcome.status == "inconclusive"
     assert report.parcel is not None
     assert [path.name for path in Path(exchange.url).iterdir()] == [report.parcel.name]
@@ -43,7 +43,7 @@ def test_it_leaves_one_parcel_and_nothing_in_the_batchs_folder(exchange: Exchang
 
 
 def test_a_path_that_only_the_client_sees_is_the_machines_fault(exchange: Exchange, tmp_path: Path) -> None:
-    report = remote._report(_errand(exchange, tmp_path, source="/only/there/ada.zip"), lambda: True)
+    report = worker._report(_errand(exchange, tmp_path, source="/only/there/ada.zip"), lambda: True)
     assert (report.outcome.status, report.outcome.kind) == ("error", "host")
     assert f"/only/there/ada.zip cannot be seen on {report.machine}" == report.outcome.message
     assert "a path that all machines share" in report.outcome.hint
@@ -51,13 +51,13 @@ def test_a_path_that_only_the_client_sees_is_the_machines_fault(exchange: Exchan
 
 
 def test_a_path_that_nobody_sees_is_the_submissions(exchange: Exchange, tmp_path: Path) -> None:
-    report = remote._report(_errand(exchange, tmp_path, source="/nowhere/ada", seen=False), lambda: True)
+    report = worker._report(_errand(exchange, tmp_path, source="/nowhere/ada", seen=False), lambda: True)
     assert (report.outcome.status, report.outcome.kind) == ("error", "submission")
     assert report.parcel is not None
 
 
 def test_what_nobody_wants_any_more_is_not_delivered(exchange: Exchange, tmp_path: Path) -> None:
-    report = remote._report(_errand(exchange, tmp_path), lambda: False)
+    report = worker._report(_errand(exchange, tmp_path), lambda: False)
     assert report.parcel is None
     assert list(Path(exchange.url).iterdir()) == []
 
@@ -65,24 +65,24 @@ def test_what_nobody_wants_any_more_is_not_delivered(exchange: Exchange, tmp_pat
 def test_an_exchange_that_cannot_be_written_is_said_with_the_machines_name(
     tmp_path: Path, monkeypatch
 ) -> None:
-    monkeypatch.setattr(remote, "PAUSE_S", 0.0)
+    monkeypatch.setattr(worker, "PAUSE_S", 0.0)
     (tmp_path / "file").write_text("no folder")
-    report = remote._report(_errand(Exchange(str(tmp_path / "file")), tmp_path), lambda: True)
+    report = worker._report(_errand(Exchange(str(tmp_path / "file")), tmp_path), lambda: True)
     assert (report.outcome.status, report.outcome.kind) == ("error", "host")
     assert "cannot be written" in report.outcome.message
     assert report.machine in report.outcome.message
-    asyncio.run(remote.dismiss(WORD))
+    asyncio.run(worker.dismiss(WORD))
 
 
 def test_dismissed_it_interrupts_what_runs_and_ends_its_processes(exchange: Exchange, tmp_path: Path) -> None:
     before = set(children_of(os.getpid()))
     found = []
     thread = threading.Thread(
-        target=lambda: found.append(remote._report(_errand(exchange, tmp_path), lambda: True))
+        target=lambda: found.append(worker._report(_errand(exchange, tmp_path), lambda: True))
     )
     thread.start()
     until(lambda: set(children_of(os.getpid())) - before)
-    asyncio.run(remote.dismiss(WORD))
+    asyncio.run(worker.dismiss(WORD))
     thread.join()
     assert [report.parcel for report in found] == [None]
     assert set(children_of(os.getpid())) <= before
@@ -92,18 +92,18 @@ def test_a_process_serves_many_jobs_and_is_ended_when_it_has_none(
     exchange: Exchange, tmp_path: Path, monkeypatch
 ) -> None:
     before = set(children_of(os.getpid()))
-    monkeypatch.setattr(remote, "IDLE_S", 3600.0)
-    remote._report(_errand(exchange, tmp_path), lambda: True)
+    monkeypatch.setattr(worker, "IDLE_S", 3600.0)
+    worker._report(_errand(exchange, tmp_path), lambda: True)
     first = set(children_of(os.getpid())) - before
-    monkeypatch.setattr(remote, "IDLE_S", 0.05)
-    remote._report(_errand(exchange, tmp_path), lambda: True)
+    monkeypatch.setattr(worker, "IDLE_S", 0.05)
+    worker._report(_errand(exchange, tmp_path), lambda: True)
     assert len(first) == 1
     until(lambda: set(children_of(os.getpid())) <= before)
 
 
 def test_it_says_who_it_is(exchange: Exchange) -> None:
     exchange.greet(WORD)
-    said = asyncio.run(remote.answer(exchange.url, WORD))
+    said = asyncio.run(worker.answer(exchange.url, WORD))
     assert said["kept_out"] == ""
-    assert {name: said[name] for name in remote.versions()} == remote.versions()
-    assert "is another place there" in asyncio.run(remote.answer(exchange.url, "another"))["kept_out"]
+    assert {name: said[name] for name in worker.versions()} == worker.versions()
+    assert "is another place there" in asyncio.run(worker.answer(exchange.url, "another"))["kept_out"]

@@ -12,8 +12,8 @@ from pathlib import Path
 import yaml
 
 from grader import __version__
-from grader.classes.batch.flow import described, write_books
 from grader.classes.batch.folder import BatchFolder, write_run
+from grader.classes.batch.run import described, write_books
 from grader.evidence.reader import load_evidence
 from grader.intake import safe_name
 from grader.judging import judge

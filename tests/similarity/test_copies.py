@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.similarity.job import run
-from grader.classes.similarity.request import Request
+from grader.classes.similarity.compare import Request, run
 from grader.model.similarity import Similarity
 from tests.similarity.classes import (
     DISGUISES,

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.similarity import compare
-from grader.classes.similarity.job import run
-from grader.classes.similarity.request import Request
+from grader.classes.similarity.compare import Request, run
 from tests.similarity.classes import class_of, renamed, solution
 
 ROOT = Path(__file__).parent.parent.parent

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from grader.checks import CHECKS
 from grader.classes.batch.pool import side_by_side, workers, working
-from grader.classes.batch.settled import figures_in
+from grader.classes.batch.regrade import fitting_runs
 from grader.errors import EvidenceError, GraderError, UsageError
+from grader.evidence.reader import load_evidence
 from grader.files import new_file, unwritable
+from grader.judging.settle import settle, unsettled
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
+from grader.model.submission_time import HandedIn, Override
+from grader.report.figures import figures_of
+from grader.report.files import write_reports
 from grader.report.html import html_report
 from grader.report.junit import junit
 from grader.report.markdown import markdown_report
 from grader.report.summary import missing_hidden
-from grader.results import RESULT, Results, read_result
+from grader.results import EVIDENCE, RESULT, Results, read_result
 from grader.rubric.load import LoadedRubric
+from grader.rubric.model import Rubric
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,3 +114,60 @@ def _written(rubric: LoadedRubric, folder: Path) -> Written:
             message = f"{folder}: internal error: {type(error).__name__}: {error}"
             return Written(folder=folder, error=message, hint="write it by itself with --debug")
         return Written(folder=folder, rubric_digest=result.rubric.digest)
+
+
+# [classes.batch.settled] What a person decided and when it was handed in, applied to a result that is there already.
+
+CONSOLE = "console.log"
+
+
+@dataclass(frozen=True)
+class Settler:
+    """Settles results by the rubric's late policy and by `overrides`: by submission, then by criterion."""
+
+    rubric: Rubric
+    overrides: Mapping[str, Mapping[str, Override]]
+
+    def of(self, submission_id: str) -> Mapping[str, Override]:
+        """A submission's overrides."""
+        return self.overrides.get(submission_id, {})
+
+    def settled(
+        self, automatic: GradingResult, submission_id: str, handed_in: HandedIn | None, earlier: GradingResult
+    ) -> GradingResult:
+        """An automatic result made the one that counts; `earlier` is the one that it takes the place of."""
+        return settle(
+            automatic,
+            self.rubric,
+            overrides=self.of(submission_id),
+            handed_in=handed_in or earlier.handed_in,
+            before=earlier.overrides,
+        )
+
+    def again(self, result: GradingResult, submission_id: str, handed_in: HandedIn | None) -> GradingResult:
+        """The same result as it counts now: an override or an extension may have come since."""
+        automatic = unsettled(result, self.rubric)
+        return self.settled(automatic, submission_id, handed_in, result)
+
+
+def rewrite(
+    folder: Path, result: GradingResult, rubric: Rubric, docs: Mapping[str, Mapping[str, str]] | None = None
+) -> None:
+    """Write the result's reports; the evidence that it was judged from stays. Raises as `Results` does.
+
+    `docs` has the sections of the checks' docstrings; without them, those of the grader's own checks are taken.
+    """
+    with Results(folder) as results:
+        figures = figures_in(folder, result, rubric)
+        docs = docs or {name: check.sections for name, check in CHECKS.items()}
+        write_reports(result, results.new, console="", rubric=rubric, figures=figures, docs=docs)
+        (results.new / CONSOLE).unlink()
+        results.commit(keep=(EVIDENCE, CONSOLE))
+
+
+def figures_in(folder: Path, result: GradingResult, rubric: Rubric) -> Figures | None:
+    """Of a submission's folder of results, drawn from its evidence; None where there is none, or it cannot be read."""
+    with suppress(Exception):  # no mark hangs on a picture
+        runs = fitting_runs(rubric, load_evidence([folder / EVIDENCE]))
+        return figures_of(rubric, runs, result.criteria)
+    return None

@@ -4,6 +4,6 @@ Results come back as files: a worker packs a submission's folder into one file a
 unpacks it into place. Nobody but the client writes into the batch's folder.
 """
 
-from grader.classes.cluster.hands import ClusterHands
+from grader.classes.cluster.executor import ClusterHands
 
 __all__ = ["ClusterHands"]

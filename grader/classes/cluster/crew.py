@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from grader.arena.ros_env import INSTALL_HINT
-from grader.classes.cluster import remote
-from grader.classes.cluster.address import is_encrypted
+from grader.classes.cluster import worker
+from grader.classes.cluster.connect import is_encrypted
 
 OPEN = "it listens without certificates: start it with the protocol of its scheduler"
 Answer = Mapping[str, str] | BaseException | None
@@ -90,7 +90,7 @@ def ask_of(client: Any, exchange: str, word: str) -> Callable[[str], Answer]:  #
 
     def ask(address: str) -> Answer:
         try:
-            said = client.run(remote.answer, exchange, word, workers=[address], on_error="return")
+            said = client.run(worker.answer, exchange, word, workers=[address], on_error="return")
         except Exception as error:  # noqa: BLE001 - whatever it is, it is this worker's answer
             return error
         found: Answer = said.get(address)

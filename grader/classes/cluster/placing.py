@@ -8,8 +8,7 @@ from typing import BinaryIO
 
 from grader.classes.batch.job import Job, Outcome
 from grader.classes.cluster.errands import Report, is_machines
-from grader.classes.cluster.exchange import Exchange, Parcel
-from grader.classes.cluster.parcels import unpack
+from grader.classes.cluster.exchange import Exchange, Parcel, unpack
 from grader.errors import HostError
 from grader.intake import safe_name
 from grader.results import RESULT, Results

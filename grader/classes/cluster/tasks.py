@@ -12,7 +12,7 @@ from pickle import dumps
 from typing import Any
 
 from grader.classes.batch.job import Job
-from grader.classes.cluster import remote
+from grader.classes.cluster import worker
 from grader.classes.cluster.errands import Errand
 
 MISSES = 2
@@ -62,7 +62,7 @@ class Tasks:
         key = f"grade-{self._batch}-{next(self._numbers)}"
         task.missed, task.placing = 0, False
         task.future = self._client.submit(
-            remote.perform, dumps(errand), key=key, pure=False, workers=workers, allow_other_workers=False
+            worker.perform, dumps(errand), key=key, pure=False, workers=workers, allow_other_workers=False
         )
         self._held[key] = task
         task.future.add_done_callback(lambda _: self._ended(key))

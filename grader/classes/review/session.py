@@ -6,9 +6,9 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 
-from grader.classes.batch.flow import GRADEBOOK, alone, ids_of, write_books
 from grader.classes.batch.folder import BatchFolder, open_batch, write_run
-from grader.classes.batch.settled import Settler, rewrite
+from grader.classes.batch.reports import Settler, rewrite
+from grader.classes.batch.run import GRADEBOOK, alone, ids_of, write_books
 from grader.classes.overrides import FILE, Overrides, read_overrides, write_override
 from grader.classes.review.edit_conflicts import Conflict, alike, mark, plain, reviewing
 from grader.classes.review.follower import Follower, Pace

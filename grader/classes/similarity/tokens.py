@@ -14,7 +14,7 @@ from pygments import token
 from pygments.lexer import Lexer
 from pygments.lexers import get_lexer_by_name
 
-from grader.classes.similarity.languages import Language
+from grader.classes.similarity.read import Language
 
 GRAM = 25
 """Signs in one fingerprint, `copydetect`'s own default: about two short statements."""

@@ -5,7 +5,7 @@ Names and texts do not matter to the comparison, only the order of what is done.
 
 from __future__ import annotations
 
-from grader.classes.similarity.sources import Source
+from grader.classes.similarity.read import Source
 
 _TALKER = """
 import rospy

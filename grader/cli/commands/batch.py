@@ -6,10 +6,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grader.classes.batch.executor import Hands, Processes
-from grader.classes.batch.flow import GRADEBOOK, INDEX, RESULTS, BatchOptions, run_batch
 from grader.classes.batch.folder import BatchFolder
-from grader.classes.batch.needs_attention import notable
+from grader.classes.batch.job import Hands, Processes
+from grader.classes.batch.progress import notable
+from grader.classes.batch.run import GRADEBOOK, INDEX, RESULTS, BatchOptions, run_batch
 from grader.classes.roster import Local, read_roster
 from grader.classes.roster.times import parse_time
 from grader.cli.class_display import open_class_display

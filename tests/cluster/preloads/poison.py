@@ -3,9 +3,9 @@
 import os
 import signal
 
-from grader.classes.cluster import remote
+from grader.classes.cluster import worker
 
-_done = remote._done
+_done = worker._done
 
 
 def _ended(sent, folder, wanted):
@@ -14,4 +14,4 @@ def _ended(sent, folder, wanted):
     return _done(sent, folder, wanted)
 
 
-remote._done = _ended
+worker._done = _ended

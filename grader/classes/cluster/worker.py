@@ -21,10 +21,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from grader.classes.batch.child import Child
     from grader.classes.batch.job import Job, Outcome
     from grader.classes.cluster.errands import Errand, Report
     from grader.classes.cluster.exchange import Parcel
+    from grader.workers import Child
 
 WATCH_S = 1.0
 LEAVE_S = 40.0
@@ -158,8 +158,10 @@ def _done(sent: Errand, folder: Path, wanted: Callable[[], bool]) -> Outcome:
 
 def _left(sent: Errand, folder: Path) -> Parcel | None:
     """The results in the exchange, after some attempts; None where the job left none."""
-    from grader.classes.cluster.exchange import Exchange  # noqa: PLC0415 - the module loads little
-    from grader.classes.cluster.parcels import pack  # noqa: PLC0415 - the module loads little
+    from grader.classes.cluster.exchange import (
+        Exchange,
+        pack,
+    )
     from grader.errors import HostError  # noqa: PLC0415 - the module loads little
     from grader.intake import safe_name  # noqa: PLC0415 - the module loads little
 
@@ -205,7 +207,7 @@ class _Children:
         self._changed = threading.Condition()
 
     def take(self, batch: str) -> Child:
-        from grader.classes.batch.child import Child  # noqa: PLC0415 - the module loads little
+        from grader.workers import Child  # noqa: PLC0415 - the module loads little
 
         with self._changed:
             child = Child()

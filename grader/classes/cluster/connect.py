@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import re
 import signal
 import threading
 import warnings
@@ -11,10 +12,9 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
 
-from grader.classes.cluster import remote
-from grader.classes.cluster.address import LOCAL, is_encrypted
+from grader.classes.cluster import worker
 from grader.classes.cluster.crew import has_no_grader
-from grader.errors import HostError
+from grader.errors import HostError, UsageError
 
 CONNECT_S = 15.0
 TLS = tuple(f"DASK_DISTRIBUTED__COMM__TLS__{name}" for name in ("CA_FILE", "CLIENT__CERT", "CLIENT__KEY"))
@@ -34,7 +34,7 @@ def connected(address: str) -> Iterator[Any]:
             _check_scheduler(client, address)
             yield client
         return
-    from grader.classes.cluster.own import own_cluster  # noqa: PLC0415 - slow to load
+    from grader.classes.cluster.local import own_cluster  # noqa: PLC0415 - slow to load
 
     with ExitStack() as stack:
         with _not_interrupted():
@@ -96,7 +96,7 @@ def _nobody_answers(address: str) -> HostError:
 def _check_scheduler(client: Any, address: str) -> None:  # noqa: ANN401 - Dask has no types
     """The scheduler reads what it hands on: it needs the same grader as the workers."""
     try:
-        there = client.run_on_scheduler(remote.versions)
+        there = client.run_on_scheduler(worker.versions)
     except Exception as error:
         if not has_no_grader(error):
             raise _nobody_answers(address) from error
@@ -104,7 +104,7 @@ def _check_scheduler(client: Any, address: str) -> None:  # noqa: ANN401 - Dask 
             f"the scheduler at {address} has no grader like this one",
             hint="install the same grader, with the extra [cluster], where the scheduler runs",
         ) from error
-    here = remote.versions()
+    here = worker.versions()
     for name in ("grader", "python"):
         if there[name] != here[name]:
             raise HostError(
@@ -137,3 +137,42 @@ def _not_interrupted() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+# [classes.cluster.address] Which clusters `--cluster` may name: those where both ends show certificates, others only if that is asked for.
+
+LOCAL = "local"
+EXTRA = 'pip install "ros-lab-grader[cluster]"'
+ENCRYPTED = ("tls", "wss")
+"""Of Dask's protocols, those in which both ends show certificates."""
+_ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://(\[[0-9A-Fa-f:.%]+\]|[^\s:/\[\]@]+):[0-9]{1,5}/?")
+
+
+def check_address(text: str, *, insecure: bool = False) -> str:
+    """What `--cluster` says: `tls://host:8786`, or `local`; with `insecure` also `tcp://host:8786` and its like.
+
+    Raises UsageError for what is neither, and where Dask is missing.
+    """
+    if text != LOCAL and not _ADDRESS.fullmatch(text):
+        raise UsageError(
+            f"--cluster {text}: not the address of a Dask scheduler",
+            hint="give tls://host:8786 as `dask scheduler` prints it, or `local`",
+        )
+    if text != LOCAL and not is_encrypted(text) and not insecure:
+        raise UsageError(
+            f"--cluster {text}: this scheduler asks for no certificate: "
+            "all who reach its port can run programs as its user",
+            hint="use tls:// (docs/how-to/cluster.md says how); where nobody else is in that network, "
+            "add --cluster-insecure",
+        )
+    try:
+        import cryptography  # noqa: F401, PLC0415 - only to know that it is there: `local` makes certificates
+        import distributed  # noqa: F401, PLC0415 - as above
+    except ImportError as error:
+        raise UsageError(f"--cluster needs Dask: {error}", hint=EXTRA) from error
+    return text
+
+
+def is_encrypted(address: str) -> bool:
+    """Whether who listens there, scheduler or worker, asks for a certificate."""
+    return address.partition("://")[0] in ENCRYPTED

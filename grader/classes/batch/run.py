@@ -5,19 +5,18 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime, timezone
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Protocol
 
 from grader import __version__
-from grader.classes.batch.executor import Hands
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch, write_run
-from grader.classes.batch.job import Job, Outcome, Sandbox
-from grader.classes.batch.selection import check, chosen
-from grader.classes.batch.settled import Settler, rewrite
+from grader.classes.batch.job import Hands, Job, Outcome, Sandbox
+from grader.classes.batch.reports import Settler, rewrite
 from grader.classes.fetching import prefetch
 from grader.classes.gradebook import write_gradebook
 from grader.classes.overrides import FILE as OVERRIDES
@@ -27,13 +26,14 @@ from grader.files import check_writable, keep_private, lock, make_folder
 from grader.intake import safe_name, without_password
 from grader.judging.summary import passed
 from grader.model.batch import MISSING, BatchRun, Counts, CriterionInfo, State
-from grader.model.result import RubricInfo
+from grader.model.result import GradingResult, RubricInfo
 from grader.model.roster import Entry, Roster, RosterFault
 from grader.pipeline import GradeOptions, prepare
 from grader.report.class_page import write_class_page
 from grader.results import finish_killed
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
+from grader.shown import line
 
 GRADEBOOK, RESULTS, INDEX = "gradebook.csv", "results.jsonl", "index.html"
 RESERVED = frozenset(
@@ -297,3 +297,48 @@ def alone(out: Path) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
+
+
+# [classes.batch.selection] `--only`: which submissions of a batch are done, and whether once more.
+
+FAILED, INCONCLUSIVE, CHANGED = "failed", "inconclusive", "changed"
+WORDS = (FAILED, INCONCLUSIVE, CHANGED)
+NAME_CHARS = 80
+
+
+def chosen(
+    entries: Sequence[Entry], only: Sequence[str], earlier: Callable[[Entry], GradingResult | None]
+) -> Iterator[tuple[Entry, bool]]:
+    """The entries to look at, each with whether it is graded even where it is complete.
+
+    Without `only`, all. `failed`: those that could not be graded, or have no result. `inconclusive`: those that say so.
+    `changed`: those with a result; it stays unless the submission, the rubric or the grader is another one now. An id:
+    that one. Raises UsageError for an id that is none.
+    """
+    check(entries, only)
+    names = {safe_name(name).casefold() for name in only if name not in WORDS}
+    for entry in entries:
+        if not only:
+            yield entry, False
+        elif safe_name(entry.id).casefold() in names:
+            yield entry, True
+        elif any(word in only for word in WORDS):
+            result = earlier(entry)
+            status = result.status if result else "error"
+            if (status == "error" and FAILED in only) or (status == "inconclusive" and INCONCLUSIVE in only):
+                yield entry, True
+            elif result is not None and CHANGED in only:
+                yield entry, False
+
+
+def check(entries: Sequence[Entry], only: Sequence[str]) -> None:
+    """Raise UsageError for an id that no entry has."""
+    known = {safe_name(entry.id).casefold(): entry.id for entry in entries}
+    for name in only:
+        if name in WORDS or safe_name(name).casefold() in known:
+            continue
+        near = get_close_matches(name, list(known.values()), n=1)
+        hint = f"did you mean {line(near[0], NAME_CHARS)}?" if near else f"an id, or {', '.join(WORDS)}"
+        raise UsageError(
+            f"--only {line(name, NAME_CHARS)}: no submission of that id in the roster", hint=hint
+        )

@@ -83,7 +83,7 @@ def _lives(process: subprocess.Popen[bytes] | None) -> bool:
 def _started() -> subprocess.Popen[bytes]:
     """In a session of its own: a Ctrl-C on the terminal is its parent's to hand on."""
     return subprocess.Popen(
-        own_module("grader.classes.batch.child"),
+        own_module("grader.workers"),
         env=anywhere(os.environ),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
@@ -137,7 +137,7 @@ def main() -> None:
     os.dup2(2, 1)
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     threading.Thread(target=_leave_with_parent, args=(inward.fileno(),), daemon=True).start()
-    from grader.classes.batch.work import work  # noqa: PLC0415 - slow to load: signals and pipes come first
+    from grader.classes.batch.job import work  # noqa: PLC0415 - slow to load: signals and pipes come first
 
     with suppress(EOFError, BrokenPipeError, KeyboardInterrupt):
         while not _Worker.stopped:

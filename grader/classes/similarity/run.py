@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,12 +13,14 @@ from pathlib import Path
 from pydantic import ValidationError
 
 import grader
-from grader.classes.similarity.request import Request
+from grader.classes.similarity.compare import Request
 from grader.errors import HostError, SubmissionError, UsageError
+from grader.files import atomic_write
 from grader.intake import Limits
 from grader.intake.archive import unpack
-from grader.model.similarity import Similarity
+from grader.model.similarity import Lines, Pair, Similarity
 from grader.outside import anywhere, own_module
+from grader.report.text import csv_text, json_text
 from grader.temporary import temporary_folder
 
 THRESHOLD = 0.8
@@ -82,7 +84,7 @@ def _answer(request: Request, place: Path) -> Similarity:
     said = place / "said"
     with (place / "answer").open("w+b") as answer, said.open("wb") as errors:
         process = subprocess.Popen(
-            own_module("grader.classes.similarity.job"),
+            own_module("grader.classes.similarity.compare"),
             env=_environment(),
             stdin=subprocess.PIPE,
             stdout=answer,
@@ -123,3 +125,48 @@ def _environment() -> dict[str, str]:
         "PYTHONHASHSEED": "0",
         "PYTHONPATH": str(Path(grader.__file__).resolve().parent.parent),
     }
+
+
+# [classes.similarity.files] `similarity.json` and `similarity.csv`, beside the class's other files.
+
+HEAD = (
+    "a", "name_a", "b", "name_b", "similarity_a_percent", "similarity_b_percent", "lines_a", "lines_b", "files"
+)  # fmt: skip
+
+
+def write_similarity(
+    similarity: Similarity, folder: Path, names: Mapping[str, str] | None = None
+) -> tuple[Path, ...]:
+    """Write both files into `folder`; gives their paths. `names` are the students', by id. Raises OutputError."""
+    rows = [HEAD, *_rows(similarity, names or {})]
+    files = {
+        "similarity.json": json_text(similarity.model_dump(mode="json", by_alias=True)),
+        "similarity.csv": "\ufeff" + csv_text(rows),
+    }
+    for name, text in files.items():
+        atomic_write(folder / name, text.encode())
+    return tuple(folder / name for name in files)
+
+
+def percent(share: float) -> int:
+    """Never 100 where anything is missing."""
+    return int(share * 100)
+
+
+def stretches(lines: Lines) -> str:
+    """`3-9, 12`."""
+    return ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in lines)
+
+
+def _rows(similarity: Similarity, names: Mapping[str, str]) -> Iterator[tuple[str | float, ...]]:
+    for pair in similarity.pairs:
+        shares = (percent(pair.similarity_a), percent(pair.similarity_b))
+        known = (pair.a, names.get(pair.a, ""), pair.b, names.get(pair.b, ""))
+        yield (*known, *shares, pair.lines_a, pair.lines_b, _files(pair))
+
+
+def _files(pair: Pair) -> str:
+    return "; ".join(
+        f"{match.file_a}:{stretches(match.lines_a)} ~ {match.file_b}:{stretches(match.lines_b)}"
+        for match in pair.files
+    )
