@@ -22,6 +22,7 @@ ALLOWED = {
     "shown": set[str](),
     "portable": set[str](),
     "outside": set[str](),
+    "workers": {"outside"},
     "files": {"errors", "portable"},
     "temporary": {"errors", "files", "portable"},
     "results": BASE | {"files"},
@@ -51,7 +52,7 @@ ALLOWED = {
     },
     "classes": {
         *BASE, "arena.ros_env", "checks", "evidence", "faults", "files", "intake", "judging", "outside", "pipeline",
-        "report", "results", "rubric", "temporary"
+        "report", "results", "rubric", "temporary", "workers"
     },
     "student": {
         *BASE, "arena.asynchronous", "arena.workspace", "faults", "intake", "package", "pipeline", "report",
@@ -60,7 +61,7 @@ ALLOWED = {
     "integrations": BASE | {"faults", "files", "intake", "pipeline", "report", "results", "rubric"},
     "cli": {
         *BASE, "arena", "authoring", "checks", "classes", "evidence", "faults", "files", "integrations", "intake",
-        "judging", "outside", "package", "pipeline", "report", "rubric", "student", "temporary"
+        "judging", "outside", "package", "pipeline", "report", "results", "rubric", "student", "temporary"
     },
     "__main__": {"cli"},
 }  # fmt: skip

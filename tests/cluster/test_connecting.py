@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.cluster import ClusterHands, connect
+from grader.classes.cluster import ClusterExecutor, connect
 from grader.classes.cluster.connect import check_address
 from grader.errors import HostError, UsageError
 from tests.cluster.jobs import jobs_for
@@ -40,7 +40,7 @@ def test_a_cluster_that_asks_for_no_certificate_is_refused_without_the_flag(
     scheme: str, tmp_path: Path
 ) -> None:
     with pytest.raises(UsageError, match="asks for no certificate") as caught:
-        ClusterHands(f"{scheme}://host:8786", tmp_path / "out")
+        ClusterExecutor(f"{scheme}://host:8786", tmp_path / "out")
     assert "--cluster-insecure" in caught.value.hint
     assert "tls://" in caught.value.hint
 
@@ -52,7 +52,7 @@ def test_a_cluster_that_asks_for_no_certificate_is_refused_without_the_flag(
 )  # fmt: skip
 def test_what_is_no_address_is_refused_before_anything_is_done(address: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="not the address of a Dask scheduler") as caught:
-        ClusterHands(address, tmp_path / "out")
+        ClusterExecutor(address, tmp_path / "out")
     assert "tls://host:8786" in caught.value.hint
     assert not (tmp_path / "out").exists()
 
@@ -66,9 +66,9 @@ def test_without_dask_it_says_what_to_install(missing: str, monkeypatch) -> None
 
 
 def _refusal(address: str, out: Path) -> HostError:
-    hands = ClusterHands(address, out, insecure=True)
+    executor = ClusterExecutor(address, out, insecure=True)
     with pytest.raises(HostError) as caught:
-        list(hands.run(jobs_for(out, 1), begun=lambda _: None))
+        list(executor.run(jobs_for(out, 1), begun=lambda _: None))
     assert "\n" not in caught.value.message
     assert "dask scheduler" in caught.value.hint
     assert not out.exists()
@@ -111,13 +111,13 @@ def test_where_something_else_answers_one_line_says_so(says: bytes, tmp_path: Pa
 
 
 def test_a_tls_address_without_certificates_says_where_they_go(tmp_path: Path) -> None:
-    hands = ClusterHands("tls://127.0.0.1:8786", tmp_path / "out")
+    executor = ClusterExecutor("tls://127.0.0.1:8786", tmp_path / "out")
     with pytest.raises(HostError) as caught:
-        list(hands.run(jobs_for(tmp_path / "out", 1), begun=lambda _: None))
+        list(executor.run(jobs_for(tmp_path / "out", 1), begun=lambda _: None))
     assert "needs certificates" in caught.value.message
     assert "DASK_DISTRIBUTED__COMM__TLS__CA_FILE" in caught.value.hint
 
 
 def test_no_jobs_need_no_cluster(tmp_path: Path) -> None:
-    hands = ClusterHands("tls://127.0.0.1:1", tmp_path / "out")
-    assert list(hands.run(iter(()), begun=lambda _: None)) == []
+    executor = ClusterExecutor("tls://127.0.0.1:1", tmp_path / "out")
+    assert list(executor.run(iter(()), begun=lambda _: None)) == []

@@ -15,7 +15,8 @@ from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.plan import Planned
 from grader.authoring.mutation.solution import Solution
 from grader.authoring.mutation.tree import Tree, unified_diff, write_tree
-from grader.classes.batch.gradings import Graded, Job, Sandbox, grade_all
+from grader.classes.batch.gradings import Graded, Job, grade_all
+from grader.classes.batch.job import Sandbox
 from grader.errors import HostError
 from grader.model.progress import Progress
 from grader.model.result import GradingResult, RubricInfo

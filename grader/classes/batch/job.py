@@ -1,15 +1,15 @@
-"""What a batch hands to whoever grades one submission, and what comes back."""
+"""One submission of a class: its `Job`, how it is fetched and graded, and its `Outcome`.
+
+An executor does many jobs: `LocalExecutor` with processes of this machine, `classes.cluster` with other machines.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from datetime import datetime
 from functools import partial
-from itertools import islice
 from pathlib import Path
-from queue import SimpleQueue
 from typing import Literal, Protocol
 
 from pydantic import Field
@@ -28,20 +28,20 @@ from grader.model.roster import Entry
 from grader.model.submission_time import HandedIn, Override
 from grader.pipeline import GradeOptions, grade
 from grader.rubric.load import LoadedRubric
-from grader.rubric.model import Rubric
 from grader.temporary import temporary_folder
-from grader.workers import Child
+from grader.workers import WorkerEnded, run_each
 
 Sandbox = Literal["auto", "require", "none"]
 OutcomeStatus = Literal["graded", "inconclusive", "error"]
+KILLED_HINT = "check whether this machine has too little memory, then grade it again with --only"
 
 
 class Job(Record):
     """One submission's grading into `out/<id>/`. It can be sent to another process, and to another machine.
 
     `before` is the time before which the commit that counts is looked for (`--before`), `overrides` map criteria to
-    what a person decided. `earlier` is the result of an earlier batch: where it is complete for the same commit, rubric
-    and grader, nothing is done, unless `again`. `commit` is the one to grade of a repository, whatever else is said.
+    what a person decided. `earlier` is the result of an earlier batch: if it is complete for the same commit, rubric
+    and grader, nothing is done, unless `again`. `commit` of a repository is graded, whatever else is said.
     What was fetched after `fetched_since` (seconds since 1970) is not fetched again.
     """
 
@@ -61,8 +61,8 @@ class Job(Record):
 class Outcome(Record):
     """What became of a job, in short: the rest is in its folder.
 
-    `kept`: the earlier result stays. `handed_in` is what was found out about the submission's time, None where it could
-    not be had. `message` and `hint` say in one line each why there is no result, or why the earlier one stays.
+    `kept`: the earlier result stays. `handed_in` is the submission's time, None if it could not be found out. `message`
+    and `hint` say in one line each why there is no result, or why the earlier one stays.
     """
 
     id: str
@@ -78,42 +78,105 @@ class Outcome(Record):
     wall_s: float = 0.0
 
 
-# [classes.batch.work] One job: the roster's entry is fetched and graded, unless that has been done already.
+class Executor(Protocol):
+    """Does many jobs at a time."""
 
-def work(job: Job) -> Outcome:
-    """Grade the job's submission into `job.out/<its id>/`. Raises KeyboardInterrupt, and nothing else."""
+    def run(self, jobs: Iterable[Job], *, begun: Callable[[str], None]) -> Iterator[Outcome]:
+        """Yield each job's outcome as it comes. Jobs are taken when they can be started; `begun` gets the id of each.
+
+        There is an outcome for every job, whatever happens to it. When the caller stops iterating, running jobs are
+        interrupted and have cleaned up on return.
+        """
+        ...
+
+
+class LocalExecutor:
+    """`count` processes of this machine, each of which does one job at a time."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+
+    def run(self, jobs: Iterable[Job], *, begun: Callable[[str], None]) -> Iterator[Outcome]:
+        """See `Executor.run`."""
+        return run_each(
+            grade_job, jobs, self.count, ended=outcome_of_ended, begun=lambda job: begun(job.entry.id)
+        )
+
+
+def failed(job: Job, *, kind: str, message: str, hint: str) -> Outcome:
+    """Return the outcome of a job that could not be done."""
+    most = job.rubric.rubric.max_points
+    return Outcome(id=job.entry.id, status="error", max_points=most, kind=kind, message=message, hint=hint)
+
+
+def outcome_of_ended(job: Job, error: WorkerEnded) -> Outcome:
+    """Return the outcome of a job whose process ended, with kind `killed` or `interrupted`."""
+    if error.interrupted:
+        return failed(job, kind="interrupted", message="interrupted", hint="")
+    message = f"the process that graded it {error.reason}"
+    return failed(job, kind="killed", message=message, hint=KILLED_HINT)
+
+
+def grade_job(job: Job) -> Outcome:
+    """Fetch and grade the job's submission into `job.out/<its id>/`, unless that has been done already.
+
+    Raises KeyboardInterrupt, and nothing else.
+    """
     begun = time.monotonic()
     try:
         with temporary_folder("fetch") as folder:
-            outcome = _graded(job, folder)
+            outcome = _grade(job, folder)
     except Exception as error:  # noqa: BLE001 - whatever it is, the others are graded
-        outcome = _failed(job, fault_of(error))
+        fault = fault_of(error)
+        outcome = failed(job, kind=fault.kind, message=fault.message, hint=fault.note or fault.hint)
     return outcome.model_copy(update={"wall_s": round(time.monotonic() - begun, 3)})
 
 
-def _graded(job: Job, folder: Path) -> Outcome:
+def _grade(job: Job, folder: Path) -> Outcome:
     try:
-        obtained = _fetched(job, folder)
+        obtained = _fetch(job, folder)
     except Exception as error:
         fault = fault_of(error)
         if job.earlier is not None and job.earlier.status != "error" and not isinstance(fault, NothingInTime):
-            return _outcome(job, job.earlier, kept=True, because=fault)
+            return _outcome(job, job.earlier, kept=True, fault=fault)
         with told_apart(_attempt(job)):
             raise
+
+    def settle_result(result: GradingResult) -> GradingResult:
+        before = job.earlier.overrides if job.earlier else ()
+        return settle(
+            result, job.rubric.rubric, overrides=job.overrides, handed_in=obtained.handed_in, before=before
+        )
+
     options = GradeOptions(
         sandbox=job.sandbox,
         submission_id=safe_name(job.entry.id),
         static_only=job.static_only,
         tidy=False,
-        kept=partial(_kept, job),
-        settled=partial(_settled, job, obtained.handed_in),
+        kept=partial(_find_complete, job),
+        settled=settle_result,
     )
     result = grade(obtained.source, job.rubric, job.out, options, Silence())
     return _outcome(job, result, kept=result is job.earlier, handed_in=obtained.handed_in)
 
 
+def _fetch(job: Job, folder: Path) -> Obtained:
+    """A missing source is the submission's fault here, not the command line's."""
+    rubric = job.rubric.rubric
+    rule = Rule(
+        deadline=rubric.deadline,
+        late=rubric.late is not None,
+        cut_off_days=rubric.late.cut_off_days if rubric.late else None,
+        before=job.before,
+    )
+    try:
+        return obtain(job.entry, rule, workdir=folder, fetched_since=job.fetched_since, commit=job.commit)
+    except UsageError as error:
+        raise SubmissionError(error.message, hint=error.hint) from error
+
+
 def _attempt(job: Job) -> Attempt:
-    """For the result of what could not be fetched."""
+    """Return what the result of a submission that could not be fetched says."""
     about = SubmissionInfo(
         id=safe_name(job.entry.id),
         source=without_password(job.entry.source),
@@ -132,47 +195,19 @@ def _attempt(job: Job) -> Attempt:
     )
 
 
-def _fetched(job: Job, folder: Path) -> Obtained:
-    """A source that is not there is the submission's fault here, not the command line's."""
-    try:
-        rule = rule_of(job.rubric.rubric, job)
-        return obtain(job.entry, rule, workdir=folder, fetched_since=job.fetched_since, commit=job.commit)
-    except UsageError as error:
-        raise SubmissionError(error.message, hint=error.hint) from error
-
-
-def rule_of(rubric: Rubric, job: Job) -> Rule:
-    """Which commit counts."""
-    return Rule(
-        deadline=rubric.deadline,
-        late=rubric.late is not None,
-        cut_off_days=rubric.late.cut_off_days if rubric.late else None,
-        before=job.before,
-    )
-
-
-def _kept(job: Job, about: SubmissionInfo) -> GradingResult | None:
-    return job.earlier if job.earlier is not None and not job.again and is_done(job, about) else None
-
-
-def is_done(job: Job, about: SubmissionInfo) -> bool:
-    """Whether the earlier result is complete for the same commit, content, rubric and grader."""
+def _find_complete(job: Job, about: SubmissionInfo) -> GradingResult | None:
+    """Return the earlier result if it is complete for the same commit, content, rubric and grader."""
     earlier = job.earlier
-    if earlier is None or earlier.status == "error":
-        return False
-    same = (earlier.submission.commit, earlier.submission.digest) == (about.commit, about.digest)
+    if earlier is None or earlier.status == "error" or job.again:
+        return None
     static = earlier.environment.sandbox == NOTHING_RUN
-    return (
-        same
+    is_same = (
+        (earlier.submission.commit, earlier.submission.digest) == (about.commit, about.digest)
         and earlier.rubric.digest == job.rubric.digest
         and earlier.environment.grader == __version__
         and (job.static_only or not static or not job.rubric.rubric.scenarios)
     )
-
-
-def _settled(job: Job, handed_in: HandedIn, result: GradingResult) -> GradingResult:
-    before = job.earlier.overrides if job.earlier else ()
-    return settle(result, job.rubric.rubric, overrides=job.overrides, handed_in=handed_in, before=before)
+    return earlier if is_same else None
 
 
 def _outcome(
@@ -181,9 +216,10 @@ def _outcome(
     *,
     kept: bool,
     handed_in: HandedIn | None = None,
-    because: GraderError | None = None,
+    fault: GraderError | None = None,
 ) -> Outcome:
-    error = result.error
+    error = fault or result.error
+    message = error.message if error else ""
     return Outcome(
         id=job.entry.id,
         status=result.status,
@@ -192,74 +228,7 @@ def _outcome(
         passed=passed(job.rubric.rubric, result),
         kept=kept,
         handed_in=handed_in,
-        kind=because.kind if because else error.kind if error else "",
-        message=f"{because.message}; the earlier result stays" if because else error.message if error else "",
-        hint=because.hint if because else error.hint if error else "",
+        kind=error.kind if error else "",
+        message=f"{message}; the earlier result stays" if fault else message,
+        hint=error.hint if error else "",
     )
-
-
-def _failed(job: Job, fault: GraderError) -> Outcome:
-    return Outcome(
-        id=job.entry.id,
-        status="error",
-        max_points=job.rubric.rubric.max_points,
-        kind=fault.kind,
-        message=fault.message,
-        hint=fault.note or fault.hint,
-    )
-
-
-# [classes.batch.executor] Who does the jobs of a batch: processes of this machine here, a cluster's workers in `grader.classes.cluster`.
-
-class Hands(Protocol):
-    """Does jobs, many at a time."""
-
-    def run(self, jobs: Iterable[Job], *, begun: Callable[[str], None]) -> Iterator[Outcome]:
-        """Each job's outcome as it comes. Jobs are taken when there are hands for them; `begun` is told of each.
-
-        There is an outcome for every job, whatever happens to it. When the caller stops asking, what runs is
-        interrupted and has cleaned up when this returns.
-        """
-        ...
-
-
-class Processes:
-    """`count` processes of this machine, each of which does one job at a time."""
-
-    def __init__(self, count: int) -> None:
-        self.count = max(count, 1)
-
-    def run(self, jobs: Iterable[Job], *, begun: Callable[[str], None]) -> Iterator[Outcome]:
-        """As `Hands.run` says."""
-        waiting = iter(jobs)
-        idle: SimpleQueue[Child] = SimpleQueue()
-        children: list[Child] = []
-        running: set[Future[Outcome]] = set()
-        with ThreadPoolExecutor(self.count) as threads:
-            try:
-                while True:
-                    for job in islice(waiting, self.count - len(running)):
-                        if idle.empty() and len(children) < self.count:
-                            children.append(Child())
-                            idle.put(children[-1])
-                        begun(job.entry.id)
-                        running.add(threads.submit(_done, idle, job))
-                    if not running:
-                        break
-                    done, running = wait(running, return_when=FIRST_COMPLETED)
-                    for future in done:
-                        yield future.result()
-            finally:
-                for child in children:
-                    child.interrupt()
-                wait(running)
-                for child in children:
-                    child.close()
-
-
-def _done(idle: SimpleQueue[Child], job: Job) -> Outcome:
-    child = idle.get()
-    try:
-        return child.do(job)
-    finally:
-        idle.put(child)

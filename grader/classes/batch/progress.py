@@ -1,4 +1,4 @@
-"""How far a batch is: what is done, running, waiting and failed, and how long the rest takes."""
+"""What a batch tells people: how far it is while it runs, and afterwards what needs their attention."""
 
 from __future__ import annotations
 
@@ -16,11 +16,23 @@ from grader.model.result import CriterionResult
 from grader.model.verdict import Status
 
 LATELY = 40
-"""So many of the last gradings say how fast it goes now."""
+"""The pace is that of so many of the last gradings."""
+OPEN = {
+    Status.INCONCLUSIVE: "could not be judged",
+    Status.MANUAL: "waits for a person",
+    Status.ERROR: "failed",
+}
+NAMES_SHOWN = 4
+NEXT_STEPS = {
+    "error": "{count} could not be graded; once that is fixed: --only failed",
+    "inconclusive": "{count} inconclusive; to grade them again: --only inconclusive",
+    "manual": "{count} with criteria that a person decides: their points go into {overrides}",
+    "missing": "{count} not graded yet: the same command goes on with them",
+}
 
 
 @dataclass
-class Course:
+class BatchProgress:
     """Counts of a batch. `total` are the submissions that were asked for, `points_sum` is over those with points."""
 
     clock: Callable[[], float] = time.monotonic
@@ -36,16 +48,16 @@ class Course:
     _paced_s: float = 0.0
 
     def planned(self, total: int) -> None:
-        """So many submissions are to be done."""
+        """`total` submissions will be graded."""
         self.total = total
         self._begun_s = self.clock()
 
     def begun(self, name: str) -> None:
-        """One more is being done."""
+        """The submission of that id begins."""
         self.running[name] = self.clock()
 
     def ended(self, outcome: Outcome) -> None:
-        """One of those came to its end."""
+        """A submission has its outcome."""
         self.running.pop(outcome.id, None)
         self.graded += outcome.status == "graded"
         self.inconclusive += outcome.status == "inconclusive"
@@ -67,7 +79,7 @@ class Course:
 
     @property
     def mean_points(self) -> float | None:
-        """Of those that have points; None as long as there is none."""
+        """The mean points of those that have points; None as long as there are none."""
         judged = self.graded + self.inconclusive
         return self.points_sum / judged if judged else None
 
@@ -77,9 +89,9 @@ class Course:
 
     @property
     def left_s(self) -> float | None:
-        """For what is left, at the pace of the last gradings; None before two of them have ended.
+        """The time that is left, at the pace of the last gradings; None before two of them have ended.
 
-        What is found complete costs nearly nothing, so the pace is that of what was really graded.
+        What was complete before takes nearly no time, so it does not count towards the pace.
         """
         if len(self._ends_s) < 2:
             return None
@@ -88,24 +100,8 @@ class Course:
         return (self.clock() - begin_s) / count * (self.total - self.done)
 
 
-# [classes.batch.needs_attention] What a person has to look at after a batch, one line each.
-
-OPEN = {
-    Status.INCONCLUSIVE: "could not be judged",
-    Status.MANUAL: "waits for a person",
-    Status.ERROR: "failed",
-}
-NAMES_SHOWN = 4
-GO_ON = {
-    "error": "{count} could not be graded; when that is mended: --only failed",
-    "inconclusive": "{count} inconclusive; to grade them again: --only inconclusive",
-    "manual": "{count} with criteria that a person decides: their points go into {overrides}",
-    "missing": "{count} not graded yet: the same command goes on with them",
-}
-
-
-def notable(folder: BatchFolder) -> Iterator[str]:
-    """Of each submission that is not graded, why; then how to go on with them."""
+def list_attention(folder: BatchFolder) -> Iterator[str]:
+    """Yield why each submission that is not graded is not, then how to go on with them."""
     found: Counter[str] = Counter()
     for row in folder.rows():
         state = _state(row)
@@ -118,20 +114,20 @@ def notable(folder: BatchFolder) -> Iterator[str]:
         for override in row.result.overrides:
             if override.changed:
                 yield f"{row.entry.id}: {override.criterion}: a person decided, and the check says something else now"
-    for state, words in GO_ON.items():
+    for state, words in NEXT_STEPS.items():
         if found[state]:
             yield words.format(count=found[state], overrides=folder.path / OVERRIDES)
 
 
 def _name(row: Row) -> str:
-    """The id, and the line of the roster where the error does not name it already."""
+    """Return the id, with the line of the roster unless the error names it already."""
     error = row.result.error
     told = error is not None and error.kind == ROSTER
     return row.entry.id if told or not row.entry.where else f"{row.entry.id} ({row.entry.where})"
 
 
 def _state(row: Row) -> str:
-    """The result's status, told apart further: nothing there yet, and only people's criteria open."""
+    """Return the result's status, or `missing` if there is none yet, or `manual` if only people's criteria are open."""
     result = row.result
     if result.error is not None and result.error.kind == MISSING:
         return "missing"

@@ -5,34 +5,39 @@ evidence, rubric → criteria → settled → reports and gradebook, and a table
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from grader import __version__
 from grader.classes.batch.folder import BatchFolder, write_run
-from grader.classes.batch.job import Hands, Sandbox
-from grader.classes.batch.pool import side_by_side, workers, working
-from grader.classes.batch.reports import Settler, rewrite
-from grader.classes.batch.run import BatchOptions, Watcher, alone, described, ids_of, run_batch, write_books
+from grader.classes.batch.job import Executor, Sandbox
+from grader.classes.batch.reports import Settler, fitting_runs, rewrite
+from grader.classes.batch.run import (
+    BatchOptions,
+    Watcher,
+    alone,
+    describe_rubric,
+    ids_of,
+    run_batch,
+    write_books,
+)
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import read_overrides
 from grader.errors import EvidenceError, GraderError
 from grader.evidence.reader import SUFFIXES, load_evidence
-from grader.evidence.run import Run
 from grader.files import atomic_write
 from grader.judging import judge
 from grader.judging.summary import overall_status, total_points
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.roster import Entry, Roster
 from grader.report.text import csv_text
-from grader.results import EVIDENCE
+from grader.results import EVIDENCE, RESULT
 from grader.rubric.load import LoadedRubric
-from grader.rubric.model import Rubric
+from grader.workers import WorkerEnded, run_each
 
-CHANGES = "changes.csv"
+CHANGES, PACKAGE = "changes.csv", "package.mcap"
 COLUMNS = ("id", "criterion", "status before", "status", "points before", "points", "max_points", "why")
 
 
@@ -100,21 +105,21 @@ def regrade(
         settler = Settler(rubric.rubric, overrides)
         by_folder = {folder.folder_of(entry): entry for entry in entries if folder.has_evidence(entry)}
         found = {
-            judged.folder: _regraded(folder, rubric, settler, by_folder[judged.folder.parent], judged)
+            judged.folder: _regrade_one(folder, rubric, settler, by_folder[judged.folder.parent], judged)
             for judged in judge_all([path / EVIDENCE for path in by_folder], rubric, jobs, fitting=True)
         }
         regraded = tuple(
-            found.get(folder.folder_of(entry) / EVIDENCE) or _without_evidence(folder, rubric, settler, entry)
+            found.get(folder.folder_of(entry) / EVIDENCE) or _settle_only(folder, rubric, settler, entry)
             for entry in entries
         )
-        run = folder.run.model_copy(update=described(rubric, rubric_source) | {"grader": __version__})
+        run = folder.run.model_copy(update=describe_rubric(rubric, rubric_source) | {"grader": __version__})
         now = BatchFolder(folder.path, run)
         write_run(now.path, now.run)
         write_changes(folder.path / CHANGES, regraded)
         return write_books(now, rubric.rubric, run.state, run.counts.kept, ended_at=run.ended_at), regraded
 
 
-def _regraded(
+def _regrade_one(
     folder: BatchFolder, rubric: LoadedRubric, settler: Settler, entry: Entry, judged: Judged
 ) -> Regraded:
     before = folder.earlier(entry)
@@ -122,7 +127,7 @@ def _regraded(
         return Regraded(entry=entry, before=before, after=None, error=judged.error or "it has no result")
     automatic = before.model_copy(
         update={
-            "rubric": described(rubric, "")["rubric"],
+            "rubric": describe_rubric(rubric, "")["rubric"],
             "criteria": judged.criteria,
             "status": overall_status(judged.criteria),
             "points": total_points(rubric.rubric, judged.criteria),
@@ -137,7 +142,7 @@ def _regraded(
     handed_in = before.handed_in and before.handed_in.model_copy(
         update={"deadline": None}
     )  # the rubric's of today
-    after = settler.settled(automatic, entry.id, handed_in, before)
+    after = settler.settle(automatic, entry.id, handed_in, before)
     try:
         if after != before:
             rewrite(folder.folder_of(entry), after, rubric.rubric, rubric.docs)
@@ -146,12 +151,14 @@ def _regraded(
     return Regraded(entry=entry, before=before, after=after, missing=judged.missing)
 
 
-def _without_evidence(folder: BatchFolder, rubric: LoadedRubric, settler: Settler, entry: Entry) -> Regraded:
+def _settle_only(folder: BatchFolder, rubric: LoadedRubric, settler: Settler, entry: Entry) -> Regraded:
     """What could not be graded has what people gave for it."""
     before = folder.earlier(entry)
     error = before.error.message if before is not None and before.error else "nothing was recorded"
     if before is not None and (settler.of(entry.id) or before.overrides):
-        rewrite(folder.folder_of(entry), settler.again(before, entry.id, None), rubric.rubric, rubric.docs)
+        rewrite(
+            folder.folder_of(entry), settler.settle_again(before, entry.id, None), rubric.rubric, rubric.docs
+        )
     return Regraded(entry=entry, before=before, after=None, error=error)
 
 
@@ -181,7 +188,7 @@ def run_missing(
     rubric: LoadedRubric,
     regraded: Sequence[Regraded],
     *,
-    hands: Hands,
+    executor: Executor,
     watcher: Watcher,
     sandbox: Sandbox,
 ) -> tuple[BatchFolder, tuple[Regraded, ...]]:
@@ -206,13 +213,13 @@ def run_missing(
         allow_local=folder.run.allow_local,
         remote_only=folder.run.remote_only,
     )
-    now = run_batch(roster, folder.run.rubric_source, rubric, options, hands=hands, watcher=watcher)
-    after = tuple(_run_again(now, one) if one.missing else one for one in regraded)
+    now = run_batch(roster, folder.run.rubric_source, rubric, options, executor=executor, watcher=watcher)
+    after = tuple(_compare_run(now, one) if one.missing else one for one in regraded)
     write_changes(folder.path / CHANGES, after)
     return now, after
 
 
-def _run_again(folder: BatchFolder, one: Regraded) -> Regraded:
+def _compare_run(folder: BatchFolder, one: Regraded) -> Regraded:
     result = folder.earlier(one.entry)
     failed = result is None or result.status == "error"
     return Regraded(
@@ -224,17 +231,11 @@ def _run_again(folder: BatchFolder, one: Regraded) -> Regraded:
     )
 
 
-# [classes.batch.judging] Recorded submissions judged again, many at a time, in worker processes. Needs no ROS.
-
-EVIDENCE, RESULT, PACKAGE = "evidence", "result.json", "package.mcap"
-SCENARIO = "scenario.digest"
-
-
 @dataclass(frozen=True, kw_only=True)
 class Judged:
-    """One submission's criteria, or in one line why there are none, and what to do about it.
+    """One submission's criteria, or in one line why there are none and what to do about it.
 
-    `missing` are the rubric's scenarios of which there is no recording that fits.
+    `missing` are the rubric's scenarios without a recording that fits.
     """
 
     folder: Path
@@ -247,93 +248,56 @@ class Judged:
 def judge_all(
     folders: Sequence[Path], rubric: LoadedRubric, jobs: int, *, fitting: bool = False
 ) -> Iterator[Judged]:
-    """Every submission's evidence judged again, each as it comes, `jobs` at a time.
+    """Judge every submission's evidence again, `jobs` at a time; yield each as it comes.
 
-    With `fitting`, a recording counts only where the rubric's scenario is still the one that was run.
-    What is wrong with one of them is in its `error` and stops no other, not even where it ends the worker.
+    With `fitting`, a recording counts only if it was made with the rubric's present scenario. What is wrong with one
+    submission is in its `error` and stops no other, even if it ends the process.
     """
-    left = dict.fromkeys(folders)
-    while left:
-        begun: list[Path] = []
-        work = partial(_judged, rubric, fitting)
-        for judged in _until_broken(tuple(left), work, jobs, begun.append):
-            del left[judged.folder]
-            yield judged
-        for suspect in [folder for folder in begun if folder in left]:
-            del left[suspect]
-            yield from tuple(_until_broken([suspect], work, 1)) or [_ended(suspect)]
+    judge_one = partial(_judge_one, rubric, fitting)
+    return run_each(judge_one, folders, min(jobs, len(folders)), ended=_judging_ended)
 
 
-def _until_broken(
-    folders: Sequence[Path],
-    work: Callable[[Path], Judged],
-    jobs: int,
-    begun: Callable[[Path], None] = lambda _: None,
-) -> Iterator[Judged]:
-    """Ends early where a worker ends: on one of those that were begun, nobody knows which."""
-    count = max(1, min(jobs, len(folders)))
-    try:
-        with workers(count) as pool:
-            yield from side_by_side(pool, work, folders, most=2 * count, begun=begun)
-    except BrokenProcessPool:
-        return
-
-
-def _ended(folder: Path) -> Judged:
-    hint = "look whether the machine has too little memory, and judge it by itself"
+def _judging_ended(folder: Path, _: WorkerEnded) -> Judged:
+    hint = "check whether this machine has too little memory, then judge it by itself"
     return Judged(folder=folder, criteria=None, error=f"{folder}: judging it ended the process", hint=hint)
 
 
-def _judged(rubric: LoadedRubric, fitting: bool, folder: Path) -> Judged:
+def _judge_one(rubric: LoadedRubric, fitting: bool, folder: Path) -> Judged:
     """In a worker."""
-    with working():
-        try:
-            runs = load_evidence([folder])
-            runs = fitting_runs(rubric.rubric, runs) if fitting else runs
-            criteria = judge(rubric.rubric, runs, rubric.checks)
-        except GraderError as error:
-            return Judged(folder=folder, criteria=None, error=error.message, hint=error.hint)
-        except Exception as error:  # noqa: BLE001 - whatever it is, the others are judged
-            message = f"{folder}: internal error: {type(error).__name__}: {error}"
-            return Judged(folder=folder, criteria=None, error=message, hint="judge it by itself with --debug")
-        missing = tuple(name for name in asked_for(rubric.rubric) if name not in runs)
-        return Judged(folder=folder, criteria=criteria, missing=missing)
-
-
-def fitting_runs(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
-    """Those that were recorded as the rubric's scenarios say; evidence that does not tell counts as such."""
-    digests = {name: scenario.digest for name, scenario in rubric.scenarios.items()}
-    return {
-        name: run
-        for name, run in runs.items()
-        if run.metadata.get(SCENARIO, digests.get(name)) == digests.get(name)
-    }
-
-
-def asked_for(rubric: Rubric) -> tuple[str, ...]:
-    """The scenarios that criteria judge."""
-    return tuple(dict.fromkeys(c.scenario for c in rubric.criteria if c.scenario is not None))
+    lab = rubric.rubric
+    try:
+        runs = load_evidence([folder])
+        runs = fitting_runs(lab, runs) if fitting else runs
+        criteria = judge(lab, runs, rubric.checks)
+    except GraderError as error:
+        return Judged(folder=folder, criteria=None, error=error.message, hint=error.hint)
+    except Exception as error:  # noqa: BLE001 - whatever it is, the others are judged
+        message = f"{folder}: internal error: {type(error).__name__}: {error}"
+        return Judged(folder=folder, criteria=None, error=message, hint="judge it by itself with --debug")
+    scenarios = dict.fromkeys(c.scenario for c in lab.criteria if c.scenario is not None)
+    missing = tuple(name for name in scenarios if name not in runs)
+    return Judged(folder=folder, criteria=criteria, missing=missing)
 
 
 def submissions_in(paths: Sequence[Path]) -> tuple[Path, ...]:
-    """The submissions' folders that these paths stand for, where they stand for several submissions; else none.
+    """Return the folders of the submissions that these paths stand for; none if they stand for one submission.
 
-    A folder of results stands for every submission in it. Raises EvidenceError where something else is among them.
+    A folder of results stands for every submission in it. Raises EvidenceError if something else is among them.
     """
     whole = [path for path in paths if _is_result(path)]
-    held = {path: _held(path) for path in paths if path not in whole}
-    found = [*whole, *(folder for folders in held.values() for folder in folders)]
+    below = {path: _submissions_below(path) for path in paths if path not in whole}
+    found = [*whole, *(folder for folders in below.values() for folder in folders)]
     if len(whole) < 2 and len(found) == len(whole):
         return ()
-    for path, folders in held.items():
+    for path, folders in below.items():
         if not folders:
             message = f"{path}: not the folder of a submission's results, as the others are"
             raise EvidenceError(message, hint="judge it by itself")
     return tuple(dict.fromkeys(found))
 
 
-def _held(folder: Path) -> list[Path]:
-    """The submissions in a folder of results; a folder of recordings is none."""
+def _submissions_below(folder: Path) -> list[Path]:
+    """Return the submissions in a folder of results; a folder of recordings has none."""
     try:
         if not folder.is_dir() or _has_recordings(folder):
             return []
@@ -344,7 +308,7 @@ def _held(folder: Path) -> list[Path]:
 
 
 def _is_result(folder: Path) -> bool:
-    """What `grade` leaves of one submission, or its evidence alone."""
+    """Whether `grade` left this of one submission, or it is its evidence alone."""
     return (folder / RESULT).is_file() or (folder / PACKAGE).is_file() or _has_recordings(folder / EVIDENCE)
 
 

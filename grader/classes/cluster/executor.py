@@ -1,48 +1,62 @@
-"""`ClusterHands`: does a batch's jobs on a Dask cluster."""
+"""`ClusterExecutor`: grades a batch's submissions on the workers of a Dask cluster.
+
+Dask decides which worker grades what, and repeats a task whose worker is lost. This client keeps one task for each
+thread under way, gives them only to workers that can grade, and alone writes into the batch's folder.
+"""
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
+import pickle
 import secrets
 import socket
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from functools import partial
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from queue import Empty, SimpleQueue
-from typing import Any
+from typing import Any, BinaryIO
 
-from grader.classes.batch.job import Job, Outcome
+from grader.classes.batch.job import Job, Outcome, failed
 from grader.classes.cluster import worker
-from grader.classes.cluster.connect import LOCAL, check_address, connected, is_encrypted
-from grader.classes.cluster.crew import Answer, Crew, Needs, ask_of
-from grader.classes.cluster.errands import Report, failed
-from grader.classes.cluster.exchange import Exchange, checked_url
-from grader.classes.cluster.placing import ParcelLost, place
-from grader.classes.cluster.tasks import Task, Tasks
+from grader.classes.cluster.connect import LOCAL, Needs, Recruits, check_address, connect, is_encrypted
+from grader.classes.cluster.exchange import Errand, Exchange, Parcel, Report, check_url, is_machines, unpack
 from grader.errors import GraderError, HostError
-from grader.rubric.load import LoadedRubric
-from grader.rubric.needs import started
+from grader.intake import safe_name
+from grader.results import RESULT, Results
+from grader.rubric.needs import needs_ros
 
 PATIENCE_S = 60.0
 EXCHANGE = ".grader-exchange"
 TOKEN_BYTES = 6
+LOOK_S, POLL_S = 1.0, 0.05
+RETRIES = 2
+LOSSES = 3
+ANSWERING = 3  # times as long is waited while a worker has still to say who it is
+RESULT_S = 10.0
+READS, PAUSE_S = 5, 1.0
+LEAVE_S = 45.0
+LOST = "the workers that graded it were lost"
+GOES_ON = "then run the same command again: it goes on where it stopped"
 
 
-class ClusterHands:
+class ParcelLost(HostError):
+    """What a worker left cannot be had: the job is done once more."""
+
+
+class ClusterExecutor:
     """The workers of the Dask cluster at `address` (`tls://host:8786`; `local` starts one for trying it).
 
-    With `insecure` it may be one without certificates (`tcp://host:8786`), to which all who reach it may send code.
+    With `insecure` it may be one without certificates (`tcp://host:8786`), to which everybody who reaches it may send
+    code. Results come back through `exchange`, any fsspec URL or path that all machines reach; by default a folder in
+    `out`, the batch's folder. `say` gets one line for each worker that is left out. If no worker can grade for
+    `patience_s`, HostError ends the batch.
 
-    `out` is the batch's folder, which only this process writes. Results come back through `exchange`, any fsspec URL or
-    path that all machines reach; by default a folder in `out`. `say` is told, in one line each, which workers are left
-    out and why. Where no worker can grade for `patience_s`, HostError ends the batch.
-
-    Raises UsageError for an address or exchange that cannot be, and where Dask is not installed.
+    Raises UsageError for an impossible address or exchange, and if Dask is not installed.
     """
 
     def __init__(
@@ -56,265 +70,236 @@ class ClusterHands:
         patience_s: float = PATIENCE_S,
     ) -> None:
         self._address = check_address(address, insecure=insecure)
-        self._exchange = Exchange(_place(out, exchange))
+        self._exchange = Exchange(_exchange_url(out, exchange))
         self._say, self._patience_s = say, patience_s
 
     def run(self, jobs: Iterable[Job], *, begun: Callable[[str], None]) -> Iterator[Outcome]:
-        """As `classes.batch.executor.Hands.run` says.
-
-        Raises HostError where no scheduler can be reached, or it is lost.
-        """
+        """See `classes.batch.job.Executor.run`. Raises HostError if no scheduler can be reached, or it is lost."""
         waiting = iter(jobs)
         first = next(waiting, None)
         if first is None:
             return
+        versions = worker.versions()
+        if self._address == LOCAL:
+            del versions["code"]  # its workers have our own files
         needs = Needs(
-            versions=self._versions(),
+            versions=versions,
             ros=not first.static_only and needs_ros(first.rubric),
             encrypted=self._address == LOCAL or is_encrypted(self._address),
         )
-        with connected(self._address) as client:
-            word = secrets.token_hex(TOKEN_BYTES)
+        batch = secrets.token_hex(TOKEN_BYTES)
+        with connect(self._address) as client:
             self._exchange.make()
             try:
-                self._exchange.greet(word)
-                shift = Shift(
-                    client=client,
-                    address=self._address,
-                    exchange=self._exchange,
-                    batch=word,
-                    needs=needs,
-                    begun=begun,
-                    say=self._say,
-                    patience_s=self._patience_s,
-                )
-                yield from shift.run(chain([first], waiting))
+                self._exchange.greet(batch)
+                recruits = Recruits(client, self._exchange.url, batch, needs, self._say)
+                tasks = _Tasks(client, self._exchange, batch, recruits, self._patience_s)
+                yield from tasks.run(chain([first], waiting), begun)
             finally:
                 with suppress(GraderError, OSError):  # what is left is removed by the next batch
                     self._exchange.remove()
 
-    def _versions(self) -> dict[str, str]:
-        """Those that a worker must have; one that is started here has our own files."""
-        versions = worker.versions()
-        return {k: v for k, v in versions.items() if k != "code"} if self._address == LOCAL else versions
 
-
-def needs_ros(rubric: LoadedRubric) -> bool:
-    """Whether anything of it is built or run."""
-    if started(rubric.rubric).scenarios:
-        return True
-    checks = rubric.checks
-    return any("build" in checks[c.check].facts for c in rubric.rubric.criteria if c.check in checks)
-
-
-def _place(out: Path, exchange: str | None) -> str:
-    """The folder of this batch alone: the same one when the batch goes on, another one for another `out`."""
+def _exchange_url(out: Path, exchange: str | None) -> str:
+    """Return the folder of this batch alone: the same one when the batch goes on, another one for another `out`."""
     if exchange is None:
         return str(out.absolute() / EXCHANGE)
     whose = hashlib.sha256(f"{socket.gethostname()}\0{out.resolve()}".encode(errors="surrogateescape"))
-    return f"{checked_url(exchange).rstrip('/')}/grader-{whose.hexdigest()[:16]}"
+    return f"{check_url(exchange).rstrip('/')}/grader-{whose.hexdigest()[:16]}"
 
 
-# [classes.cluster.shift] One batch's jobs on a cluster, from the first to the last: who grades what, and what is done when a worker is lost.
-#
-# Dask runs a task again elsewhere when its worker is lost; the client keeps a bounded number of tasks under way, knows
-# how often each was begun, and gives up on one whose workers are lost again and again. All that happens (a worker
-# answers, a task ends) comes into one inbox and is heeded in the caller's thread, which alone changes anything here.
+@dataclass(kw_only=True, eq=False)
+class _Task:
+    """A job and the future of its grading by one of `workers`. `losses`: how often that came to nothing."""
 
-LOOK_S = 1.0
-TASKS_A_THREAD = 2
-LOSSES = 3
-ANSWERING = 3  # times as long is waited while a worker has still to say who it is
-PLACERS = 4
-LEAVE_S = 45.0
-GOES_ON = "then run the same command again: it goes on where it stopped"
-LOST = "the workers that graded it were lost"
+    job: Job
+    future: Any = None
+    workers: frozenset[str] = frozenset()
+    losses: int = 0
 
 
-class Shift:
-    """`run` yields every job's outcome as it comes."""
+class _Tasks:
+    """A batch's tasks on the cluster, from the first to the last."""
 
     def __init__(
         self,
-        *,
         client: Any,  # noqa: ANN401 - Dask has no types
-        address: str,
         exchange: Exchange,
         batch: str,
-        needs: Needs,
-        begun: Callable[[str], None],
-        say: Callable[[str], None],
+        recruits: Recruits,
         patience_s: float,
     ) -> None:
-        self._client, self._address, self._exchange, self._batch = client, address, exchange, batch
-        self._begun, self._say, self._patience_s = begun, say, patience_s
-        self._inbox: SimpleQueue[Callable[[], Iterator[Outcome]]] = SimpleQueue()
-        self._crew = Crew(needs, ask_of(client, exchange.url, batch), self._put(self._answered))
-        self._tasks = Tasks(client, exchange.url, batch, self._put(self._ended))
-        self._placers = ThreadPoolExecutor(PLACERS)
-        self._looked = 0.0
-        self._idle_since = time.monotonic()
+        self._client, self._exchange, self._batch = client, exchange, batch
+        self._recruits, self._patience_s = recruits, patience_s
+        self._running: list[_Task] = []
+        self._back: deque[_Task] = deque()
+        self._count = 0
+        self._looked_s, self._idle_since_s = 0.0, time.monotonic()
 
-    def run(self, jobs: Iterable[Job]) -> Iterator[Outcome]:
-        """See `ClusterHands.run`."""
+    def run(self, jobs: Iterable[Job], begun: Callable[[str], None]) -> Iterator[Outcome]:
+        """See `ClusterExecutor.run`."""
         waiting = iter(jobs)
-        self._client.subscribe_topic(self._batch, self._put(self._told))
         try:
             while True:
-                self._look()
-                more = self._hand_out(waiting)
-                if not more and not self._tasks and not self._tasks.back:
+                yield from self._look()
+                more = self._submit(waiting, begun)
+                if not (more or self._running or self._back):
                     return
-                yield from self._heeded()
+                done = [task for task in self._running if task.future.done()]
+                self._running = [task for task in self._running if task not in done]
+                self._submit(waiting, begun)
+                for task in done:
+                    outcome = self._finish(task)
+                    if outcome is not None:
+                        yield outcome
+                if not done:
+                    time.sleep(POLL_S)
         finally:
             self._stop()
 
-    def _put(self, heed: Callable[..., Iterator[Outcome]]) -> Callable[..., None]:
-        """What may be called in any thread, to have `heed` called in this one."""
-        return lambda *said: self._inbox.put(partial(heed, *said))
-
-    def _heeded(self) -> Iterator[Outcome]:
-        try:
-            heed = self._inbox.get(timeout=LOOK_S)
-        except Empty:
-            return
-        yield from heed()
-
-    def _hand_out(self, waiting: Iterator[Job]) -> bool:
-        """As many as there are hands for. Whether there may be more jobs."""
-        while len(self._tasks) < TASKS_A_THREAD * self._crew.threads:
-            task = self._tasks.back.popleft() if self._tasks.back else None
+    def _submit(self, waiting: Iterator[Job], begun: Callable[[str], None]) -> bool:
+        """Give each thread that can grade a task. Return whether there may be more jobs."""
+        while len(self._running) < self._recruits.threads:
+            task = self._back.popleft() if self._back else None
             if task is None:
                 job = next(waiting, None)
                 if job is None:
                     return False
-                task = Task(job=job)
-            self._tasks.hand_out(task, list(self._crew.fit))
+                task = _Task(job=job)
+                begun(job.entry.id)
+            self._hand_out(task)
         return True
 
-    def _told(self, event: tuple[float, dict[str, str]]) -> Iterator[Outcome]:
-        """A worker begins a task, or reports what became of it."""
-        said = event[1]
-        key = said.get("key", "")
-        task = self._tasks.get(key)
-        if task is None or task.placing:
-            return
-        if "report" in said:
-            task.placing = True
-            report = Report.model_validate_json(said["report"])
-            placing = self._placers.submit(place, task.job, report, self._exchange)
-            placing.add_done_callback(partial(self._put(self._placed), key))
-            return
-        task.begun += 1
-        if task.begun == 1:
-            self._begun(task.job.entry.id)
-        if task.begun > LOSSES:
-            yield from self._again(key, LOST)
+    def _hand_out(self, task: _Task) -> None:
+        source = Path(task.job.entry.source)
+        seen = source.is_absolute() and (source.exists() or source.is_symlink())
+        errand = Errand(job=task.job, exchange=self._exchange.url, batch=self._batch, seen=seen)
+        task.workers = frozenset(self._recruits.fit)
+        task.future = self._client.submit(
+            worker.perform,
+            pickle.dumps(errand),
+            key=f"grade-{self._batch}-{self._count}",
+            pure=False,
+            retries=RETRIES,
+            workers=list(task.workers),
+            allow_other_workers=False,
+        )
+        self._count += 1
+        self._running.append(task)
 
-    def _ended(self, key: str) -> Iterator[Outcome]:
-        task = self._tasks.get(key)
-        if task is None or task.placing:
-            return
-        status = task.future.status
-        if status == "error":
-            yield from self._erred(key, task.future.exception())
-        elif status == "cancelled":
-            if self._client.status != "running":
-                raise self._scheduler_gone()
-            task.lost += 1
-            yield from self._again(key, "it was cancelled on the cluster")
+    def _finish(self, task: _Task) -> Outcome | None:
+        """Put the results into place. Return the outcome; None if the job is done once more."""
+        from distributed import CancelledError, KilledWorker  # noqa: PLC0415 - slow to load
 
-    def _erred(self, key: str, error: BaseException) -> Iterator[Outcome]:
-        from distributed import KilledWorker  # noqa: PLC0415 - slow to load
-
-        if isinstance(error, KilledWorker):
-            yield from self._again(key, LOST)
-            return
-        hint = "look into the workers' logs, and install the same grader everywhere"
-        message = f"a worker failed: {type(error).__name__}: {error}"
-        yield failed(self._tasks.take_out(key).job, kind="internal", message=message, hint=hint)
-
-    def _again(self, key: str, why: str) -> Iterator[Outcome]:
-        """Hand it out once more, or give it up."""
-        task = self._tasks.get(key)
-        assert task is not None  # noqa: S101 - the caller has it
-        if max(task.begun, task.lost) < LOSSES:
-            self._tasks.take_back(key)
-            return
-        self._tasks.take_out(key)
-        hint = "look into the workers' logs (out of memory?), then grade it again with `--only failed`"
-        yield failed(task.job, kind="worker-lost", message=f"{why}, {LOSSES} times", hint=hint)
-
-    def _placed(self, key: str, done: Future[Outcome]) -> Iterator[Outcome]:
-        task = self._tasks.get(key)
-        if task is None or done.cancelled():
-            return
-        error = done.exception()
-        if isinstance(error, ParcelLost):
-            task.lost += 1
-            yield from self._again(key, error.message)
-            return
-        self._tasks.take_out(key)
-        if error is None:
-            yield done.result()
-        elif isinstance(error, GraderError):
-            yield failed(task.job, kind=error.kind, message=error.message, hint=error.hint)
-        else:
-            raise error
-
-    def _look(self) -> None:
-        """Once in a while: who is there, and whether anybody has what was handed out."""
-        now = time.monotonic()
-        if now - self._looked < LOOK_S:
-            return
-        self._looked = now
         try:
-            self._crew.update(self._client.nthreads())
-            held = {key for keys in self._client.processing().values() for key in keys}
+            report = Report.model_validate_json(task.future.result(timeout=RESULT_S))
+            return place(task.job, report, self._exchange)
+        except (TimeoutError, asyncio.TimeoutError):  # lost with its worker: Dask has it done again
+            self._running.append(task)
+            return None
+        except (ParcelLost, CancelledError, KilledWorker) as error:
+            if self._client.status != "running":
+                raise self._scheduler_lost() from error
+            task.losses += LOSSES if isinstance(error, KilledWorker) else 0
+            return self._repeat(task, error.message if isinstance(error, ParcelLost) else LOST)
+        except GraderError as error:
+            return failed(task.job, kind=error.kind, message=error.message, hint=error.hint)
+        except Exception as error:  # noqa: BLE001 - whatever a worker's environment lacks, the others are graded
+            hint = "look into the workers' logs, and install the same grader everywhere"
+            message = f"a worker failed: {type(error).__name__}: {error}"
+            return failed(task.job, kind="internal", message=message, hint=hint)
+
+    def _repeat(self, task: _Task, why: str) -> Outcome | None:
+        """Queue the job once more, or give it up."""
+        with suppress(Exception):  # its worker is gone, or the scheduler
+            task.future.cancel()
+        task.losses += 1
+        if task.losses < LOSSES:
+            self._back.append(task)
+            return None
+        hint = "look into the workers' logs (out of memory?), then grade it again with `--only failed`"
+        return failed(task.job, kind="worker-lost", message=f"{why}, at least {LOSSES} times", hint=hint)
+
+    def _look(self) -> Iterator[Outcome]:
+        """Once a second, look which workers there are. Repeat what was given only to workers that are gone."""
+        self._recruits.settle()
+        now_s = time.monotonic()
+        if now_s - self._looked_s < LOOK_S:
+            return
+        self._looked_s = now_s
+        try:
+            self._recruits.look()
         except Exception as error:
-            raise self._scheduler_gone() from error
-        if self._crew.fit:
-            self._idle_since = now
-            for key in self._tasks.missed_by(held):
-                self._tasks.take_back(key)
-        elif now - self._idle_since > self._patience_s * (ANSWERING if self._crew.asked else 1):
-            raise self._nobody()
+            raise self._scheduler_lost() from error
+        for task in list(self._running):
+            if not task.future.done() and not task.workers & self._recruits.known:
+                self._running.remove(task)
+                outcome = self._repeat(task, LOST)
+                if outcome is not None:
+                    yield outcome
+        if self._recruits.fit:
+            self._idle_since_s = now_s
+        elif now_s - self._idle_since_s > self._patience_s * (ANSWERING if self._recruits.asked else 1):
+            raise self._recruits.nobody(self._patience_s, GOES_ON)
 
-    def _answered(self, address: str, answer: Answer) -> Iterator[Outcome]:
-        why = self._crew.settle(address, answer)
-        if why:
-            self._say(f"this worker is left out: {why}")
-        yield from ()
-
-    def _nobody(self) -> HostError:
-        left_out = "; ".join(self._crew.left_out.values())
-        what = f"no worker that can grade ({left_out})" if left_out else "no worker"
-        files = " --tls-ca-file CA --tls-cert CERT --tls-key KEY" if is_encrypted(self._address) else ""
-        start = f"start one with `dask worker {self._address} --nthreads 4{files}`, {GOES_ON}"
-        return HostError(
-            f"{what} at {self._address} for {self._patience_s:g} s",
-            hint=start if self._address != LOCAL else "grade without --cluster",
-        )
-
-    def _scheduler_gone(self) -> HostError:
-        return HostError(
-            f"the connection to the scheduler at {self._address} is lost",
-            hint=f"start the scheduler and its workers, {GOES_ON}",
-        )
+    def _scheduler_lost(self) -> HostError:
+        message = f"the connection to the scheduler at {self._recruits.address} is lost"
+        return HostError(message, hint=f"start the scheduler and its workers, {GOES_ON}")
 
     def _stop(self) -> None:
-        """Cancel what is under way, and wait until the workers have cleaned up."""
-        alive = self._client.status == "running"
+        """Cancel running tasks, and wait until the workers have cleaned up."""
+        if self._client.status != "running":
+            return
         with suppress(Exception):  # it ends in any case
-            if alive:
-                self._tasks.cancel_all()
-                self._client.unsubscribe_topic(self._batch)
-        self._placers.shutdown(wait=True, cancel_futures=True)
-        if alive and self._crew.fit:
+            self._client.cancel([task.future for task in self._running])
+        if self._recruits.fit:
             thread = threading.Thread(target=self._dismiss, daemon=True)
             thread.start()
             thread.join(LEAVE_S)
 
     def _dismiss(self) -> None:
         with suppress(Exception):  # a worker that is gone needs no dismissal
-            self._client.run(worker.dismiss, self._batch, workers=list(self._crew.fit), on_error="ignore")
+            workers = list(self._recruits.fit)
+            self._client.run(worker.dismiss, self._batch, workers=workers, on_error="ignore")
+
+
+def place(job: Job, report: Report, exchange: Exchange) -> Outcome:
+    """Unpack a report's results into `job.out`, and return the outcome.
+
+    A complete result is replaced by no error but the submission's own. Raises ParcelLost, and what `Results` raises.
+    """
+    outcome, parcel = report.outcome, report.parcel
+    if parcel is None:
+        return outcome
+    with Results(job.out / safe_name(job.entry.id)) as results:
+        if is_machines(outcome) and results.complete:
+            stays = f"the result of an earlier run stays as it is: {results.folder / RESULT}"
+            outcome = outcome.model_copy(update={"hint": stays})
+        else:
+            _unpack(parcel, exchange, results)
+            results.commit()
+    with suppress(HostError, OSError):  # whatever is left goes with the exchange
+        exchange.delete(parcel)
+    return outcome
+
+
+def _unpack(parcel: Parcel, exchange: Exchange, results: Results) -> None:
+    try:
+        with _open(exchange, parcel) as stream:
+            unpack(stream, parcel, results.new)
+    except (HostError, OSError) as error:
+        message = getattr(error, "message", "") or str(error)
+        raise ParcelLost(message, hint=getattr(error, "hint", "")) from error
+    if not any(results.evidence.iterdir()):
+        results.evidence.rmdir()
+    if not (results.new / RESULT).is_file():
+        raise ParcelLost(f"{parcel.name} holds no {RESULT}")
+
+
+def _open(exchange: Exchange, parcel: Parcel) -> BinaryIO:
+    """A shared folder may show a new file some time later."""
+    for _ in range(READS - 1):
+        with suppress(FileNotFoundError):
+            return exchange.open(parcel)
+        time.sleep(PAUSE_S)
+    return exchange.open(parcel)

@@ -1,8 +1,7 @@
-"""What a worker of the cluster is asked to do.
+"""What runs on a worker of the cluster: it says who it is, and grades one job at a time in each of its threads.
 
-A worker's thread hands its job to a process of its own that stays for many jobs (`classes.batch.child`): the worker of
-a nanny may have no children of `multiprocessing`, and whatever a grading does to its process, the worker lives on. The
-scheduler imports this module too: it loads little.
+A thread hands its job to a process that stays for many jobs (`grader.workers`): whatever a grading does to its process,
+the Dask worker lives on. The results go into the exchange as one file; a task returns only what became of the job.
 """
 
 from __future__ import annotations
@@ -14,98 +13,48 @@ import pickle
 import platform
 import socket
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
+import pydantic
+
+import grader
+
+if TYPE_CHECKING:  # the scheduler imports this module too: it loads little
     from grader.classes.batch.job import Job, Outcome
-    from grader.classes.cluster.errands import Errand, Report
-    from grader.classes.cluster.exchange import Parcel
-    from grader.workers import Child
+    from grader.classes.cluster.exchange import Errand, Parcel, Report
+    from grader.workers import Worker
 
 WATCH_S = 1.0
 LEAVE_S = 40.0
 IDLE_S = 60.0
-UPLOADS = 3
-PAUSE_S = 2.0
-INTERRUPTED = "interrupted"
-
-
-async def answer(exchange: str, word: str) -> dict[str, str]:
-    """Who this worker is: `host`, versions of `grader`, `python` and `pydantic`, `ros` (empty for none), and what keeps
-    it from the exchange (empty for nothing)."""
-    return await asyncio.to_thread(_answer, exchange, word)
+"""A process without a job for so long ends: its client may have been killed."""
 
 
 def versions() -> dict[str, str]:
-    """Those that must be the same everywhere."""
-    import pydantic  # noqa: PLC0415 - loads little
-
-    import grader  # noqa: PLC0415 - its version may be another one by now
-
+    """Return the versions that must be the same everywhere."""
     return {
         "grader": grader.__version__,
-        "code": _code(),
+        "code": _digest_code(),
         "python": ".".join(platform.python_version_tuple()[:2]),
         "pydantic": pydantic.VERSION,
     }
 
 
-def perform(errand: bytes) -> None:
-    """In a worker's thread: grade, and leave the results in the exchange.
-
-    The client hears two events of the batch's topic: that the task was begun, and its `Report` as JSON. A task's own
-    result would be lost with its worker, an event has reached the scheduler before the task is done.
-    """
-    from distributed import get_worker  # noqa: PLC0415 - the module loads little
-
-    sent: Errand = pickle.loads(errand)  # noqa: S301 - from the client, whose code this worker runs anyway
-    worker = get_worker()
-    key = worker.get_current_task()
-    worker.log_event(sent.batch, {"key": key})
-
-    def wanted() -> bool:
-        """A task whose client is gone, or wants it no more, is cancelled; its thread is left to itself."""
-        task = worker.state.tasks.get(key)
-        return task is not None and task.state != "cancelled"
-
-    report = _report(sent, wanted)
-    worker.log_event(sent.batch, {"key": key, "report": report.model_dump_json()})
+async def describe(exchange: str, word: str) -> dict[str, str]:
+    """Return who this worker is: its `versions`, `host`, `ros` (empty for none) and `kept_out`: what keeps it from the
+    exchange (empty for nothing)."""
+    return await asyncio.to_thread(_describe, exchange, word)
 
 
-async def dismiss(batch: str) -> None:
-    """Interrupt what is done for that batch, and wait until it has cleaned up; end the processes that do nothing."""
-    await asyncio.to_thread(_children.dismiss, batch)
-
-
-def _code() -> str:
-    """A digest of the grader's own files: two of one version may differ. In a worker, of those that it began with."""
-    if _Code.digest:
-        return _Code.digest
-    folder = Path(__file__).resolve().parents[2]
-    digest = hashlib.sha256()
-    for path in sorted(folder.rglob("*.py")):
-        name = path.relative_to(folder)
-        if "_data" not in name.parts:
-            digest.update(f"{name}\0{hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
-    return digest.hexdigest()[:12]
-
-
-class _Code:
-    """What a worker remembers of it."""
-
-    digest = ""
-
-
-def _answer(exchange: str, word: str) -> dict[str, str]:
+def _describe(exchange: str, word: str) -> dict[str, str]:
     from grader.arena.ros_env import find_ros  # noqa: PLC0415 - the module loads little
-    from grader.classes.cluster.exchange import Exchange  # noqa: PLC0415 - the module loads little
-    from grader.errors import GraderError  # noqa: PLC0415 - the module loads little
+    from grader.classes.cluster.exchange import Exchange  # noqa: PLC0415 - as above
+    from grader.errors import GraderError  # noqa: PLC0415 - as above
 
-    _Code.digest = _code()
+    _Code.digest = _digest_code()
     ros = kept_out = ""
     with suppress(GraderError):
         found = find_ros()
@@ -118,74 +67,98 @@ def _answer(exchange: str, word: str) -> dict[str, str]:
     return {**versions(), "host": socket.gethostname(), "ros": ros, "kept_out": kept_out}
 
 
-def _report(sent: Errand, wanted: Callable[[], bool]) -> Report:
-    from grader.classes.cluster.errands import Report, failed, is_machines  # noqa: PLC0415 - the module loads little
-    from grader.errors import GraderError  # noqa: PLC0415 - the module loads little
-    from grader.temporary import temporary_folder  # noqa: PLC0415 - the module loads little
+class _Code:
+    """What a worker remembers of its own files."""
 
-    host, parcel = socket.gethostname(), None
-    source = sent.job.entry.source
-    if sent.seen and not os.path.lexists(source):
-        message = f"{source} cannot be seen on {host}"
+    digest = ""
+
+
+def _digest_code() -> str:
+    """Return a digest of the grader's own files: two of one version may differ. A worker's is of those it loaded."""
+    if _Code.digest:
+        return _Code.digest
+    folder = Path(__file__).resolve().parents[2]
+    digest = hashlib.sha256()
+    for path in sorted(folder.rglob("*.py")):
+        name = path.relative_to(folder)
+        if "_data" not in name.parts:
+            digest.update(f"{name}\0{hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+    return digest.hexdigest()[:12]
+
+
+def perform(pickled: bytes) -> str:
+    """Grade the `Errand` in a thread of the worker, and return its `Report` as JSON. Raises HostError."""
+    from distributed import get_worker  # noqa: PLC0415 - slow to load
+
+    errand: Errand = pickle.loads(pickled)  # noqa: S301 - from the client, whose code this worker runs anyway
+    worker = get_worker()
+    key = worker.get_current_task()
+
+    def is_wanted() -> bool:
+        """A task that the client has cancelled, or whose client is gone, has a thread that runs on."""
+        task = worker.state.tasks.get(key)
+        return task is not None and task.state != "cancelled"
+
+    return grade(errand, is_wanted).model_dump_json()
+
+
+def grade(errand: Errand, is_wanted: Callable[[], bool]) -> Report:
+    """Grade the errand's job and leave its results in the exchange. Raises HostError."""
+    from grader.classes.cluster.exchange import Report, is_machines  # noqa: PLC0415 - the module loads little
+    from grader.errors import GraderError, HostError  # noqa: PLC0415 - as above
+    from grader.temporary import temporary_folder  # noqa: PLC0415 - as above
+
+    host, source = socket.gethostname(), errand.job.entry.source
+    if errand.seen and not os.path.lexists(source):
         hint = "submissions that are folders or archives must lie on a path that all machines share"
-        return Report(outcome=failed(sent.job, kind="host", message=message, hint=hint), machine=host)
+        raise HostError(f"{source} cannot be seen on {host}", hint=hint)
+    parcel = None
     try:
         with temporary_folder("run") as folder:
-            outcome = _done(sent, folder, wanted)
+            outcome = _grade_in(folder, errand, is_wanted)
             if is_machines(outcome):
                 outcome = outcome.model_copy(update={"message": f"{outcome.message} (on {host})"})
-            if not outcome.kept and outcome.kind != INTERRUPTED and wanted():
-                parcel = _left(sent, folder)
+            if not outcome.kept and outcome.kind != "interrupted" and is_wanted():
+                parcel = _deliver(folder, errand)
     except (GraderError, OSError) as error:
         message = getattr(error, "message", "") or str(error)
-        hint = getattr(error, "hint", "")
-        outcome = failed(sent.job, kind="host", message=f"{message} (on {host})", hint=hint)
-    return Report(outcome=outcome, machine=host, parcel=parcel)
+        raise HostError(f"{message} (on {host})", hint=getattr(error, "hint", "")) from error
+    return Report(outcome=outcome, parcel=parcel)
 
 
-def _done(sent: Errand, folder: Path, wanted: Callable[[], bool]) -> Outcome:
-    job: Job = sent.job.model_copy(update={"out": folder})
-    child = _children.take(sent.batch)
-    try:
-        with _watched(child, wanted):
-            outcome = child.do(job)
-    except BaseException:
-        _children.give(child, usable=False)
-        raise
-    _children.give(child, usable=outcome.kind != INTERRUPTED)
-    return outcome
+def _grade_in(folder: Path, errand: Errand, is_wanted: Callable[[], bool]) -> Outcome:
+    from grader.classes.batch.job import grade_job, outcome_of_ended  # noqa: PLC0415 - the module loads little
+    from grader.workers import WorkerEnded  # noqa: PLC0415 - as above
+
+    job: Job = errand.job.model_copy(update={"out": folder})
+    with _processes.borrow(errand.batch) as process, _interrupt_unwanted(process, is_wanted):
+        try:
+            return process.run(grade_job, job)
+        except WorkerEnded as error:
+            return outcome_of_ended(job, error)
 
 
-def _left(sent: Errand, folder: Path) -> Parcel | None:
-    """The results in the exchange, after some attempts; None where the job left none."""
-    from grader.classes.cluster.exchange import (
-        Exchange,
-        pack,
-    )
-    from grader.errors import HostError  # noqa: PLC0415 - the module loads little
-    from grader.intake import safe_name  # noqa: PLC0415 - the module loads little
+def _deliver(folder: Path, errand: Errand) -> Parcel | None:
+    """Put the results into the exchange; None if the job left none."""
+    from grader.classes.cluster.exchange import Exchange, pack  # noqa: PLC0415 - the module loads little
+    from grader.intake import safe_name  # noqa: PLC0415 - as above
 
-    name = safe_name(sent.job.entry.id)
+    name = safe_name(errand.job.entry.id)
     if not (folder / name).is_dir():
         return None
     packed = folder / f"{name}.packed"
     pack(folder / name, packed)
-    for _ in range(UPLOADS - 1):
-        with suppress(HostError, OSError):
-            return Exchange(sent.exchange).put(packed, name)
-        time.sleep(PAUSE_S)
-    return Exchange(sent.exchange).put(packed, name)
+    return Exchange(errand.exchange).put(packed, name)
 
 
 @contextmanager
-def _watched(child: Child, wanted: Callable[[], bool]) -> Iterator[None]:
-    """Interrupt the child when nobody wants its work any more."""
+def _interrupt_unwanted(process: Worker, is_wanted: Callable[[], bool]) -> Iterator[None]:
     done = threading.Event()
 
     def watch() -> None:
         while not done.wait(WATCH_S):
-            if not wanted():
-                child.interrupt()
+            if not is_wanted():
+                process.interrupt()
                 return
 
     thread = threading.Thread(target=watch, daemon=True)
@@ -197,56 +170,46 @@ def _watched(child: Child, wanted: Callable[[], bool]) -> Iterator[None]:
         thread.join()
 
 
-class _Children:
-    """The processes of this worker, and for which batch each of them works. One that has nothing to do for a while is
-    ended: its client may have been killed."""
+async def dismiss(batch: str) -> None:
+    """Interrupt what is graded for that batch, wait until it has cleaned up, and end the idle processes."""
+    await asyncio.to_thread(_processes.dismiss, batch)
+
+
+class _Processes:
+    """The processes of this worker, and the batch that each of them works for."""
 
     def __init__(self) -> None:
-        self._idle: dict[Child, threading.Timer] = {}
-        self._busy: dict[Child, str] = {}
+        self._idle: list[Worker] = []
+        self._busy: dict[Worker, str] = {}
         self._changed = threading.Condition()
 
-    def take(self, batch: str) -> Child:
-        from grader.workers import Child  # noqa: PLC0415 - the module loads little
+    @contextmanager
+    def borrow(self, batch: str) -> Iterator[Worker]:
+        """A process for one job; one that was interrupted is not used again."""
+        from grader.workers import Limits, Worker  # noqa: PLC0415 - the module loads little
 
         with self._changed:
-            child = Child()
-            if self._idle:
-                child, timer = self._idle.popitem()
-                timer.cancel()
-            self._busy[child] = batch
-            return child
-
-    def give(self, child: Child, *, usable: bool) -> None:
-        if not usable:
-            child.close()
-        with self._changed:
-            del self._busy[child]
-            if usable:
-                timer = threading.Timer(IDLE_S, self._retire, (child,))
-                timer.daemon = True
-                self._idle[child] = timer
-                timer.start()
-            self._changed.notify_all()
+            process = self._idle.pop() if self._idle else Worker(Limits(idle_s=IDLE_S))
+            self._busy[process] = batch
+        try:
+            yield process
+        finally:
+            if process.stopped:
+                process.close()
+            with self._changed:
+                del self._busy[process]
+                self._idle += [] if process.stopped else [process]
+                self._changed.notify_all()
 
     def dismiss(self, batch: str) -> None:
         with self._changed:
-            for child in self._of(batch):
-                child.interrupt()
-            self._changed.wait_for(lambda: not self._of(batch), LEAVE_S)
-            idle = list(self._idle)
-        for child in idle:
-            self._retire(child)
-
-    def _retire(self, child: Child) -> None:
-        with self._changed:
-            timer = self._idle.pop(child, None)
-        if timer is not None:
-            timer.cancel()
-            child.close()
-
-    def _of(self, batch: str) -> list[Child]:
-        return [child for child, whose in self._busy.items() if whose == batch]
+            for process, owner in self._busy.items():
+                if owner == batch:
+                    process.interrupt()
+            self._changed.wait_for(lambda: batch not in self._busy.values(), LEAVE_S)
+            idle, self._idle = self._idle, []
+        for process in idle:
+            process.close()
 
 
-_children = _Children()
+_processes = _Processes()

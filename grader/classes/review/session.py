@@ -108,7 +108,7 @@ class Desk:
             or not self._behind(item, result, overrides)
         ):
             return result
-        return Settler(self.rubric.rubric, overrides).again(result, item.entry.id, None)
+        return Settler(self.rubric.rubric, overrides).settle_again(result, item.entry.id, None)
 
     def waits(self, item: Item) -> str:
         """Why the files of a submission do not say yet what was decided; empty where they do."""
@@ -167,7 +167,7 @@ class Desk:
             return ""
         if result.rubric.digest != self.rubric.digest:
             return OLDER_RESULT
-        now = Settler(self.rubric.rubric, overrides).again(result, item.entry.id, None)
+        now = Settler(self.rubric.rubric, overrides).settle_again(result, item.entry.id, None)
         if now != result:
             rewrite(batch.folder_of(item.entry), now, self.rubric.rubric, self._docs)
         return ""

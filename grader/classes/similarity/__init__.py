@@ -4,6 +4,6 @@ The comparison is `copydetect`'s: code without names and layout, fingerprints of
 starter code, the tutorials and most of the class have is taken out first. Needs the extra `similarity`.
 """
 
-from grader.classes.similarity.run import compare, write_similarity
+from grader.classes.similarity.comparison import compare, write_similarity
 
 __all__ = ["compare", "write_similarity"]

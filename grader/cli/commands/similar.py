@@ -13,8 +13,8 @@ from rich.text import Text
 
 from grader.classes.batch.folder import RUN, open_batch
 from grader.classes.similarity import compare, write_similarity
-from grader.classes.similarity.read import PLACE
-from grader.classes.similarity.run import percent, require_library, stretches
+from grader.classes.similarity.comparison import percent, require_library, stretches
+from grader.classes.similarity.sources import PLACE
 from grader.cli.output import say_json
 from grader.errors import ExitCode, UsageError
 from grader.model.similarity import NotCompared, Pair, Similarity
