@@ -84,10 +84,6 @@ class BatchProgress:
         return self.points_sum / judged if judged else None
 
     @property
-    def elapsed_s(self) -> float:
-        return self.clock() - self._begun_s
-
-    @property
     def left_s(self) -> float | None:
         """The time that is left, at the pace of the last gradings; None before two of them have ended.
 

@@ -22,6 +22,14 @@ from grader.classes.cluster import worker
 from grader.errors import HostError, UsageError
 
 CONNECT_S = 15.0
+LOGGERS = (
+    "distributed",
+    "distributed.client",
+    "distributed.scheduler",
+    "distributed.nanny",
+    "tornado",
+    "asyncio",
+)
 TLS = tuple(f"DASK_DISTRIBUTED__COMM__TLS__{name}" for name in ("CA_FILE", "CLIENT__CERT", "CLIENT__KEY"))
 LOCAL = "local"
 EXTRA = 'pip install "ros-lab-grader[cluster]"'
@@ -152,14 +160,7 @@ def _check_scheduler(client: Any, address: str) -> None:  # noqa: ANN401 - Dask 
 
 def _silence() -> None:
     """What Dask logs about lost connections, the grader says where it matters."""
-    for name in (
-        "distributed",
-        "distributed.client",
-        "distributed.scheduler",
-        "distributed.nanny",
-        "tornado",
-        "asyncio",
-    ):
+    for name in LOGGERS:
         logging.getLogger(name).setLevel(logging.CRITICAL)
 
 

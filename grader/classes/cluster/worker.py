@@ -16,16 +16,17 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pydantic
 
 import grader
-
-if TYPE_CHECKING:  # the scheduler imports this module too: it loads little
-    from grader.classes.batch.job import Job, Outcome
-    from grader.classes.cluster.exchange import Errand, Parcel, Report
-    from grader.workers import Worker
+from grader.arena.ros_env import find_ros
+from grader.classes.batch.job import Outcome, grade_job, outcome_of_ended
+from grader.classes.cluster.exchange import Errand, Exchange, Parcel, Report, is_machines, pack
+from grader.errors import GraderError, HostError
+from grader.intake import safe_name
+from grader.temporary import temporary_folder
+from grader.workers import Limits, Worker, WorkerEnded
 
 WATCH_S = 1.0
 LEAVE_S = 40.0
@@ -50,9 +51,6 @@ async def describe(exchange: str, word: str) -> dict[str, str]:
 
 
 def _describe(exchange: str, word: str) -> dict[str, str]:
-    from grader.arena.ros_env import find_ros  # noqa: PLC0415 - the module loads little
-    from grader.classes.cluster.exchange import Exchange  # noqa: PLC0415 - as above
-    from grader.errors import GraderError  # noqa: PLC0415 - as above
 
     _Code.digest = _digest_code()
     ros = kept_out = ""
@@ -104,9 +102,6 @@ def perform(pickled: bytes) -> str:
 
 def grade(errand: Errand, is_wanted: Callable[[], bool]) -> Report:
     """Grade the errand's job and leave its results in the exchange. Raises HostError."""
-    from grader.classes.cluster.exchange import Report, is_machines  # noqa: PLC0415 - the module loads little
-    from grader.errors import GraderError, HostError  # noqa: PLC0415 - as above
-    from grader.temporary import temporary_folder  # noqa: PLC0415 - as above
 
     host, source = socket.gethostname(), errand.job.entry.source
     if errand.seen and not os.path.lexists(source):
@@ -127,10 +122,8 @@ def grade(errand: Errand, is_wanted: Callable[[], bool]) -> Report:
 
 
 def _grade_in(folder: Path, errand: Errand, is_wanted: Callable[[], bool]) -> Outcome:
-    from grader.classes.batch.job import grade_job, outcome_of_ended  # noqa: PLC0415 - the module loads little
-    from grader.workers import WorkerEnded  # noqa: PLC0415 - as above
 
-    job: Job = errand.job.model_copy(update={"out": folder})
+    job = errand.job.model_copy(update={"out": folder})
     with _processes.borrow(errand.batch) as process, _interrupt_unwanted(process, is_wanted):
         try:
             return process.run(grade_job, job)
@@ -140,8 +133,6 @@ def _grade_in(folder: Path, errand: Errand, is_wanted: Callable[[], bool]) -> Ou
 
 def _deliver(folder: Path, errand: Errand) -> Parcel | None:
     """Put the results into the exchange; None if the job left none."""
-    from grader.classes.cluster.exchange import Exchange, pack  # noqa: PLC0415 - the module loads little
-    from grader.intake import safe_name  # noqa: PLC0415 - as above
 
     name = safe_name(errand.job.entry.id)
     if not (folder / name).is_dir():
@@ -186,7 +177,7 @@ class _Processes:
     @contextmanager
     def borrow(self, batch: str) -> Iterator[Worker]:
         """A process for one job; one that was interrupted is not used again."""
-        from grader.workers import Limits, Worker  # noqa: PLC0415 - the module loads little
+        from grader.workers import Worker  # noqa: PLC0415 - the module loads little
 
         with self._changed:
             process = self._idle.pop() if self._idle else Worker(Limits(idle_s=IDLE_S))
