@@ -13,7 +13,8 @@ from pathlib import Path
 from grader import __version__
 from grader.classes.batch.folder import BatchFolder, write_run
 from grader.classes.batch.job import Executor, Sandbox
-from grader.classes.batch.reports import Settler, fitting_runs, rewrite
+from grader.classes.batch.judging import Judged, judge_all
+from grader.classes.batch.reports import Settler, rewrite
 from grader.classes.batch.run import (
     BatchOptions,
     Watcher,
@@ -33,17 +34,17 @@ from grader.judging.summary import overall_status, total_points
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.roster import Entry, Roster
 from grader.report.text import csv_text
-from grader.results import EVIDENCE, RESULT
+from grader.results import EVIDENCE
 from grader.rubric.load import LoadedRubric
 from grader.workers import WorkerEnded, run_each
 
-CHANGES, PACKAGE = "changes.csv", "package.mcap"
+CHANGES = "changes.csv"
 COLUMNS = ("id", "criterion", "status before", "status", "points before", "points", "max_points", "why")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """One criterion that came to something else. One that is new has no `before`, one that is gone no `after`."""
+    """One criterion whose status or points changed. A new one has no `before`, one that is gone no `after`."""
 
     criterion: str
     before: CriterionResult | None
@@ -53,13 +54,13 @@ class Change:
     def why(self) -> str:
         """What the check says now."""
         if self.after is None:
-            return "the rubric has it no more"
+            return "the rubric no longer has it"
         return self.after.message or self.after.measured or self.after.title
 
 
 @dataclass(frozen=True, kw_only=True)
 class Regraded:
-    """One submission: its result before and after, and the scenarios of which there is no recording that fits.
+    """One submission: its result before and after, and the scenarios without a recording that fits.
 
     `error` says in one line why it could not be judged: its result stays as it was.
     """
@@ -92,11 +93,11 @@ def _differs(change: Change) -> bool:
 def regrade(
     folder: BatchFolder, rubric: LoadedRubric, rubric_source: str, jobs: int
 ) -> tuple[BatchFolder, tuple[Regraded, ...]]:
-    """Judge every submission of the batch again; gives the folder as it is now and what became of each, in order.
+    """Judge every submission of the batch again; return the folder as it is now and what became of each, in order.
 
     Writes each `result.json` with its reports, `run.json`, `results.jsonl`, `gradebook.csv` and `changes.csv`.
-    Raises UsageError for faulty overrides, EvidenceError where a newer grader has written there, Busy where a batch
-    works in the folder, OutputError.
+    Raises UsageError for faulty overrides, EvidenceError if a newer grader has written there, Busy if a batch works in
+    the folder, OutputError.
     """
     with alone(folder.path):
         folder.refuse_newer()
@@ -139,9 +140,9 @@ def _regrade_one(
             "error": None,
         }
     )
-    handed_in = before.handed_in and before.handed_in.model_copy(
-        update={"deadline": None}
-    )  # the rubric's of today
+    handed_in = before.handed_in
+    if handed_in is not None:  # the deadline is that of today's rubric
+        handed_in = handed_in.model_copy(update={"deadline": None})
     after = settler.settle(automatic, entry.id, handed_in, before)
     try:
         if after != before:
@@ -152,18 +153,17 @@ def _regrade_one(
 
 
 def _settle_only(folder: BatchFolder, rubric: LoadedRubric, settler: Settler, entry: Entry) -> Regraded:
-    """What could not be graded has what people gave for it."""
+    """Apply overrides to what could not be graded."""
     before = folder.earlier(entry)
     error = before.error.message if before is not None and before.error else "nothing was recorded"
     if before is not None and (settler.of(entry.id) or before.overrides):
-        rewrite(
-            folder.folder_of(entry), settler.settle_again(before, entry.id, None), rubric.rubric, rubric.docs
-        )
+        now = settler.settle_again(before, entry.id, None)
+        rewrite(folder.folder_of(entry), now, rubric.rubric, rubric.docs)
     return Regraded(entry=entry, before=before, after=None, error=error)
 
 
 def write_changes(path: Path, regraded: Sequence[Regraded]) -> None:
-    """Each criterion that changed, a row each. Raises OutputError."""
+    """Write a row for each criterion that changed. Raises OutputError."""
     atomic_write(path, csv_text([COLUMNS, *_rows(regraded)]).encode("utf-8"))
 
 
@@ -192,7 +192,7 @@ def run_missing(
     watcher: Watcher,
     sandbox: Sandbox,
 ) -> tuple[BatchFolder, tuple[Regraded, ...]]:
-    """Grade anew, of the same commits, what has scenarios that were not recorded; gives what `regrade` gives.
+    """Grade again, from the same commits, what has scenarios that were not recorded; return what `regrade` returns.
 
     Credentials come from the environment or from git: the batch's folder holds none.
     """
@@ -229,88 +229,3 @@ def _compare_run(folder: BatchFolder, one: Regraded) -> Regraded:
         missing=one.missing if failed else (),
         error="it could not be run again" if failed else "",
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Judged:
-    """One submission's criteria, or in one line why there are none and what to do about it.
-
-    `missing` are the rubric's scenarios without a recording that fits.
-    """
-
-    folder: Path
-    criteria: tuple[CriterionResult, ...] | None
-    missing: tuple[str, ...] = ()
-    error: str = ""
-    hint: str = ""
-
-
-def judge_all(
-    folders: Sequence[Path], rubric: LoadedRubric, jobs: int, *, fitting: bool = False
-) -> Iterator[Judged]:
-    """Judge every submission's evidence again, `jobs` at a time; yield each as it comes.
-
-    With `fitting`, a recording counts only if it was made with the rubric's present scenario. What is wrong with one
-    submission is in its `error` and stops no other, even if it ends the process.
-    """
-    judge_one = partial(_judge_one, rubric, fitting)
-    return run_each(judge_one, folders, min(jobs, len(folders)), ended=_judging_ended)
-
-
-def _judging_ended(folder: Path, _: WorkerEnded) -> Judged:
-    hint = "check whether this machine has too little memory, then judge it by itself"
-    return Judged(folder=folder, criteria=None, error=f"{folder}: judging it ended the process", hint=hint)
-
-
-def _judge_one(rubric: LoadedRubric, fitting: bool, folder: Path) -> Judged:
-    """In a worker."""
-    lab = rubric.rubric
-    try:
-        runs = load_evidence([folder])
-        runs = fitting_runs(lab, runs) if fitting else runs
-        criteria = judge(lab, runs, rubric.checks)
-    except GraderError as error:
-        return Judged(folder=folder, criteria=None, error=error.message, hint=error.hint)
-    except Exception as error:  # noqa: BLE001 - whatever it is, the others are judged
-        message = f"{folder}: internal error: {type(error).__name__}: {error}"
-        return Judged(folder=folder, criteria=None, error=message, hint="judge it by itself with --debug")
-    scenarios = dict.fromkeys(c.scenario for c in lab.criteria if c.scenario is not None)
-    missing = tuple(name for name in scenarios if name not in runs)
-    return Judged(folder=folder, criteria=criteria, missing=missing)
-
-
-def submissions_in(paths: Sequence[Path]) -> tuple[Path, ...]:
-    """Return the folders of the submissions that these paths stand for; none if they stand for one submission.
-
-    A folder of results stands for every submission in it. Raises EvidenceError if something else is among them.
-    """
-    whole = [path for path in paths if _is_result(path)]
-    below = {path: _submissions_below(path) for path in paths if path not in whole}
-    found = [*whole, *(folder for folders in below.values() for folder in folders)]
-    if len(whole) < 2 and len(found) == len(whole):
-        return ()
-    for path, folders in below.items():
-        if not folders:
-            message = f"{path}: not the folder of a submission's results, as the others are"
-            raise EvidenceError(message, hint="judge it by itself")
-    return tuple(dict.fromkeys(found))
-
-
-def _submissions_below(folder: Path) -> list[Path]:
-    """Return the submissions in a folder of results; a folder of recordings has none."""
-    try:
-        if not folder.is_dir() or _has_recordings(folder):
-            return []
-        inside = [path for path in sorted(folder.iterdir()) if not path.name.startswith(".")]
-        return [path for path in inside if _is_result(path) or _has_recordings(path)]
-    except OSError as error:
-        raise EvidenceError(f"{folder}: {error.strerror or type(error).__name__}") from error
-
-
-def _is_result(folder: Path) -> bool:
-    """Whether `grade` left this of one submission, or it is its evidence alone."""
-    return (folder / RESULT).is_file() or (folder / PACKAGE).is_file() or _has_recordings(folder / EVIDENCE)
-
-
-def _has_recordings(folder: Path) -> bool:
-    return folder.is_dir() and any(path.suffix in SUFFIXES for path in folder.iterdir())

@@ -12,6 +12,7 @@ from functools import partial
 from pathlib import Path
 
 from grader.checks import CHECKS
+from grader.classes.batch.judging import fitting_runs
 from grader.errors import EvidenceError, GraderError, UsageError
 from grader.evidence.reader import load_evidence
 from grader.evidence.run import Run
@@ -31,7 +32,7 @@ from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 from grader.workers import WorkerEnded, run_each
 
-CONSOLE, SCENARIO = "console.log", "scenario.digest"
+CONSOLE = "console.log"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,13 +168,3 @@ def figures_in(folder: Path, result: GradingResult, rubric: Rubric) -> Figures |
         runs = fitting_runs(rubric, load_evidence([folder / EVIDENCE]))
         return figures_of(rubric, runs, result.criteria)
     return None
-
-
-def fitting_runs(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
-    """Return the runs that were recorded with the rubric's present scenarios; evidence that does not say counts."""
-    digests = {name: scenario.digest for name, scenario in rubric.scenarios.items()}
-    return {
-        name: run
-        for name, run in runs.items()
-        if run.metadata.get(SCENARIO, digests.get(name)) == digests.get(name)
-    }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from grader.classes.batch.regrade import Judged, judge_all, submissions_in
+from grader.classes.batch.judging import Judged, judge_all, submissions_in
 from grader.cli.errors import report
 from grader.cli.outcome import exit_code
 from grader.cli.output import say_document
