@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 from grader import __version__
@@ -26,17 +25,14 @@ from grader.classes.batch.run import (
 )
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import read_overrides
-from grader.errors import EvidenceError, GraderError
-from grader.evidence.reader import SUFFIXES, load_evidence
+from grader.errors import GraderError
 from grader.files import atomic_write
-from grader.judging import judge
 from grader.judging.summary import overall_status, total_points
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.roster import Entry, Roster
 from grader.report.text import csv_text
 from grader.results import EVIDENCE
 from grader.rubric.load import LoadedRubric
-from grader.workers import WorkerEnded, run_each
 
 CHANGES = "changes.csv"
 COLUMNS = ("id", "criterion", "status before", "status", "points before", "points", "max_points", "why")

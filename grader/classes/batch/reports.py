@@ -15,7 +15,6 @@ from grader.checks import CHECKS
 from grader.classes.batch.judging import fitting_runs
 from grader.errors import EvidenceError, GraderError, UsageError
 from grader.evidence.reader import load_evidence
-from grader.evidence.run import Run
 from grader.files import new_file, unwritable
 from grader.judging.settle import settle, unsettled
 from grader.model.figure import Figures

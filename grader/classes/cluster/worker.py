@@ -102,7 +102,6 @@ def perform(pickled: bytes) -> str:
 
 def grade(errand: Errand, is_wanted: Callable[[], bool]) -> Report:
     """Grade the errand's job and leave its results in the exchange. Raises HostError."""
-
     host, source = socket.gethostname(), errand.job.entry.source
     if errand.seen and not os.path.lexists(source):
         hint = "submissions that are folders or archives must lie on a path that all machines share"
@@ -122,7 +121,6 @@ def grade(errand: Errand, is_wanted: Callable[[], bool]) -> Report:
 
 
 def _grade_in(folder: Path, errand: Errand, is_wanted: Callable[[], bool]) -> Outcome:
-
     job = errand.job.model_copy(update={"out": folder})
     with _processes.borrow(errand.batch) as process, _interrupt_unwanted(process, is_wanted):
         try:
@@ -133,7 +131,6 @@ def _grade_in(folder: Path, errand: Errand, is_wanted: Callable[[], bool]) -> Ou
 
 def _deliver(folder: Path, errand: Errand) -> Parcel | None:
     """Put the results into the exchange; None if the job left none."""
-
     name = safe_name(errand.job.entry.id)
     if not (folder / name).is_dir():
         return None
