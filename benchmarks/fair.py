@@ -13,7 +13,7 @@ from benchmarks.busy import busy_loops
 from benchmarks.figures import Found, NotMeasured, Options, share, table
 from benchmarks.gradings import DATA, folder_for, graded, in_flight
 from benchmarks.machine import Meter
-from grader.classes.batch.workers import Job
+from grader.classes.batch.gradings import Job
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.figures import NotMeasured, Options
-from grader.classes.batch.workers import Job, grade_all
+from grader.classes.batch.gradings import Job, grade_all
 from grader.evidence.reader import load_evidence
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status

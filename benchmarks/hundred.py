@@ -19,7 +19,7 @@ from benchmarks.gradings import (
     verdicts_of,
 )
 from benchmarks.machine import Meter
-from grader.classes.batch.workers import Job
+from grader.classes.batch.gradings import Job
 from grader.model.result import GradingResult
 from grader.model.verdict import Status
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from benchmarks.figures import Found, Options, Row, spread
 from benchmarks.gradings import KINDS, RUBRIC, Verdicts, cores, folder_for, graded, verdicts_of
 from benchmarks.machine import timed
-from grader.classes.batch.workers import Job
+from grader.classes.batch.gradings import Job
 
 COUNT, TIMES = 300, 5
 GRADER = (sys.executable, "-m", "grader")

@@ -9,7 +9,7 @@ from benchmarks.busy import busy_loops
 from benchmarks.figures import Found, Options, mid, table
 from benchmarks.gradings import DATA, folder_for, graded
 from benchmarks.ros import hztest, hztest_workspace
-from grader.classes.batch.workers import Job
+from grader.classes.batch.gradings import Job
 from grader.model.verdict import Status
 
 COUNT, LOOPS = 5, (0, 4, 8, 16)

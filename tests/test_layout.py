@@ -14,14 +14,16 @@ GRADER = Path(__file__).resolve().parent.parent / "grader"
 ROS_SIDE = GRADER / "arena" / "ros"
 
 # Who may import whom, beside itself. `rubric.model` holds records only: whoever may see records may see it.
-BASE = {"model", "errors", "portable", "shown"}
+BASE = {"model", "errors", "portable", "untrusted_text", "wording"}
 ALLOWED = {
     "__init__": {"api", "errors", "model", "rubric"},
     "model": set[str](),
     "errors": set[str](),
-    "shown": set[str](),
+    "untrusted_text": set[str](),
+    "wording": set[str](),
     "portable": {"errors"},
     "host_programs": set[str](),
+    "workers": {"host_programs"},
     "files": {"errors", "portable"},
     "results": BASE | {"files"},
     "faults": BASE | {"files", "intake", "report", "results", "rubric"},
@@ -45,8 +47,8 @@ ALLOWED = {
         *BASE, "checks", "classes.batch", "evidence", "files", "intake", "package", "pipeline", "rubric"
     },
     "classes": {
-        *BASE, "arena.ros_env", "checks", "evidence", "faults", "files", "intake", "host_programs", "judging",
-        "pipeline", "report", "results", "rubric"
+        *BASE, "arena.ros_env", "checks", "evidence", "faults", "files", "host_programs", "intake", "judging",
+        "pipeline", "report", "results", "rubric", "workers"
     },
     "student": {
         *BASE, "arena.asynchronous", "arena.workspace", "faults", "files", "intake", "package", "pipeline", "report",
@@ -55,7 +57,7 @@ ALLOWED = {
     "integrations": BASE | {"faults", "files", "intake", "pipeline", "report", "results", "rubric"},
     "cli": {
         *BASE, "arena", "authoring", "checks", "classes", "evidence", "faults", "files", "integrations", "intake",
-        "judging", "host_programs", "package", "pipeline", "report", "rubric", "student"
+        "host_programs", "judging", "package", "pipeline", "report", "results", "rubric", "student"
     },
     "__main__": {"cli"},
 }  # fmt: skip

@@ -38,9 +38,6 @@ STARTS = {
     ),
     "arena/ros_env.py:_from_setup": Start("base", "'/'", "nothing: ROS's own setup.bash"),
     "arena/arena_process.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
-    "classes/batch/child.py:_started": Start(
-        "with_absolute_paths(os.environ)", None, "nothing: jobs come through a pipe, as JSON"
-    ),
     "cli/diagnosis.py:_hostname": Start("HOST_ENV", "'/'", "nothing"),
     "cli/diagnosis.py:_modules": Start("ros.env", "'/'", "nothing"),
     "cli/scope.py:_moved": Start(
@@ -59,10 +56,12 @@ STARTS = {
     "package/python.py:_run": Start(
         "with_absolute_paths(os.environ)", None, "its source files, which are parsed and not run"
     ),
-    "classes/review/serve.py:git_user": Start("with_absolute_paths(os.environ)", "'/'", "nothing"),
-    "classes/similarity/comparing.py:_answer": Start(
-        "_environment()", None, "its source files, which are read and not run"
+    "workers.py:_start": Start(
+        "{**with_absolute_paths(os.environ), **self._env}",
+        None,
+        "nothing: jobs come through a pipe, as pickles",
     ),
+    "classes/review/serve.py:git_user": Start("with_absolute_paths(os.environ)", "'/'", "nothing"),
 }
 REPLACED = {"arena/ros/namespaces.py:<module>": "becomes the program of the probe: arena/sandbox_probe.py"}
 MAKERS = {"Popen", "run", "call", "check_call", "check_output", "getoutput", "getstatusoutput"}

@@ -14,9 +14,9 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from grader.classes.batch.flow import Watcher
 from grader.classes.batch.job import Outcome
-from grader.classes.batch.progress import Course
+from grader.classes.batch.progress import BatchProgress
+from grader.classes.batch.run import Watcher
 from grader.report.text import number
 from grader.untrusted_text import line
 
@@ -28,7 +28,7 @@ MANY = 500
 """Of more submissions than that, a log has a line for each hundredth of them, and for each that is not graded."""
 
 
-class PlainClass(Course):
+class PlainClass(BatchProgress):
     """A line with the time of day for each submission."""
 
     def __init__(self, stream: IO[str]) -> None:
@@ -44,7 +44,7 @@ class PlainClass(Course):
             print(f"{stamp} {said(outcome)}  [{summary(self)}]", file=self.stream, flush=True)
 
 
-class LiveClass(Course):
+class LiveClass(BatchProgress):
     """A bar, the counts, and what runs; what is not graded stays above it as a line."""
 
     def __init__(self, console: Console) -> None:
@@ -80,18 +80,18 @@ def said(outcome: Outcome) -> str:
     return "  ".join(parts)
 
 
-def summary(course: Course) -> str:
+def summary(progress: BatchProgress) -> str:
     """`12 of 60 done, 8 running, 40 waiting, 1 failed; 87.5 points on average; about 4 min to go`."""
-    parts = [f"{course.done} of {course.total} done"]
-    parts += [f"{len(course.running)} running"] if course.running else []
-    parts += [f"{course.waiting} waiting"] if course.waiting else []
-    parts += [f"{course.inconclusive} inconclusive"] if course.inconclusive else []
-    parts += [f"{course.failed} failed"] if course.failed else []
+    parts = [f"{progress.done} of {progress.total} done"]
+    parts += [f"{len(progress.running)} running"] if progress.running else []
+    parts += [f"{progress.waiting} waiting"] if progress.waiting else []
+    parts += [f"{progress.inconclusive} inconclusive"] if progress.inconclusive else []
+    parts += [f"{progress.failed} failed"] if progress.failed else []
     words = ", ".join(parts)
-    if course.mean_points is not None:
-        words += f"; {number(course.mean_points, 1)} points on average"
-    left_s = course.left_s
-    if left_s is not None and course.done < course.total:
+    if progress.mean_points is not None:
+        words += f"; {number(progress.mean_points, 1)} points on average"
+    left_s = progress.left_s
+    if left_s is not None and progress.done < progress.total:
         words += f"; about {_span(left_s)} to go"
     return words
 
@@ -106,11 +106,11 @@ def _span(seconds: float) -> str:
 
 @contextmanager
 def open_class_display() -> Iterator[Watcher]:
-    """Show a batch's course on stderr until the block is left."""
+    """Show a batch's progress on stderr until the block is left."""
     console = Console(file=sys.stderr, markup=False, emoji=False, highlight=False)
     if not console.is_terminal or console.is_dumb_terminal or console.encoding != "utf-8":
         yield PlainClass(sys.stderr)
         return
-    course = LiveClass(console)
-    with Live(course, console=console, refresh_per_second=REFRESH_HZ, transient=True):
-        yield course
+    progress = LiveClass(console)
+    with Live(progress, console=console, refresh_per_second=REFRESH_HZ, transient=True):
+        yield progress

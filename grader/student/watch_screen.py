@@ -17,7 +17,7 @@ from grader.report.terminal import STYLES, emit, mark, open_console, print_repor
 from grader.report.text import line, number
 from grader.report.view import Loss, arrange, places, points_of
 from grader.rubric.model import Rubric
-from grader.student.watching import UNDECIDED, Outcome, Screen
+from grader.student.watching import Outcome, Screen
 
 NAME_CHARS, TEXT_CHARS = 60, 300
 NAMES_SHOWN = 3
@@ -182,8 +182,8 @@ def compare(before: GradingResult, after: GradingResult) -> dict[str, list[Crite
 
 
 def _change(before: CriterionResult, after: CriterionResult) -> str:
-    if after.status in UNDECIDED:
-        return "" if before.status in UNDECIDED else "no longer judged"
+    if after.status.is_retryable:
+        return "" if before.status.is_retryable else "no longer judged"
     had, has = before.status is Status.PASS, after.status is Status.PASS
     if has != had:
         return "now reached" if has else "now lost"

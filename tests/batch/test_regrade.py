@@ -13,8 +13,8 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from grader import __version__
-from grader.classes.batch.flow import described
 from grader.classes.batch.folder import open_batch, write_run
+from grader.classes.batch.run import describe_rubric
 from grader.cli.main import run
 from grader.evidence.reader import load_evidence
 from grader.judging import judge
@@ -39,7 +39,7 @@ def recorded(out: Path, kinds: dict[str, str]) -> Path:
     about = BatchRun(
         state="complete",
         grader=__version__,
-        **described(rubric, str(LAB)),
+        **describe_rubric(rubric, str(LAB)),
         roster="roster.csv",
         started_at=datetime(2026, 11, 1, tzinfo=timezone.utc),
         entries=entries,

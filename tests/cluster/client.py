@@ -5,12 +5,14 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from grader.classes.cluster import ClusterHands
+from grader.classes.cluster import ClusterExecutor
 from tests.cluster.jobs import jobs_for
 
 
 def main(address: str, out: Path, count: int) -> None:
-    for outcome in ClusterHands(address, out, insecure=True).run(jobs_for(out, count), begun=lambda _: None):
+    for outcome in ClusterExecutor(address, out, insecure=True).run(
+        jobs_for(out, count), begun=lambda _: None
+    ):
         print(outcome.id, flush=True)
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import dask.config
 import pytest
 
-from grader.classes.batch.executor import Processes
-from grader.classes.cluster import ClusterHands
-from grader.classes.cluster.hands import EXCHANGE
+from grader.classes.batch.job import LocalExecutor
+from grader.classes.cluster import ClusterExecutor
+from grader.classes.cluster.executor import EXCHANGE
 from grader.errors import HostError
 from tests.cluster.clusters import Cluster, cluster, kill
 from tests.cluster.jobs import ids, jobs_for, verdicts
@@ -36,7 +36,7 @@ def _none(_: str) -> None:
 def test_a_worker_killed_in_the_middle_costs_nobody_a_result(place: Cluster, tmp_path: Path) -> None:
     workers = [place.worker() for _ in range(3)]
     out, begun, outcomes = tmp_path / "out", [], []
-    for outcome in ClusterHands(place.address, out, insecure=True).run(
+    for outcome in ClusterExecutor(place.address, out, insecure=True).run(
         jobs_for(out, COUNT), begun=begun.append
     ):
         outcomes.append(outcome)
@@ -48,7 +48,7 @@ def test_a_worker_killed_in_the_middle_costs_nobody_a_result(place: Cluster, tmp
     assert not (out / EXCHANGE).exists()
 
     alone = tmp_path / "alone"
-    assert ids(Processes(2).run(jobs_for(alone, COUNT), begun=_none)) == NAMES
+    assert ids(LocalExecutor(2).run(jobs_for(alone, COUNT), begun=_none)) == NAMES
     assert verdicts(out) == verdicts(alone)
     assert sorted(verdicts(out)) == NAMES
 
@@ -61,8 +61,8 @@ def test_results_come_through_a_url_that_is_no_path(place: Cluster, tmp_path: Pa
     register()
     place.worker(preload="shelf", threads=2)
     out = tmp_path / "out"
-    hands = ClusterHands(place.address, out, "shelf://results", insecure=True)
-    assert ids(hands.run(jobs_for(out, 4), begun=_none)) == NAMES[:4]
+    executor = ClusterExecutor(place.address, out, "shelf://results", insecure=True)
+    assert ids(executor.run(jobs_for(out, 4), begun=_none)) == NAMES[:4]
     assert sorted(verdicts(out)) == NAMES[:4]
     assert on_shelf(shelf) == []
 
@@ -74,7 +74,7 @@ def test_a_cluster_with_certificates_needs_no_flag(tmp_path: Path) -> None:
         names = {"ca-file": "ca-file", "client.cert": "cert", "client.key": "key"}
         files = {f"distributed.comm.tls.{key}": str(made.certificates[name]) for key, name in names.items()}
         with dask.config.set(files):
-            assert ids(ClusterHands(made.address, out).run(jobs_for(out, 2), begun=_none)) == NAMES[:2]
+            assert ids(ClusterExecutor(made.address, out).run(jobs_for(out, 2), begun=_none)) == NAMES[:2]
     assert made.address.startswith("tls://")
     assert sorted(verdicts(out)) == NAMES[:2]
 
@@ -83,9 +83,9 @@ def test_workers_that_differ_are_named_and_left_out(place: Cluster, tmp_path: Pa
     place.worker(preload="older")
     place.worker(preload="without")
     out, said = tmp_path / "out", []
-    hands = ClusterHands(place.address, out, insecure=True, say=said.append, patience_s=5.0)
+    executor = ClusterExecutor(place.address, out, insecure=True, say=said.append, patience_s=5.0)
     with pytest.raises(HostError, match="no worker that can grade") as caught:
-        list(hands.run(jobs_for(out, 1), begun=_none))
+        list(executor.run(jobs_for(out, 1), begun=_none))
     assert f"dask worker {place.address}" in caught.value.hint
     assert any("it has grader 0.0.9, here it is" in line for line in said)
     assert any("no grader like this one is installed there" in line for line in said)
@@ -97,7 +97,7 @@ def test_workers_that_differ_are_named_and_left_out(place: Cluster, tmp_path: Pa
 def test_a_scheduler_that_differs_is_named(preload: str, why: str, tmp_path: Path) -> None:
     out = tmp_path / "out"
     with cluster(tmp_path, preload=preload) as made, pytest.raises(HostError, match=why) as caught:
-        list(ClusterHands(made.address, out, insecure=True).run(jobs_for(out, 1), begun=_none))
+        list(ClusterExecutor(made.address, out, insecure=True).run(jobs_for(out, 1), begun=_none))
     assert f"the scheduler at {made.address}" in caught.value.message
     assert caught.value.hint
     assert not out.exists()
@@ -115,11 +115,11 @@ def test_real_gradings_get_the_same_verdicts_with_a_worker_killed(place: Cluster
             kill(workers[0].pid)
 
     jobs = jobs_for(out, count, static_only=False, names=names)
-    outcomes = list(ClusterHands(place.address, out, insecure=True).run(jobs, begun=note))
+    outcomes = list(ClusterExecutor(place.address, out, insecure=True).run(jobs, begun=note))
     assert ids(outcomes) == NAMES[:count]
     assert {outcome.status for outcome in outcomes} == {"graded"}
 
     alone = tmp_path / "alone"
-    list(Processes(2).run(jobs_for(alone, 3, static_only=False, names=names), begun=_none))
+    list(LocalExecutor(2).run(jobs_for(alone, 3, static_only=False, names=names), begun=_none))
     once = verdicts(alone)
     assert verdicts(out) == {name: once[f"s{number % 3:03}"] for number, name in enumerate(NAMES[:count])}

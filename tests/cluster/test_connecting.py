@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.cluster import ClusterHands, connecting
-from grader.classes.cluster.address import check_address
+from grader.classes.cluster import ClusterExecutor, connect
+from grader.classes.cluster.connect import check_address
 from grader.errors import HostError, UsageError
 from tests.cluster.jobs import jobs_for
 
@@ -40,7 +40,7 @@ def test_a_cluster_that_asks_for_no_certificate_is_refused_without_the_flag(
     scheme: str, tmp_path: Path
 ) -> None:
     with pytest.raises(UsageError, match="asks for no certificate") as caught:
-        ClusterHands(f"{scheme}://host:8786", tmp_path / "out")
+        ClusterExecutor(f"{scheme}://host:8786", tmp_path / "out")
     assert "--cluster-insecure" in caught.value.hint
     assert "tls://" in caught.value.hint
 
@@ -52,7 +52,7 @@ def test_a_cluster_that_asks_for_no_certificate_is_refused_without_the_flag(
 )  # fmt: skip
 def test_what_is_no_address_is_refused_before_anything_is_done(address: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="not the address of a Dask scheduler") as caught:
-        ClusterHands(address, tmp_path / "out")
+        ClusterExecutor(address, tmp_path / "out")
     assert "tls://host:8786" in caught.value.hint
     assert not (tmp_path / "out").exists()
 
@@ -66,9 +66,9 @@ def test_without_dask_it_says_what_to_install(missing: str, monkeypatch) -> None
 
 
 def _refusal(address: str, out: Path) -> HostError:
-    hands = ClusterHands(address, out, insecure=True)
+    executor = ClusterExecutor(address, out, insecure=True)
     with pytest.raises(HostError) as caught:
-        list(hands.run(jobs_for(out, 1), begun=lambda _: None))
+        list(executor.run(jobs_for(out, 1), begun=lambda _: None))
     assert "\n" not in caught.value.message
     assert "dask scheduler" in caught.value.hint
     assert not out.exists()
@@ -76,7 +76,7 @@ def _refusal(address: str, out: Path) -> HostError:
 
 
 def test_where_nothing_answers_one_line_says_so(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(connecting, "CONNECT_S", 0.5)
+    monkeypatch.setattr(connect, "CONNECT_S", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as closed:
         address = f"tcp://127.0.0.1:{closed.getsockname()[1]}"
     assert f"no Dask scheduler answers at {address}" in _refusal(address, tmp_path / "out").message
@@ -89,7 +89,7 @@ def test_where_nothing_answers_one_line_says_so(tmp_path: Path, monkeypatch) -> 
     "says", [b"SSH-2.0-OpenSSH_9.2p1\r\n", b"HTTP/1.1 400 Bad Request\r\n\r\n", b"\0" * 64]
 )
 def test_where_something_else_answers_one_line_says_so(says: bytes, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(connecting, "CONNECT_S", 2.0)
+    monkeypatch.setattr(connect, "CONNECT_S", 2.0)
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
 
@@ -111,13 +111,13 @@ def test_where_something_else_answers_one_line_says_so(says: bytes, tmp_path: Pa
 
 
 def test_a_tls_address_without_certificates_says_where_they_go(tmp_path: Path) -> None:
-    hands = ClusterHands("tls://127.0.0.1:8786", tmp_path / "out")
+    executor = ClusterExecutor("tls://127.0.0.1:8786", tmp_path / "out")
     with pytest.raises(HostError) as caught:
-        list(hands.run(jobs_for(tmp_path / "out", 1), begun=lambda _: None))
+        list(executor.run(jobs_for(tmp_path / "out", 1), begun=lambda _: None))
     assert "needs certificates" in caught.value.message
     assert "DASK_DISTRIBUTED__COMM__TLS__CA_FILE" in caught.value.hint
 
 
 def test_no_jobs_need_no_cluster(tmp_path: Path) -> None:
-    hands = ClusterHands("tls://127.0.0.1:1", tmp_path / "out")
-    assert list(hands.run(iter(()), begun=lambda _: None)) == []
+    executor = ClusterExecutor("tls://127.0.0.1:1", tmp_path / "out")
+    assert list(executor.run(iter(()), begun=lambda _: None)) == []

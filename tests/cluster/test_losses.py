@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.classes.cluster import ClusterHands
-from grader.classes.cluster.hands import EXCHANGE
+from grader.classes.cluster import ClusterExecutor
+from grader.classes.cluster.executor import EXCHANGE
 from grader.errors import HostError
 from tests.cluster.clusters import ROOT, Cluster, children_of, cluster, kill, lives, until
 from tests.cluster.jobs import ids, jobs_for, named_job, verdicts
@@ -41,7 +41,7 @@ def test_a_submission_that_ends_its_workers_is_given_up_and_the_others_are_grade
     jobs = [named_job(out, "poison"), *jobs_for(out, 4)]
     outcomes = {
         outcome.id: outcome
-        for outcome in ClusterHands(place.address, out, insecure=True).run(jobs, begun=_none)
+        for outcome in ClusterExecutor(place.address, out, insecure=True).run(jobs, begun=_none)
     }
     poison = outcomes.pop("poison")
     assert (poison.status, poison.kind) == ("error", "worker-lost")
@@ -54,7 +54,7 @@ def test_a_submission_that_ends_its_workers_is_given_up_and_the_others_are_grade
 def test_workers_that_come_later_take_over_from_those_that_are_gone(place: Cluster, tmp_path: Path) -> None:
     first = place.worker()
     out, outcomes = tmp_path / "out", []
-    for outcome in ClusterHands(place.address, out, insecure=True).run(jobs_for(out, 8), begun=_none):
+    for outcome in ClusterExecutor(place.address, out, insecure=True).run(jobs_for(out, 8), begun=_none):
         outcomes.append(outcome)
         if len(outcomes) == 2:
             kill(first.pid)
@@ -67,7 +67,7 @@ def test_workers_that_come_later_take_over_from_those_that_are_gone(place: Clust
 def test_a_caller_that_stops_leaves_nothing_running(place: Cluster, tmp_path: Path) -> None:
     worker = place.worker(threads=2)
     out = tmp_path / "out"
-    outcomes = ClusterHands(place.address, out, insecure=True).run(jobs_for(out, 50), begun=_none)
+    outcomes = ClusterExecutor(place.address, out, insecure=True).run(jobs_for(out, 50), begun=_none)
     next(outcomes)
     assert children_of(worker.pid)
     outcomes.close()
@@ -93,14 +93,16 @@ def test_a_killed_client_leaves_its_workers_free_and_the_next_one_goes_on(
     until(lambda: not any(lives(pid) for pid in busy))
     (out / EXCHANGE).mkdir(exist_ok=True)
     (out / EXCHANGE / "s000.0123456789abcdef.tar.gz").write_bytes(b"of the one that was killed")
-    assert len(ids(ClusterHands(place.address, out, insecure=True).run(jobs_for(out, 4), begun=_none))) == 4
+    assert (
+        len(ids(ClusterExecutor(place.address, out, insecure=True).run(jobs_for(out, 4), begun=_none))) == 4
+    )
     assert not (out / EXCHANGE).exists()
 
 
 def test_without_its_scheduler_the_batch_ends_with_one_line(place: Cluster, tmp_path: Path) -> None:
     place.worker()
     out = tmp_path / "out"
-    outcomes = ClusterHands(place.address, out, insecure=True).run(jobs_for(out, 50), begun=_none)
+    outcomes = ClusterExecutor(place.address, out, insecure=True).run(jobs_for(out, 50), begun=_none)
     next(outcomes)
     kill(place.scheduler.pid)
     with pytest.raises(HostError, match=r"the connection to the scheduler at .* is lost") as caught:
@@ -111,7 +113,7 @@ def test_without_its_scheduler_the_batch_ends_with_one_line(place: Cluster, tmp_
 
 def test_a_cluster_of_this_machine_is_started_and_ended(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    assert len(ids(ClusterHands("local", out).run(jobs_for(out, 3), begun=_none))) == 3
+    assert len(ids(ClusterExecutor("local", out).run(jobs_for(out, 3), begun=_none))) == 3
     assert len(verdicts(out)) == 3
     until(lambda: not any(_works_for_dask(pid) for pid in children_of(os.getpid())))
 

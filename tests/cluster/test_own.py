@@ -15,8 +15,7 @@ from typing import Any
 import pytest
 from distributed.security import Security
 
-from grader.classes.cluster.address import LOCAL
-from grader.classes.cluster.connecting import connected
+from grader.classes.cluster.connect import LOCAL, connect
 from tests.cluster.sockets import listening_ports, tree_of
 
 KEY = b"PRIVATE KEY"
@@ -73,7 +72,7 @@ def before() -> list[int]:
 
 @pytest.fixture(scope="module")
 def client(before: list[int], temporary: Path, keys: list[Path]) -> Iterator[Any]:
-    with connected(LOCAL) as client:
+    with connect(LOCAL) as client:
         client.wait_for_workers(os.cpu_count() or 1)
         yield client
 

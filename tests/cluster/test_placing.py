@@ -8,11 +8,9 @@ from pathlib import Path
 import pytest
 
 from grader.classes.batch.job import Job, Outcome
-from grader.classes.cluster import placing
-from grader.classes.cluster.errands import Report
-from grader.classes.cluster.exchange import Exchange, Parcel
-from grader.classes.cluster.parcels import pack
-from grader.classes.cluster.placing import ParcelLost, place
+from grader.classes.cluster import executor
+from grader.classes.cluster.exchange import Exchange, Parcel, Report, pack
+from grader.classes.cluster.executor import ParcelLost, place
 from grader.errors import Busy
 from grader.results import Results
 from tests.cluster.jobs import jobs_for
@@ -20,7 +18,7 @@ from tests.cluster.jobs import jobs_for
 
 @pytest.fixture
 def exchange(tmp_path: Path, monkeypatch) -> Exchange:
-    monkeypatch.setattr(placing, "PAUSE_S", 0.0)
+    monkeypatch.setattr(executor, "PAUSE_S", 0.0)
     made = Exchange(str(tmp_path / "exchange"))
     made.make()
     return made
@@ -57,12 +55,13 @@ def test_of_two_attempts_the_one_that_was_reported_counts(
 ) -> None:
     believed_lost = _sent(exchange, tmp_path, words="first", evidence="first")
     reported = _sent(exchange, tmp_path, words="second", evidence="second")
-    assert place(job, Report(outcome=_outcome(), machine="b", parcel=reported), exchange).status == "graded"
+    assert place(job, Report(outcome=_outcome(), parcel=reported), exchange).status == "graded"
     assert _words(job) == "second"
     assert (job.out / "s000" / "evidence" / "package.mcap").read_text() == "second"
     assert sorted(path.name for path in (job.out / "s000").iterdir()) == ["evidence", "result.json"]
     with pytest.raises(FileNotFoundError):
-        exchange.open(believed_lost)
+        exchange.open(reported)
+    assert exchange.open(believed_lost).read()
 
 
 @pytest.mark.parametrize(("kind", "stays"), [("host", True), ("killed", True), ("submission", False)])
@@ -70,9 +69,9 @@ def test_only_an_error_of_the_submission_takes_the_place_of_a_complete_result(
     kind: str, stays: bool, exchange: Exchange, job: Job, tmp_path: Path
 ) -> None:
     earlier = _sent(exchange, tmp_path / "a", words="earlier", evidence="earlier")
-    place(job, Report(outcome=_outcome(), machine="a", parcel=earlier), exchange)
+    place(job, Report(outcome=_outcome(), parcel=earlier), exchange)
     wrong = _sent(exchange, tmp_path / "b", status="error", words="wrong")
-    outcome = place(job, Report(outcome=_outcome("error", kind), machine="a", parcel=wrong), exchange)
+    outcome = place(job, Report(outcome=_outcome("error", kind), parcel=wrong), exchange)
     assert outcome.status == "error"
     assert _words(job) == ("earlier" if stays else "wrong")
     assert (job.out / "s000" / "evidence").exists() is stays
@@ -82,7 +81,7 @@ def test_only_an_error_of_the_submission_takes_the_place_of_a_complete_result(
 
 def test_a_result_that_was_kept_needs_no_parcel(exchange: Exchange, job: Job) -> None:
     kept = _outcome().model_copy(update={"kept": True})
-    assert place(job, Report(outcome=kept, machine="a"), exchange) == kept
+    assert place(job, Report(outcome=kept), exchange) == kept
     assert not job.out.exists()
 
 
@@ -90,14 +89,14 @@ def test_a_parcel_that_is_not_there_or_not_whole_changes_nothing(
     exchange: Exchange, job: Job, tmp_path: Path
 ) -> None:
     earlier = _sent(exchange, tmp_path, words="earlier", evidence="earlier")
-    place(job, Report(outcome=_outcome(), machine="a", parcel=earlier), exchange)
+    place(job, Report(outcome=_outcome(), parcel=earlier), exchange)
     with pytest.raises(ParcelLost):
-        place(job, Report(outcome=_outcome(), machine="a", parcel=earlier), exchange)
+        place(job, Report(outcome=_outcome(), parcel=earlier), exchange)
     broken = _sent(exchange, tmp_path, words="broken")
     whole = Path(exchange.url, broken.name).read_bytes()
     Path(exchange.url, broken.name).write_bytes(whole[:-9])
     with pytest.raises(ParcelLost):
-        place(job, Report(outcome=_outcome(), machine="a", parcel=broken), exchange)
+        place(job, Report(outcome=_outcome(), parcel=broken), exchange)
     assert _words(job) == "earlier"
     assert sorted(path.name for path in (job.out / "s000").iterdir()) == ["evidence", "result.json"]
 
@@ -107,4 +106,4 @@ def test_a_submission_that_another_grader_works_on_is_left_to_it(
 ) -> None:
     parcel = _sent(exchange, tmp_path)
     with Results(job.out / "s000"), pytest.raises(Busy):
-        place(job, Report(outcome=_outcome(), machine="a", parcel=parcel), exchange)
+        place(job, Report(outcome=_outcome(), parcel=parcel), exchange)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader.authoring.mutation import session
-from grader.classes.batch.workers import Graded
+from grader.classes.batch.gradings import Graded
 from grader.cli.main import run
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import ROOT

@@ -12,7 +12,7 @@ from grader.authoring.mutation import session
 from grader.authoring.mutation.plan import Planned, plan_all
 from grader.authoring.mutation.session import Plan, run_test
 from grader.authoring.mutation.solution import Solution
-from grader.classes.batch.workers import Graded, Job
+from grader.classes.batch.gradings import Graded, Job
 from grader.errors import HostError
 from grader.model.progress import Silence
 from grader.rubric.load import load_rubric

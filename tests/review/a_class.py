@@ -12,8 +12,8 @@ from pathlib import Path
 import yaml
 
 from grader import __version__
-from grader.classes.batch.flow import described, write_books
 from grader.classes.batch.folder import BatchFolder, write_run
+from grader.classes.batch.run import describe_rubric, write_books
 from grader.evidence.reader import load_evidence
 from grader.intake import safe_name
 from grader.judging import judge
@@ -80,7 +80,7 @@ def a_class(out: Path, whos: Sequence[Who] = CLASS, faults: tuple[RosterFault, .
     run = BatchRun(
         state="complete",
         grader=__version__,
-        **described(rubric, str(rubric.path)),
+        **describe_rubric(rubric, str(rubric.path)),
         roster="roster.csv",
         started_at=datetime(2026, 11, 1, 10, tzinfo=timezone.utc),
         ended_at=datetime(2026, 11, 1, 11, tzinfo=timezone.utc),

@@ -8,7 +8,7 @@ from datetime import datetime
 
 import pytest
 
-from grader.classes.batch.flow import alone
+from grader.classes.batch.run import alone
 from grader.classes.review.background import Pace
 from grader.classes.review.session import open_session
 from grader.model.result import Override

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from grader.classes.similarity import compare
-from grader.classes.similarity.job import run
-from grader.classes.similarity.request import Request
+from grader.classes.similarity.comparison import Request
+from grader.classes.similarity.matching import compare_class
 from tests.similarity.classes import class_of, renamed, solution
 
 ROOT = Path(__file__).parent.parent.parent
@@ -81,7 +81,7 @@ int main(int argc, char **argv)
 
 
 def compared(folders, **also):
-    return run(
+    return compare_class(
         Request(folders=folders, **({"starter": (), "groups": {}, "threshold": 0.5, "jobs": 2} | also))
     )
 

@@ -14,7 +14,7 @@ from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.plan import Planned
 from grader.authoring.mutation.solution import Solution
 from grader.authoring.mutation.tree import Tree, unified_diff, write_tree
-from grader.classes.batch.workers import Graded, Job, grade_all
+from grader.classes.batch.gradings import Graded, Job, grade_all
 from grader.errors import HostError
 from grader.files import temporary_folder
 from grader.model.mutants import MutantResult, ReferenceResult, RubricTest

@@ -11,7 +11,7 @@ from grader.classes.gradebook import Book, Row
 from grader.errors import UsageError
 from grader.files import atomic_write
 from grader.intake import safe_name
-from grader.model.batch import MISSING, ROSTER, BatchRun, Entry
+from grader.model.batch import MISSING, ROSTER, BatchRun, CriterionInfo, Entry
 from grader.model.result import (
     CriterionResult,
     EnvironmentInfo,
@@ -33,7 +33,7 @@ BYTES_MAX = 64 << 20
 
 @dataclass(frozen=True)
 class BatchFolder:
-    """What a batch left in `path`, and is still writing where `run.state` is `running`."""
+    """What a batch left in `path`, or is still writing while `run.state` is `running`."""
 
     path: Path
     run: BatchRun
@@ -42,11 +42,11 @@ class BatchFolder:
         return self.path / safe_name(entry.id)
 
     def earlier(self, entry: Entry) -> GradingResult | None:
-        """The entry's result; None where there is none that can be read. Raises EvidenceError for a newer grader's."""
+        """Return the entry's result; None if none can be read. Raises EvidenceError for a newer grader's."""
         return read_result(self.folder_of(entry))
 
     def refuse_newer(self) -> None:
-        """Raise EvidenceError where a newer grader wrote one of the results: before anything is written beside it."""
+        """Raise EvidenceError if a newer grader wrote one of the results: before anything is written beside it."""
         for entry in self.run.entries:
             self.earlier(entry)
 
@@ -54,7 +54,7 @@ class BatchFolder:
         return (self.folder_of(entry) / EVIDENCE).is_dir()
 
     def book(self) -> Book:
-        """What the gradebook is of."""
+        """Return what the gradebook is about."""
         run = self.run
         return Book(
             title=run.title,
@@ -65,8 +65,8 @@ class BatchFolder:
         )
 
     def rows(self) -> Iterator[Row]:
-        """Every submission in the roster's order, read one by one; those that the roster itself keeps from being graded
-        come last. What has no result has one of status `error` here, that says so."""
+        """Yield every submission in the roster's order, read one by one; those that a faulty roster keeps from being
+        graded come last. One without a result has one of status `error` here, which says so."""
         known = set()
         for entry in self.run.entries:
             known.add(safe_name(entry.id).casefold())
@@ -79,11 +79,8 @@ class BatchFolder:
                 yield Row(entry=entry, result=self._without(entry, ROSTER, str(fault)))
 
     def _without(self, entry: Entry, kind: str, message: str) -> GradingResult:
-        hint = (
-            "correct the roster"
-            if kind == ROSTER
-            else "run `grader batch` again: it goes on where it stopped"
-        )
+        again = "run `grader batch` again: it goes on where it stopped"
+        hint = "correct the roster" if kind == ROSTER else again
         return GradingResult(
             submission=SubmissionInfo(
                 id=safe_name(entry.id), source=entry.source, commit=None, digest="", package=""
@@ -92,37 +89,38 @@ class BatchFolder:
             status="error",
             points=0.0,
             max_points=self.run.max_points,
-            criteria=tuple(
-                CriterionResult(
-                    id=c.id,
-                    title=c.title,
-                    check="",
-                    scenario=None,
-                    status=Status.ERROR,
-                    points=0.0,
-                    max_points=c.max_points,
-                    message="not judged",
-                    expected="",
-                    measured="",
-                    hint="",
-                    reproduce="",
-                    citations=(),
-                )
-                for c in self.run.criteria
-            ),
+            criteria=tuple(map(_not_judged, self.run.criteria)),
             environment=EnvironmentInfo(grader=__version__, ros="", python="", sandbox=""),
             timing=TimingInfo(wall_s=0.0, cpu_s=0.0, student_cpu_s=0.0),
             error=ErrorInfo(kind=kind, message=message, hint=hint),
         )
 
 
+def _not_judged(criterion: CriterionInfo) -> CriterionResult:
+    return CriterionResult(
+        id=criterion.id,
+        title=criterion.title,
+        check="",
+        scenario=None,
+        status=Status.ERROR,
+        points=0.0,
+        max_points=criterion.max_points,
+        message="not judged",
+        expected="",
+        measured="",
+        hint="",
+        reproduce="",
+        citations=(),
+    )
+
+
 def write_run(folder: Path, run: BatchRun) -> None:
-    """Raises OutputError."""
+    """Write `run.json`. Raises OutputError."""
     atomic_write(folder / RUN, json_text(run.model_dump(mode="json", by_alias=True)).encode())
 
 
 def open_batch(folder: Path) -> BatchFolder:
-    """The batch in `folder`. Raises UsageError where there is none."""
+    """Return the batch in `folder`. Raises UsageError if there is none."""
     path = folder / RUN
     try:
         data = path.read_bytes() if path.stat().st_size <= BYTES_MAX else b""

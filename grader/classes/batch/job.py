@@ -1,29 +1,46 @@
-"""What a batch hands to whoever grades one submission, and what comes back."""
+"""One submission of a class: its `Job`, how it is fetched and graded, and its `Outcome`.
+
+An executor does many jobs: `LocalExecutor` with processes of this machine, `classes.cluster` with other machines.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import datetime
+from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 from pydantic import Field
 
+from grader import __version__
+from grader.classes.fetching import NothingInTime, Obtained, Rule, obtain
+from grader.errors import GraderError, SubmissionError, UsageError
+from grader.faults import NOTHING_RUN, GradingContext, classify_errors, fault_of
+from grader.files import temporary_folder
+from grader.intake import safe_name, without_password
+from grader.judging.settle import settle
+from grader.judging.summary import passed
 from grader.model.batch import Entry
+from grader.model.progress import Silence
 from grader.model.record import Record
-from grader.model.result import GradingResult, HandedIn, Override
+from grader.model.result import NO_TIME, GradingResult, HandedIn, Override, SubmissionInfo
 from grader.model.submission import SandboxMode
+from grader.pipeline import GradeOptions, grade
 from grader.rubric.load import LoadedRubric
+from grader.workers import WorkerEnded, run_each
 
 OutcomeStatus = Literal["graded", "inconclusive", "error"]
+KILLED_HINT = "check whether this machine has too little memory, then grade it again with --only"
 
 
 class Job(Record):
     """One submission's grading into `out/<id>/`. It can be sent to another process, and to another machine.
 
     `before` is the time before which the commit that counts is looked for (`--before`), `overrides` map criteria to
-    what a person decided. `earlier` is the result of an earlier batch: where it is complete for the same commit, rubric
-    and grader, nothing is done, unless `again`. `commit` is the one to grade of a repository, whatever else is said.
+    what a person decided. `earlier` is the result of an earlier batch: if it is complete for the same commit, rubric
+    and grader, nothing is done, unless `again`. `commit` of a repository is graded, whatever else is said.
     What was fetched after `fetched_since` (seconds since 1970) is not fetched again.
     """
 
@@ -43,8 +60,8 @@ class Job(Record):
 class Outcome(Record):
     """What became of a job, in short: the rest is in its folder.
 
-    `kept`: the earlier result stays. `handed_in` is what was found out about the submission's time, None where it could
-    not be had. `message` and `hint` say in one line each why there is no result, or why the earlier one stays.
+    `kept`: the earlier result stays. `handed_in` is the submission's time, None if it could not be found out. `message`
+    and `hint` say in one line each why there is no result, or why the earlier one stays.
     """
 
     id: str
@@ -58,3 +75,159 @@ class Outcome(Record):
     message: str = ""
     hint: str = ""
     wall_s: float = 0.0
+
+
+class Executor(Protocol):
+    """Does many jobs at a time."""
+
+    def run(self, jobs: Iterable[Job], *, begun: Callable[[str], None]) -> Iterator[Outcome]:
+        """Yield each job's outcome as it comes. Jobs are taken when they can be started; `begun` gets the id of each.
+
+        There is an outcome for every job, whatever happens to it. When the caller stops iterating, running jobs are
+        interrupted and have cleaned up on return.
+        """
+        ...
+
+
+class LocalExecutor:
+    """`count` processes of this machine, each of which does one job at a time."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+
+    def run(self, jobs: Iterable[Job], *, begun: Callable[[str], None]) -> Iterator[Outcome]:
+        """See `Executor.run`."""
+        return run_each(
+            grade_job, jobs, self.count, ended=outcome_of_ended, begun=lambda job: begun(job.entry.id)
+        )
+
+
+def failed(job: Job, *, kind: str, message: str, hint: str) -> Outcome:
+    """Return the outcome of a job that could not be done."""
+    most = job.rubric.rubric.max_points
+    return Outcome(id=job.entry.id, status="error", max_points=most, kind=kind, message=message, hint=hint)
+
+
+def outcome_of_ended(job: Job, error: WorkerEnded) -> Outcome:
+    """Return the outcome of a job whose process ended, with kind `killed` or `interrupted`."""
+    if error.interrupted:
+        return failed(job, kind="interrupted", message="interrupted", hint="")
+    message = f"the process that graded it {error.reason}"
+    return failed(job, kind="killed", message=message, hint=KILLED_HINT)
+
+
+def grade_job(job: Job) -> Outcome:
+    """Fetch and grade the job's submission into `job.out/<its id>/`, unless that has been done already.
+
+    Raises KeyboardInterrupt, and nothing else.
+    """
+    begun = time.monotonic()
+    try:
+        with temporary_folder("fetch") as folder:
+            outcome = _grade(job, folder)
+    except Exception as error:  # noqa: BLE001 - whatever it is, the others are graded
+        fault = fault_of(error)
+        outcome = failed(job, kind=fault.kind, message=fault.message, hint=fault.note or fault.hint)
+    return outcome.model_copy(update={"wall_s": round(time.monotonic() - begun, 3)})
+
+
+def _grade(job: Job, folder: Path) -> Outcome:
+    try:
+        obtained = _fetch(job, folder)
+    except Exception as error:
+        fault = fault_of(error)
+        if job.earlier is not None and job.earlier.status != "error" and not isinstance(fault, NothingInTime):
+            return _outcome(job, job.earlier, kept=True, fault=fault)
+        with classify_errors(_attempt(job)):
+            raise
+
+    def settle_result(result: GradingResult) -> GradingResult:
+        before = job.earlier.overrides if job.earlier else ()
+        return settle(
+            result, job.rubric.rubric, overrides=job.overrides, handed_in=obtained.handed_in, before=before
+        )
+
+    options = GradeOptions(
+        sandbox=job.sandbox,
+        submission_id=safe_name(job.entry.id),
+        static_only=job.static_only,
+        tidy=False,
+        find_earlier=partial(_find_complete, job),
+        settle=settle_result,
+    )
+    result = grade(obtained.source, job.rubric, job.out, options, Silence())
+    return _outcome(job, result, kept=result is job.earlier, handed_in=obtained.handed_in)
+
+
+def _fetch(job: Job, folder: Path) -> Obtained:
+    """A missing source is the submission's fault here, not the command line's."""
+    rubric = job.rubric.rubric
+    rule = Rule(
+        deadline=rubric.deadline,
+        late=rubric.late is not None,
+        cut_off_days=rubric.late.cut_off_days if rubric.late else None,
+        before=job.before,
+    )
+    try:
+        return obtain(job.entry, rule, workdir=folder, fetched_since=job.fetched_since, commit=job.commit)
+    except UsageError as error:
+        raise SubmissionError(error.message, hint=error.hint) from error
+
+
+def _attempt(job: Job) -> GradingContext:
+    """Return what the result of a submission that could not be fetched says."""
+    about = SubmissionInfo(
+        id=safe_name(job.entry.id),
+        source=without_password(job.entry.source),
+        commit=None,
+        digest="",
+        package="",
+    )
+    return GradingContext(
+        source=about.source,
+        submission_id=about.id,
+        rubric=job.rubric,
+        out=job.out,
+        keep_hidden=True,
+        timing=lambda: NO_TIME,
+        submission=about,
+    )
+
+
+def _find_complete(job: Job, about: SubmissionInfo) -> GradingResult | None:
+    """Return the earlier result if it is complete for the same commit, content, rubric and grader."""
+    earlier = job.earlier
+    if earlier is None or earlier.status == "error" or job.again:
+        return None
+    static = earlier.environment.sandbox == NOTHING_RUN
+    is_same = (
+        (earlier.submission.commit, earlier.submission.digest) == (about.commit, about.digest)
+        and earlier.rubric.digest == job.rubric.digest
+        and earlier.environment.grader == __version__
+        and (job.static_only or not static or not job.rubric.rubric.scenarios)
+    )
+    return earlier if is_same else None
+
+
+def _outcome(
+    job: Job,
+    result: GradingResult,
+    *,
+    kept: bool,
+    handed_in: HandedIn | None = None,
+    fault: GraderError | None = None,
+) -> Outcome:
+    error = fault or result.error
+    message = error.message if error else ""
+    return Outcome(
+        id=job.entry.id,
+        status=result.status,
+        points=result.points,
+        max_points=result.max_points,
+        passed=passed(job.rubric.rubric, result),
+        kept=kept,
+        handed_in=handed_in,
+        kind=error.kind if error else "",
+        message=f"{message}; the earlier result stays" if fault else message,
+        hint=error.hint if error else "",
+    )

@@ -1,19 +1,38 @@
-"""How far a batch is: what is done, running, waiting and failed, and how long the rest takes."""
+"""What a batch tells people: how far it is while it runs, and afterwards what needs their attention."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
+from grader.classes.batch.folder import BatchFolder
 from grader.classes.batch.job import Outcome
+from grader.classes.gradebook import Row
+from grader.classes.overrides import FILE as OVERRIDES
+from grader.model.batch import MISSING, ROSTER
+from grader.model.result import CriterionResult
+from grader.model.verdict import Status
 
 LATELY = 40
-"""So many of the last gradings say how fast it goes now."""
+"""The pace is that of so many of the last gradings."""
+OPEN = {
+    Status.INCONCLUSIVE: "could not be judged",
+    Status.MANUAL: "waits for a person",
+    Status.ERROR: "failed",
+}
+NAMES_SHOWN = 4
+NEXT_STEPS = {
+    "error": "{count} could not be graded; once that is fixed: --only failed",
+    "inconclusive": "{count} inconclusive; to grade them again: --only inconclusive",
+    "manual": "{count} with criteria that a person decides: their points go into {overrides}",
+    "missing": "{count} not graded yet: the same command goes on with them",
+}
 
 
 @dataclass
-class Course:
+class BatchProgress:
     """Counts of a batch. `total` are the submissions that were asked for, `points_sum` is over those with points."""
 
     clock: Callable[[], float] = time.monotonic
@@ -29,16 +48,16 @@ class Course:
     _paced_s: float = 0.0
 
     def planned(self, total: int) -> None:
-        """So many submissions are to be done."""
+        """`total` submissions will be graded."""
         self.total = total
         self._begun_s = self.clock()
 
     def begun(self, name: str) -> None:
-        """One more is being done."""
+        """The submission of that id begins."""
         self.running[name] = self.clock()
 
     def ended(self, outcome: Outcome) -> None:
-        """One of those came to its end."""
+        """A submission has its outcome."""
         self.running.pop(outcome.id, None)
         self.graded += outcome.status == "graded"
         self.inconclusive += outcome.status == "inconclusive"
@@ -60,22 +79,64 @@ class Course:
 
     @property
     def mean_points(self) -> float | None:
-        """Of those that have points; None as long as there is none."""
+        """The mean points of those that have points; None as long as there are none."""
         judged = self.graded + self.inconclusive
         return self.points_sum / judged if judged else None
 
     @property
-    def elapsed_s(self) -> float:
-        return self.clock() - self._begun_s
-
-    @property
     def left_s(self) -> float | None:
-        """For what is left, at the pace of the last gradings; None before two of them have ended.
+        """The time that is left, at the pace of the last gradings; None before two of them have ended.
 
-        What is found complete costs nearly nothing, so the pace is that of what was really graded.
+        What was complete before takes nearly no time, so it does not count towards the pace.
         """
         if len(self._ends_s) < 2:
             return None
         few = len(self._ends_s) <= LATELY
         begin_s, count = (self._paced_s, len(self._ends_s)) if few else (self._ends_s[0], LATELY)
         return (self.clock() - begin_s) / count * (self.total - self.done)
+
+
+def list_attention(folder: BatchFolder) -> Iterator[str]:
+    """Yield why each submission that is not graded is not, then how to go on with them."""
+    found: Counter[str] = Counter()
+    for row in folder.rows():
+        state = _state(row)
+        found[state] += 1
+        if state == "error":
+            error = row.result.error
+            yield f"{_name(row)}: error: {error.message if error else _open(row)}"
+        elif state == "inconclusive":
+            yield f"{_name(row)}: inconclusive: {_open(row)}"
+        for override in row.result.overrides:
+            if override.changed:
+                yield f"{row.entry.id}: {override.criterion}: a person decided, and the check says something else now"
+    for state, words in NEXT_STEPS.items():
+        if found[state]:
+            yield words.format(count=found[state], overrides=folder.path / OVERRIDES)
+
+
+def _name(row: Row) -> str:
+    """Return the id, with the line of the roster unless the error names it already."""
+    error = row.result.error
+    told = error is not None and error.kind == ROSTER
+    return row.entry.id if told or not row.entry.where else f"{row.entry.id} ({row.entry.where})"
+
+
+def _state(row: Row) -> str:
+    """Return the result's status, or `missing` if there is none yet, or `manual` if only people's criteria are open."""
+    result = row.result
+    if result.error is not None and result.error.kind == MISSING:
+        return "missing"
+    if result.status == "inconclusive" and {c.status for c in _waiting(row)} == {Status.MANUAL}:
+        return "manual"
+    return result.status
+
+
+def _waiting(row: Row) -> tuple[CriterionResult, ...]:
+    return tuple(c for c in row.result.criteria if c.status in OPEN and c.max_points > 0)
+
+
+def _open(row: Row) -> str:
+    names = [f"{c.id} ({OPEN[c.status]})" for c in _waiting(row)]
+    more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
+    return ", ".join(names[:NAMES_SHOWN]) + more

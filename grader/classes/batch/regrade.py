@@ -10,11 +10,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader import __version__
-from grader.classes.batch.executor import Hands
-from grader.classes.batch.flow import BatchOptions, Watcher, alone, described, ids_of, run_batch, write_books
 from grader.classes.batch.folder import BatchFolder, write_run
+from grader.classes.batch.job import Executor
 from grader.classes.batch.judging import Judged, judge_all
-from grader.classes.batch.settled import Settler, rewrite
+from grader.classes.batch.reports import Settler, rewrite
+from grader.classes.batch.run import (
+    BatchOptions,
+    Watcher,
+    alone,
+    describe_rubric,
+    ids_of,
+    run_batch,
+    write_books,
+)
 from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import read_overrides
 from grader.errors import GraderError
@@ -33,7 +41,7 @@ COLUMNS = ("id", "criterion", "status before", "status", "points before", "point
 
 @dataclass(frozen=True, kw_only=True)
 class Change:
-    """One criterion that came to something else. One that is new has no `before`, one that is gone no `after`."""
+    """One criterion whose status or points changed. A new one has no `before`, one that is gone no `after`."""
 
     criterion: str
     before: CriterionResult | None
@@ -43,13 +51,13 @@ class Change:
     def why(self) -> str:
         """What the check says now."""
         if self.after is None:
-            return "the rubric has it no more"
+            return "the rubric no longer has it"
         return self.after.message or self.after.measured or self.after.title
 
 
 @dataclass(frozen=True, kw_only=True)
 class Regraded:
-    """One submission: its result before and after, and the scenarios of which there is no recording that fits.
+    """One submission: its result before and after, and the scenarios without a recording that fits.
 
     `error` says in one line why it could not be judged: its result stays as it was.
     """
@@ -82,11 +90,11 @@ def _differs(change: Change) -> bool:
 def regrade(
     folder: BatchFolder, rubric: LoadedRubric, rubric_source: str, jobs: int
 ) -> tuple[BatchFolder, tuple[Regraded, ...]]:
-    """Judge every submission of the batch again; gives the folder as it is now and what became of each, in order.
+    """Judge every submission of the batch again; return the folder as it is now and what became of each, in order.
 
     Writes each `result.json` with its reports, `run.json`, `results.jsonl`, `gradebook.csv` and `changes.csv`.
-    Raises UsageError for faulty overrides, EvidenceError where a newer grader has written there, Busy where a batch
-    works in the folder, OutputError.
+    Raises UsageError for faulty overrides, EvidenceError if a newer grader has written there, Busy if a batch works in
+    the folder, OutputError.
     """
     with alone(folder.path):
         folder.refuse_newer()
@@ -95,21 +103,21 @@ def regrade(
         settler = Settler(rubric.rubric, overrides)
         by_folder = {folder.folder_of(entry): entry for entry in entries if folder.has_evidence(entry)}
         found = {
-            judged.folder: _regraded(folder, rubric, settler, by_folder[judged.folder.parent], judged)
+            judged.folder: _regrade_one(folder, rubric, settler, by_folder[judged.folder.parent], judged)
             for judged in judge_all([path / EVIDENCE for path in by_folder], rubric, jobs, fitting=True)
         }
         regraded = tuple(
-            found.get(folder.folder_of(entry) / EVIDENCE) or _without_evidence(folder, rubric, settler, entry)
+            found.get(folder.folder_of(entry) / EVIDENCE) or _settle_only(folder, rubric, settler, entry)
             for entry in entries
         )
-        run = folder.run.model_copy(update=described(rubric, rubric_source) | {"grader": __version__})
+        run = folder.run.model_copy(update=describe_rubric(rubric, rubric_source) | {"grader": __version__})
         now = BatchFolder(folder.path, run)
         write_run(now.path, now.run)
         write_changes(folder.path / CHANGES, regraded)
         return write_books(now, rubric.rubric, run.state, run.counts.kept, ended_at=run.ended_at), regraded
 
 
-def _regraded(
+def _regrade_one(
     folder: BatchFolder, rubric: LoadedRubric, settler: Settler, entry: Entry, judged: Judged
 ) -> Regraded:
     before = folder.earlier(entry)
@@ -117,7 +125,7 @@ def _regraded(
         return Regraded(entry=entry, before=before, after=None, error=judged.error or "it has no result")
     automatic = before.model_copy(
         update={
-            "rubric": described(rubric, "")["rubric"],
+            "rubric": describe_rubric(rubric, "")["rubric"],
             "criteria": judged.criteria,
             "status": overall_status(judged.criteria),
             "points": total_points(rubric.rubric, judged.criteria),
@@ -129,10 +137,10 @@ def _regraded(
             "error": None,
         }
     )
-    handed_in = before.handed_in and before.handed_in.model_copy(
-        update={"deadline": None}
-    )  # the rubric's of today
-    after = settler.settled(automatic, entry.id, handed_in, before)
+    handed_in = before.handed_in
+    if handed_in is not None:  # the deadline is that of today's rubric
+        handed_in = handed_in.model_copy(update={"deadline": None})
+    after = settler.settle(automatic, entry.id, handed_in, before)
     try:
         if after != before:
             rewrite(folder.folder_of(entry), after, rubric.rubric, rubric.docs)
@@ -141,17 +149,18 @@ def _regraded(
     return Regraded(entry=entry, before=before, after=after, missing=judged.missing)
 
 
-def _without_evidence(folder: BatchFolder, rubric: LoadedRubric, settler: Settler, entry: Entry) -> Regraded:
-    """What could not be graded has what people gave for it."""
+def _settle_only(folder: BatchFolder, rubric: LoadedRubric, settler: Settler, entry: Entry) -> Regraded:
+    """Apply overrides to what could not be graded."""
     before = folder.earlier(entry)
     error = before.error.message if before is not None and before.error else "nothing was recorded"
     if before is not None and (settler.of(entry.id) or before.overrides):
-        rewrite(folder.folder_of(entry), settler.again(before, entry.id, None), rubric.rubric, rubric.docs)
+        now = settler.settle_again(before, entry.id, None)
+        rewrite(folder.folder_of(entry), now, rubric.rubric, rubric.docs)
     return Regraded(entry=entry, before=before, after=None, error=error)
 
 
 def write_changes(path: Path, regraded: Sequence[Regraded]) -> None:
-    """Each criterion that changed, a row each. Raises OutputError."""
+    """Write a row for each criterion that changed. Raises OutputError."""
     atomic_write(path, csv_text([COLUMNS, *_rows(regraded)]).encode("utf-8"))
 
 
@@ -176,11 +185,11 @@ def run_missing(
     rubric: LoadedRubric,
     regraded: Sequence[Regraded],
     *,
-    hands: Hands,
+    executor: Executor,
     watcher: Watcher,
     sandbox: SandboxMode,
 ) -> tuple[BatchFolder, tuple[Regraded, ...]]:
-    """Grade anew, of the same commits, what has scenarios that were not recorded; gives what `regrade` gives.
+    """Grade again, from the same commits, what has scenarios that were not recorded; return what `regrade` returns.
 
     Credentials come from the environment or from git: the batch's folder holds none.
     """
@@ -201,13 +210,13 @@ def run_missing(
         allow_local=folder.run.allow_local,
         remote_only=folder.run.remote_only,
     )
-    now = run_batch(roster, folder.run.rubric_source, rubric, options, hands=hands, watcher=watcher)
-    after = tuple(_run_again(now, one) if one.missing else one for one in regraded)
+    now = run_batch(roster, folder.run.rubric_source, rubric, options, executor=executor, watcher=watcher)
+    after = tuple(_compare_run(now, one) if one.missing else one for one in regraded)
     write_changes(folder.path / CHANGES, after)
     return now, after
 
 
-def _run_again(folder: BatchFolder, one: Regraded) -> Regraded:
+def _compare_run(folder: BatchFolder, one: Regraded) -> Regraded:
     result = folder.earlier(one.entry)
     failed = result is None or result.status == "error"
     return Regraded(

@@ -1,29 +1,39 @@
-"""The reports of results that are there already, written again from `result.json` and evidence: nothing is judged."""
+"""Results that exist already: settled again, and their reports written again. Nothing is judged.
+
+To settle is to apply what people decided (overrides) and what being late costs (deadlines) to an automatic result.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from grader.classes.batch.pool import side_by_side, workers, working
-from grader.classes.batch.settled import figures_in
+from grader.checks import CHECKS
+from grader.classes.batch.judging import fitting_runs
 from grader.errors import EvidenceError, GraderError, UsageError
+from grader.evidence.reader import load_evidence
 from grader.files import new_file, unwritable
-from grader.model.result import GradingResult
-from grader.report.files import render_files
+from grader.judging.settle import settle, unsettled
+from grader.model.figure import Figures
+from grader.model.result import GradingResult, HandedIn, Override
+from grader.report.figures import figures_of
+from grader.report.files import render_files, write_reports
 from grader.report.forms import Shown
 from grader.report.sentences import missing_hidden
-from grader.results import RESULT, Results, read_result
+from grader.results import EVIDENCE, RESULT, Results, read_result
 from grader.rubric.load import LoadedRubric
+from grader.rubric.model import Rubric
+from grader.workers import WorkerEnded, run_each
+
+CONSOLE = "console.log"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Written:
-    """What became of one submission: its reports are written, or `error` says in one line why not."""
+    """One submission's reports are written, or `error` says in one line why not."""
 
     folder: Path
     rubric_digest: str = ""
@@ -32,23 +42,19 @@ class Written:
 
 
 def write_all(folders: Sequence[Path], rubric: LoadedRubric, jobs: int) -> Iterator[Written]:
-    """Each submission's reports, `jobs` at a time, each as it comes. What is wrong with one stops no other."""
-    left = dict.fromkeys(folders)
-    work = partial(_written, rubric)
-    with suppress(BrokenProcessPool), workers(min(jobs, len(left))) as pool:
-        for written in side_by_side(pool, work, tuple(left), most=2 * jobs):
-            del left[written.folder]
-            yield written
-    for folder in left:  # a process has ended: nobody knows on which of them
-        yield Written(
-            folder=folder, error=f"{folder}: the process that wrote it has ended", hint="write it by itself"
-        )
+    """Write each submission's reports, `jobs` at a time; yield each as it comes. A faulty one stops no other."""
+    return run_each(partial(_try_write, rubric), folders, min(jobs, len(folders)), ended=_writing_ended)
+
+
+def _writing_ended(folder: Path, error: WorkerEnded) -> Written:
+    message = f"{folder}: the process that wrote it {error.reason}"
+    return Written(folder=folder, error=message, hint="write it by itself")
 
 
 def write_one(folder: Path, rubric: LoadedRubric) -> GradingResult:
-    """Write `report.html`, `report.md` and `junit.xml` anew into a submission's folder; gives its result.
+    """Write `report.html`, `report.md` and `junit.xml` again into a submission's folder; return its result.
 
-    Each appears whole; they are not flushed to the disk, for they can always be made again. Raises EvidenceError where
+    Each appears whole; they are not flushed to the disk, since they can always be made again. Raises EvidenceError if
     there is no result that can be read, and as `Results` does.
     """
     result_in(folder, rubric)  # before anything is made there
@@ -74,12 +80,12 @@ def write_one(folder: Path, rubric: LoadedRubric) -> GradingResult:
 
 
 def has_result(folder: Path) -> bool:
-    """Whether it is a submission's folder of results."""
+    """Whether `folder` holds a submission's results."""
     return (folder / RESULT).is_file()
 
 
 def result_in(folder: Path, rubric: LoadedRubric | None = None) -> GradingResult:
-    """A submission's result. Raises EvidenceError, and UsageError where it is of another lab than `rubric`."""
+    """Return a submission's result. Raises EvidenceError, and UsageError if it is of another lab than `rubric`."""
     result = read_result(folder)
     if result is None:
         message = f"{folder / RESULT}: there is none, or it is not what this grader writes"
@@ -90,14 +96,67 @@ def result_in(folder: Path, rubric: LoadedRubric | None = None) -> GradingResult
     return result
 
 
-def _written(rubric: LoadedRubric, folder: Path) -> Written:
+def _try_write(rubric: LoadedRubric, folder: Path) -> Written:
     """In a worker."""
-    with working():
-        try:
-            result = write_one(folder, rubric)
-        except GraderError as error:
-            return Written(folder=folder, error=error.message, hint=error.hint)
-        except Exception as error:  # noqa: BLE001 - whatever it is, the others are written
-            message = f"{folder}: internal error: {type(error).__name__}: {error}"
-            return Written(folder=folder, error=message, hint="write it by itself with --debug")
-        return Written(folder=folder, rubric_digest=result.rubric.digest)
+    try:
+        result = write_one(folder, rubric)
+    except GraderError as error:
+        return Written(folder=folder, error=error.message, hint=error.hint)
+    except Exception as error:  # noqa: BLE001 - whatever it is, the others are written
+        message = f"{folder}: internal error: {type(error).__name__}: {error}"
+        return Written(folder=folder, error=message, hint="write it by itself with --debug")
+    return Written(folder=folder, rubric_digest=result.rubric.digest)
+
+
+@dataclass(frozen=True)
+class Settler:
+    """Settles results by the rubric's late policy and by `overrides`: by submission, then by criterion."""
+
+    rubric: Rubric
+    overrides: Mapping[str, Mapping[str, Override]]
+
+    def of(self, submission_id: str) -> Mapping[str, Override]:
+        """Return a submission's overrides, by criterion."""
+        return self.overrides.get(submission_id, {})
+
+    def settle(
+        self, automatic: GradingResult, submission_id: str, handed_in: HandedIn | None, earlier: GradingResult
+    ) -> GradingResult:
+        """Return the result that counts, made from an automatic one; `earlier` is the result that it replaces."""
+        return settle(
+            automatic,
+            self.rubric,
+            overrides=self.of(submission_id),
+            handed_in=handed_in or earlier.handed_in,
+            before=earlier.overrides,
+        )
+
+    def settle_again(
+        self, result: GradingResult, submission_id: str, handed_in: HandedIn | None
+    ) -> GradingResult:
+        """Return the same result as it counts now: overrides or extensions may have come since."""
+        automatic = unsettled(result, self.rubric)
+        return self.settle(automatic, submission_id, handed_in, result)
+
+
+def rewrite(
+    folder: Path, result: GradingResult, rubric: Rubric, docs: Mapping[str, Mapping[str, str]] | None = None
+) -> None:
+    """Write the result's reports; its evidence stays. Raises as `Results` does.
+
+    `docs` has the sections of the checks' docstrings; by default those of the grader's own checks.
+    """
+    with Results(folder) as results:
+        figures = figures_in(folder, result, rubric)
+        docs = docs or {name: check.sections for name, check in CHECKS.items()}
+        write_reports(result, results.new, console="", rubric=rubric, figures=figures, docs=docs)
+        (results.new / CONSOLE).unlink()
+        results.commit(keep=(EVIDENCE, CONSOLE))
+
+
+def figures_in(folder: Path, result: GradingResult, rubric: Rubric) -> Figures | None:
+    """Return the figures of a submission's evidence; None if there is none, or it cannot be read."""
+    with suppress(Exception):  # no mark depends on a picture
+        runs = fitting_runs(rubric, load_evidence([folder / EVIDENCE]))
+        return figures_of(rubric, runs, result.criteria)
+    return None

@@ -1,9 +1,9 @@
-"""The submissions of a batch graded by the workers of a Dask cluster.
+"""The submissions of a batch graded by the workers of a Dask cluster; Dask does the scheduling.
 
-Results come back as files: a worker packs a submission's folder into one file and leaves it in the exchange, the client
-unpacks it into place. Nobody but the client writes into the batch's folder.
+Jobs go out as tasks, results come back as files: a worker packs a submission's folder into one file in the exchange,
+and the client, which alone writes into the batch's folder, unpacks it into place.
 """
 
-from grader.classes.cluster.hands import ClusterHands
+from grader.classes.cluster.executor import ClusterExecutor
 
-__all__ = ["ClusterHands"]
+__all__ = ["ClusterExecutor"]

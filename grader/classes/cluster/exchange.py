@@ -1,26 +1,46 @@
-"""Where results lie between a worker and the client: a folder that both reach, by its path or by any fsspec URL."""
+"""Results on their way from a worker to the client: packed into one file, in a folder that both reach.
+
+The folder is a path or any fsspec URL. Nothing in a packed file is trusted.
+"""
 
 from __future__ import annotations
 
 import hashlib
-import re
 import secrets
+import tarfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 from urllib.parse import urlsplit
 
-from grader.errors import HostError, UsageError
+from grader.classes.batch.job import Job, Outcome
+from grader.errors import HostError, PackageNotFound, SubmissionError, UsageError
 from grader.files import make_folder
 from grader.model.record import Record
 
 TOKEN_BYTES = 8
-SUFFIX = ".tar.gz"
-PART = ".part"
 CHUNK_BYTES = 1 << 20
+PARCEL_BYTES = 1 << 30
+UNPACKED_BYTES = 2 << 30
+ENTRIES = 10_000
+LEVEL = 1  # evidence is compressed already
 OWN_MEMORY = ("memory", "local+memory")
 HELLO = "hello"
+BLAME_SUBMISSION = (SubmissionError.kind, PackageNotFound.kind)
+
+
+class Errand(Record):
+    """A job on its way to a worker. `exchange` is the URL for its results, `batch` names the client's batch.
+
+    `seen`: the job's source is a path that the client sees.
+    """
+
+    job: Job
+    exchange: str
+    batch: str
+    seen: bool
 
 
 class Parcel(Record):
@@ -31,93 +51,107 @@ class Parcel(Record):
     sha256: str
 
 
-class Exchange:
-    """The folder at `url`. It can be sent to another machine, which reaches it with credentials of its own.
+class Report(Record):
+    """What became of an errand. Without a `parcel` there are no results to put into place."""
 
-    What cannot be read or written raises HostError, FileNotFoundError for a parcel that is not there.
+    outcome: Outcome
+    parcel: Parcel | None = None
+
+
+def is_machines(outcome: Outcome) -> bool:
+    """Whether it is an error that is not the submission's."""
+    return outcome.status == "error" and outcome.kind not in BLAME_SUBMISSION
+
+
+class Exchange:
+    """The folder at `url`. Each machine reaches it with credentials of its own.
+
+    What cannot be read or written raises HostError, or FileNotFoundError for a parcel that is not there.
     """
 
     def __init__(self, url: str) -> None:
         self.url = url.rstrip("/")
 
     def make(self) -> None:
-        """Make the folder, and empty it of what an earlier batch left."""
-        with _told(self, "written"):
-            place, root = self._open()
-            if place.exists(root):
-                place.rm(root, recursive=True)
+        """Make the folder, without what an earlier batch left there."""
+        self.remove()
+        with self._open("written") as (files, root):
             if "://" in self.url:
-                place.makedirs(root, exist_ok=True)
+                files.makedirs(root, exist_ok=True)
             elif not make_folder(Path(root)):
                 raise FileExistsError("somebody else has just made it")
 
     def remove(self) -> None:
-        """The folder and everything in it."""
-        with _told(self, "written"):
-            place, root = self._open()
-            if place.exists(root):
-                place.rm(root, recursive=True)
+        """Delete the folder and everything in it."""
+        with self._open("written") as (files, root):
+            if files.exists(root):
+                files.rm(root, recursive=True)
 
     def put(self, local: Path, job_id: str) -> Parcel:
-        """Upload a file as a new attempt of that job: whole or not at all."""
-        name = f"{job_id}.{secrets.token_hex(TOKEN_BYTES)}{SUFFIX}"
+        """Upload a file under a name of its own: another attempt at the same job does not overwrite it."""
+        digest = hashlib.sha256()
         with local.open("rb") as file:
-            digest = _digest(file)
-        with _told(self, "written"):
-            place, root = self._open()
-            place.put_file(str(local), f"{root}/{name}{PART}")
-            place.mv(f"{root}/{name}{PART}", f"{root}/{name}")
-        return Parcel(name=name, size=local.stat().st_size, sha256=digest)
+            while chunk := file.read(CHUNK_BYTES):
+                digest.update(chunk)
+        name = f"{job_id}.{secrets.token_hex(TOKEN_BYTES)}.tar.gz"
+        with self._open("written") as (files, root):
+            files.put_file(str(local), f"{root}/{name}")
+        return Parcel(name=name, size=local.stat().st_size, sha256=digest.hexdigest())
 
     def open(self, parcel: Parcel) -> BinaryIO:
-        """The parcel's bytes."""
-        with _told(self, "read"):
-            place, root = self._open()
-            return cast("BinaryIO", place.open(f"{root}/{parcel.name}", "rb"))
+        """Return a stream of the parcel's bytes."""
+        with self._open("read") as (files, root):
+            return cast("BinaryIO", files.open(f"{root}/{parcel.name}", "rb"))
 
-    def forget(self, job_id: str) -> None:
-        """Delete every attempt of that job."""
-        attempt = re.compile(
-            rf"{re.escape(job_id)}\.[0-9a-f]{{{2 * TOKEN_BYTES}}}{re.escape(SUFFIX)}({re.escape(PART)})?"
-        )
-        with _told(self, "written"):
-            place, root = self._open()
-            for path in place.ls(root, detail=False):
-                if attempt.fullmatch(path.rsplit("/", 1)[-1]):
-                    place.rm_file(path)
+    def delete(self, parcel: Parcel) -> None:
+        """Delete the parcel."""
+        with self._open("written") as (files, root):
+            files.rm_file(f"{root}/{parcel.name}")
 
     def greet(self, word: str) -> None:
-        """Leave a word for the workers: who reads it is at the same place."""
-        with _told(self, "written"):
-            place, root = self._open()
-            place.pipe_file(f"{root}/{HELLO}", word.encode())
+        """Leave a word: a worker that reads it reaches the same folder."""
+        with self._open("written") as (files, root):
+            files.pipe_file(f"{root}/{HELLO}", word.encode())
 
     def answers(self, word: str) -> bool:
-        """Whether the client's word is there, and something can be written beside it."""
-        with _told(self, "written"):
-            place, root = self._open()
-            if not place.exists(f"{root}/{HELLO}") or place.cat_file(f"{root}/{HELLO}") != word.encode():
+        """Whether the client's word is there, and a file can be written beside it."""
+        with self._open("written") as (files, root):
+            if not files.exists(f"{root}/{HELLO}") or files.cat_file(f"{root}/{HELLO}") != word.encode():
                 return False
             mine = f"{root}/{HELLO}.{secrets.token_hex(TOKEN_BYTES)}"
-            place.pipe_file(mine, b"")
-            place.rm_file(mine)
+            files.pipe_file(mine, b"")
+            files.rm_file(mine)
             return True
 
-    def _open(self) -> tuple[Any, str]:
-        """The file system and the folder's name in it; one for each thread, since not all of them can be shared."""
+    @contextmanager
+    def _open(self, purpose: str) -> Iterator[tuple[Any, str]]:
+        """The file system and the folder's name in it. Whatever it raises becomes a HostError that names the exchange.
+
+        Each thread opens its own, since not every file system can be shared.
+        """
         import fsspec  # noqa: PLC0415 - of the extra `cluster`
 
-        if "://" not in self.url:
-            return fsspec.filesystem("file"), self.url
-        place, root = fsspec.core.url_to_fs(self.url)
-        place.invalidate_cache()
-        return place, root.rstrip("/")
+        try:
+            if "://" in self.url:
+                files, root = fsspec.core.url_to_fs(self.url)
+                files.invalidate_cache()
+                yield files, root.rstrip("/")
+            else:
+                yield fsspec.filesystem("file"), self.url
+        except (FileNotFoundError, HostError):
+            raise
+        except Exception as error:
+            reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
+            raise HostError(
+                f"the exchange {self.url} cannot be {purpose}: {reason}",
+                hint="give --exchange a folder or URL that this machine and every worker can write",
+            ) from error
 
 
-def checked_url(text: str) -> str:
-    """What `--exchange` says, a path made absolute.
+def check_url(text: str) -> str:
+    """Return what `--exchange` says, a path made absolute.
 
-    Raises UsageError for what the workers cannot reach, and for a password: it would be sent to all of them.
+    Raises UsageError for what workers cannot reach, and for a password: it would be sent to all of them.
     """
     if "://" not in text:
         return str(Path(text).absolute())
@@ -143,23 +177,57 @@ def checked_url(text: str) -> str:
     return text
 
 
-def _digest(file: BinaryIO) -> str:
-    digest = hashlib.sha256()
-    while chunk := file.read(CHUNK_BYTES):
-        digest.update(chunk)
-    return digest.hexdigest()
+def pack(folder: Path, file: Path) -> None:
+    """Pack everything in `folder`, without the grader's own hidden files."""
+    with tarfile.open(file, "x:gz", compresslevel=LEVEL) as archive:
+        for path in sorted(folder.iterdir()):
+            if not path.name.startswith("."):
+                archive.add(path, arcname=path.name)
 
 
-@contextmanager
-def _told(exchange: Exchange, what: str) -> Iterator[None]:
-    """Whatever a file system raises becomes HostError that names the exchange."""
+def unpack(stream: BinaryIO, parcel: Parcel, folder: Path) -> None:
+    """Unpack the parcel's files into `folder`. Raises HostError for other content than was sent, for more than results
+    ever are, and for anything that is neither file nor folder or leads out; `folder` is then to be thrown away."""
+    measured = _Measured(stream, parcel)
     try:
-        yield
-    except (FileNotFoundError, HostError):
-        raise
-    except Exception as error:
-        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
-        raise HostError(
-            f"the exchange {exchange.url} cannot be {what}: {reason}",
-            hint="give --exchange a folder or URL that this machine and every worker can write",
-        ) from error
+        with tarfile.open(fileobj=cast("BinaryIO", measured), mode="r|gz") as archive:
+            _extract(archive, parcel, folder)
+        while measured.read(CHUNK_BYTES):
+            pass
+    except (tarfile.TarError, zlib.error, EOFError, ValueError, OSError) as error:
+        raise _refuse(parcel, str(error) or type(error).__name__) from error
+    if (measured.size, measured.digest.hexdigest()) != (parcel.size, parcel.sha256):
+        raise _refuse(parcel, "it is not what the worker sent")
+
+
+def _extract(archive: tarfile.TarFile, parcel: Parcel, folder: Path) -> None:
+    size, count = 0, 0
+    while (member := archive.next()) is not None:
+        size, count = size + member.size, count + 1
+        if count > ENTRIES or size > UNPACKED_BYTES:
+            raise _refuse(parcel, "it holds more than results ever are")
+        if not (member.isreg() or member.isdir()):
+            raise _refuse(parcel, "it holds something that is neither file nor folder")
+        archive.extract(member, folder, set_attrs=False, filter="data")
+        archive.members = []  # type: ignore[attr-defined] # it would keep all of them in memory
+
+
+class _Measured:
+    """A stream that counts and digests what is read from it."""
+
+    def __init__(self, stream: BinaryIO, parcel: Parcel) -> None:
+        self._stream, self._parcel = stream, parcel
+        self.size, self.digest = 0, hashlib.sha256()
+
+    def read(self, size: int) -> bytes:
+        data = self._stream.read(size)
+        self.size += len(data)
+        self.digest.update(data)
+        if self.size > min(self._parcel.size, PARCEL_BYTES):
+            raise _refuse(self._parcel, "it is larger than what the worker sent")
+        return data
+
+
+def _refuse(parcel: Parcel, why: str) -> HostError:
+    hint = "check whether somebody else writes into the exchange"
+    return HostError(f"{parcel.name} cannot be unpacked: {why}", hint=hint)

@@ -13,9 +13,9 @@ from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 
-from grader.classes.batch.flow import GRADEBOOK, alone, ids_of, write_books
 from grader.classes.batch.folder import BatchFolder, open_batch, write_run
-from grader.classes.batch.settled import Settler, rewrite
+from grader.classes.batch.reports import Settler, rewrite
+from grader.classes.batch.run import GRADEBOOK, alone, ids_of, write_books
 from grader.classes.overrides import FILE, Overrides, read_overrides
 from grader.classes.overrides.write import write_override
 from grader.classes.review.background import BackgroundWriter, Pace
@@ -115,7 +115,7 @@ class ReviewSession:
             or not self._behind(item, result, overrides)
         ):
             return result
-        return Settler(self.rubric.rubric, overrides).again(result, item.entry.id, None)
+        return Settler(self.rubric.rubric, overrides).settle_again(result, item.entry.id, None)
 
     def waits(self, item: Item) -> str:
         """Why the files of a submission do not say yet what was decided; empty where they do."""
@@ -174,7 +174,7 @@ class ReviewSession:
             return ""
         if result.rubric.digest != self.rubric.digest:
             return OLDER_RESULT
-        now = Settler(self.rubric.rubric, overrides).again(result, item.entry.id, None)
+        now = Settler(self.rubric.rubric, overrides).settle_again(result, item.entry.id, None)
         if now != result:
             rewrite(batch.folder_of(item.entry), now, self.rubric.rubric, self._docs)
         return ""

@@ -4,7 +4,6 @@ The comparison is `copydetect`'s: code without names and layout, fingerprints of
 starter code, the tutorials and most of the class have is taken out first. Needs the extra `similarity`.
 """
 
-from grader.classes.similarity.comparing import compare
-from grader.classes.similarity.files import write_similarity
+from grader.classes.similarity.comparison import compare, write_similarity
 
 __all__ = ["compare", "write_similarity"]

@@ -2,21 +2,172 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
+from importlib import metadata
 
 import numpy as np
 
-from grader.classes.similarity.tokens import Marks, Numbers, Text, covered
-from grader.model.similarity import FileMatch, Lines, Pair
+from grader.classes.similarity.comparison import Request
+from grader.classes.similarity.fingerprints import (
+    ENVIRONMENT,
+    LIMITS,
+    Fingerprints,
+    Marks,
+    Numbers,
+    Place,
+    Text,
+    covered,
+    leave_out,
+    read_place,
+    reading_ended,
+)
+from grader.model.similarity import FileMatch, Lines, NotCompared, Pair, Similarity, TakenOut
+from grader.workers import run_each
 
+LIBRARY = "copydetect"
+MIN_LINES = 10
+"""Independent solutions of a small lab share up to nine lines that anyone would write so."""
+PRINTS_MAX = 20_000_000
+PAIRS_MAX = 2_000
+STARTER_NOTES = 20
+LARGE_CLUSTER = 6
+NO_PROGRAM = "holds no program in Python or C++"
 COMMON_FROM = 6
 """Submissions a class must have before what most of them share counts as nobody's own."""
 MATRIX_COLUMNS = 4096
 CANDIDATES_MAX = 20_000
 NEAR = 0.25
 """The share of fingerprints from which two submissions are looked at sign by sign."""
+_NONE = np.zeros(0, dtype=np.int64)
+
+
+def compare_class(request: Request) -> Similarity:
+    """Compare a class. Its submissions are read in workers."""
+    read = read_all(request)
+    starter = [text for one in read.starter for text in one.texts]
+    several = len(read.submissions) >= COMMON_FROM
+    common = common_prints(list(read.submissions.values())) if several else _NONE
+    taken_out = distinct([*(text.prints for text in (*starter, *read.tutorials)), common])
+    works = [own_work(name, files, taken_out) for name, files in read.submissions.items()]
+    enough = [work for work in works if work.lines >= MIN_LINES]
+    pairs, same_group, cut = _pairs(enough, request)
+    found = clusters([(one.a, one.b) for one in pairs])
+    cut = cut or len(pairs) > PAIRS_MAX
+    return Similarity(
+        library=LIBRARY,
+        library_version=metadata.version(LIBRARY),
+        threshold=request.threshold,
+        min_lines=MIN_LINES,
+        compared=len(works),
+        pairs=tuple(pairs[:PAIRS_MAX]),
+        clusters=found,
+        taken_out=TakenOut(
+            starter=tuple(text.path for text in starter),
+            tutorials=tuple(text.path for text in read.tutorials),
+            common=len(common) if several else None,
+        ),
+        too_little=tuple(work.id for work in works if work.lines < MIN_LINES),
+        not_compared=tuple(sorted(read.left_out, key=lambda one: (one.id, one.file))),
+        same_group=same_group,
+        notes=(*_starter_notes(read.starter), *_notes(request, len(works), found, cut=cut)),
+    )
+
+
+@dataclass(kw_only=True)
+class _Class:
+    """The fingerprints of a class, as far as there is room for them."""
+
+    starter: list[Fingerprints] = field(default_factory=list)
+    tutorials: tuple[Text, ...] = ()
+    submissions: dict[str, tuple[Text, ...]] = field(default_factory=dict)
+    left_out: list[NotCompared] = field(default_factory=list)
+
+
+def read_all(request: Request) -> _Class:
+    """Read submissions, starter code and tutorials, `request.jobs` at a time, each in a worker."""
+    places = [
+        Place(),
+        *(Place(folder=folder, is_starter=True) for folder in request.starter),
+        *(Place(name=name, folder=folder) for name, folder in request.folders.items()),
+    ]
+    found, held = _Class(), 0
+    for one in run_each(
+        read_place, places, request.jobs, ended=reading_ended, limits=LIMITS, env=ENVIRONMENT
+    ):
+        size = sum(len(text.prints) for text in one.texts)
+        if one.place.folder is None:
+            found.tutorials = one.texts
+        elif one.place.is_starter:
+            found.starter.append(one)
+        elif held + size > PRINTS_MAX:
+            found.left_out += leave_out(
+                one.place, "the class has too much code to compare all of it"
+            ).left_out
+        else:
+            found.left_out += (
+                one.left_out if one.texts or one.left_out else leave_out(one.place, NO_PROGRAM).left_out
+            )
+            found.submissions |= {one.place.name: one.texts} if one.texts else {}
+            held += size
+    found.starter.sort(key=lambda one: places.index(one.place))
+    found.submissions = dict(sorted(found.submissions.items()))
+    return found
+
+
+def _starter_notes(starter: Sequence[Fingerprints]) -> list[str]:
+    """Return what to say about starter code that cannot be taken out."""
+    notes = []
+    for one in starter:
+        notes += [f"starter code: {left.file}: {left.reason}" for left in one.left_out]
+        notes += [] if one.texts or one.left_out else [f"starter code: {NO_PROGRAM}"]
+    return notes[:STARTER_NOTES]
+
+
+def _pairs(works: Sequence[Work], request: Request) -> tuple[list[Pair], int, bool]:
+    """The pairs that a person should see, how many were left out for their group, and whether the rest was cut."""
+    near, cut = candidates(works)
+    found, same_group = [], 0
+    for first, second in near:
+        one = pair(works[first], works[second])
+        if not _alike(one, request.threshold):
+            continue
+        if _same_group(one, request.groups):
+            same_group += 1
+        else:
+            found.append(one)
+    found.sort(
+        key=lambda one: (-max(one.similarity_a, one.similarity_b), -one.lines_a - one.lines_b, one.a, one.b)
+    )
+    return found, same_group, cut
+
+
+def _alike(one: Pair, threshold: float) -> bool:
+    share = max(one.similarity_a, one.similarity_b)
+    return share >= threshold and min(one.lines_a, one.lines_b) >= MIN_LINES
+
+
+def _same_group(one: Pair, groups: Mapping[str, str]) -> bool:
+    group = groups.get(one.a, "")
+    return bool(group) and group == groups.get(one.b)
+
+
+def _notes(request: Request, count: int, found: Sequence[Sequence[str]], *, cut: bool) -> list[str]:
+    notes = []
+    if count < COMMON_FROM and not request.starter:
+        notes.append(
+            f"fewer than {COMMON_FROM} submissions and no starter code: what the task itself makes alike is not "
+            "taken out; give the handout's package, or a reference solution, with --starter"
+        )
+    if any(len(group) >= LARGE_CLUSTER for group in found):
+        notes.append(
+            f"{LARGE_CLUSTER} or more submissions hang together: they may have a source in common (a tutorial, "
+            "code from the lecture); give it with --starter"
+        )
+    if cut:
+        notes.append("more pairs are alike than are named here")
+    return notes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,20 +203,20 @@ class Work:
 
 
 def common_prints(texts: Sequence[Sequence[Text]]) -> Numbers:
-    """The fingerprints that are in more than half of the submissions."""
+    """Return the fingerprints that are in more than half of the submissions."""
     each = [distinct(text.prints for text in one) for one in texts]
     prints, counts = np.unique(np.concatenate([_NONE, *each]), return_counts=True)
     return prints[counts * 2 > len(texts)]
 
 
 def own_work(name: str, texts: Sequence[Text], taken_out: Numbers) -> Work:
-    """The submission without the fingerprints in `taken_out`, which is sorted."""
+    """Return the submission without the fingerprints in `taken_out`, which is sorted."""
     return Work(name, tuple(_own(text, taken_out) for text in texts))
 
 
 def candidates(works: Sequence[Work]) -> tuple[list[tuple[int, int]], bool]:
-    """The pairs that share enough fingerprints to be worth a closer look, those that share most first, and whether
-    some had to be left out."""
+    """Return the pairs that share enough fingerprints for a closer look, those that share most first, and whether some
+    had to be left out."""
     shared = _shared_counts(works)
     sizes = np.array([max(len(work.prints), 1) for work in works])
     ratio = shared / np.minimum(sizes[:, None], sizes[None, :])
@@ -76,7 +227,7 @@ def candidates(works: Sequence[Work]) -> tuple[list[tuple[int, int]], bool]:
 
 
 def pair(a: Work, b: Work) -> Pair:
-    """What the two have in common."""
+    """Return what the two have in common."""
     here, there = _hits(a, b.prints), _hits(b, a.prints)
     return Pair(
         a=a.id,
@@ -90,7 +241,7 @@ def pair(a: Work, b: Work) -> Pair:
 
 
 def clusters(pairs: Sequence[tuple[str, str]]) -> tuple[tuple[str, ...], ...]:
-    """The submissions that hang together by pairs, the largest clusters first."""
+    """Return the submissions that hang together by pairs, the largest clusters first."""
     found: dict[str, set[str]] = {}
     for a, b in pairs:
         joined = found.get(a, {a}) | found.get(b, {b})
@@ -100,7 +251,7 @@ def clusters(pairs: Sequence[tuple[str, str]]) -> tuple[tuple[str, ...], ...]:
 
 
 def distinct(prints: Iterable[Numbers]) -> Numbers:
-    """All of them, sorted, each once."""
+    """Return all of them, sorted, each once."""
     return np.unique(np.concatenate([_NONE, *prints]))
 
 
@@ -172,6 +323,3 @@ def _stretches(one: Own, other: Own) -> Lines:
     at = np.searchsorted(filled, lines)
     parts = np.split(lines, np.flatnonzero(np.diff(at) > 1) + 1)
     return tuple((int(part[0]), int(part[-1])) for part in parts)
-
-
-_NONE = np.zeros(0, dtype=np.int64)

@@ -1,19 +1,30 @@
-"""The programs of a submission, out of its evidence, and those of the starter code: bounded, and no link followed."""
+"""Which files are compared: the programs in Python and C++ of a submission's evidence, and of the starter code.
+
+What catkin generates, or everybody has alike, is left out. Sizes are bounded, and no link is followed.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from typing import Literal
 
-from grader.classes.similarity.languages import GENERATED, Language, language_of
 from grader.errors import EvidenceError
 from grader.evidence.reader import load_run
 from grader.files import open_untrusted
 from grader.model.similarity import NotCompared
 
+Language = Literal["python", "cpp"]
+
+_CPP: tuple[str, ...] = (".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp", ".hxx")
+SUFFIXES: dict[str, Language] = {".py": "python", **dict.fromkeys(_CPP, "cpp")}
+GENERATED = frozenset({"build", "devel", "install", "logs", "__pycache__", ".git"})
+ALIKE = frozenset({"setup.py", "__init__.py"})
+_PYTHON = re.compile(rb"(\xef\xbb\xbf)?#![^\n]{0,200}python")
 PLACE = ("evidence", "package.mcap")
 EVIDENCE_BYTES_MAX = 128 << 20
 FILE_BYTES_MAX = 128 << 10
@@ -25,7 +36,7 @@ STARTER_FILES_MAX = 2_000
 
 @dataclass(frozen=True, kw_only=True)
 class Source:
-    """A program's text."""
+    """A program's text, at `path` of its package."""
 
     path: str
     code: str
@@ -34,28 +45,28 @@ class Source:
 
 @dataclass(frozen=True, kw_only=True)
 class Sources:
-    """A submission's programs, and those files that cannot be compared."""
+    """A submission's programs, and the files that cannot be compared."""
 
     files: tuple[Source, ...]
     left_out: tuple[NotCompared, ...]
 
 
 def read_submission(name: str, folder: Path) -> Sources:
-    """The judged files of the package in `folder/evidence/package.mcap`.
+    """Return the programs among the judged files of the package in `folder/evidence/package.mcap`.
 
-    Raises OSError where there is none, it is no file, or a link is on the way, EvidenceError where it cannot be read.
+    Raises OSError if there is none, or a link is on the way, EvidenceError if it cannot be read.
     """
     with open_untrusted(folder, *PLACE) as file:
         if os.fstat(file.fileno()).st_size > EVIDENCE_BYTES_MAX:
             raise EvidenceError(f"evidence/package.mcap is larger than {EVIDENCE_BYTES_MAX >> 20} MiB")
         attached = load_run(file).attachments
-    return _chosen(name, sorted(attached.items()))
+    return _choose(name, sorted(attached.items()))
 
 
 def read_starter(folder: Path) -> Sources:
-    """The programs below `folder`, or the one file that it is. Raises OSError."""
+    """Return the programs below `folder`, or the one file that it is. Raises OSError."""
     if folder.is_file():
-        return _chosen("", [(folder.name, _head(folder))])
+        return _choose("", [(folder.name, _read_head(folder))])
     found = []
     for place, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if name not in GENERATED)
@@ -63,19 +74,19 @@ def read_starter(folder: Path) -> Sources:
         found += [path for path in paths if stat.S_ISREG(path.lstat().st_mode)]
         if len(found) > STARTER_FILES_MAX:
             break
-    return _chosen(
-        "", [(path.relative_to(folder).as_posix(), _head(path)) for path in found[:STARTER_FILES_MAX]]
+    return _choose(
+        "", [(path.relative_to(folder).as_posix(), _read_head(path)) for path in found[:STARTER_FILES_MAX]]
     )
 
 
-def _head(path: Path) -> bytes:
-    """What of a file can be compared, and one byte more where there is more."""
+def _read_head(path: Path) -> bytes:
+    """Read what can be compared of a file, and one byte more if there is more."""
     with path.open("rb") as file:
         return file.read(FILE_BYTES_MAX + 1)
 
 
-def _chosen(name: str, files: list[tuple[str, bytes]]) -> Sources:
-    """Small ones first: large ones take nobody's room."""
+def _choose(name: str, files: list[tuple[str, bytes]]) -> Sources:
+    """Take small programs first, so that large ones do not take their room."""
     chosen: list[Source] = []
     left_out: list[NotCompared] = []
     room_bytes = SUBMISSION_BYTES_MAX
@@ -105,3 +116,13 @@ def _why_not(data: bytes, room_bytes: int, count: int) -> str:
     if len(data) > room_bytes:
         return f"the submission's programs are larger than {SUBMISSION_BYTES_MAX >> 10} KiB together"
     return f"more than {FILES_MAX} programs" if count >= FILES_MAX else ""
+
+
+def language_of(path: str, data: bytes) -> Language | None:
+    """Return the language of a package's file by its suffix, or by its first line; None if it is not compared."""
+    name = PurePosixPath(path)
+    if name.name in ALIKE or GENERATED.intersection(name.parts[:-1]):
+        return None
+    if name.suffix:
+        return SUFFIXES.get(name.suffix.lower())
+    return "python" if _PYTHON.match(data) else None

@@ -28,25 +28,6 @@ if __name__ == '__main__':
         pass
 """
 
-_QUIET_TALKER = """
-import rospy
-from std_msgs.msg import String
-
-def say():
-    words = rospy.Publisher('words', String, queue_size=10)
-    rospy.init_node('speaker')
-    pace = rospy.Rate(10)
-    while not rospy.is_shutdown():
-        text = "it is %s" % rospy.get_time()
-        words.publish(text)
-        pace.sleep()
-
-if __name__ == '__main__':
-    try:
-        say()
-    except rospy.ROSInterruptException: pass
-"""
-
 _LISTENER = """
 import rospy
 from std_msgs.msg import String
@@ -56,22 +37,6 @@ def heard(message):
 
 def listen():
     rospy.init_node('hearer', anonymous=True)
-    rospy.Subscriber("words", String, heard)
-    rospy.spin()
-
-if __name__ == '__main__':
-    listen()
-"""
-
-_QUIET_LISTENER = """
-import rospy
-from std_msgs.msg import String
-
-def heard(message):
-    rospy.loginfo("it said %s", message.data)
-
-def listen():
-    rospy.init_node('hearer')
     rospy.Subscriber("words", String, heard)
     rospy.spin()
 
@@ -126,6 +91,8 @@ int main(int argc, char **argv)
 }
 """
 
+_QUIET_TALKER = _TALKER.replace(", anonymous=True", "").replace("        rospy.loginfo(text)\n", "")
+_QUIET_LISTENER = _LISTENER.replace(", anonymous=True", "").replace('rospy.get_caller_id() + "it', '"it')
 TUTORIALS = (
     Source(path="talker.py", code=_TALKER, language="python"),
     Source(path="talker.py without a log", code=_QUIET_TALKER, language="python"),

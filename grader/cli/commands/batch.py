@@ -6,10 +6,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grader.classes.batch.executor import Hands, Processes
-from grader.classes.batch.flow import GRADEBOOK, INDEX, RESULTS, BatchOptions, run_batch
 from grader.classes.batch.folder import BatchFolder
-from grader.classes.batch.needs_attention import notable
+from grader.classes.batch.job import Executor, LocalExecutor
+from grader.classes.batch.progress import list_attention
+from grader.classes.batch.run import GRADEBOOK, INDEX, RESULTS, BatchOptions, run_batch
 from grader.classes.roster import Local, read_roster
 from grader.classes.roster.entries import parse_time
 from grader.cli.class_display import open_class_display
@@ -69,8 +69,8 @@ def run(
     for fault in named.faults:
         say_beside(f"roster: {fault}")
     with open_class_display() as watcher:
-        hands = _hands(options, exchange)
-        folder = run_batch(named, rubric_source(rubric), loaded, options, hands=hands, watcher=watcher)
+        executor = _executor(options, exchange)
+        folder = run_batch(named, rubric_source(rubric), loaded, options, executor=executor, watcher=watcher)
     _show(folder, as_json=as_json)
     return exit_code(folder.run)
 
@@ -113,15 +113,15 @@ def _local(folders: list[Path], *, remote_only: bool) -> Local:
     return Local(folders=tuple(folder.absolute() for folder in folders), remote_only=remote_only)
 
 
-def _hands(options: BatchOptions, exchange: str | None) -> Hands:
+def _executor(options: BatchOptions, exchange: str | None) -> Executor:
     if not options.cluster:
         given = {"--exchange": exchange is not None, "--cluster-insecure": options.cluster_insecure}
         for flag in (name for name, there in given.items() if there):
             raise UsageError(f"{flag} is for --cluster", hint="leave it out")
-        return Processes(options.jobs)
-    from grader.classes.cluster import ClusterHands  # noqa: PLC0415 - an extra
+        return LocalExecutor(options.jobs)
+    from grader.classes.cluster import ClusterExecutor  # noqa: PLC0415 - an extra
 
-    return ClusterHands(
+    return ClusterExecutor(
         options.cluster,
         options.out,
         exchange,
@@ -134,7 +134,7 @@ def _show(folder: BatchFolder, *, as_json: bool) -> None:
     if as_json:
         say_json(folder.run.model_dump(mode="json", by_alias=True, exclude={"entries"}))
         return
-    for text in notable(folder):
+    for text in list_attention(folder):
         say(text)
     counts = folder.run.counts
     parts = [f"{counts.submissions} submissions", f"{counts.graded} graded ({counts.passed} passed)"]

@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 from grader import pipeline
-from grader.classes.batch.folder import read_result
 from grader.cli.display import open_progress
 from grader.cli.errors import report
 from grader.cli.outcome import exit_code, settled
@@ -30,6 +29,7 @@ from grader.model.result import GradingResult
 from grader.report.sentences import without_sandbox
 from grader.report.terminal import open_console, print_report
 from grader.report.view import hidden_ids, without_hidden
+from grader.results import read_result
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from grader.classes.batch.executor import Processes
-from grader.classes.batch.flow import GRADEBOOK
 from grader.classes.batch.folder import BatchFolder, open_batch
+from grader.classes.batch.job import LocalExecutor
 from grader.classes.batch.regrade import CHANGES, Change, Regraded, regrade, run_missing
+from grader.classes.batch.run import GRADEBOOK
 from grader.cli.class_display import open_class_display
 from grader.cli.commands.batch import JOBS_PER_CORE, exit_code, rubric_source
 from grader.cli.output import say, say_json
@@ -45,9 +45,9 @@ def run(
     if missing and run_missing_too:
         say_unwalled(sandbox, loaded)
         with open_class_display() as watcher:
-            hands = Processes(jobs or own * JOBS_PER_CORE)
+            executor = LocalExecutor(jobs or own * JOBS_PER_CORE)
             batch, regraded = run_missing(
-                batch, loaded, regraded, hands=hands, watcher=watcher, sandbox=sandbox
+                batch, loaded, regraded, executor=executor, watcher=watcher, sandbox=sandbox
             )
     if as_json:
         say_json([_data(one) for one in regraded])

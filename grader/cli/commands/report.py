@@ -6,10 +6,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from grader.classes.batch.flow import INDEX
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch
-from grader.classes.batch.reports import Written, has_result, result_in, write_all, write_one
-from grader.classes.batch.settled import figures_in
+from grader.classes.batch.reports import Written, figures_in, has_result, result_in, write_all, write_one
+from grader.classes.batch.run import INDEX
 from grader.cli.errors import report
 from grader.cli.outcome import exit_code
 from grader.cli.output import say, say_beside

@@ -13,8 +13,7 @@ from rich.text import Text
 
 from grader.classes.batch.folder import RUN, open_batch
 from grader.classes.similarity import compare, write_similarity
-from grader.classes.similarity.comparing import require_library
-from grader.classes.similarity.files import percent, stretches
+from grader.classes.similarity.comparison import percent, require_library, stretches
 from grader.classes.similarity.sources import PLACE
 from grader.cli.output import say_json
 from grader.errors import ExitCode, UsageError

@@ -1,5 +1,5 @@
 """A worker that ends processes with nothing to do at once."""
 
-from grader.classes.cluster import remote
+from grader.classes.cluster import worker
 
-remote.IDLE_S = 0.5
+worker.IDLE_S = 0.5

@@ -3,15 +3,15 @@
 import os
 import signal
 
-from grader.classes.cluster import remote
+from grader.classes.cluster import worker
 
-_done = remote._done
+_grade_in = worker._grade_in
 
 
-def _ended(sent, folder, wanted):
-    if sent.job.entry.id == "poison":
+def _ended(folder, errand, is_wanted):
+    if errand.job.entry.id == "poison":
         os.kill(os.getpid(), signal.SIGKILL)
-    return _done(sent, folder, wanted)
+    return _grade_in(folder, errand, is_wanted)
 
 
-remote._done = _ended
+worker._grade_in = _ended

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import asyncio
 import os
+import socket
 import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from grader.classes.cluster import remote
-from grader.classes.cluster.errands import Errand
-from grader.classes.cluster.exchange import Exchange
-from tests.cluster.clusters import children_of, until
+from grader.classes.cluster import worker
+from grader.classes.cluster.exchange import Errand, Exchange
+from grader.errors import HostError
+from tests.cluster.clusters import children_of, lives, until
 from tests.cluster.jobs import named_job
 
 WORD = "0123abcd"
@@ -24,7 +25,7 @@ def exchange(tmp_path: Path) -> Iterator[Exchange]:
     made = Exchange(str(tmp_path / "exchange"))
     made.make()
     yield made
-    asyncio.run(remote.dismiss(WORD))
+    asyncio.run(worker.dismiss(WORD))
 
 
 def _errand(exchange: Exchange, tmp_path: Path, *, source: str = "", seen: bool = True) -> Errand:
@@ -35,7 +36,7 @@ def _errand(exchange: Exchange, tmp_path: Path, *, source: str = "", seen: bool 
 
 
 def test_it_leaves_one_parcel_and_nothing_in_the_batchs_folder(exchange: Exchange, tmp_path: Path) -> None:
-    report = remote._report(_errand(exchange, tmp_path), lambda: True)
+    report = worker.grade(_errand(exchange, tmp_path), lambda: True)
     assert report.outcome.status == "inconclusive"
     assert report.parcel is not None
     assert [path.name for path in Path(exchange.url).iterdir()] == [report.parcel.name]
@@ -43,46 +44,39 @@ def test_it_leaves_one_parcel_and_nothing_in_the_batchs_folder(exchange: Exchang
 
 
 def test_a_path_that_only_the_client_sees_is_the_machines_fault(exchange: Exchange, tmp_path: Path) -> None:
-    report = remote._report(_errand(exchange, tmp_path, source="/only/there/ada.zip"), lambda: True)
-    assert (report.outcome.status, report.outcome.kind) == ("error", "host")
-    assert f"/only/there/ada.zip cannot be seen on {report.machine}" == report.outcome.message
-    assert "a path that all machines share" in report.outcome.hint
-    assert report.parcel is None
+    with pytest.raises(HostError, match=r"/only/there/ada\.zip cannot be seen on ") as caught:
+        worker.grade(_errand(exchange, tmp_path, source="/only/there/ada.zip"), lambda: True)
+    assert "a path that all machines share" in caught.value.hint
 
 
 def test_a_path_that_nobody_sees_is_the_submissions(exchange: Exchange, tmp_path: Path) -> None:
-    report = remote._report(_errand(exchange, tmp_path, source="/nowhere/ada", seen=False), lambda: True)
+    report = worker.grade(_errand(exchange, tmp_path, source="/nowhere/ada", seen=False), lambda: True)
     assert (report.outcome.status, report.outcome.kind) == ("error", "submission")
     assert report.parcel is not None
 
 
 def test_what_nobody_wants_any_more_is_not_delivered(exchange: Exchange, tmp_path: Path) -> None:
-    report = remote._report(_errand(exchange, tmp_path), lambda: False)
+    report = worker.grade(_errand(exchange, tmp_path), lambda: False)
     assert report.parcel is None
     assert list(Path(exchange.url).iterdir()) == []
 
 
-def test_an_exchange_that_cannot_be_written_is_said_with_the_machines_name(
-    tmp_path: Path, monkeypatch
-) -> None:
-    monkeypatch.setattr(remote, "PAUSE_S", 0.0)
+def test_an_exchange_that_cannot_be_written_is_said_with_the_machines_name(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
-    report = remote._report(_errand(Exchange(str(tmp_path / "file")), tmp_path), lambda: True)
-    assert (report.outcome.status, report.outcome.kind) == ("error", "host")
-    assert "cannot be written" in report.outcome.message
-    assert report.machine in report.outcome.message
-    asyncio.run(remote.dismiss(WORD))
+    with pytest.raises(HostError, match=rf"cannot be written: .* \(on {socket.gethostname()}\)"):
+        worker.grade(_errand(Exchange(str(tmp_path / "file")), tmp_path), lambda: True)
+    asyncio.run(worker.dismiss(WORD))
 
 
 def test_dismissed_it_interrupts_what_runs_and_ends_its_processes(exchange: Exchange, tmp_path: Path) -> None:
     before = set(children_of(os.getpid()))
     found = []
     thread = threading.Thread(
-        target=lambda: found.append(remote._report(_errand(exchange, tmp_path), lambda: True))
+        target=lambda: found.append(worker.grade(_errand(exchange, tmp_path), lambda: True))
     )
     thread.start()
     until(lambda: set(children_of(os.getpid())) - before)
-    asyncio.run(remote.dismiss(WORD))
+    asyncio.run(worker.dismiss(WORD))
     thread.join()
     assert [report.parcel for report in found] == [None]
     assert set(children_of(os.getpid())) <= before
@@ -92,18 +86,18 @@ def test_a_process_serves_many_jobs_and_is_ended_when_it_has_none(
     exchange: Exchange, tmp_path: Path, monkeypatch
 ) -> None:
     before = set(children_of(os.getpid()))
-    monkeypatch.setattr(remote, "IDLE_S", 3600.0)
-    remote._report(_errand(exchange, tmp_path), lambda: True)
+    monkeypatch.setattr(worker, "IDLE_S", 5.0)
+    worker.grade(_errand(exchange, tmp_path), lambda: True)
     first = set(children_of(os.getpid())) - before
-    monkeypatch.setattr(remote, "IDLE_S", 0.05)
-    remote._report(_errand(exchange, tmp_path), lambda: True)
+    worker.grade(_errand(exchange, tmp_path), lambda: True)
     assert len(first) == 1
-    until(lambda: set(children_of(os.getpid())) <= before)
+    assert set(children_of(os.getpid())) - before == first
+    until(lambda: not any(lives(pid) for pid in first))
 
 
 def test_it_says_who_it_is(exchange: Exchange) -> None:
     exchange.greet(WORD)
-    said = asyncio.run(remote.answer(exchange.url, WORD))
+    said = asyncio.run(worker.describe(exchange.url, WORD))
     assert said["kept_out"] == ""
-    assert {name: said[name] for name in remote.versions()} == remote.versions()
-    assert "is another place there" in asyncio.run(remote.answer(exchange.url, "another"))["kept_out"]
+    assert {name: said[name] for name in worker.versions()} == worker.versions()
+    assert "is another place there" in asyncio.run(worker.describe(exchange.url, "another"))["kept_out"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.classes.batch.workers import _Steps
+from grader.classes.batch.gradings import _Steps
 
 
 def test_a_run_that_is_made_again_is_counted_and_one_that_is_still_going_on_is_not() -> None:

@@ -1,4 +1,4 @@
-"""What a batch says of its course: counts, points so far, an honest guess of what is left."""
+"""What a batch says of its progress: counts, points so far, an honest guess of what is left."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from grader.classes.batch.job import Outcome
-from grader.classes.batch.progress import LATELY, Course
+from grader.classes.batch.progress import LATELY, BatchProgress
 from grader.cli.class_display import LiveClass, PlainClass, summary
 
 
@@ -26,52 +26,52 @@ def outcome(name: str, **more) -> Outcome:
 
 
 def test_counts_and_points_so_far() -> None:
-    course = Course()
-    course.planned(5)
+    progress = BatchProgress()
+    progress.planned(5)
     for name in ("a", "b", "c", "d"):
-        course.begun(name)
-    course.ended(outcome("a"))
-    course.ended(outcome("b", status="inconclusive", points=40.0))
-    course.ended(outcome("c", status="error", points=0.0))
-    assert (course.done, list(course.running), course.waiting) == (3, ["d"], 1)
-    assert course.mean_points == 60
-    words = summary(course)
+        progress.begun(name)
+    progress.ended(outcome("a"))
+    progress.ended(outcome("b", status="inconclusive", points=40.0))
+    progress.ended(outcome("c", status="error", points=0.0))
+    assert (progress.done, list(progress.running), progress.waiting) == (3, ["d"], 1)
+    assert progress.mean_points == 60
+    words = summary(progress)
     assert words.startswith(
         "3 of 5 done, 1 running, 1 waiting, 1 inconclusive, 1 failed; 60 points on average"
     )
 
 
 def test_nothing_is_said_of_the_time_left_before_anything_is_known() -> None:
-    course = Course(clock=Clock())
-    course.planned(10)
-    assert course.left_s is None
-    course.ended(outcome("a", kept=True))
-    course.ended(outcome("b", kept=True))
-    assert course.left_s is None
+    progress = BatchProgress(clock=Clock())
+    progress.planned(10)
+    assert progress.left_s is None
+    progress.ended(outcome("a", kept=True))
+    progress.ended(outcome("b", kept=True))
+    assert progress.left_s is None
 
 
 @pytest.mark.parametrize("count", [10, 5 * LATELY])
 def test_the_time_left_at_an_even_pace(count: int) -> None:
     clock = Clock()
-    course = Course(clock=clock)
-    course.planned(2 * count)
+    progress = BatchProgress(clock=clock)
+    progress.planned(2 * count)
     for number in range(count):
         clock.now_s += 2.0
-        course.ended(outcome(str(number)))
-    assert course.left_s == pytest.approx(2.0 * count, rel=0.01)
+        progress.ended(outcome(str(number)))
+    assert progress.left_s == pytest.approx(2.0 * count, rel=0.01)
 
 
 def test_what_was_complete_does_not_make_the_rest_look_quick() -> None:
     clock = Clock()
-    course = Course(clock=clock)
-    course.planned(200)
+    progress = BatchProgress(clock=clock)
+    progress.planned(200)
     for number in range(100):
         clock.now_s += 0.01
-        course.ended(outcome(f"kept-{number}", kept=True, wall_s=0.01))
+        progress.ended(outcome(f"kept-{number}", kept=True, wall_s=0.01))
     for number in range(10):
         clock.now_s += 2.0
-        course.ended(outcome(str(number)))
-    assert course.left_s == pytest.approx(180, rel=0.05)
+        progress.ended(outcome(str(number)))
+    assert progress.left_s == pytest.approx(180, rel=0.05)
 
 
 def test_a_log_has_a_line_for_each_submission_and_no_control_signs() -> None:

@@ -1,4 +1,4 @@
-"""Gradings side by side, each in a process: they wait most of the time."""
+"""Folders graded side by side, each in a process: rubric tests and benchmarks do so."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.classes.batch.pool import side_by_side, workers, working
 from grader.errors import GraderError
 from grader.model.progress import Silence, StepState
 from grader.model.result import GradingResult
 from grader.model.submission import SandboxMode
 from grader.pipeline import GradeOptions, grade, prepare
 from grader.rubric.load import load_rubric
+from grader.workers import WorkerEnded, run_each
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,21 +38,23 @@ class Graded:
 
 
 def grade_all(jobs: Sequence[Job], most: int, begun: Callable[[str], None]) -> Iterator[Graded]:
-    """Each job's result as it comes, `most` at a time. `begun` is told each job's name when it starts."""
+    """Yield each job's result as it comes, `most` at a time. `begun` gets each job's name when it starts."""
     for sandbox in {job.sandbox for job in jobs}:
         prepare(GradeOptions(sandbox=sandbox))
-    with workers(min(most, len(jobs))) as pool:
-        yield from side_by_side(pool, _graded, jobs, most=most, begun=lambda job: begun(job.name))
+    return run_each(_grade, jobs, min(most, len(jobs)), ended=_ended, begun=lambda job: begun(job.name))
 
 
-def _graded(job: Job) -> Graded:
-    with working():
-        options, steps = GradeOptions(sandbox=job.sandbox, submission_id=job.name), _Steps()
-        try:
-            result = grade(str(job.source), load_rubric(str(job.rubric)), job.out, options, steps)
-        except GraderError as error:
-            return Graded(name=job.name, result=None, error=error.message)
-        return Graded(name=job.name, result=result, again=steps.again)
+def _ended(job: Job, error: WorkerEnded) -> Graded:
+    return Graded(name=job.name, result=None, error=f"the process that graded it {error.reason}")
+
+
+def _grade(job: Job) -> Graded:
+    options, steps = GradeOptions(sandbox=job.sandbox, submission_id=job.name), _Steps()
+    try:
+        result = grade(str(job.source), load_rubric(str(job.rubric)), job.out, options, steps)
+    except GraderError as error:
+        return Graded(name=job.name, result=None, error=error.message)
+    return Graded(name=job.name, result=result, again=steps.again)
 
 
 class _Steps(Silence):

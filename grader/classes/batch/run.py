@@ -5,19 +5,18 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime, timezone
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Protocol
 
 from grader import __version__
-from grader.classes.batch.executor import Hands
 from grader.classes.batch.folder import RUN, BatchFolder, open_batch, write_run
-from grader.classes.batch.job import Job, Outcome
-from grader.classes.batch.selection import check, chosen
-from grader.classes.batch.settled import Settler, rewrite
+from grader.classes.batch.job import Executor, Job, Outcome
+from grader.classes.batch.reports import Settler, rewrite
 from grader.classes.fetching import prefetch
 from grader.classes.gradebook import write_gradebook
 from grader.classes.overrides import FILE as OVERRIDES
@@ -27,13 +26,14 @@ from grader.files import check_writable, keep_private, lock, make_folder
 from grader.intake import safe_name, without_password
 from grader.judging.summary import passed
 from grader.model.batch import MISSING, BatchRun, Counts, CriterionInfo, Entry, Roster, RosterFault, State
-from grader.model.result import RubricInfo
+from grader.model.result import GradingResult, RubricInfo
 from grader.model.submission import SandboxMode
 from grader.pipeline import GradeOptions, prepare
 from grader.report.class_page.page import write_class_page
 from grader.results import finish_killed
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
+from grader.untrusted_text import line
 
 GRADEBOOK, RESULTS, INDEX = "gradebook.csv", "results.jsonl", "index.html"
 RESERVED = frozenset(
@@ -41,11 +41,16 @@ RESERVED = frozenset(
 )
 
 
+FAILED, INCONCLUSIVE, CHANGED = "failed", "inconclusive", "changed"
+WORDS = (FAILED, INCONCLUSIVE, CHANGED)
+NAME_CHARS = 80
+
+
 @dataclass(frozen=True, kw_only=True)
 class BatchOptions:
-    """`jobs` submissions side by side; `only` as `--only` has it. With `same_commit`, what is
-    graded again is the commit of the earlier result. What `cluster` and those below it say stands in `run.json`, so
-    that the same can be asked for again."""
+    """`jobs` submissions side by side; `only` as on the command line. With `same_commit`, the commit of the earlier
+    result is graded again. `cluster` and the fields below it stand in `run.json`, for `regrade` to use again.
+    """
 
     out: Path
     jobs: int
@@ -61,21 +66,21 @@ class BatchOptions:
 
 
 class Watcher(Protocol):
-    """Is told how a batch goes."""
+    """Follows a batch."""
 
     def planned(self, total: int) -> None:
-        """So many submissions are to be done."""
+        """`total` submissions will be graded."""
 
     def begun(self, name: str) -> None:
-        """This one is being done."""
+        """The submission of that id begins."""
 
     def ended(self, outcome: Outcome) -> None:
-        """One came to its end."""
+        """A submission has its outcome."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Batch:
-    """What all of a batch knows. `folder.run.entries` are the roster's without passwords."""
+    """What every part of a batch knows. `folder.run.entries` are the roster's without passwords."""
 
     roster: Roster
     rubric: LoadedRubric
@@ -90,48 +95,51 @@ def run_batch(
     rubric: LoadedRubric,
     options: BatchOptions,
     *,
-    hands: Hands,
+    executor: Executor,
     watcher: Watcher,
 ) -> BatchFolder:
-    """Grade what the roster names into `options.out`, and write `run.json`, `results.jsonl`, `gradebook.csv`
-    and `index.html`.
+    """Grade the roster's submissions into `options.out`, and write `run.json`, `results.jsonl`, `gradebook.csv` and
+    `index.html`.
 
-    What is complete is not done again. Where this is interrupted, what there is by then is in the gradebook.
-    Raises UsageError for an option that does not fit the roster, Busy where another batch works in the same folder,
-    EvidenceError where a newer grader has written there, OutputError where it cannot be written, and KeyboardInterrupt.
+    What is complete is not done again. If this is interrupted, the gradebook holds what there is by then.
+    Raises UsageError for an option that does not fit the roster, Busy if another batch works in the same folder,
+    EvidenceError if a newer grader has written there, OutputError if it cannot be written, and KeyboardInterrupt.
     """
     roster = _gradable(roster, options.out)
-    check(roster.entries, options.only)
+    _check_only(roster.entries, options.only)
     check_writable(options.out)
     is_new = make_folder(options.out)
     with alone(options.out):
-        finish_killed(options.out)
-        overrides = read_overrides(options.out / OVERRIDES, rubric.rubric, ids_of(roster))
-        own = _kept_private(options.out, is_new=is_new)
-        folder = BatchFolder(options.out, _run_of(roster, rubric_source, rubric, options, own_folder=own))
-        folder.refuse_newer()
-        write_run(options.out, folder.run)
-        batch = _Batch(
-            roster=roster,
-            rubric=rubric,
-            options=options,
-            folder=folder,
-            settler=Settler(rubric.rubric, overrides),
-        )
+        batch = _begin(roster, rubric_source, rubric, options, is_new=is_new)
         state: State = "interrupted"
         kept = 0
         try:
-            for outcome in _outcomes(batch, hands, watcher):
+            for outcome in _grade_all(batch, executor, watcher):
                 kept += outcome.kept
                 watcher.ended(outcome)
             state = "complete"
         finally:
-            folder = write_books(folder, rubric.rubric, state, kept)
+            folder = write_books(batch.folder, rubric.rubric, state, kept)
     return folder
 
 
-def _kept_private(out: Path, *, is_new: bool) -> bool:
-    """Whether a batch made this folder: then it is for its owner alone. Any other one keeps the mode that it has."""
+def _begin(
+    roster: Roster, rubric_source: str, rubric: LoadedRubric, options: BatchOptions, *, is_new: bool
+) -> _Batch:
+    """Take over the folder from an earlier batch, and write the `run.json` of one that is running."""
+    out = options.out
+    finish_killed(out)
+    overrides = read_overrides(out / OVERRIDES, rubric.rubric, ids_of(roster))
+    own_folder = _keep_private(out, is_new=is_new)
+    folder = BatchFolder(out, _describe_run(roster, rubric_source, rubric, options, own_folder=own_folder))
+    folder.refuse_newer()
+    write_run(out, folder.run)
+    settler = Settler(rubric.rubric, overrides)
+    return _Batch(roster=roster, rubric=rubric, options=options, folder=folder, settler=settler)
+
+
+def _keep_private(out: Path, *, is_new: bool) -> bool:
+    """A folder that a batch made is for its owner alone; any other one keeps its mode. Return which of them it is."""
     with suppress(UsageError):
         is_new = is_new or open_batch(out).run.own_folder
     if is_new:
@@ -139,10 +147,10 @@ def _kept_private(out: Path, *, is_new: bool) -> bool:
     return is_new
 
 
-def _outcomes(batch: _Batch, hands: Hands, watcher: Watcher) -> Iterator[Outcome]:
-    """Each submission's, as it comes to its end; one that was complete is settled as it counts now."""
+def _grade_all(batch: _Batch, executor: Executor, watcher: Watcher) -> Iterator[Outcome]:
+    """Yield each submission's outcome as it comes; one that was complete is settled again."""
     options = batch.options
-    todo = list(chosen(batch.roster.entries, options.only, batch.folder.earlier))
+    todo = list(_select(batch.roster.entries, options.only, batch.folder.earlier))
     watcher.planned(len(todo))
     if todo and not options.cluster:
         prepare(GradeOptions(sandbox=options.sandbox, static_only=options.static_only))
@@ -151,10 +159,10 @@ def _outcomes(batch: _Batch, hands: Hands, watcher: Watcher) -> Iterator[Outcome
     ahead = [entry for entry, _ in todo] if not options.cluster else []
     with prefetch(ahead, fetched_since=since):
         jobs = (_job(batch, entry, again=again, since=since) for entry, again in todo)
-        for outcome in hands.run(jobs, begun=watcher.begun):
+        for outcome in executor.run(jobs, begun=watcher.begun):
             entry = entries[outcome.id]
             decided = outcome.status == "error" and batch.settler.of(entry.id)
-            yield _settled(batch, entry, outcome) if outcome.kept or decided else outcome
+            yield _settle_again(batch, entry, outcome) if outcome.kept or decided else outcome
 
 
 def _job(batch: _Batch, entry: Entry, *, again: bool, since: float) -> Job:
@@ -175,13 +183,13 @@ def _job(batch: _Batch, entry: Entry, *, again: bool, since: float) -> Job:
     )
 
 
-def _settled(batch: _Batch, entry: Entry, outcome: Outcome) -> Outcome:
-    """An override, an extension or a deadline may be new since its result was written, and people may give points for
-    what could not be graded."""
+def _settle_again(batch: _Batch, entry: Entry, outcome: Outcome) -> Outcome:
+    """An override, an extension or a deadline may be newer than the result, and people may award points for what could
+    not be graded."""
     earlier = batch.folder.earlier(entry)
     if earlier is None or earlier.rubric.digest != batch.rubric.digest:
         return outcome
-    now = batch.settler.again(earlier, entry.id, outcome.handed_in)
+    now = batch.settler.settle_again(earlier, entry.id, outcome.handed_in)
     if now == earlier:
         return outcome
     try:
@@ -192,13 +200,13 @@ def _settled(batch: _Batch, entry: Entry, outcome: Outcome) -> Outcome:
     return outcome.model_copy(update={"status": now.status, "points": now.points, "passed": ok})
 
 
-def _run_of(
+def _describe_run(
     roster: Roster, rubric_source: str, rubric: LoadedRubric, options: BatchOptions, *, own_folder: bool
 ) -> BatchRun:
     return BatchRun(
         state="running",
         grader=__version__,
-        **described(rubric, rubric_source),
+        **describe_rubric(rubric, rubric_source),
         roster=roster.file,
         static_only=options.static_only,
         before=options.before,
@@ -211,12 +219,14 @@ def _run_of(
         remote_only=options.remote_only,
         columns=roster.columns,
         faults=roster.faults,
-        entries=tuple(_without_password(entry) for entry in roster.entries),
+        entries=tuple(
+            entry.model_copy(update={"source": without_password(entry.source)}) for entry in roster.entries
+        ),
     )
 
 
-def described(rubric: LoadedRubric, rubric_source: str) -> dict[str, Any]:
-    """What `run.json` says of the rubric, by its keys."""
+def describe_rubric(rubric: LoadedRubric, rubric_source: str) -> dict[str, Any]:
+    """Return what `run.json` says about the rubric, by key."""
     lab = rubric.rubric
     return {
         "rubric": RubricInfo(id=lab.id, version=lab.version, digest=rubric.digest),
@@ -227,12 +237,8 @@ def described(rubric: LoadedRubric, rubric_source: str) -> dict[str, Any]:
     }
 
 
-def _without_password(entry: Entry) -> Entry:
-    return entry.model_copy(update={"source": without_password(entry.source)})
-
-
 def ids_of(roster: Roster | BatchRun) -> list[str]:
-    """Of all that may stand in `overrides.yaml`: what cannot be graded, too."""
+    """Return the ids that may stand in `overrides.yaml`: those that cannot be graded, too."""
     return [
         *(entry.id for entry in roster.entries),
         *(fault.id for fault in roster.faults if fault.id is not None),
@@ -240,7 +246,7 @@ def ids_of(roster: Roster | BatchRun) -> list[str]:
 
 
 def _gradable(roster: Roster, out: Path) -> Roster:
-    """The roster without the folder of results itself, and without ids whose folders would be in the way of files."""
+    """Return the roster without the folder of results itself, and without ids that name the batch's own files."""
     entries, faults = [], list(roster.faults)
     for entry in roster.entries:
         if Path(entry.source) == out.absolute():
@@ -256,7 +262,7 @@ def _gradable(roster: Roster, out: Path) -> Roster:
 def write_books(
     folder: BatchFolder, rubric: Rubric, state: State, kept: int, *, ended_at: datetime | None = None
 ) -> BatchFolder:
-    """`gradebook.csv`, `results.jsonl`, `index.html`, and `run.json` with what it all came to, which is given back.
+    """Write `gradebook.csv`, `results.jsonl`, `index.html`, and `run.json` with counts; return the folder with them.
 
     `ended_at` is when the batch ended, by default now.
     """
@@ -283,11 +289,11 @@ def _counts(folder: BatchFolder, rubric: Rubric, kept: int) -> Counts:
 
 @contextmanager
 def alone(out: Path) -> Iterator[None]:
-    """Hold a batch's folder. Raises Busy where another batch does."""
+    """Hold a batch's folder. Raises Busy if another batch does."""
     descriptor = os.open(out, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         held = True
-        with suppress(OSError):  # a file system without locks: whoever shares it has to know what they do
+        with suppress(OSError):  # a file system without locks: nothing can be known there
             held = lock(descriptor)
         if not held:
             raise Busy(
@@ -297,3 +303,40 @@ def alone(out: Path) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
+
+
+def _select(
+    entries: Sequence[Entry], only: Sequence[str], earlier: Callable[[Entry], GradingResult | None]
+) -> Iterator[tuple[Entry, bool]]:
+    """Yield the entries that `--only` asks for, each with whether it is graded even if it is complete.
+
+    Without `only`, all. `failed`: those that could not be graded, or have no result. `inconclusive`: those whose result
+    is. `changed`: those with a result, which stays unless the submission, the rubric or the grader has changed. An id:
+    that one.
+    """
+    names = {safe_name(name).casefold() for name in only if name not in WORDS}
+    for entry in entries:
+        if not only:
+            yield entry, False
+        elif safe_name(entry.id).casefold() in names:
+            yield entry, True
+        elif any(word in only for word in WORDS):
+            result = earlier(entry)
+            status = result.status if result else "error"
+            if (status == "error" and FAILED in only) or (status == "inconclusive" and INCONCLUSIVE in only):
+                yield entry, True
+            elif result is not None and CHANGED in only:
+                yield entry, False
+
+
+def _check_only(entries: Sequence[Entry], only: Sequence[str]) -> None:
+    """Raise UsageError for an id that no entry has, with the nearest one."""
+    known = {safe_name(entry.id).casefold(): entry.id for entry in entries}
+    for name in only:
+        if name in WORDS or safe_name(name).casefold() in known:
+            continue
+        near = get_close_matches(name, list(known.values()), n=1)
+        hint = f"did you mean {line(near[0], NAME_CHARS)}?" if near else f"an id, or {', '.join(WORDS)}"
+        raise UsageError(
+            f"--only {line(name, NAME_CHARS)}: no submission of that id in the roster", hint=hint
+        )

@@ -1,0 +1,147 @@
+"""`compare` finds near-identical submissions in a process of its own; `write_similarity` writes them down."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+from grader.errors import HostError, SubmissionError, UsageError
+from grader.files import atomic_write, temporary_folder
+from grader.intake import Limits as IntakeLimits
+from grader.intake.archive import unpack
+from grader.model.record import Record
+from grader.model.similarity import Lines, Pair, Similarity
+from grader.report.text import csv_text, json_text
+from grader.workers import Limits, Worker, WorkerEnded
+
+THRESHOLD = 0.8
+INSTALL = "pip install 'ros-lab-grader[similarity]'"
+LIMITS = Limits(memory_bytes=6 << 30, cpu_s=1800, wall_s=1800)
+REASON_CHARS = 200
+HEAD = (
+    "a", "name_a", "b", "name_b", "similarity_a_percent", "similarity_b_percent", "lines_a", "lines_b", "files"
+)  # fmt: skip
+
+
+class Request(Record):
+    """What the process is asked: `folders` of results by id, starter code as folders and files, a share from 0 to 1."""
+
+    folders: dict[str, Path]
+    starter: tuple[Path, ...]
+    groups: dict[str, str]
+    threshold: float
+    jobs: int
+
+
+def compare(
+    folders: Mapping[str, Path],
+    *,
+    starter: Sequence[Path] = (),
+    groups: Mapping[str, str] | None = None,
+    threshold: float = THRESHOLD,
+    jobs: int = 2,
+) -> Similarity:
+    """Return which submissions are nearly the same. `folders` are their folders of results, by id.
+
+    What is in `starter` (folders, archives, single files) is nobody's own. Two of one group (`groups` by id) are not
+    named. `threshold` is the share (0 to 1) of the one's own code that is in the other, `jobs` how many are read side
+    by side.
+
+    Raises UsageError without `copydetect` and for starter code that cannot be read, HostError if the process ends.
+    """
+    require_library()
+    with temporary_folder("source") as place:
+        request = Request(
+            folders={name: folder.absolute() for name, folder in folders.items()},
+            starter=tuple(_unpack(path, place / str(number)) for number, path in enumerate(starter)),
+            groups=dict(groups or {}),
+            threshold=threshold,
+            jobs=max(1, jobs),
+        )
+        return _compare_apart(request)
+
+
+def require_library() -> None:
+    """Raise UsageError if the extra is not installed."""
+    if find_spec("copydetect") is None:
+        raise UsageError("comparing submissions needs copydetect, which is not installed", hint=INSTALL)
+
+
+def _unpack(path: Path, into: Path) -> Path:
+    """Return the folder that an archive becomes; folders and programs stay where they are."""
+    if not path.exists():
+        raise UsageError(f"--starter {path}: not found", hint="name a folder, an archive or a program")
+    if path.is_dir() or path.suffix in {".py", ".cpp", ".cc", ".h", ".hpp"}:
+        return path.absolute()
+    try:
+        unpack(path, into, IntakeLimits())
+    except SubmissionError as error:
+        raise UsageError(f"--starter {error.message}", hint=error.hint) from error
+    except OSError as error:
+        raise UsageError(f"--starter {path}: cannot be read: {error.strerror}") from error
+    return into
+
+
+def _compare_apart(request: Request) -> Similarity:
+    """Compare in a worker, which has limits and can be ended with all that it started."""
+    worker = Worker(LIMITS)
+    hint = "give it more memory, or compare fewer submissions"
+    try:
+        return worker.run(_compare_class, request)
+    except WorkerEnded as error:
+        raise HostError(
+            f"the submissions could not be compared: the process {error.reason}", hint=hint
+        ) from error
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"[:REASON_CHARS]
+        raise HostError(f"the submissions could not be compared: {reason}", hint=hint) from error
+    finally:
+        worker.close()
+
+
+def _compare_class(request: Request) -> Similarity:
+    from grader.classes.similarity.matching import compare_class  # noqa: PLC0415 - of the extra `similarity`
+
+    return compare_class(request)
+
+
+def write_similarity(
+    similarity: Similarity, folder: Path, names: Mapping[str, str] | None = None
+) -> tuple[Path, ...]:
+    """Write `similarity.json` and `similarity.csv` into `folder`; return their paths. `names` are the students', by id.
+
+    Raises OutputError.
+    """
+    rows = [HEAD, *_rows(similarity, names or {})]
+    files = {
+        "similarity.json": json_text(similarity.model_dump(mode="json", by_alias=True)),
+        "similarity.csv": "\ufeff" + csv_text(rows),
+    }
+    for name, text in files.items():
+        atomic_write(folder / name, text.encode())
+    return tuple(folder / name for name in files)
+
+
+def percent(share: float) -> int:
+    """Return whole percent, and never 100 if anything is missing."""
+    return int(share * 100)
+
+
+def stretches(lines: Lines) -> str:
+    """Return lines as `3-9, 12`."""
+    return ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in lines)
+
+
+def _rows(similarity: Similarity, names: Mapping[str, str]) -> Iterator[tuple[str | float, ...]]:
+    for pair in similarity.pairs:
+        shares = (percent(pair.similarity_a), percent(pair.similarity_b))
+        known = (pair.a, names.get(pair.a, ""), pair.b, names.get(pair.b, ""))
+        yield (*known, *shares, pair.lines_a, pair.lines_b, _files(pair))
+
+
+def _files(pair: Pair) -> str:
+    return "; ".join(
+        f"{match.file_a}:{stretches(match.lines_a)} ~ {match.file_b}:{stretches(match.lines_b)}"
+        for match in pair.files
+    )

@@ -1,0 +1,328 @@
+"""Worker processes: each does one job after another, and whatever ends it costs only the job that it was doing.
+
+A job is a function of a module and its argument. Both sides send pickles, each preceded by its length, through pipes
+that no other process holds. A worker imports nothing from the current folder, and ends itself when its parent is gone.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from queue import LifoQueue
+from types import FrameType
+from typing import IO, Any, TypeVar
+
+from grader.host_programs import module_command, with_absolute_paths
+
+HEAD_BYTES = 8
+LEAVE_S = 30.0
+"""How long a worker may take to clean up once it is told to stop."""
+IDLE_CODE = 75
+Job = TypeVar("Job")
+Result = TypeVar("Result")
+
+
+class WorkerEnded(Exception):
+    """The process ended before its job was done. `interrupted`: because it was told to stop."""
+
+    def __init__(self, reason: str, *, interrupted: bool = False) -> None:
+        super().__init__(reason)
+        self.reason, self.interrupted = reason, interrupted
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """What a worker may take; None sets no limit.
+
+    `memory_bytes` is address space beside what is mapped when the first job begins. `cpu_s` and `wall_s` are for each
+    job. A worker that waits longer than `idle_s` for its next job ends, and is started again with that job.
+    """
+
+    memory_bytes: int | None = None
+    cpu_s: float | None = None
+    wall_s: float | None = None
+    idle_s: float | None = None
+
+
+class Worker:
+    """A process that is started with its first job, and again after a job that ended it.
+
+    `env` is added to this process's environment. `stopped`: it was told to stop, and does no more jobs.
+    """
+
+    def __init__(self, limits: Limits | None = None, env: Mapping[str, str] | None = None) -> None:
+        self._limits, self._env = limits or Limits(), dict(env or {})
+        self._process: subprocess.Popen[bytes] | None = None
+        self.stopped = False
+        self._lock = threading.Lock()
+
+    def run(self, function: Callable[[Job], Result], job: Job) -> Result:
+        """Return what `function(job)` returns in the process, or raise what it raises. Raises WorkerEnded."""
+        message = pickle.dumps((function, job, self._limits))
+        while True:
+            with self._lock:
+                if self.stopped:
+                    raise WorkerEnded("interrupted", interrupted=True)
+                process, is_new = self._process, False
+                if process is None or process.poll() is not None:
+                    process, is_new = self._start(), True
+            try:
+                raised, answer = self._exchange(process, message)
+            except (EOFError, OSError, pickle.UnpicklingError) as error:
+                if self.stopped:
+                    raise WorkerEnded("interrupted", interrupted=True) from error
+                process.kill()
+                code = process.wait()
+                if code == IDLE_CODE and not is_new:
+                    continue  # it had waited too long just as the job came
+                how = f"by signal {-code}" if code < 0 else f"with {code}"
+                raise WorkerEnded(f"ended {how}") from error
+            if raised:
+                raise answer
+            result: Result = answer
+            return result
+
+    def interrupt(self) -> None:
+        """Let the current job clean up and end, and begin no other."""
+        with self._lock:
+            self.stopped = True
+            if self._process is not None and self._process.poll() is None:
+                if sys.platform == "win32":
+                    self._process.terminate()
+                else:
+                    self._process.send_signal(signal.SIGINT)
+
+    def close(self) -> None:
+        """End the process, by force if it does not end in time."""
+        self.interrupt()
+        process = self._process
+        if process is None:
+            return
+        _close(process)
+        try:
+            process.wait(LEAVE_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        """Start it in a session of its own: its parent passes on a Ctrl-C from the terminal."""
+        if self._process is not None:
+            _close(self._process)
+        self._process = subprocess.Popen(
+            module_command("grader.workers"),
+            env={**with_absolute_paths(os.environ), **self._env},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            start_new_session=True,
+        )
+        return self._process
+
+    def _exchange(self, process: subprocess.Popen[bytes], message: bytes) -> Any:  # noqa: ANN401 - whatever was pickled
+        assert process.stdin is not None  # noqa: S101 - opened with PIPE
+        assert process.stdout is not None  # noqa: S101 - opened with PIPE
+        timer = threading.Timer(self._limits.wall_s or 0.0, process.kill)
+        timer.daemon = True
+        if self._limits.wall_s is not None:
+            timer.start()
+        try:
+            _send(process.stdin, message)
+            return _receive(process.stdout)
+        finally:
+            timer.cancel()
+
+
+def run_each(
+    function: Callable[[Job], Result],
+    jobs: Iterable[Job],
+    count: int,
+    *,
+    ended: Callable[[Job, WorkerEnded], Result],
+    begun: Callable[[Job], None] = lambda _: None,
+    limits: Limits | None = None,
+    env: Mapping[str, str] | None = None,
+) -> Iterator[Result]:
+    """Yield each job's result as it comes, with up to `count` workers at a time.
+
+    Jobs are taken when there is a worker for them; `begun` is then called with each. `ended` makes the result of a job
+    whose worker ended. When the caller stops iterating, running jobs are interrupted and have cleaned up on return.
+    """
+    count = max(count, 1)
+    waiting = iter(jobs)
+    workers = [Worker(limits, env) for _ in range(count)]
+    idle: LifoQueue[Worker] = LifoQueue()
+    for worker in workers:
+        idle.put(worker)
+
+    def work(job: Job) -> Result:
+        worker = idle.get()
+        try:
+            return worker.run(function, job)
+        except WorkerEnded as error:
+            return ended(job, error)
+        finally:
+            idle.put(worker)
+
+    running: set[Future[Result]] = set()
+    with ThreadPoolExecutor(count) as threads:
+        try:
+            while True:
+                for job in islice(waiting, count - len(running)):
+                    begun(job)
+                    running.add(threads.submit(work, job))
+                if not running:
+                    break
+                done, running = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    yield future.result()
+        finally:
+            for worker in workers:
+                worker.interrupt()
+            wait(running)
+            for worker in workers:
+                worker.close()
+
+
+def _close(process: subprocess.Popen[bytes]) -> None:
+    for stream in (process.stdin, process.stdout):
+        if stream is not None:
+            with suppress(OSError):
+                stream.close()
+
+
+def _send(stream: IO[bytes], content: bytes) -> None:
+    stream.write(len(content).to_bytes(HEAD_BYTES, "big") + content)
+    stream.flush()
+
+
+def _receive(stream: IO[bytes]) -> Any:  # noqa: ANN401 - whatever the other side has pickled
+    size = int.from_bytes(_read(stream, HEAD_BYTES), "big")
+    return pickle.loads(_read(stream, size))  # noqa: S301 - our own process is at the other end
+
+
+def _read(stream: IO[bytes], size: int) -> bytes:
+    """Read exactly `size` bytes; an unbuffered stream gives fewer at a time. Raises EOFError."""
+    parts = bytearray()
+    while len(parts) < size:
+        part = stream.read(size - len(parts))
+        if not part:
+            raise EOFError
+        parts += part
+    return bytes(parts)
+
+
+# ---- inside the process
+
+
+class _State:
+    """What the process knows about itself."""
+
+    busy = False
+    stopped = False
+
+
+def main() -> None:
+    """Do the jobs that come on stdin until it ends. Whatever a job prints goes to stderr."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in grader.__main__
+    signal.signal(signal.SIGINT, _stop)
+    signal.signal(signal.SIGTERM, _stop)
+    jobs = os.fdopen(os.dup(0), "rb", buffering=0)
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    if hasattr(select, "poll"):  # not on Windows, where only an idle worker hears of its parent's end
+        threading.Thread(target=_leave_with_parent, args=(jobs.fileno(),), daemon=True).start()
+    limits: Limits | None = None
+    with suppress(EOFError, BrokenPipeError, KeyboardInterrupt):
+        while not _State.stopped:
+            _wait_for_job(jobs.fileno(), limits)
+            function, job, now = _receive(jobs)
+            _State.busy = True
+            try:
+                if _State.stopped:
+                    break
+                _limit(now, is_first=limits is None)
+                answer = _answer(function, job)
+            finally:
+                _State.busy = False
+            limits = now
+            _send(answers, answer)
+
+
+def _answer(function: Callable[[Any], object], job: object) -> bytes:
+    """Pickle whether the job raised an exception, and its result or that exception."""
+    try:
+        return pickle.dumps((False, function(job)))
+    except Exception as error:  # noqa: BLE001 - it is raised again in the parent
+        with suppress(Exception):
+            answer = pickle.dumps((True, error))
+            pickle.loads(answer)  # noqa: S301 - some exceptions can be pickled and not be read
+            return answer
+        return pickle.dumps((True, RuntimeError(f"{type(error).__name__}: {error}")))
+
+
+def _limit(limits: Limits, *, is_first: bool) -> None:
+    if limits.memory_bytes is None and limits.cpu_s is None:
+        return
+    import resource  # noqa: PLC0415 - not on Windows
+
+    def lower(kind: int, most: int) -> int:
+        hard = resource.getrlimit(kind)[1]
+        return most if hard == resource.RLIM_INFINITY else min(most, hard)
+
+    if limits.memory_bytes is not None and is_first:
+        most = lower(resource.RLIMIT_AS, _mapped_bytes(resource.getpagesize()) + limits.memory_bytes)
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    if limits.cpu_s is not None:
+        most = lower(resource.RLIMIT_CPU, int(time.process_time() + limits.cpu_s) + 1)
+        resource.setrlimit(resource.RLIMIT_CPU, (most, resource.getrlimit(resource.RLIMIT_CPU)[1]))
+
+
+def _mapped_bytes(page_bytes: int) -> int:
+    """Return what this process has mapped: the first number of statm, in pages (proc(5))."""
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[0]) * page_bytes
+    except OSError:  # not Linux
+        return 0
+
+
+def _wait_for_job(descriptor: int, limits: Limits | None) -> None:
+    if limits is None or limits.idle_s is None:
+        return
+    poll = select.poll()
+    poll.register(descriptor, select.POLLIN)
+    if not poll.poll(limits.idle_s * 1000):
+        os._exit(IDLE_CODE)
+
+
+def _stop(_number: int, _frame: FrameType | None) -> None:
+    _State.stopped = True
+    if not _State.busy:
+        os._exit(130)
+    raise KeyboardInterrupt
+
+
+def _leave_with_parent(descriptor: int) -> None:
+    """Clean up like an interrupted process once the parent, which holds the other end of the pipe, is gone."""
+    poll = select.poll()
+    poll.register(descriptor, 0)
+    poll.poll()
+    os.kill(os.getpid(), signal.SIGINT)
+    threading.Event().wait(LEAVE_S)
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    main()

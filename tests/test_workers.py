@@ -1,0 +1,142 @@
+"""Worker processes: whatever a job does to its process, the other jobs are done."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from grader.errors import HostError
+from grader.workers import Limits, Worker, WorkerEnded, run_each
+from tests.cluster.clusters import children_of, lives, until
+
+ROOT = Path(__file__).resolve().parent.parent
+PARENT = """
+import sys
+from tests.test_workers import sleep
+from grader.workers import Worker
+Worker().run(sleep, sys.argv[1])
+"""
+
+
+@pytest.fixture(autouse=True)
+def _importable(monkeypatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+
+
+@pytest.fixture
+def worker() -> Iterator[Worker]:
+    made = Worker(Limits(memory_bytes=1 << 30, cpu_s=2.0, wall_s=20.0))
+    yield made
+    made.close()
+
+
+def pid(_: object) -> int:
+    return os.getpid()
+
+
+def take_memory(_: object) -> int:
+    return len(bytearray(8 << 30))
+
+
+def compute(_: object) -> None:
+    re.match(r"(a+)+$", "a" * 60 + "b")
+
+
+def kill(_: object) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def fail(_: object) -> None:
+    raise HostError("no room", hint="make some")
+
+
+def sleep(path: str) -> None:
+    """As a grading does: it cleans up when it is interrupted."""
+    Path(path).write_text("asleep")
+    try:
+        time.sleep(3600)
+    finally:
+        Path(path).unlink()
+
+
+def harm(number: int) -> int:
+    print("what a job prints does not reach its parent")
+    if number == 3:
+        kill(None)
+    return number * number
+
+
+def test_one_process_does_many_jobs(worker: Worker) -> None:
+    assert worker.run(pid, 1) == worker.run(pid, 2) != os.getpid()
+
+
+@pytest.mark.parametrize(("job", "how"), [(kill, "by signal 9"), (compute, "by signal")])
+def test_what_ends_a_process_costs_its_job(job, how: str, worker: Worker) -> None:
+    with pytest.raises(WorkerEnded, match=how):
+        worker.run(job, None)
+    assert worker.run(harm, 2) == 4
+
+
+def test_a_job_is_limited_in_time(tmp_path: Path) -> None:
+    worker = Worker(Limits(wall_s=1.0))
+    with pytest.raises(WorkerEnded, match="by signal 9"):
+        worker.run(sleep, str(tmp_path / "mark"))
+    worker.close()
+
+
+def test_what_a_job_raises_is_raised(worker: Worker) -> None:
+    with pytest.raises(MemoryError):
+        worker.run(take_memory, None)
+    with pytest.raises(HostError, match="no room") as caught:
+        worker.run(fail, None)
+    assert caught.value.hint == "make some"
+
+
+def test_every_job_has_a_result() -> None:
+    begun: list[int] = []
+    found = run_each(harm, range(6), 2, begun=begun.append, ended=lambda job, error: f"{job} {error.reason}")
+    assert sorted(map(str, found)) == ["0", "1", "16", "25", "3 ended by signal 9", "4"]
+    assert begun == list(range(6))
+
+
+def test_a_caller_that_stops_leaves_nothing_running(tmp_path: Path) -> None:
+    before, mark = children_of(os.getpid()), tmp_path / "mark"
+    found = run_each(_mark_or_sleep, [str(mark), ""], 2, ended=lambda *_: "ended")
+    assert next(found) == "asleep"
+    found.close()
+    assert children_of(os.getpid()) == before
+    assert not mark.exists()
+
+
+def _mark_or_sleep(path: str) -> str:
+    if path:
+        sleep(path)
+    time.sleep(2)
+    return "asleep"
+
+
+def test_an_idle_process_ends_and_a_new_one_does_the_next_job() -> None:
+    worker = Worker(Limits(idle_s=0.1))
+    first = worker.run(pid, None)
+    until(lambda: not lives(first))
+    assert worker.run(pid, None) != first
+    worker.close()
+
+
+def test_a_process_whose_parent_was_killed_cleans_up(tmp_path: Path) -> None:
+    mark = tmp_path / "mark"
+    parent = subprocess.Popen([sys.executable, "-c", PARENT, str(mark)], cwd=ROOT)
+    until(mark.exists)
+    (child,) = children_of(parent.pid)
+    parent.kill()
+    parent.wait()
+    until(lambda: not lives(child))
+    assert not mark.exists()
