@@ -1,4 +1,4 @@
-"""Whether the package builds."""
+"""Whether the package builds, and its own programs run."""
 
 from __future__ import annotations
 

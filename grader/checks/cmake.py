@@ -1,4 +1,4 @@
-"""What `CMakeLists.txt` says."""
+"""Whether `CMakeLists.txt` makes a catkin package and installs the scripts."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from grader.checks.support.text import listed, near_names, shown
 from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
+
+BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 
 
 class CMakeParams(Record):
@@ -98,9 +100,6 @@ def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[tuple[str, str
 
 def _first(facts: CMakeFacts, name: str) -> CMakeCall | None:
     return next((c for c in facts.calls if c.name == name), None)
-
-
-BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 
 
 class CMakeInstallParams(Record):

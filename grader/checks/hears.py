@@ -1,4 +1,4 @@
-"""Whether a listener prints what it hears."""
+"""Whether a listener prints what it hears, and if not, why."""
 
 from __future__ import annotations
 
@@ -23,6 +23,11 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+
+HAND_IN = "add the script to the package, and push it"
+CALLBACK_HINT = (
+    "print data.data in the callback, without a condition and nothing slow beside it; end with rospy.spin()"
+)
 
 
 class HearsParams(Record):
@@ -114,12 +119,6 @@ def _how_many(missing: Sequence[Probe], probes: Sequence[Probe]) -> str:
 
 def _squeezed(text: object) -> str:
     return "".join(str(text).split())
-
-
-HAND_IN = "add the script to the package, and push it"
-CALLBACK_HINT = (
-    "print data.data in the callback, without a condition and nothing slow beside it; end with rospy.spin()"
-)
 
 
 def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:

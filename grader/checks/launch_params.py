@@ -1,4 +1,4 @@
-"""Whether a launch file loads parameters before its node reads them."""
+"""Whether a launch file puts parameters where its node reads them, before it does so."""
 
 from __future__ import annotations
 
@@ -35,6 +35,7 @@ from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
 
 SUMMARY = re.compile(r"\s*\*\s+/")  # roslaunch's list of parameters
 OUTSIDE = 'write <rosparam file="$(find <package>)/{}"/> outside the <node>, without ns'
+Wanted = Mapping[str, int | float | str]
 
 
 class LaunchLoadsParams(Record):
@@ -195,9 +196,6 @@ def _line(file: LaunchFile, params: LaunchLoadsParams) -> int:
     here = [load for load in file.loads if load.file == file.path]
     named = [load for load in here if _is_of(load, params)]
     return (named or here)[0].line if here else 1
-
-
-Wanted = Mapping[str, int | float | str]
 
 
 def params_misplaced(run: Run, file: LaunchFile, nodes: Iterable[str], wanted: Wanted) -> Verdict | None:

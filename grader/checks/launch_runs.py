@@ -1,4 +1,4 @@
-"""Whether a launch file brings the nodes up together."""
+"""Whether a launch file brings its nodes up, under their names and connected."""
 
 from __future__ import annotations
 

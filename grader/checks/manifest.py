@@ -1,4 +1,4 @@
-"""What `package.xml` says."""
+"""Whether `package.xml` names the package, its dependencies and a maintainer."""
 
 from __future__ import annotations
 

@@ -31,6 +31,7 @@ from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 
 ENOUGH = 3
 UNFILLED = ("%s", "%d", "%f", "{}", "{0}")
+ROUNDING = 1e-6
 
 
 class MessageParams(Record):
@@ -161,9 +162,6 @@ def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: 
     if _watched_ns(run, heard) >= WATCHED_S * 1e9:
         return unjudged(f"{few}: too few to see the time grow", hint=f"publish in the loop; {GET_TIME}")
     return inconclusive(f"{few} while it was watched: too few to see the time grow", hint="grade again")
-
-
-ROUNDING = 1e-6
 
 
 class FieldBoundsParams(Record):

@@ -30,6 +30,9 @@ from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Citation, FileCitation, Verdict, failed, inconclusive, passed, unjudged
 
+EXACT = 1e-9
+MISSING = object()
+
 
 class ParamsLoadedParams(Record):
     """`process` runs `rosparam load` on `file`; `names` have to be on the server afterwards, maps taken apart."""
@@ -326,10 +329,6 @@ def _not_logged(run: Run, params: ParamsSetParams) -> Verdict | None:
         return None
     message = f"{params.name} is set to {params.value}, but the new value is never printed"
     return failed(message, hint=f"rospy.loginfo(rospy.get_param('{params.name}'))")
-
-
-EXACT = 1e-9
-MISSING = object()
 
 
 class ParamValueParams(Record):

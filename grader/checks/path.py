@@ -1,4 +1,4 @@
-"""Whether a robot takes the way that it should."""
+"""Whether a robot takes the right path, and if not, where and how it leaves it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field, model_validator
 
 from grader.checks.registry import check
+from grader.checks.support.clocks import run_seconds
 from grader.checks.support.geometry import (
     Course,
     Point,
@@ -19,7 +20,6 @@ from grader.checks.support.geometry import (
     length_m,
     off_m,
     relative,
-    run_seconds,
     track,
 )
 from grader.checks.support.lateness import NO_EXCUSE, Lateness, lateness
@@ -37,6 +37,7 @@ LATE_P95_MS = 5.0
 ORIGIN = (0.0, 0.0)
 
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+MOVED_M = 0.01
 
 
 class PathParams(Record):
@@ -149,9 +150,6 @@ def _excused(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
 def _kept_waiting(late: Lateness) -> bool:
     """Whether the machine was so late, or so busy, that a robot may have strayed by it."""
     return late.full or late.max_ms >= LATE_MS or late.p95_ms >= LATE_P95_MS
-
-
-MOVED_M = 0.01
 
 
 class Words(NamedTuple):

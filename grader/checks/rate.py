@@ -1,4 +1,4 @@
-"""Whether messages come at the rate of the handout."""
+"""Whether messages come at the rate that the handout asks for, evenly."""
 
 from __future__ import annotations
 

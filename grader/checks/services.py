@@ -1,4 +1,4 @@
-"""Whether a node offers a service, and whether it answers well."""
+"""Whether a node offers a service, and whether it answers the grader's calls correctly."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The facts that checks ask for by name, out of the recorded runs."""
+"""The facts that checks ask for by name, from the grader's own runs or from recordings of other tools."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ NOT_RUN = "not_run"
 NO_PACKAGE = PackageFacts(
     name="", path=".", manifest=None, manifest_fault=None, cmake=None, files=(), launch_files=()
 )
+PACKAGE_RUN = "package"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +126,6 @@ def try_facts(rubric: Rubric, runs: Mapping[str, Run]) -> Facts:
     return Facts(rubric=rubric, runs=runs, package=package)
 
 
-PACKAGE_RUN = "package"
 
 
 def with_recordings(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:

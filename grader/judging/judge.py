@@ -1,4 +1,4 @@
-"""From evidence and rubric to criteria: runs the checks, settles what blocks what, gives the points."""
+"""From evidence and rubric to criteria: run the checks, find what blocks what, award the points."""
 
 from __future__ import annotations
 

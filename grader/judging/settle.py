@@ -1,4 +1,6 @@
-"""From the automatic result to the one that counts, and back: what people decided, then what being late costs."""
+"""From the automatic result to the one that counts, and back: what people decided, then what being late costs.
+
+Lateness is pure arithmetic on absolute times. A day is 24 hours, whatever the clocks were set to."""
 
 from __future__ import annotations
 
@@ -12,6 +14,10 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.submission_time import AppliedOverride, Automatic, HandedIn, Lateness, Override
 from grader.model.verdict import Status
 from grader.rubric.model import Late, Rubric
+
+UNITS = {"day": timedelta(days=1), "hour": timedelta(hours=1)}
+SPANS = {"day": 86_400, "hour": 3600, "minute": 60, "second": 1}
+NOBODY = "nobody says when it was handed in, so it counts as in time"
 
 
 def settle(
@@ -108,9 +114,6 @@ def _decided(criterion: CriterionResult, override: Override, digits: int) -> Cri
     return criterion.model_copy(update={"status": status, "points": points, "message": message})
 
 
-UNITS = {"day": timedelta(days=1), "hour": timedelta(hours=1)}
-SPANS = {"day": 86_400, "hour": 3600, "minute": 60, "second": 1}
-NOBODY = "nobody says when it was handed in, so it counts as in time"
 
 
 def deadline_of(rubric: Rubric, extension_days: float = 0.0) -> datetime | None:

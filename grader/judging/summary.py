@@ -1,4 +1,6 @@
-"""What all criteria together come to."""
+"""What all criteria come to, and notes on what was noticed while student code ran.
+
+Points are rounded as people round them: half up, in decimals. Notes cost no points."""
 
 from __future__ import annotations
 
@@ -14,6 +16,10 @@ from grader.shown import clip, clipped, json_text, text_limit
 
 LIMIT = 2000
 OPEN = {Status.INCONCLUSIVE, Status.MANUAL, Status.ERROR}
+KINDS = ("refused", "limit")
+NOTES_MAX = 20
+TEXT_CHARS = 300
+ACTOR_CHARS = 100
 
 
 def total_points(rubric: Rubric, results: Sequence[CriterionResult]) -> float:
@@ -92,10 +98,6 @@ def round_half_up(points: float, digits: int) -> float:
     return float(Decimal(repr(points)).quantize(step, rounding=ROUND_HALF_UP))
 
 
-KINDS = ("refused", "limit")
-NOTES_MAX = 20
-TEXT_CHARS = 300
-ACTOR_CHARS = 100
 
 
 def notes_of(runs: Mapping[str, Run]) -> tuple[Note, ...]:

@@ -16,6 +16,13 @@ from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
 TOTAL_POINTS = 100
 ANSWERS = "service-answers"
 MANUAL = "manual"  # a person gives the points, no check does
+KINDS_OF_START = ("script", "launch", "load", "program", "built")
+STRING = "std_msgs/String"
+INTEGERS = {
+    f"std_msgs/{prefix}Int{bits}": (low, high)
+    for bits in (8, 16, 32, 64)
+    for prefix, low, high in (("", -(2 ** (bits - 1)), 2 ** (bits - 1) - 1), ("U", 0, 2**bits - 1))
+}
 
 
 def cross_faults(data: object, checks: Mapping[str, Check], *, complete: bool = True) -> list[Fault]:
@@ -149,13 +156,6 @@ def _late(rubric: dict[str, Any]) -> Iterator[Fault]:
         )
 
 
-KINDS_OF_START = ("script", "launch", "load", "program", "built")
-STRING = "std_msgs/String"
-INTEGERS = {
-    f"std_msgs/{prefix}Int{bits}": (low, high)
-    for bits in (8, 16, 32, 64)
-    for prefix, low, high in (("", -(2 ** (bits - 1)), 2 ** (bits - 1) - 1), ("U", 0, 2**bits - 1))
-}
 
 
 def scenario_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:

@@ -1,4 +1,6 @@
-"""The instructor's files that a rubric names, read before it is judged sound."""
+"""An instructor's own checks: the files that a rubric names are read, and the file of checks is run.
+
+What they print goes to stderr, with what a student wrote in it made visible."""
 
 from __future__ import annotations
 
@@ -25,6 +27,10 @@ from grader.rubric.source import Fault, KeyPath, as_map, as_maps
 from grader.shown import visible
 
 PYTEST = "pytest"
+LineFault = tuple[int, str]
+LINE_CHARS = 65_536
+_STREAMS = threading.RLock()
+"""Stdout is the whole process's: two threads would leave each other's behind."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +74,6 @@ def known_checks(folder: Path, own: Mapping[str, Check]) -> dict[str, Check]:
     return {**CHECKS, tests.name: tests, **own}
 
 
-LineFault = tuple[int, str]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,9 +152,6 @@ class _Loader(ExecutionLoader):
         return importlib.util.decode_source(self._raw)
 
 
-LINE_CHARS = 65_536
-_STREAMS = threading.RLock()
-"""Stdout is the whole process's: two threads would leave each other's behind."""
 
 
 class Shown(io.TextIOBase):

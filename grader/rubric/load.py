@@ -1,4 +1,4 @@
-"""A rubric's file into its records. Every fault is named at once, as `file:line: key.path: what is wrong`."""
+"""Load a rubric's file, naming every fault at once as `file:line: key.path: what is wrong`; what a rubric needs."""
 
 from __future__ import annotations
 

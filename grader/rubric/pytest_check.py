@@ -27,6 +27,8 @@ TAIL_BYTES = 8192
 # pytest's own exit codes: every test was run, some may have failed; an error of pytest's own, or a wrong -k
 ALL_RUN = {0, 1}
 NOT_RUN = {3, 4}
+Outcome = Literal["passed", "failed", "skipped", "open"]
+MAX_BYTES = 1_000_000
 
 
 class PytestParams(Record):
@@ -202,7 +204,6 @@ def _sub_score(test: TestOutcome) -> str:
     return f"{test.name} {test.points if test.outcome == 'passed' else 0:g}/{test.points:g}"
 
 
-Outcome = Literal["passed", "failed", "skipped", "open"]
 
 
 class TestOutcome(Record):
@@ -224,7 +225,6 @@ class SessionOutcome(Record):
     faults: tuple[str, ...]
 
 
-MAX_BYTES = 1_000_000
 
 
 class FileFault(ValueError):

@@ -1,4 +1,4 @@
-"""What time it was by the run's clocks when a message arrived, in seconds since the first of them."""
+"""The run's clocks, in seconds, and whether numbers in messages are a time that grows as they do."""
 
 from __future__ import annotations
 
@@ -13,6 +13,13 @@ from grader.model.verdict import Verdict, failed, inconclusive
 Seconds = tuple[float, ...]
 ToSeconds = Callable[[int], float]
 """From a `log_time` (ns) to a second of the time that the node lives in."""
+SLACK_S = 1.5
+SLACK_SHARE = 0.05
+WATCHED_S = 3.0
+SHORT_S = 1.1
+WHOLE_S = 1.05
+UNITS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
+GET_TIME = "rospy.get_time() gives the time in seconds; ask it again for every message"
 
 
 def clocks_at(run: Run, times_ns: Sequence[int]) -> tuple[Seconds, ...]:
@@ -61,15 +68,6 @@ def _ticks(run: Run) -> list[tuple[int, float]]:
         for time_ns, value in zip(channel.times_ns, channel.values, strict=True)
         if value and value.get("clock")
     ]
-
-
-SLACK_S = 1.5
-SLACK_SHARE = 0.05
-WATCHED_S = 3.0
-SHORT_S = 1.1
-WHOLE_S = 1.05
-UNITS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
-GET_TIME = "rospy.get_time() gives the time in seconds; ask it again for every message"
 
 
 def wrong_growth(told: Sequence[float], clocks: Sequence[Seconds], *, short: bool = False) -> Verdict | None:

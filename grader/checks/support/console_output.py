@@ -1,4 +1,6 @@
-"""What a node printed or logged, and whether probes are among it."""
+"""What nodes printed and logged, and whether the messages that were sent are in it.
+
+Two senders of a topic may send the same text at once: then it has to be printed once more than the other one sent it."""
 
 from __future__ import annotations
 
@@ -23,6 +25,18 @@ _WORD = re.compile(r"/?[A-Za-z][\w/]*")
 _ANONYMOUS_END = re.compile(r"(?=(_\d+_\d{9,}))")
 _HEX = re.compile(r"0[xX][0-9a-fA-F]+")
 _NUMBER = re.compile(r"(?<![\d.])([-+]?)(\d+)(\.\d+)?(?!\d)", re.ASCII)
+_BEFORE, _BEHIND = r"(?<![\w.])", r"(?![\w]|[.,]\d)"
+_Lines = list[tuple[str, str]]
+"""Lines with their blanks squeezed, and as they are."""
+LOOKED_AT, LOOKED_AT_LEAST = 400, 8
+TEXT_CHARS_MAX = 200
+SEARCHED_CHARS_MAX = 100_000_000
+"""Texts are as many times fewer as what was printed is longer, and none is longer than a lab's are."""
+PUNCTUATION = ".,;:!?'\"()[]{}<>"
+Level = Literal["debug", "info", "warn", "error", "fatal"]
+LEVELS: dict[int, Level] = {1: "debug", 2: "info", 4: "warn", 8: "error", 16: "fatal"}
+CALLS = {level: f"rospy.log{'err' if level == 'error' else level}" for level in LEVELS.values()}
+_CONSOLE = re.compile(r"^\s*\[\s*(DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*\[[^\]]*\]\s*:?\s?(.*)$")
 
 
 class Probe(NamedTuple):
@@ -202,17 +216,6 @@ def in_order(places: Sequence[tuple[int, ...]]) -> bool:
     return None not in chosen(places)
 
 
-_BEFORE, _BEHIND = r"(?<![\w.])", r"(?![\w]|[.,]\d)"
-_Lines = list[tuple[str, str]]
-"""Lines with their blanks squeezed, and as they are."""
-
-LOOKED_AT, LOOKED_AT_LEAST = 400, 8
-TEXT_CHARS_MAX = 200
-SEARCHED_CHARS_MAX = 100_000_000
-"""Texts are as many times fewer as what was printed is longer, and none is longer than a lab's are."""
-PUNCTUATION = ".,;:!?'\"()[]{}<>"
-
-
 class Sent(NamedTuple):
     """The texts that one sender published from `from_ns` on, with how many times."""
 
@@ -299,12 +302,6 @@ def _times(lines: _Lines, text: str, template: str) -> int:
 def _edge(mark: str, whole: str, before: str) -> str:
     """A number has to stand for itself; a word may follow on others (`I heardThe time`)."""
     return mark if whole[:1].isdigit() and not before else ""
-
-
-Level = Literal["debug", "info", "warn", "error", "fatal"]
-LEVELS: dict[int, Level] = {1: "debug", 2: "info", 4: "warn", 8: "error", 16: "fatal"}
-CALLS = {level: f"rospy.log{'err' if level == 'error' else level}" for level in LEVELS.values()}
-_CONSOLE = re.compile(r"^\s*\[\s*(DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*\[[^\]]*\]\s*:?\s?(.*)$")
 
 
 class Logged(NamedTuple):

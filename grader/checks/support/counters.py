@@ -1,4 +1,4 @@
-"""A counter's values as they came: steps, what was lost on the way, floods."""
+"""A counter's values as they came: steps, what was lost on the way, floods, and how it starts again at its maximum."""
 
 from __future__ import annotations
 
@@ -23,6 +23,8 @@ from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 FLOOD_FACTOR = 3
 SYSTEMATIC_SHARE = 0.05
 STUCK_COUNT = 5
+SILENT_PERIODS = 20
+SILENT_NS = 500_000_000
 
 
 class Step(NamedTuple):
@@ -177,10 +179,6 @@ def _number(value: object) -> float | None:
 def first_values(values: Sequence[float]) -> str:
     from_start = ", ".join(f"{v:g}" for v in values[:4])
     return f"{from_start}, …" if len(values) > 4 else from_start
-
-
-SILENT_PERIODS = 20
-SILENT_NS = 500_000_000
 
 
 class WrapParams(Record):

@@ -1,4 +1,4 @@
-"""Ways in the plane: where velocities lead, and how far a path strays from the way that it should take."""
+"""Paths in the plane: read from a run's poses or added up from its velocities, and how far they stray from points."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ SAMPLE_RAD = 0.2
 SAMPLES_MAX = 2000
 
 Point = tuple[float, float]
+FASTEST = 1e6
 
 
 class Pose(NamedTuple):
@@ -148,9 +149,6 @@ def followed(path: Sequence[Pose], points: Sequence[Point], tolerance_m: float) 
     last = len(legs) - 1
     done = last in on and math.dist(path[-1].point, points[-1]) <= tolerance_m
     return Course(reached, None, largest, done)
-
-
-FASTEST = 1e6
 
 
 class Track(NamedTuple):

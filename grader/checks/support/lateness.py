@@ -1,4 +1,4 @@
-"""What the machine did in a stretch of a run: how late it woke who slept, by the arena's timer and its calibration."""
+"""How late the machine was in a stretch of a run, by the arena's timer and its calibration."""
 
 from __future__ import annotations
 

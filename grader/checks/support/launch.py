@@ -1,4 +1,4 @@
-"""A launch file and its nodes, as far as the package's files tell."""
+"""A launch file and its nodes: what its text says, what roslaunch printed, and why a node is not there."""
 
 from __future__ import annotations
 
@@ -17,6 +17,44 @@ from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, un
 
 UNRESOLVED = "$("
 ATTRIBUTES = ("pkg", "type", "name")
+_ERRORS = (
+    "ERROR: cannot launch",
+    "RLException",
+    "Invalid ",
+    "ERROR:",
+    "process has died",
+    "roslaunch:",
+    "Resource not found",
+)
+_SUBSTITUTION = re.compile(r"\\\$\\\(([^)]*)\\\)")
+# Students print such lines too: between brackets is no other bracket, so that a line is looked through once.
+_STARTED = re.compile(r"process\[([^\s\[\]]+)-\d+\]: started with pid")
+_DIED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has died \[pid \d+, exit code (-?\d+)")
+_FINISHED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has finished cleanly")
+_REQUIRED = re.compile(r"REQUIRED process (\[[^\s\[\]]+-\d+\]) has died")
+# what roslaunch says when it starts nothing, what it means, and what to do ({0}: the pattern's group)
+_REFUSALS = (
+    (r"multiple nodes named \[([^\[\]\n]+)\]", "two nodes are named {0}", "give each <node> a name of its own"),
+    (r"cannot contain a namespace", "a node's name has a slash in it",
+     'write name="…" without a slash; a namespace goes into ns="…"'),
+    (r"missing required attribute: '?(\w+)", "a tag has no {0}", "add the attribute"),
+    (r"file does not exist \[([^\[\]\n]+)\]", "the file {0} that <rosparam> loads does not exist",
+     "write $(find <package>)/config/<file>, and push the file"),
+    (r"Resource not found: (\S+)", "there is no package {0}",
+     "$(find …) and pkg take the package's name, letter by letter"),
+    (r"requires the '(\w+)' arg to be set", 'its <arg name="{0}"> has no default',
+     'write <arg name="{0}" default="…"/>'),
+    (r"output must be one of", 'output is "screen" or "log", in small letters', 'write output="screen"'),
+    (r"multiple files named", "the package has two launch files of that name",
+     "delete one of them, also one in a folder of old files: find . -name '*.launch' lists them"),
+    (r"Unable to launch \[([^\s\[\]]+)-\d+\]", "the system cannot start the script of {0}",
+     "its first line has to be #!/usr/bin/env python3, or #!/bin/bash for a shell script"),
+    (r"Unknown substitution command \[([^\[\]\n]+)\]", "$({0}) is nothing that roslaunch knows",
+     "write $(find <package>)/…"),
+    (r"error loading <rosparam> tag", "<rosparam> cannot load its file",
+     "rosparam load <file> shows what is wrong with the file"),
+    (r"Invalid roslaunch XML syntax", "it is not well-formed", "close every element"),
+)  # fmt: skip
 
 
 class Slip(NamedTuple):
@@ -182,47 +220,6 @@ def _folder(package: PackageFacts) -> str:
 
 def _slip(node: LaunchNode, why: str, fix: str) -> Slip:
     return Slip(node.file, node.line, why, fix)
-
-
-_ERRORS = (
-    "ERROR: cannot launch",
-    "RLException",
-    "Invalid ",
-    "ERROR:",
-    "process has died",
-    "roslaunch:",
-    "Resource not found",
-)
-_SUBSTITUTION = re.compile(r"\\\$\\\(([^)]*)\\\)")
-# Students print such lines too: between brackets is no other bracket, so that a line is looked through once.
-_STARTED = re.compile(r"process\[([^\s\[\]]+)-\d+\]: started with pid")
-_DIED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has died \[pid \d+, exit code (-?\d+)")
-_FINISHED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has finished cleanly")
-_REQUIRED = re.compile(r"REQUIRED process (\[[^\s\[\]]+-\d+\]) has died")
-
-# what roslaunch says when it starts nothing, what it means, and what to do ({0}: the pattern's group)
-_REFUSALS = (
-    (r"multiple nodes named \[([^\[\]\n]+)\]", "two nodes are named {0}", "give each <node> a name of its own"),
-    (r"cannot contain a namespace", "a node's name has a slash in it",
-     'write name="…" without a slash; a namespace goes into ns="…"'),
-    (r"missing required attribute: '?(\w+)", "a tag has no {0}", "add the attribute"),
-    (r"file does not exist \[([^\[\]\n]+)\]", "the file {0} that <rosparam> loads does not exist",
-     "write $(find <package>)/config/<file>, and push the file"),
-    (r"Resource not found: (\S+)", "there is no package {0}",
-     "$(find …) and pkg take the package's name, letter by letter"),
-    (r"requires the '(\w+)' arg to be set", 'its <arg name="{0}"> has no default',
-     'write <arg name="{0}" default="…"/>'),
-    (r"output must be one of", 'output is "screen" or "log", in small letters', 'write output="screen"'),
-    (r"multiple files named", "the package has two launch files of that name",
-     "delete one of them, also one in a folder of old files: find . -name '*.launch' lists them"),
-    (r"Unable to launch \[([^\s\[\]]+)-\d+\]", "the system cannot start the script of {0}",
-     "its first line has to be #!/usr/bin/env python3, or #!/bin/bash for a shell script"),
-    (r"Unknown substitution command \[([^\[\]\n]+)\]", "$({0}) is nothing that roslaunch knows",
-     "write $(find <package>)/…"),
-    (r"error loading <rosparam> tag", "<rosparam> cannot load its file",
-     "rosparam load <file> shows what is wrong with the file"),
-    (r"Invalid roslaunch XML syntax", "it is not well-formed", "close every element"),
-)  # fmt: skip
 
 
 class Absence(NamedTuple):

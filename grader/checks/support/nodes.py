@@ -1,4 +1,4 @@
-"""Which nodes a process registered, and whether a name is the one that was asked for."""
+"""Names of the ROS graph, which nodes a process registered, and whether a name is the one that was asked for."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from grader.evidence.run import Run
 Anonymous = Literal["allowed", "required", "forbidden"]
 _KINDS = {"allowed": "plain or anonymous", "required": "anonymous", "forbidden": "plain"}
 _SUFFIX = re.compile(r"_\d+_\d+$")
+_ANONYMOUS = r"(_\d+_\d+)?"
+TypeName = Annotated[str, Field(pattern=r"^[A-Za-z]\w*/[A-Za-z]\w*$")]
 
 
 def nodes_of(run: Run, process: str) -> tuple[str, ...]:
@@ -70,9 +72,6 @@ def _bases(names: Iterable[str]) -> list[str]:
     return ["/" + name.lstrip("/") for name in names]
 
 
-_ANONYMOUS = r"(_\d+_\d+)?"
-
-
 def _global(name: str) -> str:
     if not name.startswith("/"):
         raise ValueError(f'a name of the graph begins with a slash: "/{name}"')
@@ -91,5 +90,3 @@ def is_called(node: str, name: str) -> bool:
 
 GlobalName = Annotated[str, AfterValidator(_global)]
 """A topic's, a service's or a parameter's full name."""
-
-TypeName = Annotated[str, Field(pattern=r"^[A-Za-z]\w*/[A-Za-z]\w*$")]

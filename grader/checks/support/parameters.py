@@ -1,4 +1,6 @@
-"""What was on the parameter server at a time; maps are taken apart into their leaves (`/details/name/first`)."""
+"""The parameter server over time, parameters that the grader made up, and what `rosparam load` says of a YAML file.
+
+Maps are taken apart into their leaves (`/details/name/first`)."""
 
 from __future__ import annotations
 
@@ -24,6 +26,31 @@ SYSTEM = (
     "/rosout_disable_topics_generation",
     "/roslaunch/",
 )
+NOT_IN_FILE = "not in the file"
+PRINTED_INDENT = 4
+_PLACE = re.compile(r"line (\d+), column (\d+)")
+_IN_LINE = "line {line} has a tab behind a name or a value, which YAML does not take"
+_INDENT = "indent with spaces alone, two for each level"
+# what is printed, what it means ({line}: where), and what to do
+_CAUSES = (
+    (r"found character '\\t'", "line {line} is indented with a tab, which YAML does not take", _INDENT),
+    (r"cannot marshal None", "a name has no value: nothing stands behind it, and nothing is indented below it",
+     "write a value behind the name; what belongs to a name is indented by two spaces more than the name"),
+    (r"exceeds XML-RPC limits|Overflow Error", "a number is larger than 2147483647, the largest that ROS can hold",
+     'write a long number in quotes, as text: phone: "9876543210"'),
+    (r"mapping values are not allowed here",
+     "in line {line} or above it, the space behind a `:` is missing, or a `:` is part of a value",
+     'write `name: value` with a space, and a value that holds a `:` in "quotes"'),
+    (r"scanning a quoted scalar|found unexpected end of stream", "a closing quote is missing near line {line}",
+     'close every " on its own line'),
+    (r"expected <block end>|unindent does not match|expected ',' or '[\]}}]'|could not find expected ':'",
+     "line {line} does not fit those above it: names of one level begin in the same column", _INDENT),
+    (r"cannot start any token", "line {line} has a character that needs quotes", 'write the value in "quotes"'),
+    (r"can only be set to a dictionary", "it holds no `name: value`", "write `details:` and its values below it"),
+    (r"UnicodeDecodeError|codec can't decode|special characters are not allowed", "it is not saved as UTF-8",
+     "save it as UTF-8"),
+    (r"is not iterable|NoneType", "it is empty, or a part of it is", "write `details:` and its values below it"),
+)  # fmt: skip
 
 
 def absolute(name: str) -> str:
@@ -76,9 +103,6 @@ def instead(found: Mapping[str, Any], name: str) -> str:
     return f"there is no {name}" + (f"; there is {listed(near)}" if near else "")
 
 
-NOT_IN_FILE = "not in the file"
-
-
 class Given(NamedTuple):
     """A parameter as the grader set it before the run."""
 
@@ -122,33 +146,6 @@ def broken(package: PackageFacts, run: Run) -> Ending | None:
     seen = f"; there is {listed(near)}" if near else ""
     hint = "write the name as rosparam list shows it, one key for each level: get_param('details')['name']['first']"
     return end._replace(cause=f"{end.cause}: nothing is named {key[1]} there{seen}", hint=hint)
-
-
-PRINTED_INDENT = 4
-_PLACE = re.compile(r"line (\d+), column (\d+)")
-_IN_LINE = "line {line} has a tab behind a name or a value, which YAML does not take"
-_INDENT = "indent with spaces alone, two for each level"
-
-# what is printed, what it means ({line}: where), and what to do
-_CAUSES = (
-    (r"found character '\\t'", "line {line} is indented with a tab, which YAML does not take", _INDENT),
-    (r"cannot marshal None", "a name has no value: nothing stands behind it, and nothing is indented below it",
-     "write a value behind the name; what belongs to a name is indented by two spaces more than the name"),
-    (r"exceeds XML-RPC limits|Overflow Error", "a number is larger than 2147483647, the largest that ROS can hold",
-     'write a long number in quotes, as text: phone: "9876543210"'),
-    (r"mapping values are not allowed here",
-     "in line {line} or above it, the space behind a `:` is missing, or a `:` is part of a value",
-     'write `name: value` with a space, and a value that holds a `:` in "quotes"'),
-    (r"scanning a quoted scalar|found unexpected end of stream", "a closing quote is missing near line {line}",
-     'close every " on its own line'),
-    (r"expected <block end>|unindent does not match|expected ',' or '[\]}}]'|could not find expected ':'",
-     "line {line} does not fit those above it: names of one level begin in the same column", _INDENT),
-    (r"cannot start any token", "line {line} has a character that needs quotes", 'write the value in "quotes"'),
-    (r"can only be set to a dictionary", "it holds no `name: value`", "write `details:` and its values below it"),
-    (r"UnicodeDecodeError|codec can't decode|special characters are not allowed", "it is not saved as UTF-8",
-     "save it as UTF-8"),
-    (r"is not iterable|NoneType", "it is empty, or a part of it is", "write `details:` and its values below it"),
-)  # fmt: skip
 
 
 class Words(NamedTuple):

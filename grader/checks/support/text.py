@@ -1,4 +1,4 @@
-"""Names that nearly fit, and numbers as a student reads them."""
+"""Text as a student reads it: names that nearly fit, numbers and lists, templates of messages and lines."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ NAMES_MAX, NAME_CHARS_MAX = 1_000, 60
 SHOWN_CHARS = 160
 SHOWN_BEFORE_CHARS = 10_000
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+SECONDS = "{seconds}"
+VALUE = "{value}"
+NUMBER = r"[-+]?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?"
 
 
 def near_names(wanted: str, names: Iterable[str]) -> tuple[str, ...]:
@@ -94,11 +97,6 @@ def seconds(duration_ns: float) -> str:
 
 def plural(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
-SECONDS = "{seconds}"
-VALUE = "{value}"
-NUMBER = r"[-+]?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?"
 
 
 def words_pattern(words: str) -> str:

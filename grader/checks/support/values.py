@@ -1,4 +1,4 @@
-"""Two values of messages, services and parameters against each other: where they differ, in words."""
+"""Values of messages, services and parameters as text, and where two of them differ."""
 
 from __future__ import annotations
 
