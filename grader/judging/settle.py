@@ -1,6 +1,7 @@
 """From the automatic result to the one that counts, and back: what people decided, then what being late costs.
 
-Lateness is pure arithmetic on absolute times. A day is 24 hours, whatever the clocks were set to."""
+Lateness is pure arithmetic on absolute times. A day is 24 hours, whatever the clocks were set to.
+"""
 
 from __future__ import annotations
 

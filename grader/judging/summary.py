@@ -1,6 +1,7 @@
 """What all criteria come to, and notes on what was noticed while student code ran.
 
-Points are rounded as people round them: half up, in decimals. Notes cost no points."""
+Points are rounded as people round them: half up, in decimals. Notes cost no points.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """An instructor's own checks: the files that a rubric names are read, and the file of checks is run.
 
-What they print goes to stderr, with what a student wrote in it made visible."""
+What they print goes to stderr, with what a student wrote in it made visible.
+"""
 
 from __future__ import annotations
 

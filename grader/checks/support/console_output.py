@@ -1,6 +1,7 @@
 """What nodes printed and logged, and whether the messages that were sent are in it.
 
-Two senders of a topic may send the same text at once: then it has to be printed once more than the other one sent it."""
+Two senders of a topic may send the same text at once: then it has to be printed once more than the other one sent it.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """The parameter server over time, parameters that the grader made up, and what `rosparam load` says of a YAML file.
 
-Maps are taken apart into their leaves (`/details/name/first`)."""
+Maps are taken apart into their leaves (`/details/name/first`).
+"""
 
 from __future__ import annotations
 

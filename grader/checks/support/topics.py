@@ -144,7 +144,7 @@ def whole_until_ns(run: Run, topic: str, until_ns: int | None = None) -> int | N
 
 
 def all_lost(run: Run, topic: str) -> Verdict | None:
-    """Where nothing came on a topic because the recorder dropped it."""
+    """Return the verdict where nothing is recorded of a topic because the recorder dropped it."""
     lost = losses(run, topic)
     if lost is None or lost.kept:
         return None
