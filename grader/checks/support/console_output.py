@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import Literal, NamedTuple
 
 from grader.checks.support.exit_causes import HEADING, tracebacks
@@ -217,45 +217,22 @@ def in_order(places: Sequence[tuple[int, ...]]) -> bool:
     return None not in chosen(places)
 
 
-class Sent(NamedTuple):
-    """The texts that one sender published from `from_ns` on, with how many times."""
-
-    texts: Counter[str]
-
-    @property
-    def total(self) -> int:
-        return self.texts.total()
-
-
-def sent_by(run: Run, topic: str, nodes: Collection[str], from_ns: int = 0) -> Sent:
-    """What these nodes published as text on the topic at `from_ns` or later."""
-    texts = (
-        text
-        for channel in run.student_channels(topic)
-        if channel.callerid in nodes
-        for t, text in zip(channel.times_ns, channel.data, strict=True)
-        if t >= from_ns and _is_text(text)
-    )
-    return Sent(Counter(texts))
+def sent_by(run: Run, topic: str, nodes: Collection[str], from_ns: int = 0) -> Counter[str]:
+    """Return what these nodes published as text on the topic at `from_ns` or later, with how many times."""
+    return Counter(text for t, text in _texts_of(run, topic, nodes) if t >= from_ns)
 
 
 def both_from_ns(run: Run, topic: str, first: Collection[str], second: Collection[str]) -> int | None:
-    """From when on both had sent a text; None where one of them never did."""
-    begins = [
-        [
-            t
-            for channel in run.student_channels(topic)
-            if channel.callerid in nodes
-            for t, text in zip(channel.times_ns, channel.data, strict=True)
-            if _is_text(text)
-        ]
-        for nodes in (first, second)
-    ]
+    """Return from when on both had sent a text; None where one of them never did."""
+    begins = [[t for t, _ in _texts_of(run, topic, nodes)] for nodes in (first, second)]
     return max(min(times) for times in begins) if all(begins) else None
 
 
-def _is_text(value: object) -> bool:
-    return isinstance(value, str) and bool(value.strip())
+def _texts_of(run: Run, topic: str, nodes: Collection[str]) -> Iterator[tuple[int, str]]:
+    for channel in run.student_channels(topic):
+        if channel.callerid in nodes:
+            pairs = zip(channel.times_ns, channel.data, strict=True)
+            yield from ((t, text) for t, text in pairs if isinstance(text, str) and text.strip())
 
 
 def printed_times(run: Run, process: str, texts: Collection[str], template: str) -> Counter[str]:
@@ -284,9 +261,9 @@ def _worth_a_look(texts: Iterable[str], streams: Iterable[_Lines], most: int) ->
     return found[:: max(1, len(found) // most)]
 
 
-def heard_of(sent: Sent, other: Sent, printed: Counter[str]) -> int:
-    """How many messages were printed that can only be this sender's."""
-    return sum(min(count, max(0, printed[text] - other.texts[text])) for text, count in sent.texts.items())
+def heard_of(sent: Counter[str], other: Counter[str], printed: Counter[str]) -> int:
+    """Return how many messages were printed that can only be this sender's."""
+    return sum(min(count, max(0, printed[text] - other[text])) for text, count in sent.items())
 
 
 def _times(lines: _Lines, text: str, template: str) -> int:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import statistics
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 from grader.evidence.events import HostEvent
 from grader.evidence.run import Channel, Run
+from grader.model.verdict import Verdict, inconclusive
 
 CALIBRATION = "/grader/calibration"
 CALIBRATION_TYPE = "std_msgs/Header"
@@ -76,6 +77,23 @@ def lateness(run: Run, from_ns: int, to_ns: int, *, own: bool = False) -> Latene
         busy=timer.busy,
         own=timer.own,
     )
+
+
+def excused(verdict: Verdict, run: Run, from_ns: int, to_ns: int, why: Callable[[Lateness], str]) -> Verdict:
+    """Return the verdict, open where the machine was so late that nothing follows from it.
+
+    `why` gives what the machine was that explains the failure, or "". What the run's own processes did excuses nothing.
+    """
+    late, whole = (lateness(run, from_ns, to_ns, own=own) for own in (False, True))
+    if late is None or whole is None:
+        return verdict
+    if what := why(late):
+        message = f"{verdict.message}; but the grading machine was {what}"
+        hint = "grade again while the machine has less to do"
+        return inconclusive(message, hint=hint, measured=verdict.measured)
+    if why(whole):
+        return verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}"})
+    return verdict
 
 
 class _Window(NamedTuple):
