@@ -196,7 +196,7 @@ def _lack(package: PackageFacts, all_named: Sequence[Installed], script: str) ->
         return _misplaced(package, by_python[0])
     blurred = next((o for o in all_named if o.call.name == PYTHON and not o.known), None)
     if blurred is not None:
-        why = f"which scripts {blurred.path} holds, only CMake can tell, and it was not run to its end"
+        why = f"which scripts {blurred.path} holds is known to CMake alone, and it did not finish"
         return Lack(why, "build the package with catkin_make", _line(blurred), unsure=True)
     return _unnamed(all_named, hits, paths[0], script)
 
@@ -207,12 +207,14 @@ def _misplaced(package: PackageFacts, one: Installed) -> Lack:
         why = f"{where}: catkin_install_python(…) does not begin with the word PROGRAMS"
         return Lack(why, f"write catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(one))
     if "DESTINATION" in one.call.args and not one.destination and not _called(package, "catkin_package"):
-        why = f"{where}: {BIN} has no value, for catkin_package() is not called before it"
+        why = f"{where}: {BIN} has no value, because catkin_package() is not called before it"
         return Lack(why, "call catkin_package() above catkin_install_python(…)", _line(one), follows=True)
     if one.destination is None:
         why = f"{where}: catkin_install_python(…) gives {{}} no DESTINATION"
     elif not one.destination:
-        why = f"{where}: nothing stands behind DESTINATION, or a variable that has no value (its name misspelt?)"
+        why = (
+            f"{where}: nothing follows DESTINATION, or only a variable that has no value (its name misspelt?)"
+        )
     else:
         why = f"{where}: the destination of {{}} is {shown(one.destination)}, not {BIN} (lib/{package.name})"
     return Lack(why, f"write DESTINATION {BIN}, below find_package(catkin …)", _line(one))
@@ -236,9 +238,9 @@ def _unnamed(all_named: Sequence[Installed], hits: Sequence[Installed], path: st
     near = [wanted] if wanted in names else list(near_names(wanted, names))
     if near:
         one = names[near[0]]
-        why = f"line {one.call.line}: {shown(one.path)} is named, which is not there; the script is {path}"
+        why = f"line {one.call.line}: {shown(one.path)} is named, but does not exist; the script is {path}"
         return Lack(why, f"write {path}", _line(one))
-    return Lack("catkin_install_python(…) does not name {}", "write {} into it, behind PROGRAMS", None, path)
+    return Lack("catkin_install_python(…) does not name {}", "write {} into it, after PROGRAMS", None, path)
 
 
 def _called(package: PackageFacts, name: str) -> bool:

@@ -61,7 +61,7 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
 
     How it is measured
         By every change of the parameter server up to the node's registration, and by what `roslaunch` says of
-        the node. `<rosparam>` may stand before or behind the `<node>`: `roslaunch` sets parameters first. In a
+        the node. `<rosparam>` may stand before or after the `<node>`: `roslaunch` sets parameters first. In a
         namespace, the file counts as loaded where the node prints all of its values from there.
 
     How to fix

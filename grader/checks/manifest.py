@@ -84,7 +84,7 @@ def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
         That `package.xml` lists each package which the nodes import, as a dependency at run time.
 
     Why it matters on a robot
-        Whoever installs the package on the robot asks the manifest what else to install. What is missing
+        The manifest tells what else to install with the package on the robot. What is missing
         there is missing on the robot, and the node stops at its first import.
 
     How it is measured

@@ -50,7 +50,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
         message to message.
 
     Why it matters on a robot
-        Whoever reads the messages goes by their form, and measurements without the right time cannot be put
+        Programs that read the messages go by their form, and measurements without the right time cannot be put
         in order or be told from old ones.
 
     How it is measured
@@ -106,7 +106,7 @@ def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdic
     if any(mark in text for mark in UNFILLED):
         message = f"a message reads {in_one_line(text)!r}: its placeholder was never filled in"
     elif more := _behind(part):
-        message = f"a message has {more!r} behind the time: {in_one_line(text)!r}, not '{wanted}'"
+        message = f"a message has {more!r} after the time: {in_one_line(text)!r}, not '{wanted}'"
     elif part:
         message = f"a message says {part!r} where the time in seconds belongs: {in_one_line(text)!r}, not '{wanted}'"
     else:

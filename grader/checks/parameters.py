@@ -58,7 +58,7 @@ def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -
         `rosparam load` loads the file as it was handed in; what it sets is compared by name. Values are free.
 
     How to fix
-        Indent with spaces, two for each level, and write `name: value` with a space behind the colon.
+        Indent with spaces, two for each level, and write `name: value` with a space after the colon.
         `rosparam load <file>`, then `rosparam list` shows the names.
     """
     wanted = [absolute(name) for name in params.names]
@@ -114,7 +114,7 @@ def _missing(found: dict[str, object], missing: list[str], path: str) -> Verdict
         return failed(f"{path} sets nothing at all", hint="write `details:` and its values below it")
     name = missing[0]
     if name in found:
-        return failed(f"{name} has no value", hint=f"write a value behind `{name.rpartition('/')[2]}:`")
+        return failed(f"{name} has no value", hint=f"write a value after `{name.rpartition('/')[2]}:`")
     if slip := _in_its_place(found, name, path):
         return slip
     more = f", and {len(missing) - 1} more names are missing" if len(missing) > 1 else ""
@@ -135,7 +135,7 @@ def _in_its_place(found: dict[str, object], name: str, path: str) -> Verdict | N
             return failed(f"{path} loads, but {why}", hint="take the `-` away: write names below each other")
         if isinstance(value, str) and f"{last}:" in value:
             why = f"{above} is the text {shown(value)!r}, so there is no {name}"
-            return failed(f"{path} loads, but {why}", hint=f"write a space behind each colon: `{last}: …`")
+            return failed(f"{path} loads, but {why}", hint=f"write a space after each colon: `{last}: …`")
     return None
 
 
@@ -386,7 +386,7 @@ def _judged(got: object, params: ParamValueParams) -> Verdict:
     wrong = [str(one) for one in differences(got, params.value, EXACT)]
     if not wrong:
         return passed(f"{params.name} is {shown(value_text(got))}")
-    hint = "numbers stand without quotes, text with them" if "(text, not" in wrong[0] else ""
+    hint = "write numbers without quotes, and text in quotes" if "(text, not" in wrong[0] else ""
     message = shown(f"{params.name} is {listed(wrong)}")
     return failed(message, hint=hint or f"rosparam get {params.name} shows it; set it to the lab's value")
 

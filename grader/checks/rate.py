@@ -65,7 +65,7 @@ class RateParams(Record):
 
     @property
     def bounds(self) -> RateBounds:
-        """What whoever records it has to know of it."""
+        """Return what the recorder has to know of it."""
         low_ns, high_ns = self.bounds_ns
         return RateBounds(
             topic=self.topic,
@@ -187,7 +187,7 @@ def _bursts(found: Rhythm, outside: list[int], even: bool, params: RateParams) -
         return None
     share = f"{len(outside)} of {len(found.gaps_ns)} gaps are far from {1 / params.rate_hz:g} s"
     kind = "in bursts" if found.comes_in_bursts else "unevenly"
-    message = f"{params.topic} comes {kind}: {hertz(found.mean_hz)} in the mean, but {share}"
+    message = f"{params.topic} comes {kind}: {hertz(found.mean_hz)} on average, but {share}"
     return failed(message, hint="publish one message in each turn of the loop, and sleep once in each turn")
 
 

@@ -49,7 +49,7 @@ def service(package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
         That a node of the package offers the service under exactly this name, and that it is of this type.
 
     Why it matters on a robot
-        Whoever calls a service waits for its name and asks by its type. One letter off, and the caller
+        A node that calls a service waits for its name and asks by its type. One letter off, and the caller
         waits for ever; another type, and every call is refused.
 
     How it is measured
@@ -288,7 +288,7 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
         hint = f"end the callback with return {kind}Response(…)"
         return failed(f"{asked} fails: its callback returns nothing", hint=hint)
     if "returned invalid value" in one.detail or "wrong number of values" in one.detail:
-        message = f"{asked} fails: its callback returns what is no {kind}Response ({shown(one.detail)})"
+        message = f"{asked} fails: its callback returns something that is not a {kind}Response ({shown(one.detail)})"
         return failed(message, hint=f"end the callback with return {kind}Response(…), its fields by name")
     owner = life_of(run, offers(run)[service].node)
     if owner is not None and owner.ended_early:

@@ -65,7 +65,7 @@ class Facts:
     def _no_package(self) -> Verdict:
         if not any(run.foreign for run in self.runs.values()):
             return inconclusive("the evidence holds no package facts", hint="grade the submission again")
-        message = "a recording was handed in, and the package's files are not part of it"
+        message = "only a recording was handed in, without the package's files"
         return inconclusive(message, hint="hand in the package too, to have its files judged")
 
     def _run(self, scenario: str) -> Run | Verdict:
@@ -124,8 +124,6 @@ def try_facts(rubric: Rubric, runs: Mapping[str, Run]) -> Facts:
     except ValidationError:
         return Facts(rubric=rubric, runs=runs, package=None)
     return Facts(rubric=rubric, runs=runs, package=package)
-
-
 
 
 def with_recordings(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:

@@ -115,8 +115,6 @@ def _decided(criterion: CriterionResult, override: Override, digits: int) -> Cri
     return criterion.model_copy(update={"status": status, "points": points, "message": message})
 
 
-
-
 def deadline_of(rubric: Rubric, extension_days: float = 0.0) -> datetime | None:
     """The rubric's deadline with one submission's extension, in its time zone; None where the rubric has none."""
     if rubric.deadline is None:

@@ -99,8 +99,6 @@ def round_half_up(points: float, digits: int) -> float:
     return float(Decimal(repr(points)).quantize(step, rounding=ROUND_HALF_UP))
 
 
-
-
 def notes_of(runs: Mapping[str, Run]) -> tuple[Note, ...]:
     """The notes of all runs, in the order of the runs and of time; equal ones once, at most 20 of each kind a run.
 

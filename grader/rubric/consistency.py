@@ -156,8 +156,6 @@ def _late(rubric: dict[str, Any]) -> Iterator[Fault]:
         )
 
 
-
-
 def scenario_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     """Every fault of one scenario that its record's types cannot say."""
     if "warp" in scenario and scenario.get("clock", "real") == "real":

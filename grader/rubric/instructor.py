@@ -75,8 +75,6 @@ def known_checks(folder: Path, own: Mapping[str, Check]) -> dict[str, Check]:
     return {**CHECKS, tests.name: tests, **own}
 
 
-
-
 @dataclass(frozen=True, kw_only=True)
 class OwnChecks:
     """`complete` is false where the file has a fault: then it may mean more checks than are here."""
@@ -151,8 +149,6 @@ class _Loader(ExecutionLoader):
     def get_source(self, fullname: str) -> str:  # noqa: ARG002 - as above
         """As Python reads it: by the coding that the file declares."""
         return importlib.util.decode_source(self._raw)
-
-
 
 
 class Shown(io.TextIOBase):

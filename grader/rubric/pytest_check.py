@@ -204,8 +204,6 @@ def _sub_score(test: TestOutcome) -> str:
     return f"{test.name} {test.points if test.outcome == 'passed' else 0:g}/{test.points:g}"
 
 
-
-
 class TestOutcome(Record):
     """One test. `open`: a run that it asks for was not recorded. `message` is one line, empty where it passed."""
 
@@ -223,8 +221,6 @@ class SessionOutcome(Record):
 
     tests: tuple[TestOutcome, ...]
     faults: tuple[str, ...]
-
-
 
 
 class FileFault(ValueError):

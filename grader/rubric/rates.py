@@ -1,4 +1,4 @@
-"""The rates that a rubric judges, for whoever records them: a run may end when they are clear."""
+"""The rates that a rubric judges, for the recorder: a run may end when they are clear."""
 
 from __future__ import annotations
 

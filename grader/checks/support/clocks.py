@@ -104,9 +104,9 @@ def _too_short(span_s: float) -> Verdict:
 
 
 def _falls_back(before: float, after: float) -> Verdict:
-    message = f"the time in the messages falls back from {_plain(before)} to {_plain(after)}"
+    message = f"the time in the messages goes back from {_plain(before)} to {_plain(after)}"
     within = before < 1e9 and before == int(before) and before > 1e6
-    why = "`.nsecs` is only the part behind the whole second; " if within else ""
+    why = "`.nsecs` is only the part after the whole second; " if within else ""
     return failed(message, hint=why + GET_TIME)
 
 
@@ -117,12 +117,10 @@ def _other_pace(told: Sequence[float], span_s: float) -> Verdict:
     if unit:
         return failed(f"the time in the messages is in {unit}, not in seconds", hint=GET_TIME)
     if all(b - a == 1 for a, b in pairwise(told)):
-        message = (
-            f"the number in the messages counts them ({_plain(told[0])}, {_plain(told[1])}, …) and is no time"
-        )
+        message = f"the number in the messages counts them ({_plain(told[0])}, {_plain(told[1])}, …) and is not a time"
         return failed(message, hint=GET_TIME)
     message = (
-        f"the number in the messages grows by {_plain(growth)} in {span_s:.1f} s: it is no time in seconds"
+        f"the number in the messages grows by {_plain(growth)} in {span_s:.1f} s: it is not a time in seconds"
     )
     return failed(f"{message} ({plural(len(told), 'message')})", hint=GET_TIME)
 

@@ -254,7 +254,7 @@ def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: Wra
         message = f"{params.topic} is flooded, so its publisher drops values, also around the wrap"
         return unjudged(message, hint="first make the loop sleep, then look at the counter again")
     if whose == "lost":
-        message = f"values of {params.topic} got lost around the wrap, with a gap in time"
+        message = f"values of {params.topic} were lost around the wrap, with a gap in time"
         return inconclusive(message, hint="grade again while the machine has less to do")
     return failed(bad_turn_message(step, turns, params), hint=params.reset_hint)
 
@@ -286,7 +286,7 @@ def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
         return f"the counter resets to {after}, not to {low}: {comes}"
     if step.after == low:
         return f"the counter resets too early: {comes}"
-    return f"the counter falls back before it has reached {high}: {comes}"
+    return f"the counter goes back before it has reached {high}: {comes}"
 
 
 def _died(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> Verdict | None:

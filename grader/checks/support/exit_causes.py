@@ -42,8 +42,8 @@ SLIPS = {
     "init_node() has already been called with different arguments": ("`rospy.init_node(…)` is called a second time",
      "one script is one node: call `rospy.init_node(…)` once"),
     "Invalid number of arguments, args should be": (
-     "the message is given another number of values than it has fields",
-     'one value for each field; numbers get into a text by `%`: `publish("… %s" % value)`, not by a comma'),
+     "the message gets a different number of values than it has fields",
+     'one value for each field; put a number into text with `%`: `publish("… %s" % value)`, not by a comma'),
 }  # fmt: skip
 _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
@@ -178,9 +178,9 @@ def _refused_name(life: Life, run: Run) -> Ending | None:
     if match is None:
         return None
     kind, name = "service" if match[1] == "service" else "topic", match[2]
-    what = "has a blank in it" if re.search(r"\s", name) else "is no name that ROS takes"
+    what = "has a space in it" if re.search(r"\s", name) else "is not a name that ROS accepts"
     hint = (
-        f"a {kind}'s name is made of letters, digits, _ and /: no blanks, also none before the closing quote"
+        f"a {kind}'s name is made of letters, digits, _ and /: no spaces, not even before the closing quote"
     )
     return Ending(f"ROS shuts it down, for the name of its {kind} {name!r} {what}", hint)
 

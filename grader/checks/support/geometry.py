@@ -173,7 +173,7 @@ def track(run: Run, topic: str, hold_s: float | None) -> Track | None:
     if len(poses) < len(pairs) and len(commands) < len(pairs):
         return Track(misfit=f"are {plain_type(channels[0].type)}: neither velocities nor poses")
     if not all(_finite(*one[1:]) for one in (*poses, *commands)):
-        return Track(fault="hold what is no number, or none that a robot could follow")
+        return Track(fault="hold values that are not numbers, or that no robot could follow")
     if poses:
         return Track(tuple(poses))
     end_s = seconds(observed_until_ns(run) or run.end_ns)

@@ -22,7 +22,7 @@ OWN_LEAST, OTHERS_MOST = 0.6, 0.25
 """Shares of the processors' time of half a second: a run that took so much itself, and left so little to all others,
 made the machine late in it. One busy loop takes half of two processors, and is not it; nor is who shares the machine.
 """
-NO_EXCUSE = "the grading machine was busy with this run's own processes, which excuses nothing"
+NO_EXCUSE = "the grading machine was busy with this run's own processes, which is no excuse"
 
 
 class Lateness(NamedTuple):

@@ -149,7 +149,7 @@ def illegal_name(node: LaunchNode) -> Slip | None:
     name = node.name or ""
     if UNRESOLVED in name or re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
         return None
-    why = f'name="{name}" is no legal name in ROS, and other tools stumble over it'
+    why = f'name="{name}" is not a legal name in ROS, and other tools stumble over it'
     return _slip(node, why, "begin it with a letter, and use letters, digits and _ only")
 
 

@@ -51,7 +51,7 @@ def wrong_name(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymou
     if {base_name(n) for n in there}.isdisjoint(_bases(names)):
         return f"the node is named {listed(there)}, not {listed(_bases(names), 'or')}"
     how = "without" if anonymous == "required" else "with"
-    return f"the node is named {listed(there)}, {how} the numbers that anonymous=True puts behind the name"
+    return f"the node is named {listed(there)}, {how} the numbers that anonymous=True adds to the name"
 
 
 def name_hint(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous) -> str:

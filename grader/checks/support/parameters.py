@@ -30,17 +30,17 @@ SYSTEM = (
 NOT_IN_FILE = "not in the file"
 PRINTED_INDENT = 4
 _PLACE = re.compile(r"line (\d+), column (\d+)")
-_IN_LINE = "line {line} has a tab behind a name or a value, which YAML does not take"
+_IN_LINE = "line {line} has a tab after a name or a value, which YAML does not accept"
 _INDENT = "indent with spaces alone, two for each level"
 # what is printed, what it means ({line}: where), and what to do
 _CAUSES = (
-    (r"found character '\\t'", "line {line} is indented with a tab, which YAML does not take", _INDENT),
-    (r"cannot marshal None", "a name has no value: nothing stands behind it, and nothing is indented below it",
-     "write a value behind the name; what belongs to a name is indented by two spaces more than the name"),
+    (r"found character '\\t'", "line {line} is indented with a tab, which YAML does not accept", _INDENT),
+    (r"cannot marshal None", "a name has no value: nothing follows it, and nothing is indented below it",
+     "write a value after the name; what belongs to a name is indented by two spaces more than the name"),
     (r"exceeds XML-RPC limits|Overflow Error", "a number is larger than 2147483647, the largest that ROS can hold",
      'write a long number in quotes, as text: phone: "9876543210"'),
     (r"mapping values are not allowed here",
-     "in line {line} or above it, the space behind a `:` is missing, or a `:` is part of a value",
+     "in line {line} or above it, the space after a `:` is missing, or a `:` is part of a value",
      'write `name: value` with a space, and a value that holds a `:` in "quotes"'),
     (r"scanning a quoted scalar|found unexpected end of stream", "a closing quote is missing near line {line}",
      'close every " on its own line'),
