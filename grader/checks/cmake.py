@@ -79,7 +79,7 @@ def _fault(fault: Fault | None) -> Iterator[str]:
 
 
 def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[tuple[str, str, int | None]]:
-    """What is missing or wrong, how to fix it, and the line."""
+    """Yield what is missing or wrong, how to fix it, and the line."""
     wanted = names[0]
     project = _first(facts, "project")
     if project is None:
@@ -173,20 +173,20 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
 
 
 def _reasons(lacks: dict[str, Lack]) -> Iterator[str]:
-    """Each reason once, with the scripts that it is true of."""
+    """Yield each reason once, with the scripts that it is true of."""
     for why in dict.fromkeys(lack.why for lack in lacks.values()):
         scripts = [name for name, lack in lacks.items() if lack.why == why]
         yield why.replace("{}", listed(scripts))
 
 
 def _fixes(lacks: dict[str, Lack]) -> Iterator[str]:
-    """Each repair once, as one line for all scripts that it is true of."""
+    """Yield each repair once, as one line for all scripts that it is true of."""
     for fix in dict.fromkeys(lack.fix for lack in lacks.values()):
         yield fix.replace("{}", " ".join(lack.path for lack in lacks.values() if lack.fix == fix))
 
 
 def _lack(package: PackageFacts, all_named: Sequence[Installed], script: str) -> Lack | None:
-    """None where `catkin_install_python` puts the script where `rosrun` looks."""
+    """Return None where `catkin_install_python` puts the script where `rosrun` looks."""
     paths = [f.path for f in copies_of(package, script)] or [script]
     hits = [one for one in all_named if any(names_script(one, path) for path in paths)]
     by_python = [one for one in hits if one.call.name == PYTHON]

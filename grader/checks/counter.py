@@ -176,12 +176,12 @@ def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
 
 
 def begins_with(first: Count, start: int) -> bool:
-    """Whether this is the first of all its values, and the right one."""
+    """Return whether this is the first of all its values, and the right one."""
     return first.values[0] == start and first.sequences[0] == 0
 
 
 def missed_the_first(run: Run, topic: str, first: Count) -> bool:
-    """Whether values may have come before the first one that is recorded."""
+    """Return whether values may have come before the first one that is recorded."""
     return first.sequences[0] > 0 or _recorder_was_late(run, topic, first.callerid)
 
 

@@ -199,7 +199,7 @@ def _line(file: LaunchFile, params: LaunchLoadsParams) -> int:
 
 
 def params_misplaced(run: Run, file: LaunchFile, nodes: Iterable[str], wanted: Wanted) -> Verdict | None:
-    """None where all of `wanted` are in one place where one of the nodes reads them.
+    """Return None where all of `wanted` are in one place where one of the nodes reads them.
 
     A node reads its private parameters (`/sim/background_r`), or those of its namespace, as older ones do.
     """

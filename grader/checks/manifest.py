@@ -148,7 +148,7 @@ def _declared(found: Manifest) -> str:
 
 
 def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
-    """What the manifest does not declare for run time; None where it declares all."""
+    """Return what the manifest does not declare for run time; None where it declares all."""
     declared = {d.name for d in found.dependencies if d.kind in RUNTIME_KINDS}
     missing = [n for n in names if n not in declared]
     if not missing:

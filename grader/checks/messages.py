@@ -117,7 +117,7 @@ def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdic
 
 
 def _behind(part: str) -> str:
-    """What stands behind the number where more than a number is found."""
+    """Return what stands behind the number where more than a number is found."""
     found = re.match(rf"{NUMBER}\s+([^\W\d].*)", part)
     return found[1] if found else ""
 
@@ -147,7 +147,7 @@ def _wrong_time(
 
 
 def _watched_ns(run: Run, heard: Sequence[Channel]) -> int:
-    """How long its messages could have come."""
+    """Return how long its messages could have come."""
     return (observed_until_ns(run) or run.end_ns) - min(c.times_ns[0] for c in heard)
 
 

@@ -95,7 +95,7 @@ def _no_file(package: PackageFacts, path: str) -> Verdict:
 
 
 def _error(run: Run, one: Life, path: str) -> Verdict | None:
-    """What rosparam said where it failed."""
+    """Return what rosparam said where it failed."""
     code = one.end.exit_code if one.end else None
     if code == 0:
         return None
@@ -210,7 +210,7 @@ def _not_printed(
 
 
 def _in_file(build: Run, file: str, name: str) -> list[str]:
-    """What stands behind the name's last part in the file as handed in."""
+    """Return what stands behind the name's last part in the file as handed in."""
     base = PurePosixPath(file).name
     data = next((d for path, d in build.attachments.items() if PurePosixPath(path).name == base), b"")
     last = re.escape(name.rpartition("/")[2])
@@ -314,7 +314,7 @@ def _clobbered(run: Run, after: dict[str, Any], params: ParamsSetParams) -> Verd
 
 
 def _taken_away(run: Run, name: str) -> str:
-    """The change that took a name away: a map that lacks it, a value in the map's place, or a delete."""
+    """Return the change that took a name away: a map that lacks it, a value in the map's place, or a delete."""
     for _, event in reversed(run.params):
         above = absolute(event.name)
         if run.is_student_node(event.caller_id) and f"{name}/".startswith(f"{above.rstrip('/')}/"):
@@ -375,7 +375,7 @@ def _until_ns(run: Run) -> int:
 
 
 def _held(leaves: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401 - a parameter may be anything
-    """The value, or the map of all values below the name."""
+    """Return the value, or the map of all values below the name."""
     if name in leaves:
         return leaves[name]
     parts = [n.removeprefix(f"{name}/").partition("/")[0] for n in leaves if n.startswith(f"{name}/")]

@@ -170,7 +170,7 @@ def metres(distance_m: float) -> str:
 
 
 def stands(path: Sequence[Pose]) -> bool:
-    """Whether it never left its place."""
+    """Return whether it never left its place."""
     return all(math.dist(p.point, path[0].point) <= MOVED_M for p in path)
 
 
@@ -285,7 +285,7 @@ def _peak(path: Sequence[Pose], way: Way, course: Course) -> tuple[Pose, float]:
 
 
 def _along(point: Point, start: Point, end: Point) -> tuple[float, float]:
-    """How far along the line through two points, and how far to the left of it (m)."""
+    """Return how far along the line through two points, and how far to the left of it (m)."""
     dx, dy = end[0] - start[0], end[1] - start[1]
     length = math.hypot(dx, dy)
     x, y = point[0] - start[0], point[1] - start[1]
@@ -298,6 +298,6 @@ def _after(path: Sequence[Pose], pose: Pose) -> str:
 
 
 def measured(path: Sequence[Pose], course: Course, way: Way) -> str:
-    """The figures of a path in one line."""
+    """Return the figures of a path in one line."""
     off = metres(course.off_m) if course.strayed is None else metres(_peak(path, way, course)[1])
     return f"{off} off at most, {metres(length_m(path))} long, {course.reached} of {len(way.points)} points"

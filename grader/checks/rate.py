@@ -123,13 +123,13 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
 
 
 def judged_rhythm(run: Run, params: RateParams, channels: Sequence[Channel]) -> Rhythm | None:
-    """What these channels of the topic sent, as far as it is judged."""
+    """Return what these channels of the topic sent, as far as it is judged."""
     until_ns = whole_until_ns(run, params.topic, observed_until_ns(run))
     return rhythm(channels, until_ns, params.period_ns)
 
 
 def _measured(found: Rhythm, run: Run, params: RateParams) -> str:
-    """What came, and how late the machine was meanwhile."""
+    """Return what came, and how late the machine was meanwhile."""
     seen = described(found, *params.bounds_ns)
     late = lateness(run, found.times_ns[0], found.until_ns, own=True) if found.gaps_ns else None
     return seen if late is None else f"{seen}, {late.described}"
@@ -159,7 +159,7 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
 
 
 def _uneven(found: Rhythm, params: RateParams) -> Verdict | None:
-    """What is wrong with the rate, None if nothing is."""
+    """Return what is wrong with the rate, None if nothing is."""
     mean_hz, period_ns = found.mean_hz, params.period_ns
     outside = found.outside(*params.bounds_ns)
     allowed = (1 - params.share_in_bounds) * len(found.gaps_ns) + ROUNDING
@@ -225,7 +225,7 @@ def _why_late(found: Rhythm, late: Lateness, params: RateParams) -> str:
 
 
 def was_late(late: Lateness, params: RateParams) -> bool:
-    """Whether the machine was late by so much that it shows in the gaps."""
+    """Return whether the machine was late by so much that it shows in the gaps."""
     period_ms = params.period_ns / 1e6
     return (
         late.mean_ms >= max(params.tolerance, 0.02) / 2 * period_ms
@@ -271,7 +271,7 @@ def _mean(found: Rhythm) -> str:
 
 
 def rhythm(channels: Sequence[Channel], until_ns: int | None, period_ns: float) -> Rhythm | None:
-    """All messages of these channels until `until_ns`. Silence at the end counts from 1.5 periods on."""
+    """Return all messages of these channels until `until_ns`. Silence at the end counts from 1.5 periods on."""
     times = sorted(t for c in channels for t in c.times_ns if until_ns is None or t <= until_ns)
     if not times:
         return None

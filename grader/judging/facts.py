@@ -36,7 +36,7 @@ class Facts:
     package: PackageFacts | None
 
     def of(self, check: Check, criterion: Criterion, params: Record) -> dict[str, object] | Verdict:
-        """The facts by the names that the check asks for, or the verdict where one of them is not there."""
+        """Return the facts by the names that the check asks for, or the verdict where one of them is not there."""
         found: dict[str, object] = {"params": params}
         if check.needs_run:
             run = self._run(criterion.scenario or "")
@@ -127,7 +127,7 @@ def try_facts(rubric: Rubric, runs: Mapping[str, Run]) -> Facts:
 
 
 def with_recordings(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
-    """The grader's own runs by scenario, and for each scenario without one the recording that stands for it.
+    """Return the grader's own runs by scenario, and for each scenario without one the recording that stands for it.
 
     A recording is known by its name (`talker.bag` for the scenario `talker`) or by the scenario's pattern. A single
     one that was judged without a package stands for everything.
@@ -152,7 +152,7 @@ def _named(name: str, scenario: Scenario, foreign: list[Run]) -> Run | None:
 
 
 def unread_recording(run: Run) -> Verdict | None:
-    """Why there is nothing to judge where a scenario's recording was not found or could not be read."""
+    """Return why there is nothing to judge where a scenario's recording was not found or could not be read."""
     if RECORDING_MISSING in run.metadata:
         pattern = run.metadata[RECORDING_MISSING]
         message = f"no recording {pattern} is in the submission"

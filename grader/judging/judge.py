@@ -27,7 +27,7 @@ WITH_HINT = {Status.FAIL, Status.PARTIAL, Status.BLOCKED, Status.INCONCLUSIVE}
 def judge(
     rubric: Rubric, runs: Mapping[str, Run], checks: Mapping[str, Check] = CHECKS
 ) -> tuple[CriterionResult, ...]:
-    """Every criterion in the rubric's order. `runs` maps scenarios, and `package`, to their recorded runs.
+    """Return every criterion in the rubric's order. `runs` maps scenarios, and `package`, to their recorded runs.
 
     `checks` are the grader's and the rubric's own (`LoadedRubric.checks`). The same evidence and rubric always give
     equal results; nothing that is wrong with the evidence raises.
@@ -43,7 +43,7 @@ def judge(
 
 
 def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> Verdict:
-    """What the criterion's check says; an exception inside it is not the student's fault and says so."""
+    """Return what the criterion's check says; an exception inside it is not the student's fault and says so."""
     if criterion.check == MANUAL:
         return Verdict(status=Status.MANUAL, score=0.0, message="a person gives these points")
     check = checks.get(criterion.check)
@@ -107,7 +107,7 @@ def settled(
 
 
 def result_of(criterion: Criterion, verdict: Verdict, digits: int) -> CriterionResult:
-    """The report's line of a criterion, with the points of its verdict."""
+    """Return the report's line of a criterion, with the points of its verdict."""
     lost = verdict.status in WITH_HINT
     return CriterionResult(
         id=criterion.id,

@@ -24,7 +24,7 @@ ACTOR_CHARS = 100
 
 
 def total_points(rubric: Rubric, results: Sequence[CriterionResult]) -> float:
-    """The sum of the criteria's points, rounded half up to the rubric's digits."""
+    """Return the sum of the criteria's points, rounded half up to the rubric's digits."""
     total = sum((Decimal(repr(r.points)) for r in results), Decimal(0))
     return round_half_up(float(total), rubric.digits)
 
@@ -41,7 +41,7 @@ def overall_status(results: Sequence[CriterionResult]) -> Literal["graded", "inc
 
 
 def reached_pass_mark(rubric: Rubric, results: Sequence[CriterionResult]) -> bool:
-    """Whether the points reach the rubric's mark; without one, every visible criterion has to pass."""
+    """Return whether the points reach the rubric's mark; without one, every visible criterion has to pass."""
     if rubric.pass_mark is not None:
         return total_points(rubric, results) >= rubric.pass_mark
     visible = {c.id for c in rubric.criteria if c.visibility == "visible" and c.points > 0}
@@ -89,7 +89,7 @@ def _criteria(results: Sequence[CriterionResult]) -> object:
 
 
 def criteria_bytes(results: Sequence[CriterionResult]) -> bytes:
-    """The same as UTF-8."""
+    """Return the same as UTF-8."""
     return criteria_text(results).encode()
 
 

@@ -70,7 +70,7 @@ def read_instructor(data: object, folder: Path) -> Beside:
 
 
 def known_checks(folder: Path, own: Mapping[str, Check]) -> dict[str, Check]:
-    """The grader's, `pytest` for tests in the rubric's folder, and the rubric's own."""
+    """Return the grader's, `pytest` for tests in the rubric's folder, and the rubric's own."""
     tests = pytest_check(folder)
     return {**CHECKS, tests.name: tests, **own}
 
@@ -86,7 +86,7 @@ class OwnChecks:
 
 @lru_cache(maxsize=64)
 def run_checks_file(path: Path, raw: bytes) -> OwnChecks:
-    """The checks that the file registers. It is run once for each content; whatever goes wrong is a fault."""
+    """Return the checks that the file registers. It is run once for each content; whatever goes wrong is a fault."""
     with collecting(str(path)) as collection:
         fault = _run(path, raw)
     faults = [*collection.faults, *([fault] if fault else [])]
@@ -130,7 +130,7 @@ def _run(path: Path, raw: bytes) -> LineFault | None:
 
 
 def _line(path: Path, error: BaseException) -> int:
-    """The last line of the file that took part."""
+    """Return the last line of the file that took part."""
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(path)]
     return lines[-1] if lines and lines[-1] else 1
 

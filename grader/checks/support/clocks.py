@@ -71,7 +71,7 @@ def _ticks(run: Run) -> list[tuple[int, float]]:
 
 
 def wrong_growth(told: Sequence[float], clocks: Sequence[Seconds], *, short: bool = False) -> Verdict | None:
-    """None where the numbers told go along with one of the clocks, from wherever they start.
+    """Return None where the numbers told go along with one of the clocks, from wherever they start.
 
     Whole seconds may repeat. The first clock is the one that a message speaks of. A recording that is `short` by
     the node's own doing (a flood, its early end) is judged by less of it, and with less slack.

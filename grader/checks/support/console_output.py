@@ -59,7 +59,7 @@ def probes_on(run: Run, topic: str) -> tuple[Probe, ...]:
 
 
 def printed_lines(run: Run) -> tuple[Line, ...]:
-    """All that the student's processes printed and their nodes logged, by time; tracebacks left out."""
+    """Return all that the student's processes printed and their nodes logged, by time; tracebacks left out."""
     students = {e.name for _, e in run.processes if e.role == "student"}
     lines = [
         line
@@ -74,7 +74,7 @@ def printed_lines(run: Run) -> tuple[Line, ...]:
 
 
 def stream_lines(run: Run, process: str) -> tuple[tuple[Line, ...], ...]:
-    """What one process printed on stdout and on stderr, and what its nodes logged, each by time."""
+    """Return what one process printed on stdout and on stderr, and what its nodes logged, each by time."""
     nodes = run.student_nodes(process)[:NAMES_MAX]
     console = ([(t, c.line) for t, c in run.lines(process) if c.stream == s] for s in ("stdout", "stderr"))
     streams = (*console, _logged(run, nodes))
@@ -82,7 +82,7 @@ def stream_lines(run: Run, process: str) -> tuple[tuple[Line, ...], ...]:
 
 
 def _logged(run: Run, nodes: Collection[str] | None = None) -> list[tuple[int, str]]:
-    """The messages on /rosout, line by line: of these nodes, or of all that are the student's."""
+    """Return the messages on /rosout, line by line: of these nodes, or of all that are the student's."""
     texts = (
         (t, str(value.get("msg", "")))
         for channel in run.student_channels("/rosout")
@@ -129,7 +129,7 @@ def numbers_in(text: str) -> frozenset[int]:
 def places_of(
     run: Run, probes: Sequence[Probe], lines: Sequence[Line], template: str
 ) -> list[tuple[int, ...]] | None:
-    """For each probe where it was printed; None where so many numbers are printed that nobody can tell.
+    """Return for each probe where it was printed; None where so many numbers are printed that nobody can tell.
 
     Places follow each other as the lines do; `line_finder` gives a place's line.
     """
@@ -154,7 +154,7 @@ def _are_numbers(probes: Sequence[Probe]) -> bool:
 def number_places(
     probes: Sequence[Probe], lines: Sequence[Line], texts: Iterable[str]
 ) -> list[tuple[int, ...]] | None:
-    """For each probe the indices of the lines that hold it, at its time or later.
+    """Return for each probe the indices of the lines that hold it, at its time or later.
 
     `texts` are other probes that the lines may show too; digits in them are no numbers. None where so many
     numbers are printed that any probe would be among them.
@@ -175,7 +175,7 @@ def number_places(
 
 
 def text_places(probes: Sequence[Probe], lines: Sequence[Line], template: str) -> list[tuple[int, ...]]:
-    """The same for texts, as offsets in all that was printed. A text may be split over lines.
+    """Return the same for texts, as offsets in all that was printed. A text may be split over lines.
 
     The template's own words may be in capitals or not; the text itself stands letter by letter.
     """
@@ -203,7 +203,7 @@ def _joined(lines: Sequence[Line], template: str) -> tuple[str, list[tuple[int, 
 
 
 def chosen(places: Sequence[tuple[int, ...]]) -> list[int | None]:
-    """For each probe the first of its places that is behind the one before; None where it has none."""
+    """Return for each probe the first of its places that is behind the one before; None where it has none."""
     position, found = -1, list[int | None]()
     for choices in places:
         later = next((place for place in choices if place > position), None)
@@ -213,7 +213,7 @@ def chosen(places: Sequence[tuple[int, ...]]) -> list[int | None]:
 
 
 def in_order(places: Sequence[tuple[int, ...]]) -> bool:
-    """Whether one place can be chosen for each probe, each behind the one before."""
+    """Return whether one place can be chosen for each probe, each behind the one before."""
     return None not in chosen(places)
 
 

@@ -77,7 +77,7 @@ class Count(Record):
         return max(median(gaps), sum(gaps) / len(gaps) / 2)
 
     def lost_on_the_way(self, step: Step, jump: float) -> bool:
-        """Whether `jump - 1` values between these two were published and did not arrive.
+        """Return whether `jump - 1` values between these two were published and did not arrive.
 
         The recording says so, or the time between them fits: then it was the transport or the host. A jump in
         normal time, or one that comes again and again, is the program's.
@@ -140,7 +140,7 @@ def wrong_steps(count: Count, run: Run, *, maximum: int, rate_hz: float) -> Wron
 
 
 def judged_steps(count: Count, maximum: int) -> tuple[Step, ...]:
-    """All of them, without the repeats of a counter that stays at its maximum: that is the wrap's fault."""
+    """Return all of them, without the repeats of a counter that stays at its maximum: that is the wrap's fault."""
     stays = count.values[-1] == maximum and count.stuck > 1
     return count.steps[: len(count.steps) - (count.stuck - 1)] if stays else count.steps
 
@@ -200,7 +200,7 @@ class WrapParams(Record):
 def judge_wraps(
     count: Count, run: Run, package: PackageFacts, params: WrapParams
 ) -> tuple[Verdict, Step | None]:
-    """The verdict, and the turn that it rests on."""
+    """Return the verdict, and the turn that it rests on."""
     turns, good, wrong = turns_of(count, run, params)
     bad = wrong[0] if wrong else None
     if bad is not None:
@@ -260,7 +260,7 @@ def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: Wra
 
 
 def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Literal["program", "flood", "lost"]:
-    """Whether a bad turn is the program's own, or one of values that its flood, or the way, swallowed."""
+    """Return whether a bad turn is the program's own, or one of values that its flood, or the way, swallowed."""
     low, high = params.minimum, params.maximum
     if step.after > high or step.after < low:
         return "program"
@@ -271,7 +271,7 @@ def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Litera
 
 
 def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
-    """What is wrong with a turn, in a student's words."""
+    """Return what is wrong with a turn, in a student's words."""
     low, high = params.minimum, params.maximum
     before, after = number(step.before), number(step.after)
     comes = f"after {before} comes {after}"
@@ -311,7 +311,7 @@ def _stuck(count: Count, params: WrapParams) -> Verdict | None:
 
 
 def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> Verdict | None:
-    """The node lives, and has stopped to publish."""
+    """Return the verdict where the node lives on, and has stopped publishing."""
     until_ns = observed_until_ns(run)
     if until_ns is None or losses(run, params.topic):
         return None

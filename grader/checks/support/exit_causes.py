@@ -84,7 +84,7 @@ class Traceback(NamedTuple):
 
 
 def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
-    """Every traceback, also the bare `File …` form of a syntax error. One that was cut short is left out."""
+    """Return every traceback, also the bare `File …` form of a syntax error. One that was cut short is left out."""
     found: list[Traceback] = []
     frames: list[Frame] = []
     first: int | None = None
@@ -166,7 +166,7 @@ def explain_error(package: PackageFacts, run: Run) -> Ending | None:
 
 
 def _limit(life: Life, run: Run) -> str:
-    """What it had too much of, so that it was stopped."""
+    """Return what it had too much of, so that it was stopped."""
     met = (e.detail for _, e in run.actors if e.action in LIMITS and e.actor == life.name)
     return next((detail for detail in met if detail.startswith("stopped by the grader")), "")
 
@@ -201,7 +201,7 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
 def process_tracebacks(
     run: Run, process: str, *, after_ns: int | None = None, before_ns: int | None = None
 ) -> tuple[Traceback, ...]:
-    """The tracebacks on a process's stderr that began at `after_ns` or later, and before `before_ns`."""
+    """Return the tracebacks on a process's stderr that began at `after_ns` or later, and before `before_ns`."""
     lines = [(t, c.line) for t, c in run.lines(process) if c.stream == "stderr"]
     found = tracebacks([line for _, line in lines])
     first_ns = after_ns if after_ns is not None else run.start_ns

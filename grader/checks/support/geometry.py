@@ -60,7 +60,7 @@ def moved(pose: Pose, command: Command, duration_s: float) -> Pose:
 
 
 def driven(commands: Sequence[Command], hold_s: float | None, end_s: float) -> list[Pose]:
-    """The path from the origin, heading along x: each command holds until the next one, and at most `hold_s`.
+    """Return the path from the origin, heading along x: each command holds until the next one, and at most `hold_s`.
 
     Without `hold_s` the last one holds until `end_s`.
     """
@@ -84,7 +84,7 @@ def _samples(start: Pose, command: Command, duration_s: float) -> Iterator[Pose]
 
 
 def relative(path: Sequence[Pose]) -> list[Pose]:
-    """The path as seen from its first pose."""
+    """Return the path as seen from its first pose."""
     if not path:
         return []
     first = path[0]
@@ -105,7 +105,7 @@ def length_m(path: Sequence[Pose]) -> float:
 
 
 def off_m(point: Point, start: Point, end: Point) -> float:
-    """The distance of a point from the line between two others."""
+    """Return the distance of a point from the line between two others."""
     dx, dy = end[0] - start[0], end[1] - start[1]
     square = dx * dx + dy * dy
     share = ((point[0] - start[0]) * dx + (point[1] - start[1]) * dy) / square if square else 0.0
@@ -160,7 +160,7 @@ class Track(NamedTuple):
 
 
 def track(run: Run, topic: str, hold_s: float | None) -> Track | None:
-    """The path told on a topic, None where no message came (or, in a warped run, no clock)."""
+    """Return the path told on a topic, None where no message came (or, in a warped run, no clock)."""
     seconds = run_seconds(run)
     channels = _publishers(run, topic)
     pairs = sorted(

@@ -113,7 +113,7 @@ class _Window(NamedTuple):
 
 
 def _windows(run: Run, from_ns: int, to_ns: int) -> list[_Window]:
-    """All that touch this stretch of time."""
+    """Return all that touch this stretch of time."""
     starts = [run.start_ns, *(t for t, _ in run.host)]
     found = [_Window(start, t, event) for start, (t, event) in zip(starts, run.host, strict=False)]
     return [w for w in found if w.to_ns > from_ns and w.from_ns < to_ns]

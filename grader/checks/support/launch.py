@@ -74,7 +74,7 @@ class Slip(NamedTuple):
 
 
 def find_launch(package: PackageFacts, name: str) -> LaunchFile | None:
-    """The launch file of that name in any folder, one in `launch/` first."""
+    """Return the launch file of that name in any folder, one in `launch/` first."""
     found = [f for f in package.launch_files if PurePosixPath(f.path).name == name]
     return min(found, key=lambda f: (PurePosixPath(f.path).parts[0] != "launch", f.path), default=None)
 
@@ -121,7 +121,7 @@ def has_program(package: PackageFacts, name: str) -> bool:
 
 
 def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip | None:
-    """Why a node cannot start by what the file says of it. Names with `$(…)` are roslaunch's to resolve.
+    """Return why a node cannot start by what the file says of it. Names with `$(…)` are roslaunch's to resolve.
 
     `said` is what roslaunch said: a package that it does not find is a slip, any other is not this package's.
     """
@@ -154,7 +154,7 @@ def illegal_name(node: LaunchNode) -> Slip | None:
 
 
 def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
-    """What makes roslaunch start nothing at all."""
+    """Yield what makes roslaunch start nothing at all."""
     for fault in file.include_faults:
         yield Slip(
             fault.file or file.path, fault.line or 1, fault.message, "write $(find <package>)/launch/<file>"
@@ -175,13 +175,13 @@ def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
 
 
 def nodes_of_script(package: PackageFacts, file: LaunchFile, script: str) -> tuple[LaunchNode, ...]:
-    """The nodes that run this script of the package, or may run it as far as can be seen."""
+    """Return the nodes that run this script of the package, or may run it as far as can be seen."""
     name = PurePosixPath(script).name
     return tuple(n for n in file.brings if _may_be(n.pkg, package.name) and _may_be(n.type, name))
 
 
 def nodes_of_program(file: LaunchFile, program: str) -> tuple[LaunchNode, ...]:
-    """The nodes that run `package/program`; a Python program's `.py` may be there or not."""
+    """Return the nodes that run `package/program`; a Python program's `.py` may be there or not."""
     pkg, _, name = program.partition("/")
     names = {name, name.removesuffix(".py"), f"{name}.py"}
     return tuple(n for n in file.brings if _may_be(n.pkg, pkg) and any(_may_be(n.type, one) for one in names))
@@ -237,7 +237,7 @@ class Absence(NamedTuple):
 
 
 def name_pattern(node: LaunchNode) -> re.Pattern[str]:
-    """The names that a node can come up under: `$(anon x)` becomes `x_<host>_<pid>_<digits>`.
+    """Return the names that a node can come up under: `$(anon x)` becomes `x_<host>_<pid>_<digits>`.
 
     However many substitutions there are, a name is looked through once: each takes the least that it can, and what it
     took stands (a group in a lookahead is not tried again).
@@ -257,7 +257,7 @@ def name_pattern(node: LaunchNode) -> re.Pattern[str]:
 
 
 def is_exact(node: LaunchNode) -> bool:
-    """Whether the file alone says the node's name."""
+    """Return whether the file alone says the node's name."""
     return "$(" not in node.full_name
 
 
@@ -268,7 +268,7 @@ def nodes_up(run: Run, node: LaunchNode) -> tuple[str, ...]:
 
 
 def refusal(run: Run) -> Absence | None:
-    """Why roslaunch started nothing, or broke off."""
+    """Return why roslaunch started nothing, or broke off."""
     text = "\n".join(line for line in _lines(run))
     for pattern, why, hint in _REFUSALS:
         if match := re.search(pattern, text):
@@ -278,7 +278,7 @@ def refusal(run: Run) -> Absence | None:
 
 
 def died(run: Run, node: LaunchNode) -> int | None:
-    """The exit code with which roslaunch saw it die before Ctrl-C; None where it did not."""
+    """Return the exit code with which roslaunch saw it die before Ctrl-C; None where it did not."""
     until_ns = observed_until_ns(run) or run.end_ns
     lines = _joined(bare(c.line) for t, c in run.console if t <= until_ns)
     codes = [int(m[2]) for line in lines if (m := _DIED.search(line)) and _is(node, m[1])]
@@ -286,12 +286,12 @@ def died(run: Run, node: LaunchNode) -> int | None:
 
 
 def finished(run: Run, node: LaunchNode) -> bool:
-    """Whether it ran to its own end without an error."""
+    """Return whether it ran to its own end without an error."""
     return any((m := _FINISHED.search(line)) and _is(node, m[1]) for line in _joined(_lines(run)))
 
 
 def why_not_up(package: PackageFacts, run: Run, node: LaunchNode) -> Absence:
-    """Why a node of the launch file did not come up."""
+    """Return why a node of the launch file did not come up."""
     return (
         _not_found(package, run, node)
         or why_died(package, run, node)
@@ -335,7 +335,7 @@ def quoted(run: Run) -> str:
 
 
 def roslaunch_error(run: Run) -> str:
-    """The first line in which roslaunch, or a node that it started, says what is wrong."""
+    """Return the first line in which roslaunch, or a node that it started, says what is wrong."""
     lines = [c.line for _, c in run.console if c.line.strip()]
     found = (line for mark in _ERRORS for line in lines if mark in line)
     return shown(next(found, ""))
@@ -380,7 +380,7 @@ def _is(node: LaunchNode, process: str) -> bool:
 
 
 def _substituted(inside: str) -> tuple[str, str]:
-    """What stands for `$(inside)` in a pattern: the name that is known, and what follows it."""
+    """Return what stands for `$(inside)` in a pattern: the name that is known, and what follows it."""
     words = re.sub(r"\\(.)", r"\1", inside).split()
     return (f"{re.escape(words[1])}_", ".+") if len(words) == 2 and words[0] == "anon" else ("", ".*")
 

@@ -24,7 +24,7 @@ def nodes_of(run: Run, process: str) -> tuple[str, ...]:
 
 
 def are_noted(run: Run) -> bool:
-    """Whether the graph says which process each of the student's nodes belongs to."""
+    """Return whether the graph says which process each of the student's nodes belongs to."""
     return any(run.is_student_node(node) for _, event in run.graph for node in event.processes)
 
 
@@ -55,7 +55,7 @@ def wrong_name(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymou
 
 
 def name_hint(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous) -> str:
-    """What to write into `init_node`."""
+    """Return what to write into `init_node`."""
     there = tuple(nodes)
     counted = [n for n in there if any(re.fullmatch(rf"{re.escape(b)}_*\d+", n) for b in _bases(names))]
     if counted and anonymous == "allowed":
@@ -84,7 +84,7 @@ def plain_type(name: str) -> str:
 
 
 def is_called(node: str, name: str) -> bool:
-    """Whether a node has this name, given with its slash or without; an anonymous one counts."""
+    """Return whether a node has this name, given with its slash or without; an anonymous one counts."""
     return re.fullmatch(re.escape("/" + name.lstrip("/")) + _ANONYMOUS, node) is not None
 
 

@@ -71,7 +71,7 @@ def leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 
 def tree(
     run: Run, *, until_ns: int | None = None, by: Callable[[str], bool] = lambda _: True
 ) -> dict[str, Any]:
-    """The server's leaves after all changes up to `until_ns` by those callers that `by` wants."""
+    """Return the server's leaves after all changes up to `until_ns` by those callers that `by` wants."""
     found: dict[str, Any] = {}
     for at_ns, event in run.params:
         if (until_ns is None or at_ns <= until_ns) and by(event.caller_id):
@@ -113,7 +113,7 @@ class Given(NamedTuple):
 
 
 def given(run: Run) -> dict[str, Given]:
-    """What the grader set before anything started, by name."""
+    """Return what the grader set before anything started, by name."""
     events = [e for _, e in run.actors if e.action == "param"]
     names = (absolute(e.topic or "") for e in events)
     return {n: Given(n, e.value, NOT_IN_FILE not in e.detail) for n, e in zip(names, events, strict=True)}

@@ -77,7 +77,7 @@ def shown(text: str) -> str:
 
 
 def in_one_line(text: str) -> str:
-    """The same of a message: its colours are part of it."""
+    """Return the same of a message: its colours are part of it."""
     line = visible(" ".join(text[:SHOWN_BEFORE_CHARS].split()))
     return line if len(line) <= SHOWN_CHARS else line[: SHOWN_CHARS - 1] + "…"
 
@@ -106,18 +106,18 @@ def words_pattern(words: str) -> str:
 
 
 def message_pattern(template: str, value: str) -> re.Pattern[str]:
-    """The whole text: the template's words, and `value` (a regular expression) where it says `{seconds}`."""
+    """Return the whole text: the template's words, and `value` (a regular expression) where it says `{seconds}`."""
     first, *others = template.strip().split(SECONDS)
     inner = "".join(f"({value}){words_pattern(words)}" for words in others)
     return re.compile(rf"\s*{words_pattern(first)}{inner}\s*", re.DOTALL)
 
 
 def line_pattern(template: str, value: str) -> re.Pattern[str]:
-    """The template's words around `value`, which has to stand there letter by letter, blanks squeezed."""
+    """Return the template's words around `value`, which has to stand there letter by letter, blanks squeezed."""
     squeezed = re.escape(" ".join(value.split()))
     return re.compile(squeezed.join(words_pattern(words) for words in template.strip().split(VALUE)))
 
 
 def in_words(template: str) -> str:
-    """The template as a student reads it: `hello world <seconds>`."""
+    """Return the template as a student reads it: `hello world <seconds>`."""
     return template.replace(SECONDS, "<seconds>").replace(VALUE, "<message>")
