@@ -54,7 +54,7 @@ _CAUSES = (
 )  # fmt: skip
 
 
-def absolute(name: str) -> str:
+def absolute_name(name: str) -> str:
     """With the slash in front, and none at the end."""
     return "/" + name.strip("/")
 
@@ -68,7 +68,7 @@ def leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 
         yield name, value
 
 
-def tree(
+def params_on_server(
     run: Run, *, until_ns: int | None = None, by: Callable[[str], bool] = lambda _: True
 ) -> dict[str, Any]:
     """Return the server's leaves after all changes up to `until_ns` by those callers that `by` wants."""
@@ -79,13 +79,13 @@ def tree(
     return found
 
 
-def own(found: Mapping[str, Any]) -> dict[str, Any]:
+def without_system_params(found: Mapping[str, Any]) -> dict[str, Any]:
     """Without what ROS itself keeps there."""
     return {name: value for name, value in found.items() if not name.startswith(SYSTEM)}
 
 
 def _apply(found: dict[str, Any], event: ParamEvent) -> None:
-    name = absolute(event.name)
+    name = absolute_name(event.name)
     below = f"{name.rstrip('/')}/"
     for known in [n for n in found if n == name or n.startswith(below)]:
         del found[known]
@@ -95,10 +95,10 @@ def _apply(found: dict[str, Any], event: ParamEvent) -> None:
         found.update(leaves(name, event.value))
 
 
-def instead(found: Mapping[str, Any], name: str) -> str:
+def describe_missing(found: Mapping[str, Any], name: str) -> str:
     """`there is no /details/name/first` with what is there in its place."""
     last = name.rpartition("/")[2]
-    others = own(found)
+    others = without_system_params(found)
     same = [n for n in others if n.rpartition("/")[2] == last]
     near = same or near_names(name, others) or list(others)
     return f"there is no {name}" + (f"; there is {listed(near)}" if near else "")
@@ -112,10 +112,10 @@ class Given(NamedTuple):
     in_file: bool
 
 
-def given(run: Run) -> dict[str, Given]:
+def params_given(run: Run) -> dict[str, Given]:
     """Return what the grader set before anything started, by name."""
     events = [e for _, e in run.actors if e.action == "param"]
-    names = (absolute(e.topic or "") for e in events)
+    names = (absolute_name(e.topic or "") for e in events)
     return {n: Given(n, e.value, NOT_IN_FILE not in e.detail) for n, e in zip(names, events, strict=True)}
 
 
@@ -129,7 +129,7 @@ def is_printed(value: object, lines: Sequence[Line]) -> bool:
     return any(word.search(line.text) for line in lines)
 
 
-def broken(package: PackageFacts, run: Run) -> Ending | None:
+def explain_failure(package: PackageFacts, run: Run) -> Ending | None:
     """An error that ended the node, or its last traceback."""
     ended = early_end(run)
     if ended is not None and ended.end is not None and ended.end.exit_code != 0:
@@ -141,7 +141,9 @@ def broken(package: PackageFacts, run: Run) -> Ending | None:
     key = re.match(r"KeyError: ['\"]?([^'\" (]+)", end.cause)
     if key is None:
         return end
-    parts = {part for name in own(tree(run)) for part in name.split("/") if part}
+    parts = {
+        part for name in without_system_params(params_on_server(run)) for part in name.split("/") if part
+    }
     last = PurePosixPath(key[1]).name
     near = near_names(last, parts - {last})
     seen = f"; there is {listed(near)}" if near else ""
