@@ -172,7 +172,7 @@ def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
     if any(c.messages for c in run.student_channels(topic)):
         hint = "publish the counter itself, as an Int8"
         return unjudged(f"{topic} carries no numbers", measured="no number", hint=hint)
-    return no_message(package, run, topic)
+    return no_message(package, run, topic).about(measured="no message")
 
 
 def begins_with(first: Count, start: int) -> bool:
