@@ -1,4 +1,4 @@
-"""Whether the package builds."""
+"""Whether the package builds, and its own programs run."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _OTHER_ERROR = re.compile(
 
 
 def run_hint(reason: str) -> str:
-    """What brings evidence that was not recorded, by the recording's own reason."""
+    """Return what brings evidence that was not recorded, by the recording's own reason."""
     if "only the files" in reason:
         return "grade without --static"
     return INSTALL_ROS if "no ROS" in reason else "grade the submission again"
@@ -100,7 +100,7 @@ def build(package: PackageFacts, build: Run, params: BuildParams) -> Verdict:
 
 
 def judge_build(package: PackageFacts, build: Run) -> Verdict:
-    """Whether `catkin_make` succeeded, and if not, why."""
+    """Return whether `catkin_make` succeeded, and if not, why."""
     found = {e.event: (t, e) for t, e in build.processes if e.name == CATKIN_MAKE}
     if "start" not in found and "exit" not in found:
         reason = build.metadata.get("not_run") or (build.outcome.detail if build.outcome else "")
@@ -161,7 +161,7 @@ def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | No
 
 
 def _first_error(lines: Sequence[str]) -> BuildError | None:
-    """The first line that fits: a compiler's error comes before make's summary of it."""
+    """Return the first line that fits: a compiler's error comes before make's summary of it."""
     for index, line in enumerate(lines):
         if match := _CMAKE_ERROR.match(line):
             place = f"{match['file']}:{match['line']}: " if match["file"] else ""
@@ -291,7 +291,7 @@ def _gave_way(run: Run, one: Life) -> bool:
 
 
 def _last_words(run: Run, one: Life) -> str:
-    """The loader's complaint, or ROS's, or that of an exception where there is one, or else the last line."""
+    """Return the loader's complaint, or ROS's, or that of an exception where there is one, or else the last line."""
     lines = [line.line for _, line in run.lines(one.name) if line.line.strip()]
     complaints = [line for line in lines if any(mark in line for mark in (*LOADER, *TELLING))]
     return shown(bare((complaints or lines[-1:] or [""])[0]))

@@ -1,4 +1,4 @@
-"""What `CMakeLists.txt` says."""
+"""Whether `CMakeLists.txt` makes a catkin package and installs the scripts."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from grader.checks.support.text import listed, near_names, shown
 from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
+
+BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 
 
 class CMakeParams(Record):
@@ -77,7 +79,7 @@ def _fault(fault: Fault | None) -> Iterator[str]:
 
 
 def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[tuple[str, str, int | None]]:
-    """What is missing or wrong, how to fix it, and the line."""
+    """Yield what is missing or wrong, how to fix it, and the line."""
     wanted = names[0]
     project = _first(facts, "project")
     if project is None:
@@ -98,9 +100,6 @@ def _wrong(facts: CMakeFacts, names: tuple[str, str]) -> Iterator[tuple[str, str
 
 def _first(facts: CMakeFacts, name: str) -> CMakeCall | None:
     return next((c for c in facts.calls if c.name == name), None)
-
-
-BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 
 
 class CMakeInstallParams(Record):
@@ -174,20 +173,20 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
 
 
 def _reasons(lacks: dict[str, Lack]) -> Iterator[str]:
-    """Each reason once, with the scripts that it is true of."""
+    """Yield each reason once, with the scripts that it is true of."""
     for why in dict.fromkeys(lack.why for lack in lacks.values()):
         scripts = [name for name, lack in lacks.items() if lack.why == why]
         yield why.replace("{}", listed(scripts))
 
 
 def _fixes(lacks: dict[str, Lack]) -> Iterator[str]:
-    """Each repair once, as one line for all scripts that it is true of."""
+    """Yield each repair once, as one line for all scripts that it is true of."""
     for fix in dict.fromkeys(lack.fix for lack in lacks.values()):
         yield fix.replace("{}", " ".join(lack.path for lack in lacks.values() if lack.fix == fix))
 
 
 def _lack(package: PackageFacts, all_named: Sequence[Installed], script: str) -> Lack | None:
-    """None where `catkin_install_python` puts the script where `rosrun` looks."""
+    """Return None where `catkin_install_python` puts the script where `rosrun` looks."""
     paths = [f.path for f in copies_of(package, script)] or [script]
     hits = [one for one in all_named if any(names_script(one, path) for path in paths)]
     by_python = [one for one in hits if one.call.name == PYTHON]
@@ -197,7 +196,7 @@ def _lack(package: PackageFacts, all_named: Sequence[Installed], script: str) ->
         return _misplaced(package, by_python[0])
     blurred = next((o for o in all_named if o.call.name == PYTHON and not o.known), None)
     if blurred is not None:
-        why = f"which scripts {blurred.path} holds, only CMake can tell, and it was not run to its end"
+        why = f"which scripts {blurred.path} holds is known to CMake alone, and it did not finish"
         return Lack(why, "build the package with catkin_make", _line(blurred), unsure=True)
     return _unnamed(all_named, hits, paths[0], script)
 
@@ -208,12 +207,14 @@ def _misplaced(package: PackageFacts, one: Installed) -> Lack:
         why = f"{where}: catkin_install_python(…) does not begin with the word PROGRAMS"
         return Lack(why, f"write catkin_install_python(PROGRAMS … DESTINATION {BIN})", _line(one))
     if "DESTINATION" in one.call.args and not one.destination and not _called(package, "catkin_package"):
-        why = f"{where}: {BIN} has no value, for catkin_package() is not called before it"
+        why = f"{where}: {BIN} has no value, because catkin_package() is not called before it"
         return Lack(why, "call catkin_package() above catkin_install_python(…)", _line(one), follows=True)
     if one.destination is None:
         why = f"{where}: catkin_install_python(…) gives {{}} no DESTINATION"
     elif not one.destination:
-        why = f"{where}: nothing stands behind DESTINATION, or a variable that has no value (its name misspelt?)"
+        why = (
+            f"{where}: nothing follows DESTINATION, or only a variable that has no value (its name misspelt?)"
+        )
     else:
         why = f"{where}: the destination of {{}} is {shown(one.destination)}, not {BIN} (lib/{package.name})"
     return Lack(why, f"write DESTINATION {BIN}, below find_package(catkin …)", _line(one))
@@ -237,9 +238,9 @@ def _unnamed(all_named: Sequence[Installed], hits: Sequence[Installed], path: st
     near = [wanted] if wanted in names else list(near_names(wanted, names))
     if near:
         one = names[near[0]]
-        why = f"line {one.call.line}: {shown(one.path)} is named, which is not there; the script is {path}"
+        why = f"line {one.call.line}: {shown(one.path)} is named, but does not exist; the script is {path}"
         return Lack(why, f"write {path}", _line(one))
-    return Lack("catkin_install_python(…) does not name {}", "write {} into it, behind PROGRAMS", None, path)
+    return Lack("catkin_install_python(…) does not name {}", "write {} into it, after PROGRAMS", None, path)
 
 
 def _called(package: PackageFacts, name: str) -> bool:

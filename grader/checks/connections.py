@@ -78,7 +78,7 @@ def _fits(run: Run, node: str, wanted: str) -> bool:
 
 
 def _apart(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
-    """Why no two nodes are connected: one is missing, or not on the topic, or the types differ."""
+    """Return why no two nodes are connected: one is missing, or not on the topic, or the types differ."""
     lacking = [end for end in ENDS if not _on(run, params.topic, end, params)]
     for end in lacking:
         if verdict := _misnamed(run, end, params):

@@ -10,7 +10,6 @@ from pydantic import Field
 from grader.checks.registry import check
 from grader.checks.support.console_output import (
     LOOKED_AT,
-    Sent,
     both_from_ns,
     heard_of,
     printed_times,
@@ -182,13 +181,13 @@ def _heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) ->
     copies = (trio.first_nodes, trio.second_nodes)
     from_ns = both_from_ns(run, params.topic, *copies)
     if from_ns is None:
-        silent = next(nodes for nodes in copies if not sent_by(run, params.topic, nodes).texts)
+        silent = next(nodes for nodes in copies if not sent_by(run, params.topic, nodes))
         message = f"both copies live, but {listed(silent)} sends no text on {params.topic}"
         return unjudged(message, hint=f"publish on {params.topic} in the loop, as a copy alone does")
     first, second = (sent_by(run, params.topic, nodes, from_ns) for nodes in copies)
-    if first.total + second.total > LOOKED_AT:  # the listener lags behind a flood
+    if first.total() + second.total() > LOOKED_AT:  # the listener lags behind a flood
         first, second = (sent_by(run, params.topic, nodes) for nodes in copies)
-    texts = {**first.texts, **second.texts}
+    texts = {**first, **second}
     said, known = (printed_times(run, trio.listener.name, texts, form) for form in (params.template, VALUE))
     return (
         _judged(first, second, said, trio, params)
@@ -205,15 +204,15 @@ def _other_words(params: CopiesParams) -> Verdict:
 
 
 def _judged(
-    first: Sent, second: Sent, printed: Counter[str], trio: Trio, params: CopiesParams
+    first: Counter[str], second: Counter[str], printed: Counter[str], trio: Trio, params: CopiesParams
 ) -> Verdict | None:
     """A pass where both were heard."""
     counts = heard_of(first, second, printed), heard_of(second, first, printed)
     if not all(counts):
         return None
     names = f"{trio.first_nodes[0]} and {trio.second_nodes[0]}"
-    heard = f"{counts[0]} of {plural(first.total, 'message')} and {counts[1]} of {second.total}"
-    if first.total + second.total > LOOKED_AT:
+    heard = f"{counts[0]} of {plural(first.total(), 'message')} and {counts[1]} of {second.total()}"
+    if first.total() + second.total() > LOOKED_AT:
         heard = f"at least {heard}"
     return passed(
         f"{names} live at once, and {params.listener} prints messages of both",
@@ -221,10 +220,12 @@ def _judged(
     )
 
 
-def _unheard(first: Sent, second: Sent, printed: Counter[str], trio: Trio, params: CopiesParams) -> Verdict:
+def _unheard(
+    first: Counter[str], second: Counter[str], printed: Counter[str], trio: Trio, params: CopiesParams
+) -> Verdict:
     """The listener hears one copy, or none at all: then the listener's own criterion says why."""
     names = (trio.first_nodes[0], trio.second_nodes[0])
-    if min(first.total, second.total) < FEW:
+    if min(first.total(), second.total()) < FEW:
         message = "the two copies were watched too briefly to see their messages printed"
         return inconclusive(message, hint="grade again")
     if not printed:

@@ -53,7 +53,7 @@ def counter_start(package: PackageFacts, run: Run, params: StartParams) -> Verdi
         That the very first value published on the topic is the one that the handout asks for.
 
     Why it matters on a robot
-        Whoever counts along, to find lost messages or to number pictures, begins with the first one. Off by
+        A program that counts along, to find lost messages or to number pictures, begins with the first one. Off by
         one at the start is off by one for ever.
 
     How it is measured
@@ -172,16 +172,16 @@ def _nothing(package: PackageFacts, run: Run, topic: str) -> Verdict:
     if any(c.messages for c in run.student_channels(topic)):
         hint = "publish the counter itself, as an Int8"
         return unjudged(f"{topic} carries no numbers", measured="no number", hint=hint)
-    return no_message(package, run, topic)
+    return no_message(package, run, topic).about(measured="no message")
 
 
 def begins_with(first: Count, start: int) -> bool:
-    """Whether this is the first of all its values, and the right one."""
+    """Return whether this is the first of all its values, and the right one."""
     return first.values[0] == start and first.sequences[0] == 0
 
 
 def missed_the_first(run: Run, topic: str, first: Count) -> bool:
-    """Whether values may have come before the first one that is recorded."""
+    """Return whether values may have come before the first one that is recorded."""
     return first.sequences[0] > 0 or _recorder_was_late(run, topic, first.callerid)
 
 
@@ -200,7 +200,7 @@ def _wrong(count: Count, found: Wrong, params: StepParams) -> Verdict | None:
         return _flooded(len(found.steps), params)
     if not found.own:
         missing = sum(int(min(s.change, LARGEST)) - 1 for s in found.lost)
-        message = f"{plural(missing, 'value')} of {params.topic} got lost on the way, with a gap in time"
+        message = f"{plural(missing, 'value')} of {params.topic} were lost on the way, with a gap in time"
         return inconclusive(message, hint="grade again while the machine has less to do")
     first, usual = found.own[0], count.usual_step()
     after = seconds(first.to_ns - count.times_ns[0])

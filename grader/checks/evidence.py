@@ -18,7 +18,7 @@ class NotRecorded(Exception):
 
 
 class NoSuchScenario(KeyError):
-    """A scenario was asked for that the rubric does not have: a slip of whoever wrote the check."""
+    """A scenario was asked for that the rubric does not have: a slip in the check itself."""
 
     def __str__(self) -> str:
         return str(self.args[0])

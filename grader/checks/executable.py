@@ -94,7 +94,7 @@ def _judged(package: PackageFacts, build: Run, found: SourceFile, params: Execut
 
 
 def has_wrapper(package: PackageFacts, build: Run, path: str) -> bool:
-    """The build worked, and `catkin_install_python` put this script where `rosrun` looks."""
+    """Return whether the build worked, and `catkin_install_python` put this script where `rosrun` looks."""
     built = any(e.event == "exit" and e.name == CATKIN_MAKE and e.exit_code == 0 for _, e in build.processes)
     named = (i for i in installed(package) if i.call.name == PYTHON and i.kind == "PROGRAMS")
     return built and any(names_script(i, path) and is_found(i.destination or "", package) for i in named)
@@ -122,7 +122,7 @@ def _mode_obstacles(file: SourceFile, remarks: tuple[str, ...]) -> Iterator[Obst
 
 
 def _shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
-    """What keeps the system from starting the file, the package facts' own words first."""
+    """Yield what keeps the system from starting the file, the package facts' own words first."""
     fix = f"write {RIGHT_SHEBANG} as the very first line, with nothing above it"
     if file.link_problem:
         yield Obstacle(f"cannot be run: {file.link_problem}", "hand in the file itself")

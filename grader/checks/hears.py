@@ -1,4 +1,4 @@
-"""Whether a listener prints what it hears."""
+"""Whether a listener prints what it hears, and if not, why."""
 
 from __future__ import annotations
 
@@ -23,6 +23,11 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+
+HAND_IN = "add the script to the package, and push it"
+CALLBACK_HINT = (
+    "print data.data in the callback, without a condition and nothing slow beside it; end with rospy.spin()"
+)
 
 
 class HearsParams(Record):
@@ -67,7 +72,7 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
     places = places_of(run, probes, lines, params.template)
     missing = [] if places is None else [p for p, found in zip(probes, places, strict=True) if not found]
     if places is None:
-        message = "it prints so many numbers that it cannot be told which of them it heard"
+        message = "it prints so many numbers that nobody can tell which of them it heard"
         verdict = failed(message, hint="print each number once, in the callback")
     elif missing:
         verdict = _other_words(probes, missing, lines, params) or not_printed(
@@ -102,7 +107,7 @@ def _other_words(
     if any(f'data: "{missing[0].value}"' in line for line in said):
         return failed(message, hint="print data.data, which is the text: data is the whole message around it")
     if blank and said and all(text_places(missing, lines, glued)):
-        return failed(message, hint=f"put a blank between the words and the message: '{wanted}'")
+        return failed(message, hint=f"put a space between the words and the message: '{wanted}'")
     return failed(message, hint=f"print '{wanted}', with the handout's own words")
 
 
@@ -114,12 +119,6 @@ def _how_many(missing: Sequence[Probe], probes: Sequence[Probe]) -> str:
 
 def _squeezed(text: object) -> str:
     return "".join(str(text).split())
-
-
-HAND_IN = "add the script to the package, and push it"
-CALLBACK_HINT = (
-    "print data.data in the callback, without a condition and nothing slow beside it; end with rospy.spin()"
-)
 
 
 def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:

@@ -123,7 +123,7 @@ def _script(package: PackageFacts, build: Run, file: LaunchFile, params: OpensPa
 
 
 def _of_shell(verdict: Verdict) -> Verdict:
-    """The executable check's words with the shell's first line."""
+    """Return the executable check's words with the shell's first line."""
     words = {name: getattr(verdict, name).replace(RIGHT_SHEBANG, SHELL) for name in ("message", "hint")}
     return verdict.model_copy(update=words)
 
@@ -162,7 +162,7 @@ def _page(package: PackageFacts, file: LaunchFile, run: Run, params: OpensParams
 
 
 def _words(package: PackageFacts, file: LaunchFile, run: Run) -> str:
-    """What the script or roslaunch said instead."""
+    """Return what the script or roslaunch said instead."""
     lines = [bare(c.line) for _, c in run.console]
     shell = re.compile(
         r"command not found|No such file|[Ss]yntax error|not found$|bad interpreter|cannot launch node"

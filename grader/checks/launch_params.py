@@ -1,4 +1,4 @@
-"""Whether a launch file loads parameters before its node reads them."""
+"""Whether a launch file puts parameters where its node reads them, before it does so."""
 
 from __future__ import annotations
 
@@ -24,7 +24,13 @@ from grader.checks.support.launch import (
     why_died,
     why_not_up,
 )
-from grader.checks.support.parameters import absolute, instead, is_printed, own, tree
+from grader.checks.support.parameters import (
+    absolute_name,
+    describe_missing,
+    is_printed,
+    params_on_server,
+    without_system_params,
+)
 from grader.checks.support.scripts import add_hint, find_script
 from grader.checks.support.text import listed, number, shown
 from grader.checks.support.topics import cite
@@ -35,6 +41,7 @@ from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
 
 SUMMARY = re.compile(r"\s*\*\s+/")  # roslaunch's list of parameters
 OUTSIDE = 'write <rosparam file="$(find <package>)/{}"/> outside the <node>, without ns'
+Wanted = Mapping[str, int | float | str]
 
 
 class LaunchLoadsParams(Record):
@@ -60,7 +67,7 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
 
     How it is measured
         By every change of the parameter server up to the node's registration, and by what `roslaunch` says of
-        the node. `<rosparam>` may stand before or behind the `<node>`: `roslaunch` sets parameters first. In a
+        the node. `<rosparam>` may stand before or after the `<node>`: `roslaunch` sets parameters first. In a
         namespace, the file counts as loaded where the node prints all of its values from there.
 
     How to fix
@@ -77,7 +84,7 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
         or _judged(package, file, run, params)
         or passed(f"roslaunch loads {params.file}, then runs {PurePosixPath(params.script).name}")
     )
-    found = own(tree(run, by=lambda caller: caller not in run.student_nodes()))
+    found = without_system_params(params_on_server(run, by=lambda caller: caller not in run.student_nodes()))
     place = FileCitation(file=file.path, line=_line(file, params))
     return verdict.about(
         expected=expected,
@@ -90,8 +97,8 @@ def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchLoa
     node = nodes_of_script(package, file, params.script)[0]
     up = nodes_up(run, node)
     start_ns = min((t for t, event in run.graph if set(up) & set(event.nodes)), default=run.end_ns)
-    before = tree(run, until_ns=start_ns, by=lambda caller: caller not in up)
-    missing = [name for name in map(absolute, params.names) if name not in before]
+    before = params_on_server(run, until_ns=start_ns, by=lambda caller: caller not in up)
+    missing = [name for name in map(absolute_name, params.names) if name not in before]
     if missing and not _read_where_loaded(file, run, params, before):
         return _not_loaded(package, file, run, params, missing)
     if not (
@@ -117,7 +124,7 @@ def _read_where_loaded(
 
 
 def _moved(load: LaunchLoad, params: LaunchLoadsParams) -> list[str]:
-    return [load.namespace.rstrip("/") + absolute(name) for name in params.names]
+    return [load.namespace.rstrip("/") + absolute_name(name) for name in params.names]
 
 
 def _not_running(package: PackageFacts, run: Run, node: LaunchNode) -> Verdict | None:
@@ -149,7 +156,7 @@ def _not_loaded(
 
 def _loaded_otherwise(run: Run, params: LaunchLoadsParams, loads: list[LaunchLoad], missing: str) -> Verdict:
     """The launch file loads the file: into a namespace, too late, or with other names in it."""
-    found = tree(run)
+    found = params_on_server(run)
     for load in loads:
         moved = load.namespace.rstrip("/") + missing
         if moved in found and moved != missing:
@@ -158,7 +165,7 @@ def _loaded_otherwise(run: Run, params: LaunchLoadsParams, loads: list[LaunchLoa
     if missing in found:
         message = f"{missing} is set only after the node has started"
         return failed(message, hint=OUTSIDE.format(params.file))
-    message = f"{params.file} is loaded, but {instead(found, missing)}"
+    message = f"{params.file} is loaded, but {describe_missing(found, missing)}"
     return unjudged(message, hint=f"fix the names in {params.file}")
 
 
@@ -197,11 +204,8 @@ def _line(file: LaunchFile, params: LaunchLoadsParams) -> int:
     return (named or here)[0].line if here else 1
 
 
-Wanted = Mapping[str, int | float | str]
-
-
 def params_misplaced(run: Run, file: LaunchFile, nodes: Iterable[str], wanted: Wanted) -> Verdict | None:
-    """None where all of `wanted` are in one place where one of the nodes reads them.
+    """Return None where all of `wanted` are in one place where one of the nodes reads them.
 
     A node reads its private parameters (`/sim/background_r`), or those of its namespace, as older ones do.
     """
@@ -211,11 +215,11 @@ def params_misplaced(run: Run, file: LaunchFile, nodes: Iterable[str], wanted: W
 
 def _of_node(run: Run, file: LaunchFile, node: str, wanted: Wanted) -> Verdict | None:
     start_ns = next((t for t, event in run.graph if node in event.nodes), run.end_ns)
-    before = tree(run, until_ns=start_ns, by=lambda caller: caller != node)
+    before = params_on_server(run, until_ns=start_ns, by=lambda caller: caller != node)
     places = (f"{node}/", f"{node.rpartition('/')[0]}/")
     if _is_there(before, places, wanted):
         return None
-    if _is_there(tree(run, by=lambda caller: caller != node), places, wanted):
+    if _is_there(params_on_server(run, by=lambda caller: caller != node), places, wanted):
         message = f"{listed(wanted)} are set only after {node} has started, and it reads them as it starts"
         verdict = failed(message, hint="set them with <param> inside the <node>: roslaunch does that first")
     else:

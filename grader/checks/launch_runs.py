@@ -1,4 +1,4 @@
-"""Whether a launch file brings the nodes up together."""
+"""Whether a launch file brings its nodes up, under their names and connected."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def _names_missing(nodes: tuple[str, ...], file: LaunchFile, params: LaunchConne
 
 
 def _unconnected(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchConnectsParams) -> Verdict:
-    """Why no two nodes are connected: a wrong attribute, an error of roslaunch's, or what the graph shows."""
+    """Return why no two nodes are connected: a wrong attribute, an error of roslaunch's, or what the graph shows."""
     said = roslaunch_error(run)
     for node in file.nodes:
         if wrong := node_slip(package, node.model_copy(update={"file": file.path}), said):
@@ -122,7 +122,7 @@ def _unconnected(package: PackageFacts, file: LaunchFile, run: Run, params: Laun
 
 
 def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
-    """Why nodes that are there are not connected: other topics, other types, or an end that is missing."""
+    """Return why nodes that are there are not connected: other topics, other types, or an end that is missing."""
     others = {
         c.topic
         for _, event in run.graph
@@ -273,7 +273,7 @@ def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
 
 
 def _swapped(file: LaunchFile, name: str, params: LaunchRunsParams) -> Verdict | None:
-    """The name of one node on the program of another: `/talker` runs listener.py."""
+    """The name of one node is on the program of another: `/talker` runs listener.py."""
     for node in _named(file, name):
         program = PurePosixPath(node.type or "").stem
         if program != name.lstrip("/") and program in {n.lstrip("/") for n in params.nodes}:

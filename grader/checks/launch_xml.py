@@ -72,7 +72,7 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
 
 
 def missing_node(package: PackageFacts, file: LaunchFile, script: str) -> Verdict | None:
-    """Why the file starts no node of this script, None where it does."""
+    """Return why the file starts no node of this script, None where it does."""
     name = PurePosixPath(script).name
     if nodes_of_script(package, file, script) and _exists(package, name):
         return None

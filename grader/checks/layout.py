@@ -114,7 +114,7 @@ def _lost_folder(package: PackageFacts, folder: str, params: LayoutParams) -> Sl
         return Slip(what, f"git mv {instead} {folder}", f"{instead}/")
     own = [s for s in params.scripts if PurePosixPath(s).parts[0] == folder]
     nowhere = bool(own) and all(find_script(package, s) is None for s in own)
-    fix = f"mkdir {folder} in the package folder, put the files there that belong into it, and git add them"
+    fix = f"mkdir {folder} in the package folder, put the files that belong there into it, and git add them"
     return Slip(f"there is no folder {folder}/", fix, explained=nowhere)
 
 

@@ -93,7 +93,7 @@ def _only_printed(run: Run, params: LogsParams) -> Verdict | None:
         return None
     of_logger = next((log for log in map(console_log, (line.line for line in said)) if log), None)
     if of_logger is None:
-        message = f"{shown(said[0].line)!r} is only printed, and not logged"
+        message = f"{shown(said[0].line)!r} is only printed, not logged"
         return failed(message, hint=f"{_call(params)} instead of print(…)")
     if of_logger[0] != params.level:
         message = f"{params.text!r} is logged at level {of_logger[0].upper()}, not {params.level.upper()}"
@@ -127,7 +127,7 @@ def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | No
         alike = max(texts, key=lambda text: _likeness(text, params.text), default="")
         if _likeness(alike, params.text) >= ALIKE:
             text = (console_log(alike) or ("", alike))[1]
-            return failed(f"{shown(text)!r} {how}, and not {params.text!r}", hint=_call(params))
+            return failed(f"{shown(text)!r} {how}, not {params.text!r}", hint=_call(params))
     return None
 
 
@@ -155,7 +155,7 @@ def _nothing(
         hint = "call rospy.init_node(…) before logging"
         return unjudged("no node was registered that could log", hint=hint)
     if lines:
-        message = f"{listed(nodes)} logs {shown(lines[0].text)!r}, and not {params.text!r}"
+        message = f"{listed(nodes)} logs {shown(lines[0].text)!r}, not {params.text!r}"
         return failed(message, hint=_call(params))
     hint = f"{_call(params)} below rospy.init_node(…): above it, nothing is sent"
     return failed(f"{listed(nodes)} logs nothing", hint=hint)

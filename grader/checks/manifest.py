@@ -1,4 +1,4 @@
-"""What `package.xml` says."""
+"""Whether `package.xml` names the package, its dependencies and a maintainer."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
         That `package.xml` lists each package which the nodes import, as a dependency at run time.
 
     Why it matters on a robot
-        Whoever installs the package on the robot asks the manifest what else to install. What is missing
+        The manifest tells what else to install with the package on the robot. What is missing
         there is missing on the robot, and the node stops at its first import.
 
     How it is measured
@@ -148,7 +148,7 @@ def _declared(found: Manifest) -> str:
 
 
 def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
-    """What the manifest does not declare for run time; None where it declares all."""
+    """Return what the manifest does not declare for run time; None where it declares all."""
     declared = {d.name for d in found.dependencies if d.kind in RUNTIME_KINDS}
     missing = [n for n in names if n not in declared]
     if not missing:

@@ -31,6 +31,7 @@ from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 
 ENOUGH = 3
 UNFILLED = ("%s", "%d", "%f", "{}", "{0}")
+ROUNDING = 1e-6
 
 
 class MessageParams(Record):
@@ -49,7 +50,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
         message to message.
 
     Why it matters on a robot
-        Whoever reads the messages goes by their form, and measurements without the right time cannot be put
+        Programs that read the messages go by their form, and measurements without the right time cannot be put
         in order or be told from old ones.
 
     How it is measured
@@ -105,7 +106,7 @@ def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdic
     if any(mark in text for mark in UNFILLED):
         message = f"a message reads {in_one_line(text)!r}: its placeholder was never filled in"
     elif more := _behind(part):
-        message = f"a message has {more!r} behind the time: {in_one_line(text)!r}, not '{wanted}'"
+        message = f"a message has {more!r} after the time: {in_one_line(text)!r}, not '{wanted}'"
     elif part:
         message = f"a message says {part!r} where the time in seconds belongs: {in_one_line(text)!r}, not '{wanted}'"
     else:
@@ -116,7 +117,7 @@ def _misfit(run: Run, heard: Sequence[Channel], params: MessageParams) -> Verdic
 
 
 def _behind(part: str) -> str:
-    """What stands behind the number where more than a number is found."""
+    """Return what stands behind the number where more than a number is found."""
     found = re.match(rf"{NUMBER}\s+([^\W\d].*)", part)
     return found[1] if found else ""
 
@@ -146,7 +147,7 @@ def _wrong_time(
 
 
 def _watched_ns(run: Run, heard: Sequence[Channel]) -> int:
-    """How long its messages could have come."""
+    """Return how long its messages could have come."""
     return (observed_until_ns(run) or run.end_ns) - min(c.times_ns[0] for c in heard)
 
 
@@ -161,9 +162,6 @@ def _too_few(package: PackageFacts, run: Run, heard: Sequence[Channel], params: 
     if _watched_ns(run, heard) >= WATCHED_S * 1e9:
         return unjudged(f"{few}: too few to see the time grow", hint=f"publish in the loop; {GET_TIME}")
     return inconclusive(f"{few} while it was watched: too few to see the time grow", hint="grade again")
-
-
-ROUNDING = 1e-6
 
 
 class FieldBoundsParams(Record):

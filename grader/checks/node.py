@@ -145,7 +145,7 @@ def _fitting(nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams) -
 
 
 def _misnamed(nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams) -> Verdict | None:
-    """None where a name fits, or none is asked for."""
+    """Return None where a name fits, or none is asked for."""
     if not params.names or _fitting(nodes, params):
         return None
     given = params.names, nodes, params.anonymous
@@ -153,7 +153,7 @@ def _misnamed(nodes: tuple[str, ...], params: NodeNameParams | NodeLivesParams) 
 
 
 def _up_ns(one: Life, run: Run, nodes: tuple[str, ...]) -> int:
-    """How long it lived freely after its first message, or after its start where it published none."""
+    """Return how long it lived freely after its first message, or after its start where it published none."""
     channels = (c for c in run.student_channels() if c.topic != "/rosout" and c.callerid in nodes)
     first = min((c.times_ns[0] for c in channels if c.messages), default=one.start_ns)
     return max(0, one.until_ns(run) - first)
@@ -184,7 +184,7 @@ def _short_watch(one: Life, up_ns: int, params: NodeLivesParams) -> Verdict | No
 
 
 def _bad_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
-    """How its end after Ctrl-C was wrong, None where it was not."""
+    """Return how its end after Ctrl-C was wrong, None where it was not."""
     stopped_by = one.end.stopped_by if one.end else None
     if stopped_by in {"TERM", "KILL"}:
         excuse = _locked_up(one, run)

@@ -11,14 +11,14 @@ from grader.checks.registry import check
 from grader.checks.support.console_output import printed_lines
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.parameters import (
-    absolute,
-    broken,
+    absolute_name,
+    describe_missing,
+    explain_failure,
     explain_yaml,
-    given,
-    instead,
     is_printed,
-    own,
-    tree,
+    params_given,
+    params_on_server,
+    without_system_params,
 )
 from grader.checks.support.processes import Life, first_interrupt_ns, life, lives, not_started
 from grader.checks.support.scripts import add_hint, find_script, paths_by_name
@@ -29,6 +29,9 @@ from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Citation, FileCitation, Verdict, failed, inconclusive, passed, unjudged
+
+EXACT = 1e-9
+MISSING = object()
 
 
 class ParamsLoadedParams(Record):
@@ -55,13 +58,13 @@ def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -
         `rosparam load` loads the file as it was handed in; what it sets is compared by name. Values are free.
 
     How to fix
-        Indent with spaces, two for each level, and write `name: value` with a space behind the colon.
+        Indent with spaces, two for each level, and write `name: value` with a space after the colon.
         `rosparam load <file>`, then `rosparam list` shows the names.
     """
-    wanted = [absolute(name) for name in params.names]
+    wanted = [absolute_name(name) for name in params.names]
     expected = f"rosparam load {params.file} sets {listed(wanted)}"
     source = find_script(package, params.file)
-    found = own(tree(run))
+    found = without_system_params(params_on_server(run))
     one = life(run, params.process)
     if source is None:
         verdict = _no_file(package, params.file)
@@ -92,7 +95,7 @@ def _no_file(package: PackageFacts, path: str) -> Verdict:
 
 
 def _error(run: Run, one: Life, path: str) -> Verdict | None:
-    """What rosparam said where it failed."""
+    """Return what rosparam said where it failed."""
     code = one.end.exit_code if one.end else None
     if code == 0:
         return None
@@ -111,7 +114,7 @@ def _missing(found: dict[str, object], missing: list[str], path: str) -> Verdict
         return failed(f"{path} sets nothing at all", hint="write `details:` and its values below it")
     name = missing[0]
     if name in found:
-        return failed(f"{name} has no value", hint=f"write a value behind `{name.rpartition('/')[2]}:`")
+        return failed(f"{name} has no value", hint=f"write a value after `{name.rpartition('/')[2]}:`")
     if slip := _in_its_place(found, name, path):
         return slip
     more = f", and {len(missing) - 1} more names are missing" if len(missing) > 1 else ""
@@ -119,7 +122,7 @@ def _missing(found: dict[str, object], missing: list[str], path: str) -> Verdict
     shallow = f"{above.rpartition('/')[0]}/{last}"
     moved = f"indent {last} by two spaces more, so that it is below {above.rpartition('/')[2]}"
     hint = moved if shallow in found else f"write it so that rosparam list shows {name}, letter by letter"
-    return failed(f"{path} loads, but {instead(found, name)}{more}", hint=hint)
+    return failed(f"{path} loads, but {describe_missing(found, name)}{more}", hint=hint)
 
 
 def _in_its_place(found: dict[str, object], name: str, path: str) -> Verdict | None:
@@ -132,7 +135,7 @@ def _in_its_place(found: dict[str, object], name: str, path: str) -> Verdict | N
             return failed(f"{path} loads, but {why}", hint="take the `-` away: write names below each other")
         if isinstance(value, str) and f"{last}:" in value:
             why = f"{above} is the text {shown(value)!r}, so there is no {name}"
-            return failed(f"{path} loads, but {why}", hint=f"write a space behind each colon: `{last}: …`")
+            return failed(f"{path} loads, but {why}", hint=f"write a space after each colon: `{last}: …`")
     return None
 
 
@@ -166,7 +169,7 @@ def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadP
         `rospy.get_param('/details/name/first')`, or `rospy.get_param('details')` for a map of them all, then
         `rospy.loginfo(…)` each. `rosparam list` shows the names.
     """
-    known = given(run)
+    known = params_given(run)
     lines = printed_lines(run)
     missing = [n for n in params.names if n not in known or not is_printed(known[n].value, lines)]
     expected = f"the values of {listed(params.names)} on the server are printed"
@@ -183,11 +186,11 @@ def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadP
 def _not_printed(
     package: PackageFacts, build: Run, run: Run, params: ParamsReadParams, missing: Sequence[str]
 ) -> Verdict:
-    known = given(run)
+    known = params_given(run)
     names = listed(missing)
     if not lives(run):
         return not_started("the node")
-    if end := broken(package, run):
+    if end := explain_failure(package, run):
         return end.verdict(failed, f"{names} {_are(missing)} not printed: the node ended with {end.cause}")
     strange = [n for n in missing if n not in known or not known[n].in_file]
     if strange:
@@ -207,7 +210,7 @@ def _not_printed(
 
 
 def _in_file(build: Run, file: str, name: str) -> list[str]:
-    """What stands behind the name's last part in the file as handed in."""
+    """Return what stands behind the name's last part in the file as handed in."""
     base = PurePosixPath(file).name
     data = next((d for path, d in build.attachments.items() if PurePosixPath(path).name == base), b"")
     last = re.escape(name.rpartition("/")[2])
@@ -249,7 +252,7 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
         back with `rospy.get_param` and log it.
     """
     until_ns = _until_ns(run)
-    after = tree(run, until_ns=until_ns)
+    after = params_on_server(run, until_ns=until_ns)
     got = after.get(params.name)
     others = f", {listed(params.unchanged)} as before" if params.unchanged else ""
     expected = f"{params.name} is {params.value}{others}" + (", and it is logged" if params.logged else "")
@@ -277,27 +280,27 @@ def _not_set(
         return not_started("the node")
     sets = [e for t, e in run.params if e.action == "set" and t <= until_ns]
     mine = [e for e in sets if run.is_student_node(e.caller_id)]
-    last = next((e for e in reversed(mine) if absolute(e.name) == params.name), None)
+    last = next((e for e in reversed(mine) if absolute_name(e.name) == params.name), None)
     hint = f"write rospy.set_param('{params.name}', {params.value!r})"
     if last is not None and params.name in after:
         message = f"{params.name} is set to {shown(str(after[params.name]))}, not to {params.value}"
         return failed(message, hint=hint)
-    if params.name not in after and params.name in given(run):
+    if params.name not in after and params.name in params_given(run):
         cause = _taken_away(run, params.name)
         return failed(f"{params.name} is no longer on the server{cause}", hint=hint)
-    if end := broken(package, run):
+    if end := explain_failure(package, run):
         return end.verdict(unjudged, f"{params.name} was never set: the node ended with {end.cause}")
-    if _is_value(tree(run).get(params.name), params.value):
+    if _is_value(params_on_server(run).get(params.name), params.value):
         message = f"{params.name} is set to {params.value} only after Ctrl-C: the node waits too long"
         return failed(message, hint="set it as soon as the values are read, without a long sleep before it")
-    others = dict.fromkeys(absolute(e.name) for e in mine)
+    others = dict.fromkeys(absolute_name(e.name) for e in mine)
     instead = f"; the node sets {listed(others)}" if others else ""
     return failed(f"{params.name} is never set to {params.value}{instead}", hint=hint)
 
 
 def _clobbered(run: Run, after: dict[str, Any], params: ParamsSetParams) -> Verdict | None:
-    known = given(run)
-    before = tree(run, by=lambda caller: not run.is_student_node(caller))
+    known = params_given(run)
+    before = params_on_server(run, by=lambda caller: not run.is_student_node(caller))
     for name in params.unchanged:
         was = known[name].value if name in known else before.get(name)
         if was is None or after.get(name) == was:
@@ -311,9 +314,9 @@ def _clobbered(run: Run, after: dict[str, Any], params: ParamsSetParams) -> Verd
 
 
 def _taken_away(run: Run, name: str) -> str:
-    """The change that took a name away: a map that lacks it, a value in the map's place, or a delete."""
+    """Return the change that took a name away: a map that lacks it, a value in the map's place, or a delete."""
     for _, event in reversed(run.params):
-        above = absolute(event.name)
+        above = absolute_name(event.name)
         if run.is_student_node(event.caller_id) and f"{name}/".startswith(f"{above.rstrip('/')}/"):
             if event.action == "delete":
                 return f": the node deletes {above}"
@@ -326,10 +329,6 @@ def _not_logged(run: Run, params: ParamsSetParams) -> Verdict | None:
         return None
     message = f"{params.name} is set to {params.value}, but the new value is never printed"
     return failed(message, hint=f"rospy.loginfo(rospy.get_param('{params.name}'))")
-
-
-EXACT = 1e-9
-MISSING = object()
 
 
 class ParamValueParams(Record):
@@ -358,9 +357,13 @@ def param_value(package: PackageFacts, run: Run, params: ParamValueParams) -> Ve
         `rospy.set_param('<name>', value)`, a `<param>` in the launch file, or a YAML file that `rosparam`
         loads. Within `<node>`, and with `~`, a name is below the node's own. `rosparam get <name>` shows it.
     """
-    held = tree(run, until_ns=_until_ns(run))
-    got = _held(held, absolute(params.name))
-    verdict = _not_there(package, run, own(held), params) if got is MISSING else _judged(got, params)
+    held = params_on_server(run, until_ns=_until_ns(run))
+    got = _held(held, absolute_name(params.name))
+    verdict = (
+        _not_there(package, run, without_system_params(held), params)
+        if got is MISSING
+        else _judged(got, params)
+    )
     cited = cite(run, "/grader/param")
     return verdict.about(
         expected=f"{params.name}: {shown(value_text(params.value))}",
@@ -376,7 +379,7 @@ def _until_ns(run: Run) -> int:
 
 
 def _held(leaves: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401 - a parameter may be anything
-    """The value, or the map of all values below the name."""
+    """Return the value, or the map of all values below the name."""
     if name in leaves:
         return leaves[name]
     parts = [n.removeprefix(f"{name}/").partition("/")[0] for n in leaves if n.startswith(f"{name}/")]
@@ -387,7 +390,7 @@ def _judged(got: object, params: ParamValueParams) -> Verdict:
     wrong = [str(one) for one in differences(got, params.value, EXACT)]
     if not wrong:
         return passed(f"{params.name} is {shown(value_text(got))}")
-    hint = "numbers stand without quotes, text with them" if "(text, not" in wrong[0] else ""
+    hint = "write numbers without quotes, and text in quotes" if "(text, not" in wrong[0] else ""
     message = shown(f"{params.name} is {listed(wrong)}")
     return failed(message, hint=hint or f"rosparam get {params.name} shows it; set it to the lab's value")
 

@@ -1,4 +1,4 @@
-"""Whether a robot takes the way that it should."""
+"""Whether a robot takes the right path, and if not, where and how it leaves it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from grader.checks.support.geometry import (
     relative,
     track,
 )
-from grader.checks.support.lateness import NO_EXCUSE, Lateness, lateness
+from grader.checks.support.lateness import Lateness, excused
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.text import listed, number
 from grader.checks.support.topics import cite, no_message
@@ -37,6 +37,7 @@ LATE_P95_MS = 5.0
 ORIGIN = (0.0, 0.0)
 
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+MOVED_M = 0.01
 
 
 class PathParams(Record):
@@ -126,32 +127,17 @@ def _judged(found: Track, run: Run, params: PathParams) -> Verdict:
         hint = "publish a velocity that is not 0, again and again while it has to drive"
         return unjudged("it never moves", measured=figures, hint=hint)
     words = what_is_wrong(taken, params.way, course, mirror=params.relative)
-    nearly = followed(taken, params.way.points, 2 * params.tolerance_m).done
     verdict = failed(words.message, hint=words.hint, measured=figures)
-    return _excused(verdict, run, nearly=nearly)
-
-
-def _excused(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
-    """Where the machine itself was late, a robot that only just strays may have strayed with it."""
-    late, whole = (lateness(run, run.start_ns, run.end_ns, own=own) for own in (False, True))
-    if not nearly or late is None or whole is None:
+    if not followed(taken, params.way.points, 2 * params.tolerance_m).done:
         return verdict
-    if _kept_waiting(late):
-        late_by = f"late itself, by up to {late.max_ms:.0f} ms"
-        message = f"{verdict.message}; but the grading machine was {'busy' if late.full else late_by}"
-        hint = "grade again while the machine has less to do"
-        return inconclusive(message, hint=hint, measured=verdict.measured)
-    if _kept_waiting(whole):
-        return verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}"})
-    return verdict
+    # a robot that only just strays may have strayed with a machine that was late itself
+    return excused(verdict, run, run.start_ns, run.end_ns, _why_late)
 
 
-def _kept_waiting(late: Lateness) -> bool:
-    """Whether the machine was so late, or so busy, that a robot may have strayed by it."""
-    return late.full or late.max_ms >= LATE_MS or late.p95_ms >= LATE_P95_MS
-
-
-MOVED_M = 0.01
+def _why_late(late: Lateness) -> str:
+    if not (late.full or late.max_ms >= LATE_MS or late.p95_ms >= LATE_P95_MS):
+        return ""
+    return "busy" if late.full else f"late itself, by up to {late.max_ms:.0f} ms"
 
 
 class Words(NamedTuple):
@@ -184,7 +170,7 @@ def metres(distance_m: float) -> str:
 
 
 def stands(path: Sequence[Pose]) -> bool:
-    """Whether it never left its place."""
+    """Return whether it never left its place."""
     return all(math.dist(p.point, path[0].point) <= MOVED_M for p in path)
 
 
@@ -299,7 +285,7 @@ def _peak(path: Sequence[Pose], way: Way, course: Course) -> tuple[Pose, float]:
 
 
 def _along(point: Point, start: Point, end: Point) -> tuple[float, float]:
-    """How far along the line through two points, and how far to the left of it (m)."""
+    """Return how far along the line through two points, and how far to the left of it (m)."""
     dx, dy = end[0] - start[0], end[1] - start[1]
     length = math.hypot(dx, dy)
     x, y = point[0] - start[0], point[1] - start[1]
@@ -312,6 +298,6 @@ def _after(path: Sequence[Pose], pose: Pose) -> str:
 
 
 def measured(path: Sequence[Pose], course: Course, way: Way) -> str:
-    """The figures of a path in one line."""
+    """Return the figures of a path in one line."""
     off = metres(course.off_m) if course.strayed is None else metres(_peak(path, way, course)[1])
     return f"{off} off at most, {metres(length_m(path))} long, {course.reached} of {len(way.points)} points"

@@ -1,16 +1,17 @@
-"""Whether messages come at the rate of the handout."""
+"""Whether messages come at the rate that the handout asks for, evenly."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Annotated
 
 from pydantic import Field
 
 from grader.checks.registry import check
 from grader.checks.support.exit_causes import explain_early_end
-from grader.checks.support.lateness import NO_EXCUSE, Lateness, lateness
+from grader.checks.support.lateness import Lateness, excused, lateness
 from grader.checks.support.processes import observed_until_ns
 from grader.checks.support.text import hertz, number, plural, seconds
 from grader.checks.support.topics import cite, no_message, whole_until_ns
@@ -18,7 +19,7 @@ from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Citation, FileCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
 
 FLOOD_FACTOR = 5
 LATE_P95_SHARE = 0.2
@@ -64,7 +65,7 @@ class RateParams(Record):
 
     @property
     def rate_bounds(self) -> RateBounds:
-        """What the recorder has to know of the rate: a run may end when it is clear."""
+        """Return what the recorder has to know of the rate: a run may end when it is clear."""
         low_ns, high_ns = self.bounds_ns
         return RateBounds(
             topic=self.topic,
@@ -107,25 +108,28 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     found = judged_rhythm(run, params, run.student_channels(params.topic))
     if found is None:
         return no_message(package, run, params.topic).about(expected=expected)
+    uneven = _uneven(found, params)
+    if uneven is not None:
+        why = partial(_why_late, found, params=params)
+        uneven = excused(uneven, run, found.times_ns[0], found.until_ns, why)
     verdict = (
         _flood(found, package, params)
         or _short(found, run, package, params)
-        or _excused(_uneven(found, params), found, run, params)
+        or uneven
         or passed(f"{params.topic} has {hertz(found.mean_hz)}, evenly")
     )
-    span = cite(run, params.topic, found.times_ns[0], found.times_ns[-1])
-    citations: tuple[Citation, ...] = (*verdict.citations, span)
+    citations = (*verdict.citations, cite(run, params.topic, found.times_ns[0], found.times_ns[-1]))
     return verdict.about(expected=expected, measured=_measured(found, run, params), citations=citations)
 
 
 def judged_rhythm(run: Run, params: RateParams, channels: Sequence[Channel]) -> Rhythm | None:
-    """What these channels of the topic sent, as far as it is judged."""
+    """Return what these channels of the topic sent, as far as it is judged."""
     until_ns = whole_until_ns(run, params.topic, observed_until_ns(run))
     return rhythm(channels, until_ns, params.period_ns)
 
 
 def _measured(found: Rhythm, run: Run, params: RateParams) -> str:
-    """What came, and how late the machine was meanwhile."""
+    """Return what came, and how late the machine was meanwhile."""
     seen = described(found, *params.bounds_ns)
     late = lateness(run, found.times_ns[0], found.until_ns, own=True) if found.gaps_ns else None
     return seen if late is None else f"{seen}, {late.described}"
@@ -155,7 +159,7 @@ def _short(found: Rhythm, run: Run, package: PackageFacts, params: RateParams) -
 
 
 def _uneven(found: Rhythm, params: RateParams) -> Verdict | None:
-    """What is wrong with the rate, None if nothing is."""
+    """Return what is wrong with the rate, None if nothing is."""
     mean_hz, period_ns = found.mean_hz, params.period_ns
     outside = found.outside(*params.bounds_ns)
     allowed = (1 - params.share_in_bounds) * len(found.gaps_ns) + ROUNDING
@@ -183,7 +187,7 @@ def _bursts(found: Rhythm, outside: list[int], even: bool, params: RateParams) -
         return None
     share = f"{len(outside)} of {len(found.gaps_ns)} gaps are far from {1 / params.rate_hz:g} s"
     kind = "in bursts" if found.comes_in_bursts else "unevenly"
-    message = f"{params.topic} comes {kind}: {hertz(found.mean_hz)} in the mean, but {share}"
+    message = f"{params.topic} comes {kind}: {hertz(found.mean_hz)} on average, but {share}"
     return failed(message, hint="publish one message in each turn of the loop, and sleep once in each turn")
 
 
@@ -205,38 +209,23 @@ def _rate_hint(ratio: float, nominal: str) -> str:
     return f"use rospy.Rate({nominal}) and rate.sleep() in each turn"
 
 
-def _excused(verdict: Verdict | None, found: Rhythm, run: Run, params: RateParams) -> Verdict | None:
-    """A rate that fails while the host was late costs nobody anything, unless it is too far off for that, or the run
-    itself kept the host busy."""
-    if verdict is None:
-        return None
-    late, whole = (lateness(run, found.times_ns[0], found.until_ns, own=own) for own in (False, True))
-    if late is None or whole is None:
-        return verdict
-    what = _excuse(found, late, params)
-    if what:
-        message = f"{verdict.message}; but the grading machine was {what}, so nothing follows from it"
-        return inconclusive(message, hint="grade again while the machine has less to do")
-    if _excuse(found, whole, params):
-        return verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}"})
-    return verdict
-
-
-def _excuse(found: Rhythm, late: Lateness, params: RateParams) -> str:
-    """What the machine was that may have made the rate wrong; "" where that is not why."""
+def _why_late(found: Rhythm, late: Lateness, params: RateParams) -> str:
+    """Return what the machine was that may have made the rate wrong; "" where that is not why, or it is too far off."""
     if found.mean_hz >= 2 * params.rate_hz:
         return ""
     if found.tail_ns / 2e6 > max(late.max_ms, params.period_ns / 1e6):
         return ""
     if was_late(late, params) or sleeps_explain(found, late, params):
-        return f"late itself (by up to {late.max_ms:.0f} ms, 95 % within {late.p95_ms:.0f} ms)"
+        by = f"by up to {late.max_ms:.0f} ms, 95 % within {late.p95_ms:.0f} ms"
+        return f"late itself ({by}), so nothing follows from it"
     if stalls_explain(found, late, params):
-        return f"{(late.busy or 0) * 100:.0f} % busy, and without the few long gaps the rate would be right"
+        busy = f"{(late.busy or 0) * 100:.0f} % busy"
+        return f"{busy}, and without the few long gaps the rate would be right, so nothing follows from it"
     return ""
 
 
 def was_late(late: Lateness, params: RateParams) -> bool:
-    """Whether the machine was late by so much that it shows in the gaps."""
+    """Return whether the machine was late by so much that it shows in the gaps."""
     period_ms = params.period_ns / 1e6
     return (
         late.mean_ms >= max(params.tolerance, 0.02) / 2 * period_ms
@@ -282,7 +271,7 @@ def _mean(found: Rhythm) -> str:
 
 
 def rhythm(channels: Sequence[Channel], until_ns: int | None, period_ns: float) -> Rhythm | None:
-    """All messages of these channels until `until_ns`. Silence at the end counts from 1.5 periods on."""
+    """Return all messages of these channels until `until_ns`. Silence at the end counts from 1.5 periods on."""
     times = sorted(t for c in channels for t in c.times_ns if until_ns is None or t <= until_ns)
     if not times:
         return None

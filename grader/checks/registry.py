@@ -126,7 +126,7 @@ def _problems(name: str, function: Callable[..., Verdict]) -> Iterator[str]:
 def _own_problems(
     name: str, function: Callable[..., Verdict], params: object, own: Collection
 ) -> Iterator[str]:
-    """What the grader's own tests hold for its own checks, and nothing but this holds for an instructor's."""
+    """Yield what the grader's own tests hold for its own checks, and nothing but this holds for an instructor's."""
     if not NAME.fullmatch(name):
         yield "a name is lower-case letters, digits and hyphens, beginning with a letter"
     if name in own.checks:
@@ -138,7 +138,7 @@ def _own_problems(
 
 
 def parts(docstring: str) -> tuple[str, dict[str, str]]:
-    """The title line, and the text under each heading with its lines joined into paragraphs."""
+    """Return the title line, and the text under each heading with its lines joined into paragraphs."""
     title, *rest = docstring.splitlines() or [""]
     sections: dict[str, list[str]] = {}
     heading = ""

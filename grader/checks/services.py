@@ -1,4 +1,4 @@
-"""Whether a node offers a service, and whether it answers well."""
+"""Whether a node offers a service, and whether it answers the grader's calls correctly."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def service(package: PackageFacts, run: Run, params: ServiceParams) -> Verdict:
         That a node of the package offers the service under exactly this name, and that it is of this type.
 
     Why it matters on a robot
-        Whoever calls a service waits for its name and asks by its type. One letter off, and the caller
+        A node that calls a service waits for its name and asks by its type. One letter off, and the caller
         waits for ever; another type, and every call is refused.
 
     How it is measured
@@ -130,7 +130,7 @@ def _judged(offer: Offer, package: PackageFacts, run: Run, params: ServiceParams
 def _fault(
     one: Exchange, wanted: dict[str, Any], package: PackageFacts, run: Run, params: ServiceAnswersParams
 ) -> Verdict | None:
-    """What is wrong with one answer, None if nothing is."""
+    """Return what is wrong with one answer, None if nothing is."""
     if one.response is None:
         if params.service not in offers(run):
             return _not_there(package, run, params)
@@ -193,7 +193,7 @@ class Exchange(NamedTuple):
 
 
 def offers(run: Run) -> dict[str, Offer]:
-    """The services of the student's nodes by name, as they were last; every node's loggers left out."""
+    """Return the services of the student's nodes by name, as they were last; every node's loggers left out."""
     found: dict[str, Offer] = {}
     for _, event in run.graph:
         for name, nodes in event.services.items():
@@ -206,12 +206,12 @@ def offers(run: Run) -> dict[str, Offer]:
 
 
 def described(found: Mapping[str, Offer]) -> str:
-    """All services in one line."""
+    """Return all services in one line."""
     return listed(f"{name} ({offer.type or 'type unknown'})" for name, offer in found.items()) or "no service"
 
 
 def exchanges(run: Run, service: str) -> tuple[Exchange, ...]:
-    """The grader's calls of one service with their answers, in order."""
+    """Return the grader's calls of one service with their answers, in order."""
     calls = [(t, e) for t, e in run.actors if e.action == "call" and e.topic == service]
     answers = [(t, e) for t, e in run.actors if e.action == "answer" and e.topic == service]
     found = []
@@ -224,7 +224,7 @@ def exchanges(run: Run, service: str) -> tuple[Exchange, ...]:
 
 
 def not_offered(package: PackageFacts, run: Run, service: str) -> Verdict:
-    """Why no node of the student's offers it."""
+    """Return why no node of the student's offers it."""
     found = offers(run)
     owner = _other_owner(run, service)
     near = near_names(service, found)
@@ -255,7 +255,7 @@ def _rename_hint(wanted: str, found: str, node: str) -> str:
 
 
 def handler_traceback(run: Run, service: str, since_ns: int) -> Traceback | None:
-    """The first traceback of the service's node since a call; rospy logs a handler's as a list on one line."""
+    """Return the first traceback of the service's node since a call; rospy logs a handler's as a list on one line."""
     offer = offers(run).get(service)
     one = life_of(run, offer.node) if offer else None
     if one is None:
@@ -277,7 +277,7 @@ def _unpacked(line: str) -> list[str]:
 
 
 def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> Verdict:
-    """Why a call brought nothing back."""
+    """Return why a call brought nothing back."""
     asked = f"{service}, called with {fields_text(one.request)},"
     found = handler_traceback(run, service, one.at_ns)
     if found is not None:
@@ -288,7 +288,7 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
         hint = f"end the callback with return {kind}Response(…)"
         return failed(f"{asked} fails: its callback returns nothing", hint=hint)
     if "returned invalid value" in one.detail or "wrong number of values" in one.detail:
-        message = f"{asked} fails: its callback returns what is no {kind}Response ({shown(one.detail)})"
+        message = f"{asked} fails: its callback returns something that is not a {kind}Response ({shown(one.detail)})"
         return failed(message, hint=f"end the callback with return {kind}Response(…), its fields by name")
     owner = life_of(run, offers(run)[service].node)
     if owner is not None and owner.ended_early:
@@ -299,7 +299,7 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
 
 
 def other_type(run: Run, service: str, one: Exchange) -> Verdict | None:
-    """The call could not fit, because the service is of another type."""
+    """Return the verdict where the call could not fit, because the service is of another type."""
     kind = offers(run)[service].type if service in offers(run) else ""
     if not kind or not one.type or kind == one.type:
         return None

@@ -33,7 +33,7 @@ UNBUILT = Run(
 def judge_files(
     rubric: Rubric, package: PackageFacts, checks: Mapping[str, Check] = CHECKS
 ) -> tuple[EarlyVerdict, ...]:
-    """The criteria that need no run, as far as the files decide them, in the rubric's order.
+    """Return the criteria that need no run, as far as the files decide them, in the rubric's order.
 
     What needs the build, or a criterion that is not decided yet, is left out. A verdict is final where nothing that
     the build makes more precise was looked at for it.

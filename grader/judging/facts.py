@@ -1,4 +1,4 @@
-"""The facts that checks ask for by name, out of the recorded runs."""
+"""The facts that checks ask for by name, from the grader's own runs or from recordings of other tools."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ NOT_RUN = "not_run"
 NO_PACKAGE = PackageFacts(
     name="", path=".", manifest=None, manifest_fault=None, cmake=None, files=(), launch_files=()
 )
+PACKAGE_RUN = "package"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +36,7 @@ class Facts:
     package: PackageFacts | None
 
     def of(self, check: Check, criterion: Criterion, params: Record) -> dict[str, object] | Verdict:
-        """The facts by the names that the check asks for, or the verdict where one of them is not there."""
+        """Return the facts by the names that the check asks for, or the verdict where one of them is not there."""
         found: dict[str, object] = {"params": params}
         if check.needs_run:
             run = self._run(criterion.scenario or "")
@@ -64,7 +65,7 @@ class Facts:
     def _no_package(self) -> Verdict:
         if not any(run.foreign for run in self.runs.values()):
             return inconclusive("the evidence holds no package facts", hint="grade the submission again")
-        message = "a recording was handed in, and the package's files are not part of it"
+        message = "only a recording was handed in, without the package's files"
         return inconclusive(message, hint="hand in the package too, to have its files judged")
 
     def _run(self, scenario: str) -> Run | Verdict:
@@ -125,11 +126,8 @@ def try_facts(rubric: Rubric, runs: Mapping[str, Run]) -> Facts:
     return Facts(rubric=rubric, runs=runs, package=package)
 
 
-PACKAGE_RUN = "package"
-
-
 def with_recordings(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
-    """The grader's own runs by scenario, and for each scenario without one the recording that stands for it.
+    """Return the grader's own runs by scenario, and for each scenario without one the recording that stands for it.
 
     A recording is known by its name (`talker.bag` for the scenario `talker`) or by the scenario's pattern. A single
     one that was judged without a package stands for everything.
@@ -154,7 +152,7 @@ def _named(name: str, scenario: Scenario, foreign: list[Run]) -> Run | None:
 
 
 def unread_recording(run: Run) -> Verdict | None:
-    """Why there is nothing to judge where a scenario's recording was not found or could not be read."""
+    """Return why there is nothing to judge where a scenario's recording was not found or could not be read."""
     if RECORDING_MISSING in run.metadata:
         pattern = run.metadata[RECORDING_MISSING]
         message = f"no recording {pattern} is in the submission"

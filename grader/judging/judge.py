@@ -1,4 +1,4 @@
-"""From evidence and rubric to criteria: runs the checks, applies what blocks what, gives the points."""
+"""From evidence and rubric to criteria: run the checks, find what blocks what, award the points."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MANUAL = "manual"
 def judge(
     rubric: Rubric, runs: Mapping[str, Run], checks: Mapping[str, Check] = CHECKS
 ) -> tuple[CriterionResult, ...]:
-    """Every criterion in the rubric's order. `runs` maps scenarios, and `package`, to their recorded runs.
+    """Return every criterion in the rubric's order. `runs` maps scenarios, and `package`, to their recorded runs.
 
     `checks` are the grader's and the rubric's own (`LoadedRubric.checks`). The same evidence and rubric always give
     equal results; nothing that is wrong with the evidence raises.
@@ -40,7 +40,7 @@ def judge(
 
 
 def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> Verdict:
-    """What the criterion's check says; an exception inside it is not the student's fault and says so."""
+    """Return what the criterion's check says; an exception inside it is not the student's fault and says so."""
     if criterion.check == MANUAL:
         return Verdict(status=Status.MANUAL, score=0.0, message="a person gives these points")
     check = checks.get(criterion.check)
@@ -104,7 +104,7 @@ def apply_requirements(
 
 
 def result_of(criterion: Criterion, verdict: Verdict, digits: int) -> CriterionResult:
-    """The report's line of a criterion, with the points of its verdict."""
+    """Return the report's line of a criterion, with the points of its verdict."""
     lost = verdict.status.is_lost or verdict.status is Status.INCONCLUSIVE
     return CriterionResult(
         id=criterion.id,

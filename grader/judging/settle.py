@@ -1,4 +1,7 @@
-"""From the automatic result to the one that counts, and back: what people decided, then what being late costs."""
+"""From the automatic result to the one that counts, and back: what people decided, then what being late costs.
+
+Lateness is pure arithmetic on absolute times. A day is 24 hours, whatever the clocks were set to.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +22,10 @@ from grader.model.result import (
 )
 from grader.model.verdict import Status
 from grader.rubric.model import Late, Rubric
+
+UNITS = {"day": timedelta(days=1), "hour": timedelta(hours=1)}
+SPANS = {"day": 86_400, "hour": 3600, "minute": 60, "second": 1}
+NOBODY = "nobody says when it was handed in, so it counts as in time"
 
 
 def settle(
@@ -104,23 +111,18 @@ def _applied(
 
 
 def _is(earlier: AppliedOverride, override: Override) -> bool:
-    """Whether it is the same decision."""
+    """Return whether it is the same decision."""
     return all(getattr(earlier, name) == getattr(override, name) for name in Override.model_fields)
 
 
 def _decided(criterion: CriterionResult, override: Override, digits: int) -> CriterionResult:
-    """The criterion with a person's points. What was expected and measured stays."""
+    """Return the criterion with a person's points. What was expected and measured stays."""
     points = round_half_up(override.points, digits)
     status = Status.PASS if points >= criterion.max_points else Status.PARTIAL if points > 0 else Status.FAIL
     author = f" by {override.author}" if override.author else ", decided by a person"
     comment = f": {override.comment}" if override.comment else ""
     message = f"{points:g} of {criterion.max_points:g} points{author}{comment}"
     return criterion.model_copy(update={"status": status, "points": points, "message": message})
-
-
-UNITS = {"day": timedelta(days=1), "hour": timedelta(hours=1)}
-SPANS = {"day": 86_400, "hour": 3600, "minute": 60, "second": 1}
-NOBODY = "nobody says when it was handed in, so it counts as in time"
 
 
 def deadline_of(rubric: Rubric, extension_days: float = 0.0) -> datetime | None:
@@ -132,7 +134,7 @@ def deadline_of(rubric: Rubric, extension_days: float = 0.0) -> datetime | None:
 
 
 def lateness(points: float, rubric: Rubric, handed_in: HandedIn | None) -> Lateness | None:
-    """What is left of `points`, and why. None where there is no deadline.
+    """Return what is left of `points`, and why. None where there is no deadline.
 
     The deadline is that of `handed_in`, which holds the extension already; where it has none, the rubric's with the
     extension. What nobody dates counts as in time.
@@ -154,7 +156,7 @@ def lateness(points: float, rubric: Rubric, handed_in: HandedIn | None) -> Laten
 
 
 def _late_by(at: datetime | None, deadline: datetime, policy: Late | None) -> timedelta:
-    """How much later than the deadline; nothing for what is in time, by grace too."""
+    """Return how much later than the deadline; nothing for what is in time, by grace too."""
     if at is None:
         return timedelta()
     by = _between(deadline, at)

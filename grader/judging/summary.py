@@ -1,4 +1,7 @@
-"""What all criteria together come to."""
+"""What all criteria come to, and notes on what was noticed while student code ran.
+
+Points are rounded as people round them: half up, in decimals. Notes cost no points.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +16,14 @@ from grader.rubric.model import Rubric
 from grader.untrusted_text import clip, clipped, json_text, text_limit
 
 LIMIT = 2000
+KINDS = ("refused", "limit")
+NOTES_MAX = 20
+TEXT_CHARS = 300
+ACTOR_CHARS = 100
 
 
 def total_points(rubric: Rubric, results: Sequence[CriterionResult]) -> float:
-    """The sum of the criteria's points, rounded half up to the rubric's digits."""
+    """Return the sum of the criteria's points, rounded half up to the rubric's digits."""
     total = sum((Decimal(repr(r.points)) for r in results), Decimal(0))
     return round_half_up(float(total), rubric.digits)
 
@@ -33,7 +40,7 @@ def overall_status(results: Sequence[CriterionResult]) -> Literal["graded", "inc
 
 
 def reached_pass_mark(rubric: Rubric, results: Sequence[CriterionResult]) -> bool:
-    """Whether the points reach the rubric's mark; without one, every visible criterion has to pass."""
+    """Return whether the points reach the rubric's mark; without one, every visible criterion has to pass."""
     if rubric.pass_mark is not None:
         return total_points(rubric, results) >= rubric.pass_mark
     visible = {c.id for c in rubric.criteria if c.visibility == "visible" and c.points > 0}
@@ -81,7 +88,7 @@ def _criteria(results: Sequence[CriterionResult]) -> object:
 
 
 def criteria_bytes(results: Sequence[CriterionResult]) -> bytes:
-    """The same as UTF-8."""
+    """Return the same as UTF-8."""
     return criteria_text(results).encode()
 
 
@@ -89,12 +96,6 @@ def round_half_up(points: float, digits: int) -> float:
     """`round_half_up(2.25, 1)` is 2.3, where Python's own `round` says 2.2."""
     step = Decimal(1).scaleb(-digits)
     return float(Decimal(repr(points)).quantize(step, rounding=ROUND_HALF_UP))
-
-
-KINDS = ("refused", "limit")
-NOTES_MAX = 20
-TEXT_CHARS = 300
-ACTOR_CHARS = 100
 
 
 def notes_of(runs: Mapping[str, Run]) -> tuple[Note, ...]:

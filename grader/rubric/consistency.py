@@ -16,10 +16,17 @@ from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
 TOTAL_POINTS = 100
 ANSWERS = "service-answers"
 MANUAL = "manual"  # a person gives the points, no check does
+KINDS_OF_START = ("script", "launch", "load", "program", "built")
+STRING = "std_msgs/String"
+INTEGERS = {
+    f"std_msgs/{prefix}Int{bits}": (low, high)
+    for bits in (8, 16, 32, 64)
+    for prefix, low, high in (("", -(2 ** (bits - 1)), 2 ** (bits - 1) - 1), ("U", 0, 2**bits - 1))
+}
 
 
 def cross_faults(data: object, checks: Mapping[str, Check], *, complete: bool = True) -> list[Fault]:
-    """Every fault that shows only between one part of a rubric and another, or between it and the checks.
+    """Return every fault that shows only between one part of a rubric and another, or between it and the checks.
 
     Where `checks` are not complete, because the instructor's file of them is broken, a name that is near none is
     left alone: it may be one of theirs.
@@ -100,7 +107,7 @@ def _names(criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
 
 
 def _circles(criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
-    """Each circle once, named from the criterion of it that comes first."""
+    """Yield each circle once, named from the criterion of it that comes first."""
     needs = {str(c.get("id")): [name for _, name in as_texts(c.get("requires"))] for _, c in criteria}
     places = {str(c.get("id")): index for index, c in reversed(criteria)}
     told: set[frozenset[str]] = set()
@@ -149,17 +156,8 @@ def _late(rubric: dict[str, Any]) -> Iterator[Fault]:
         )
 
 
-KINDS_OF_START = ("script", "launch", "load", "program", "built")
-STRING = "std_msgs/String"
-INTEGERS = {
-    f"std_msgs/{prefix}Int{bits}": (low, high)
-    for bits in (8, 16, 32, 64)
-    for prefix, low, high in (("", -(2 ** (bits - 1)), 2 ** (bits - 1) - 1), ("U", 0, 2**bits - 1))
-}
-
-
 def scenario_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
-    """Every fault of one scenario that its record's types cannot say."""
+    """Yield every fault of one scenario that its record's types cannot say."""
     if "warp" in scenario and scenario.get("clock", "real") == "real":
         yield (*path, "warp"), 'only a scenario with "clock: warped" has a warp'
     yield from _means(path, scenario)
@@ -230,7 +228,7 @@ def _probes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
 
 
 def _contents(at: KeyPath, probe: dict[str, Any], kind: str) -> Iterator[Fault]:
-    """What is sent has to fit the type."""
+    """Yield the faults of what is sent: it has to fit the type."""
     values = list(enumerate(_items(probe.get("values"))))
     if values or (kind != STRING and kind not in INTEGERS):
         yield from _misfits(at, kind, values)

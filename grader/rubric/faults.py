@@ -55,7 +55,7 @@ BOUNDS = {
 
 
 def model_faults(model: type[BaseModel], data: object, base: KeyPath = ()) -> list[Fault]:
-    """Every fault of `data` as a `model`, as the key's path (below `base`) and what is wrong there.
+    """Return every fault of `data` as a `model`, as the key's path (below `base`) and what is wrong there.
 
     `data` is read as JSON, strictly: text is no number, and a number no text.
     """
@@ -82,7 +82,7 @@ def _friendly(model: type[BaseModel], data: object, details: Iterable[ErrorDetai
 
 
 def _data_path(data: object, detail: ErrorDetails) -> KeyPath:
-    """The location as far as the data goes: pydantic also puts types' names into it."""
+    """Return the location as far as the data goes: pydantic also puts types' names into it."""
     path: KeyPath = ()
     for part in detail["loc"]:
         if not _holds(data, part):
@@ -120,7 +120,7 @@ def _message(model: type[BaseModel], path: KeyPath, detail: ErrorDetails) -> str
 
 
 def _remedy(path: KeyPath, kind: str, value: object) -> str:
-    """How to write what was meant."""
+    """Return how to write what was meant."""
     if kind == "string_type" and isinstance(value, int | float):
         return ": put it in quotes"
     number = _NUMBER_AND_UNIT.fullmatch(value) if isinstance(value, str) else None
@@ -142,7 +142,7 @@ def _literal(value: object, expected: str) -> str:
 
 
 def shown(value: object) -> str:
-    """The value as YAML's author knows it, cut where it is long."""
+    """Return the value as YAML's author knows it, cut where it is long."""
     if isinstance(value, dict):
         return "a map"
     if isinstance(value, list):
@@ -160,7 +160,7 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 
 
 def _keys(model: type[BaseModel], path: KeyPath) -> list[str]:
-    """The keys that the record at `path` knows."""
+    """Return the keys that the record at `path` knows."""
     found: object = model
     for part in path:
         found = next(_inside(found, part), None)

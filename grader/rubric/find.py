@@ -12,7 +12,7 @@ SUFFIXES = (".yaml", ".yml")
 
 
 def rubrics_folder() -> Path:
-    """The folder of the rubrics that come with the grader."""
+    """Return the folder of the rubrics that come with the grader."""
     checkout = PACKAGE.parent
     if (checkout / "pyproject.toml").is_file() and (checkout / "rubrics").is_dir():
         return checkout / "rubrics"
@@ -20,12 +20,12 @@ def rubrics_folder() -> Path:
 
 
 def rubric_ids() -> tuple[str, ...]:
-    """The ids of the rubrics that come with the grader, in order."""
+    """Return the ids of the rubrics that come with the grader, in order."""
     return tuple(sorted(p.stem for p in rubrics_folder().glob("*.yaml")))
 
 
 def locate(name_or_path: str) -> tuple[Path, str]:
-    """The rubric's file, and the name that messages give it. Raises RubricError."""
+    """Return the rubric's file, and the name that messages give it. Raises RubricError."""
     if name_or_path in rubric_ids():
         path = rubrics_folder() / f"{name_or_path}.yaml"
         return path, _short(path)

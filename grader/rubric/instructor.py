@@ -1,4 +1,7 @@
-"""The instructor's files that a rubric names, read before it is judged sound."""
+"""An instructor's own checks: the files that a rubric names are read, and the file of checks is run.
+
+What they print goes to stderr, with what a student wrote in it made visible.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +28,10 @@ from grader.rubric.source import Fault, KeyPath, as_map, as_maps
 from grader.untrusted_text import visible
 
 PYTEST = "pytest"
+LineFault = tuple[int, str]
+LINE_CHARS = 65_536
+_STREAMS = threading.RLock()
+"""Stdout is the whole process's: two threads would leave each other's behind."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,12 +70,9 @@ def read_instructor(data: object, folder: Path) -> Beside:
 
 
 def known_checks(folder: Path, own: Mapping[str, Check]) -> dict[str, Check]:
-    """The grader's, `pytest` for tests in the rubric's folder, and the rubric's own."""
+    """Return the grader's, `pytest` for tests in the rubric's folder, and the rubric's own."""
     tests = pytest_check(folder)
     return {**CHECKS, tests.name: tests, **own}
-
-
-LineFault = tuple[int, str]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +86,7 @@ class OwnChecks:
 
 @lru_cache(maxsize=64)
 def run_checks_file(path: Path, raw: bytes) -> OwnChecks:
-    """The checks that the file registers. It is run once for each content; whatever goes wrong is a fault."""
+    """Return the checks that the file registers. It is run once for each content; whatever goes wrong is a fault."""
     with collecting(str(path)) as collection:
         fault = _run(path, raw)
     faults = [*collection.faults, *([fault] if fault else [])]
@@ -126,7 +130,7 @@ def _run(path: Path, raw: bytes) -> LineFault | None:
 
 
 def _line(path: Path, error: BaseException) -> int:
-    """The last line of the file that took part."""
+    """Return the last line of the file that took part."""
     lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == str(path)]
     return lines[-1] if lines and lines[-1] else 1
 
@@ -145,11 +149,6 @@ class _Loader(ExecutionLoader):
     def get_source(self, fullname: str) -> str:  # noqa: ARG002 - as above
         """As Python reads it: by the coding that the file declares."""
         return importlib.util.decode_source(self._raw)
-
-
-LINE_CHARS = 65_536
-_STREAMS = threading.RLock()
-"""Stdout is the whole process's: two threads would leave each other's behind."""
 
 
 class Shown(io.TextIOBase):

@@ -1,4 +1,4 @@
-"""A rubric's file into its records. Every fault is named at once, as `file:line: key.path: what is wrong`."""
+"""Load a rubric's file, naming every fault at once as `file:line: key.path: what is wrong`; what a rubric needs."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class LoadedRubric(Record):
 
 
 def load_rubric(name_or_path: str) -> LoadedRubric:
-    """The rubric of that id (of those that come with the grader), or in that file.
+    """Return the rubric of that id (of those that come with the grader), or in that file.
 
     Raises RubricError with every fault that it has.
     """
@@ -83,7 +83,7 @@ def all_rubrics() -> tuple[LoadedRubric, ...]:
 
 
 def find_rubric_for_package(name: str) -> str | None:
-    """The id of the rubric for a package of that name, or None. Raises UsageError where there are several."""
+    """Return the id of the rubric for a package of that name, or None. Raises UsageError where there are several."""
     found = [
         rubric_id
         for rubric_id, package in _packages(rubrics_folder()).items()
@@ -133,13 +133,13 @@ def started(rubric: Rubric) -> Rubric:
 
 
 def needs_package(loaded: LoadedRubric) -> bool:
-    """Whether there is anything to run, or any check that looks at the package's files."""
+    """Return whether there is anything to run, or any check that looks at the package's files."""
     rubric, checks = loaded.rubric, loaded.checks
     return bool(started(rubric).scenarios) or any(_looks_at_files(c, checks) for c in rubric.criteria)
 
 
 def needs_ros(loaded: LoadedRubric) -> bool:
-    """Whether anything is to be built or run: files alone decide everything else."""
+    """Return whether anything is to be built or run: files alone decide everything else."""
     rubric, checks = loaded.rubric, loaded.checks
     return bool(started(rubric).scenarios) or any(_needs_build(c, checks) for c in rubric.criteria)
 

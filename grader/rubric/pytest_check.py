@@ -27,6 +27,8 @@ TAIL_BYTES = 8192
 # pytest's own exit codes: every test was run, some may have failed; an error of pytest's own, or a wrong -k
 ALL_RUN = {0, 1}
 NOT_RUN = {3, 4}
+Outcome = Literal["passed", "failed", "skipped", "open"]
+MAX_BYTES = 1_000_000
 
 
 class PytestParams(Record):
@@ -44,7 +46,7 @@ class TestsBroken(Exception):
 
 
 def pytest_check(folder: Path) -> Check:
-    """The check `pytest` for the rubric in this folder."""
+    """Return the check `pytest` for the rubric in this folder."""
     title, sections = parts(inspect.getdoc(run_tests) or "")
     return Check(
         name="pytest",
@@ -126,7 +128,7 @@ def _environment() -> dict[str, str]:
 
 
 def _run(command: list[str], folder: Path, timeout_s: float) -> int:
-    """The exit code. What the tests started ends with them. Raises TestsBroken after `timeout_s`."""
+    """Return the exit code. What the tests started ends with them. Raises TestsBroken after `timeout_s`."""
     with (folder / "output").open("wb") as output:
         process = subprocess.Popen(
             command,
@@ -146,7 +148,7 @@ def _run(command: list[str], folder: Path, timeout_s: float) -> int:
 
 
 def _last_words(folder: Path, code: int) -> str:
-    """What the last line of output says of a session that left no outcome."""
+    """Return what the last line of output says of a session that left no outcome."""
     with (folder / "output").open("rb") as file:
         file.seek(max(0, file.seek(0, os.SEEK_END) - TAIL_BYTES))
         lines = [line.strip() for line in file.read().decode(errors="replace").splitlines() if line.strip()]
@@ -156,7 +158,7 @@ def _last_words(folder: Path, code: int) -> str:
 
 
 def _verdict(outcome: SessionOutcome, params: PytestParams) -> Verdict:
-    """The share of the points of the tests that passed, of those that count."""
+    """Return the share of the points of the tests that passed, of those that count."""
     verdict = _judged(outcome, params)
     return verdict.about(expected=f"the tests in {params.file} pass", measured=_sub_scores(outcome.tests))
 
@@ -202,9 +204,6 @@ def _sub_score(test: TestOutcome) -> str:
     return f"{test.name} {test.points if test.outcome == 'passed' else 0:g}/{test.points:g}"
 
 
-Outcome = Literal["passed", "failed", "skipped", "open"]
-
-
 class TestOutcome(Record):
     """One test. `open`: a run that it asks for was not recorded. `message` is one line, empty where it passed."""
 
@@ -224,15 +223,12 @@ class SessionOutcome(Record):
     faults: tuple[str, ...]
 
 
-MAX_BYTES = 1_000_000
-
-
 class FileFault(ValueError):
     """The file is not there, or is none that may be used."""
 
 
 def read_beside(folder: Path, name: str) -> tuple[Path, bytes]:
-    """The file of that name in the rubric's folder, or below it. Raises FileFault."""
+    """Return the file of that name in the rubric's folder, or below it. Raises FileFault."""
     plain = PurePosixPath(name)
     if plain.suffix != ".py" or plain.is_absolute() or ".." in plain.parts or "\0" in name:
         raise FileFault("must name a Python file beside the rubric, like my_checks.py")

@@ -36,19 +36,19 @@ def pytest_configure(config: pytest.Config) -> None:
 
 @pytest.fixture(scope="session")
 def evidence(pytestconfig: pytest.Config) -> Evidence:
-    """The runs by scenario: `evidence["talker"]`."""
+    """Return the runs by scenario: `evidence["talker"]`."""
     return pytestconfig.stash[_EVIDENCE]
 
 
 @pytest.fixture(scope="session")
 def run(evidence: Evidence) -> Run:
-    """The run of the criterion's own scenario."""
+    """Return the run of the criterion's own scenario."""
     return evidence.run
 
 
 @pytest.fixture(scope="session")
 def package(evidence: Evidence) -> PackageFacts:
-    """What the package's files say."""
+    """Return what the package's files say."""
     return evidence.package
 
 

@@ -32,7 +32,7 @@ def rubric_schema(checks: Mapping[str, Check] | None = None) -> dict[str, Any]:
 
 
 def _criterion(check: Check) -> type[Criterion]:
-    """The criterion's record with this check, its parameters and its docs in place."""
+    """Return the criterion's record with this check, its parameters and its docs in place."""
     needs_parameters = any(f.is_required() for f in check.params.model_fields.values())
     parameters = Field(alias="with") if needs_parameters else Field(alias="with", default_factory=dict)
     fields: dict[str, Any] = {

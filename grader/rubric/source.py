@@ -55,7 +55,7 @@ class Source:
     faults: list[Fault] = field(default_factory=list)
 
     def line(self, path: KeyPath) -> int:
-        """The line of the key, or of the nearest one above it."""
+        """Return the line of the key, or of the nearest one above it."""
         while path and path not in self.lines:
             path = path[:-1]
         return self.lines.get(path, 1)
@@ -75,12 +75,12 @@ def dotted(path: KeyPath) -> str:
 
 
 def read_source(path: Path, name: str, form: Form = RUBRIC) -> Source:
-    """The file's data. Raises RubricError where it is no YAML of that form."""
+    """Return the file's data. Raises RubricError where it is no YAML of that form."""
     return source_of(_read(path, name, form), name, form)
 
 
 def source_of(raw: bytes, name: str, form: Form) -> Source:
-    """The data of a file that holds these bytes. Raises RubricError as `read_source` does."""
+    """Return the data of a file that holds these bytes. Raises RubricError as `read_source` does."""
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -90,7 +90,7 @@ def source_of(raw: bytes, name: str, form: Form) -> Source:
 
 
 def text_at(path: Path, name: str, key: str) -> str:
-    """What a file says at one key of its first level, read no further; empty where it says nothing there.
+    """Return what a file says at one key of its first level, read no further; empty where it says nothing there.
 
     Raises RubricError where the file cannot be read up to there.
     """
@@ -266,12 +266,12 @@ def as_map(value: object) -> dict[str, Any]:
 
 
 def as_maps(value: object) -> list[tuple[int, dict[str, Any]]]:
-    """The maps in a list, each with its place in the list."""
+    """Return the maps in a list, each with its place in the list."""
     items = value if isinstance(value, list) else []
     return [(index, item) for index, item in enumerate(items) if isinstance(item, dict)]
 
 
 def as_texts(value: object) -> list[tuple[int, str]]:
-    """The texts in a list, each with its place in the list."""
+    """Return the texts in a list, each with its place in the list."""
     items = value if isinstance(value, list) else []
     return [(index, item) for index, item in enumerate(items) if isinstance(item, str)]

@@ -7,7 +7,12 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.checks.support.parameters import instead, leaves, own, tree
+from grader.checks.support.parameters import (
+    describe_missing,
+    leaves,
+    params_on_server,
+    without_system_params,
+)
 from tests.support.timeline import build_runs
 
 NAMES = st.lists(st.sampled_from("abc"), min_size=1, max_size=3)
@@ -60,7 +65,7 @@ def test_tree_is_what_the_master_keeps(changes: list[tuple[list[str], Any]]) -> 
         for n, (keys, value) in enumerate(changes)
     ]
     run = build_runs({"params": lines, "host": [], "graph": []})["run"]
-    assert tree(run) == model(changes)
+    assert params_on_server(run) == model(changes)
 
 
 def test_tree_of_one_time_and_of_some_callers() -> None:
@@ -69,9 +74,9 @@ def test_tree_of_one_time_and_of_some_callers() -> None:
         {"name": "/x", "value": 2, "at_s": 2, "caller_id": "/node"},
     ]
     run = build_runs({"params": lines})["run"]
-    assert tree(run) == {"/x": 2}
-    assert tree(run, until_ns=run.params[0][0]) == {"/x": 1}
-    assert tree(run, by=lambda caller: caller != "/node") == {"/x": 1}
+    assert params_on_server(run) == {"/x": 2}
+    assert params_on_server(run, until_ns=run.params[0][0]) == {"/x": 1}
+    assert params_on_server(run, by=lambda caller: caller != "/node") == {"/x": 1}
 
 
 def test_leaves_of_an_empty_map_and_of_the_root() -> None:
@@ -81,6 +86,9 @@ def test_leaves_of_an_empty_map_and_of_the_root() -> None:
 
 def test_instead_prefers_the_same_last_name() -> None:
     found = {"/rosdistro": "noetic", "/details/first": 1, "/details/nam/last": 2}
-    assert instead(found, "/details/name/first") == "there is no /details/name/first; there is /details/first"
-    assert instead({}, "/x") == "there is no /x"
-    assert own(found).keys() == {"/details/first", "/details/nam/last"}
+    assert (
+        describe_missing(found, "/details/name/first")
+        == "there is no /details/name/first; there is /details/first"
+    )
+    assert describe_missing({}, "/x") == "there is no /x"
+    assert without_system_params(found).keys() == {"/details/first", "/details/nam/last"}

@@ -13,7 +13,7 @@ from grader.model.figure import CounterFigure, Figure, HeardFigure, PathFigure, 
 from grader.model.result import CriterionResult
 from grader.model.verdict import EvidenceCitation, Status
 from grader.report.figures import DRAWN, figures_of
-from tests.checks.examples import TIMELINES, Example, examples, runs_of
+from tests.checks.examples import Example, examples, runs_of
 from tests.figures.made import criterion
 from tests.judging.rubrics import SCENARIO, rubric
 
@@ -22,7 +22,7 @@ NOTHING = re.compile(r"no message|no number|not started|ended|no subscription|su
 
 
 def _examples(check: str) -> list[Any]:
-    return [pytest.param(e, id=str(e.path.relative_to(TIMELINES))) for e in EXAMPLES if e.check == check]
+    return [pytest.param(e, id=e.id) for e in EXAMPLES if e.check == check]
 
 
 def _drawn(example: Example) -> tuple[tuple[Figure, ...], CriterionResult, Run]:

@@ -37,7 +37,7 @@ def test_blocked_names_the_root() -> None:
     assert statuses(found) == {"rate": "blocked", "chatter": "blocked", "node": "fail", "executable": "pass"}
     for name in ("rate", "chatter"):
         assert found[name].message.startswith("blocked by node: talker ended by itself")
-        assert found[name].hint == "mend node first"
+        assert found[name].hint == "fix node first"
         assert found[name].points == 0
 
 

@@ -1,4 +1,4 @@
-"""What time it was by the run's clocks when a message arrived, in seconds since the first of them."""
+"""The run's clocks, in seconds, and whether numbers in messages are a time that grows as they do."""
 
 from __future__ import annotations
 
@@ -13,6 +13,13 @@ from grader.model.verdict import Verdict, failed, inconclusive
 Seconds = tuple[float, ...]
 ToSeconds = Callable[[int], float]
 """From a `log_time` (ns) to a second of the time that the node lives in."""
+SLACK_S = 1.5
+SLACK_SHARE = 0.05
+WATCHED_S = 3.0
+SHORT_S = 1.1
+WHOLE_S = 1.05
+UNITS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
+GET_TIME = "rospy.get_time() gives the time in seconds; ask it again for every message"
 
 
 def clocks_at(run: Run, times_ns: Sequence[int]) -> tuple[Seconds, ...]:
@@ -63,17 +70,8 @@ def _ticks(run: Run) -> list[tuple[int, float]]:
     ]
 
 
-SLACK_S = 1.5
-SLACK_SHARE = 0.05
-WATCHED_S = 3.0
-SHORT_S = 1.1
-WHOLE_S = 1.05
-UNITS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
-GET_TIME = "rospy.get_time() gives the time in seconds; ask it again for every message"
-
-
 def wrong_growth(told: Sequence[float], clocks: Sequence[Seconds], *, short: bool = False) -> Verdict | None:
-    """None where the numbers told go along with one of the clocks, from wherever they start.
+    """Return None where the numbers told go along with one of the clocks, from wherever they start.
 
     Whole seconds may repeat. The first clock is the one that a message speaks of. A recording that is `short` by
     the node's own doing (a flood, its early end) is judged by less of it, and with less slack.
@@ -106,9 +104,9 @@ def _too_short(span_s: float) -> Verdict:
 
 
 def _falls_back(before: float, after: float) -> Verdict:
-    message = f"the time in the messages falls back from {_plain(before)} to {_plain(after)}"
+    message = f"the time in the messages goes back from {_plain(before)} to {_plain(after)}"
     within = before < 1e9 and before == int(before) and before > 1e6
-    why = "`.nsecs` is only the part behind the whole second; " if within else ""
+    why = "`.nsecs` is only the part after the whole second; " if within else ""
     return failed(message, hint=why + GET_TIME)
 
 
@@ -119,12 +117,10 @@ def _other_pace(told: Sequence[float], span_s: float) -> Verdict:
     if unit:
         return failed(f"the time in the messages is in {unit}, not in seconds", hint=GET_TIME)
     if all(b - a == 1 for a, b in pairwise(told)):
-        message = (
-            f"the number in the messages counts them ({_plain(told[0])}, {_plain(told[1])}, …) and is no time"
-        )
+        message = f"the number in the messages counts them ({_plain(told[0])}, {_plain(told[1])}, …) and is not a time"
         return failed(message, hint=GET_TIME)
     message = (
-        f"the number in the messages grows by {_plain(growth)} in {span_s:.1f} s: it is no time in seconds"
+        f"the number in the messages grows by {_plain(growth)} in {span_s:.1f} s: it is not a time in seconds"
     )
     return failed(f"{message} ({plural(len(told), 'message')})", hint=GET_TIME)
 

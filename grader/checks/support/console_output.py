@@ -1,11 +1,14 @@
-"""What a node printed or logged, and whether probes are among it."""
+"""What nodes printed and logged, and whether the messages that were sent are in it.
+
+Two senders of a topic may send the same text at once: then it has to be printed once more than the other one sent it.
+"""
 
 from __future__ import annotations
 
 import re
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from typing import Literal, NamedTuple
 
 from grader.checks.support.exit_causes import HEADING, tracebacks
@@ -23,6 +26,18 @@ _WORD = re.compile(r"/?[A-Za-z][\w/]*")
 _ANONYMOUS_END = re.compile(r"(?=(_\d+_\d{9,}))")
 _HEX = re.compile(r"0[xX][0-9a-fA-F]+")
 _NUMBER = re.compile(r"(?<![\d.])([-+]?)(\d+)(\.\d+)?(?!\d)", re.ASCII)
+_BEFORE, _BEHIND = r"(?<![\w.])", r"(?![\w]|[.,]\d)"
+_Lines = list[tuple[str, str]]
+"""Lines with their blanks squeezed, and as they are."""
+LOOKED_AT, LOOKED_AT_LEAST = 400, 8
+TEXT_CHARS_MAX = 200
+SEARCHED_CHARS_MAX = 100_000_000
+"""Texts are as many times fewer as what was printed is longer, and none is longer than a lab's are."""
+PUNCTUATION = ".,;:!?'\"()[]{}<>"
+Level = Literal["debug", "info", "warn", "error", "fatal"]
+LEVELS: dict[int, Level] = {1: "debug", 2: "info", 4: "warn", 8: "error", 16: "fatal"}
+CALLS = {level: f"rospy.log{'err' if level == 'error' else level}" for level in LEVELS.values()}
+_CONSOLE = re.compile(r"^\s*\[\s*(DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*\[[^\]]*\]\s*:?\s?(.*)$")
 
 
 class Probe(NamedTuple):
@@ -44,7 +59,7 @@ def probes_on(run: Run, topic: str) -> tuple[Probe, ...]:
 
 
 def printed_lines(run: Run) -> tuple[Line, ...]:
-    """All that the student's processes printed and their nodes logged, by time; tracebacks left out."""
+    """Return all that the student's processes printed and their nodes logged, by time; tracebacks left out."""
     students = {e.name for _, e in run.processes if e.role == "student"}
     lines = [
         line
@@ -59,7 +74,7 @@ def printed_lines(run: Run) -> tuple[Line, ...]:
 
 
 def stream_lines(run: Run, process: str) -> tuple[tuple[Line, ...], ...]:
-    """What one process printed on stdout and on stderr, and what its nodes logged, each by time."""
+    """Return what one process printed on stdout and on stderr, and what its nodes logged, each by time."""
     nodes = run.student_nodes(process)[:NAMES_MAX]
     console = ([(t, c.line) for t, c in run.lines(process) if c.stream == s] for s in ("stdout", "stderr"))
     streams = (*console, _logged(run, nodes))
@@ -67,7 +82,7 @@ def stream_lines(run: Run, process: str) -> tuple[tuple[Line, ...], ...]:
 
 
 def _logged(run: Run, nodes: Collection[str] | None = None) -> list[tuple[int, str]]:
-    """The messages on /rosout, line by line: of these nodes, or of all that are the student's."""
+    """Return the messages on /rosout, line by line: of these nodes, or of all that are the student's."""
     texts = (
         (t, str(value.get("msg", "")))
         for channel in run.student_channels("/rosout")
@@ -114,7 +129,7 @@ def numbers_in(text: str) -> frozenset[int]:
 def places_of(
     run: Run, probes: Sequence[Probe], lines: Sequence[Line], template: str
 ) -> list[tuple[int, ...]] | None:
-    """For each probe where it was printed; None where so many numbers are printed that nobody can tell.
+    """Return for each probe where it was printed; None where so many numbers are printed that nobody can tell.
 
     Places follow each other as the lines do; `line_finder` gives a place's line.
     """
@@ -139,7 +154,7 @@ def _are_numbers(probes: Sequence[Probe]) -> bool:
 def number_places(
     probes: Sequence[Probe], lines: Sequence[Line], texts: Iterable[str]
 ) -> list[tuple[int, ...]] | None:
-    """For each probe the indices of the lines that hold it, at its time or later.
+    """Return for each probe the indices of the lines that hold it, at its time or later.
 
     `texts` are other probes that the lines may show too; digits in them are no numbers. None where so many
     numbers are printed that any probe would be among them.
@@ -160,7 +175,7 @@ def number_places(
 
 
 def text_places(probes: Sequence[Probe], lines: Sequence[Line], template: str) -> list[tuple[int, ...]]:
-    """The same for texts, as offsets in all that was printed. A text may be split over lines.
+    """Return the same for texts, as offsets in all that was printed. A text may be split over lines.
 
     The template's own words may be in capitals or not; the text itself stands letter by letter.
     """
@@ -188,7 +203,7 @@ def _joined(lines: Sequence[Line], template: str) -> tuple[str, list[tuple[int, 
 
 
 def chosen(places: Sequence[tuple[int, ...]]) -> list[int | None]:
-    """For each probe the first of its places that is behind the one before; None where it has none."""
+    """Return for each probe the first of its places that is behind the one before; None where it has none."""
     position, found = -1, list[int | None]()
     for choices in places:
         later = next((place for place in choices if place > position), None)
@@ -198,60 +213,26 @@ def chosen(places: Sequence[tuple[int, ...]]) -> list[int | None]:
 
 
 def in_order(places: Sequence[tuple[int, ...]]) -> bool:
-    """Whether one place can be chosen for each probe, each behind the one before."""
+    """Return whether one place can be chosen for each probe, each behind the one before."""
     return None not in chosen(places)
 
 
-_BEFORE, _BEHIND = r"(?<![\w.])", r"(?![\w]|[.,]\d)"
-_Lines = list[tuple[str, str]]
-"""Lines with their blanks squeezed, and as they are."""
-
-LOOKED_AT, LOOKED_AT_LEAST = 400, 8
-TEXT_CHARS_MAX = 200
-SEARCHED_CHARS_MAX = 100_000_000
-"""Texts are as many times fewer as what was printed is longer, and none is longer than a lab's are."""
-PUNCTUATION = ".,;:!?'\"()[]{}<>"
-
-
-class Sent(NamedTuple):
-    """The texts that one sender published from `from_ns` on, with how many times."""
-
-    texts: Counter[str]
-
-    @property
-    def total(self) -> int:
-        return self.texts.total()
-
-
-def sent_by(run: Run, topic: str, nodes: Collection[str], from_ns: int = 0) -> Sent:
-    """What these nodes published as text on the topic at `from_ns` or later."""
-    texts = (
-        text
-        for channel in run.student_channels(topic)
-        if channel.callerid in nodes
-        for t, text in zip(channel.times_ns, channel.data, strict=True)
-        if t >= from_ns and _is_text(text)
-    )
-    return Sent(Counter(texts))
+def sent_by(run: Run, topic: str, nodes: Collection[str], from_ns: int = 0) -> Counter[str]:
+    """Return what these nodes published as text on the topic at `from_ns` or later, with how many times."""
+    return Counter(text for t, text in _texts_of(run, topic, nodes) if t >= from_ns)
 
 
 def both_from_ns(run: Run, topic: str, first: Collection[str], second: Collection[str]) -> int | None:
-    """From when on both had sent a text; None where one of them never did."""
-    begins = [
-        [
-            t
-            for channel in run.student_channels(topic)
-            if channel.callerid in nodes
-            for t, text in zip(channel.times_ns, channel.data, strict=True)
-            if _is_text(text)
-        ]
-        for nodes in (first, second)
-    ]
+    """Return from when on both had sent a text; None where one of them never did."""
+    begins = [[t for t, _ in _texts_of(run, topic, nodes)] for nodes in (first, second)]
     return max(min(times) for times in begins) if all(begins) else None
 
 
-def _is_text(value: object) -> bool:
-    return isinstance(value, str) and bool(value.strip())
+def _texts_of(run: Run, topic: str, nodes: Collection[str]) -> Iterator[tuple[int, str]]:
+    for channel in run.student_channels(topic):
+        if channel.callerid in nodes:
+            pairs = zip(channel.times_ns, channel.data, strict=True)
+            yield from ((t, text) for t, text in pairs if isinstance(text, str) and text.strip())
 
 
 def printed_times(run: Run, process: str, texts: Collection[str], template: str) -> Counter[str]:
@@ -280,9 +261,9 @@ def _worth_a_look(texts: Iterable[str], streams: Iterable[_Lines], most: int) ->
     return found[:: max(1, len(found) // most)]
 
 
-def heard_of(sent: Sent, other: Sent, printed: Counter[str]) -> int:
-    """How many messages were printed that can only be this sender's."""
-    return sum(min(count, max(0, printed[text] - other.texts[text])) for text, count in sent.texts.items())
+def heard_of(sent: Counter[str], other: Counter[str], printed: Counter[str]) -> int:
+    """Return how many messages were printed that can only be this sender's."""
+    return sum(min(count, max(0, printed[text] - other[text])) for text, count in sent.items())
 
 
 def _times(lines: _Lines, text: str, template: str) -> int:
@@ -299,12 +280,6 @@ def _times(lines: _Lines, text: str, template: str) -> int:
 def _edge(mark: str, whole: str, before: str) -> str:
     """A number has to stand for itself; a word may follow on others (`I heardThe time`)."""
     return mark if whole[:1].isdigit() and not before else ""
-
-
-Level = Literal["debug", "info", "warn", "error", "fatal"]
-LEVELS: dict[int, Level] = {1: "debug", 2: "info", 4: "warn", 8: "error", 16: "fatal"}
-CALLS = {level: f"rospy.log{'err' if level == 'error' else level}" for level in LEVELS.values()}
-_CONSOLE = re.compile(r"^\s*\[\s*(DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*\[[^\]]*\]\s*:?\s?(.*)$")
 
 
 class Logged(NamedTuple):

@@ -1,4 +1,4 @@
-"""A counter's values as they came: steps, what was lost on the way, floods."""
+"""A counter's values as they came: steps, what was lost on the way, floods, and how it starts again at its maximum."""
 
 from __future__ import annotations
 
@@ -23,6 +23,8 @@ from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 FLOOD_FACTOR = 3
 SYSTEMATIC_SHARE = 0.05
 STUCK_COUNT = 5
+SILENT_PERIODS = 20
+SILENT_NS = 500_000_000
 
 
 class Step(NamedTuple):
@@ -75,7 +77,7 @@ class Count(Record):
         return max(median(gaps), sum(gaps) / len(gaps) / 2)
 
     def lost_on_the_way(self, step: Step, jump: float) -> bool:
-        """Whether `jump - 1` values between these two were published and did not arrive.
+        """Return whether `jump - 1` values between these two were published and did not arrive.
 
         The recording says so, or the time between them fits: then it was the transport or the host. A jump in
         normal time, or one that comes again and again, is the program's.
@@ -138,7 +140,7 @@ def wrong_steps(count: Count, run: Run, *, maximum: int, rate_hz: float) -> Wron
 
 
 def judged_steps(count: Count, maximum: int) -> tuple[Step, ...]:
-    """All of them, without the repeats of a counter that stays at its maximum: that is the wrap's fault."""
+    """Return all of them, without the repeats of a counter that stays at its maximum: that is the wrap's fault."""
     stays = count.values[-1] == maximum and count.stuck > 1
     return count.steps[: len(count.steps) - (count.stuck - 1)] if stays else count.steps
 
@@ -179,10 +181,6 @@ def first_values(values: Sequence[float]) -> str:
     return f"{from_start}, …" if len(values) > 4 else from_start
 
 
-SILENT_PERIODS = 20
-SILENT_NS = 500_000_000
-
-
 class WrapParams(Record):
     """After `maximum`, or the value before it, comes `minimum`, `wraps` times; `rate_hz` is nominal."""
 
@@ -202,7 +200,7 @@ class WrapParams(Record):
 def judge_wraps(
     count: Count, run: Run, package: PackageFacts, params: WrapParams
 ) -> tuple[Verdict, Step | None]:
-    """The verdict, and the turn that it rests on."""
+    """Return the verdict, and the turn that it rests on."""
     turns, good, wrong = turns_of(count, run, params)
     bad = wrong[0] if wrong else None
     if bad is not None:
@@ -256,13 +254,13 @@ def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: Wra
         message = f"{params.topic} is flooded, so its publisher drops values, also around the wrap"
         return unjudged(message, hint="first make the loop sleep, then look at the counter again")
     if whose == "lost":
-        message = f"values of {params.topic} got lost around the wrap, with a gap in time"
+        message = f"values of {params.topic} were lost around the wrap, with a gap in time"
         return inconclusive(message, hint="grade again while the machine has less to do")
     return failed(bad_turn_message(step, turns, params), hint=params.reset_hint)
 
 
 def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Literal["program", "flood", "lost"]:
-    """Whether a bad turn is the program's own, or one of values that its flood, or the way, swallowed."""
+    """Return whether a bad turn is the program's own, or one of values that its flood, or the way, swallowed."""
     low, high = params.minimum, params.maximum
     if step.after > high or step.after < low:
         return "program"
@@ -273,7 +271,7 @@ def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Litera
 
 
 def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
-    """What is wrong with a turn, in a student's words."""
+    """Return what is wrong with a turn, in a student's words."""
     low, high = params.minimum, params.maximum
     before, after = number(step.before), number(step.after)
     comes = f"after {before} comes {after}"
@@ -288,7 +286,7 @@ def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
         return f"the counter resets to {after}, not to {low}: {comes}"
     if step.after == low:
         return f"the counter resets too early: {comes}"
-    return f"the counter falls back before it has reached {high}: {comes}"
+    return f"the counter goes back before it has reached {high}: {comes}"
 
 
 def _died(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> Verdict | None:
@@ -313,7 +311,7 @@ def _stuck(count: Count, params: WrapParams) -> Verdict | None:
 
 
 def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> Verdict | None:
-    """The node lives, and has stopped to publish."""
+    """Return the verdict where the node lives on, and has stopped publishing."""
     until_ns = observed_until_ns(run)
     if until_ns is None or losses(run, params.topic):
         return None

@@ -42,8 +42,8 @@ SLIPS = {
     "init_node() has already been called with different arguments": ("`rospy.init_node(…)` is called a second time",
      "one script is one node: call `rospy.init_node(…)` once"),
     "Invalid number of arguments, args should be": (
-     "the message is given another number of values than it has fields",
-     'one value for each field; numbers get into a text by `%`: `publish("… %s" % value)`, not by a comma'),
+     "the message gets a different number of values than it has fields",
+     'one value for each field; put a number into text with `%`: `publish("… %s" % value)`, not by a comma'),
 }  # fmt: skip
 _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
@@ -84,7 +84,7 @@ class Traceback(NamedTuple):
 
 
 def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
-    """Every traceback, also the bare `File …` form of a syntax error. One that was cut short is left out."""
+    """Return every traceback, also the bare `File …` form of a syntax error. One that was cut short is left out."""
     found: list[Traceback] = []
     frames: list[Frame] = []
     first: int | None = None
@@ -166,7 +166,7 @@ def explain_error(package: PackageFacts, run: Run) -> Ending | None:
 
 
 def _limit(life: Life, run: Run) -> str:
-    """What it had too much of, so that it was stopped."""
+    """Return what it had too much of, so that it was stopped."""
     met = (e.detail for _, e in run.actors if e.action in LIMITS and e.actor == life.name)
     return next((detail for detail in met if detail.startswith("stopped by the grader")), "")
 
@@ -178,9 +178,9 @@ def _refused_name(life: Life, run: Run) -> Ending | None:
     if match is None:
         return None
     kind, name = "service" if match[1] == "service" else "topic", match[2]
-    what = "has a blank in it" if re.search(r"\s", name) else "is no name that ROS takes"
+    what = "has a space in it" if re.search(r"\s", name) else "is not a name that ROS accepts"
     hint = (
-        f"a {kind}'s name is made of letters, digits, _ and /: no blanks, also none before the closing quote"
+        f"a {kind}'s name is made of letters, digits, _ and /: no spaces, not even before the closing quote"
     )
     return Ending(f"ROS shuts it down, for the name of its {kind} {name!r} {what}", hint)
 
@@ -201,7 +201,7 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
 def process_tracebacks(
     run: Run, process: str, *, after_ns: int | None = None, before_ns: int | None = None
 ) -> tuple[Traceback, ...]:
-    """The tracebacks on a process's stderr that began at `after_ns` or later, and before `before_ns`."""
+    """Return the tracebacks on a process's stderr that began at `after_ns` or later, and before `before_ns`."""
     lines = [(t, c.line) for t, c in run.lines(process) if c.stream == "stderr"]
     found = tracebacks([line for _, line in lines])
     first_ns = after_ns if after_ns is not None else run.start_ns

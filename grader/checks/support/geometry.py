@@ -1,4 +1,4 @@
-"""Ways in the plane: where velocities lead, and how far a path strays from the way that it should take."""
+"""Paths in the plane: read from a run's poses or added up from its velocities, and how far they stray from points."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ SAMPLE_RAD = 0.2
 SAMPLES_MAX = 2000
 
 Point = tuple[float, float]
+FASTEST = 1e6
 
 
 class Pose(NamedTuple):
@@ -59,7 +60,7 @@ def moved(pose: Pose, command: Command, duration_s: float) -> Pose:
 
 
 def driven(commands: Sequence[Command], hold_s: float | None, end_s: float) -> list[Pose]:
-    """The path from the origin, heading along x: each command holds until the next one, and at most `hold_s`.
+    """Return the path from the origin, heading along x: each command holds until the next one, and at most `hold_s`.
 
     Without `hold_s` the last one holds until `end_s`.
     """
@@ -83,7 +84,7 @@ def _samples(start: Pose, command: Command, duration_s: float) -> Iterator[Pose]
 
 
 def relative(path: Sequence[Pose]) -> list[Pose]:
-    """The path as seen from its first pose."""
+    """Return the path as seen from its first pose."""
     if not path:
         return []
     first = path[0]
@@ -104,7 +105,7 @@ def length_m(path: Sequence[Pose]) -> float:
 
 
 def off_m(point: Point, start: Point, end: Point) -> float:
-    """The distance of a point from the line between two others."""
+    """Return the distance of a point from the line between two others."""
     dx, dy = end[0] - start[0], end[1] - start[1]
     square = dx * dx + dy * dy
     share = ((point[0] - start[0]) * dx + (point[1] - start[1]) * dy) / square if square else 0.0
@@ -150,9 +151,6 @@ def followed(path: Sequence[Pose], points: Sequence[Point], tolerance_m: float) 
     return Course(reached, None, largest, done)
 
 
-FASTEST = 1e6
-
-
 class Track(NamedTuple):
     """The path, or why the messages tell of none: `misfit` if they are of another type, `fault` if they are bad."""
 
@@ -162,7 +160,7 @@ class Track(NamedTuple):
 
 
 def track(run: Run, topic: str, hold_s: float | None) -> Track | None:
-    """The path told on a topic, None where no message came (or, in a warped run, no clock)."""
+    """Return the path told on a topic, None where no message came (or, in a warped run, no clock)."""
     seconds = run_seconds(run)
     channels = _publishers(run, topic)
     pairs = sorted(
@@ -175,7 +173,7 @@ def track(run: Run, topic: str, hold_s: float | None) -> Track | None:
     if len(poses) < len(pairs) and len(commands) < len(pairs):
         return Track(misfit=f"are {plain_type(channels[0].type)}: neither velocities nor poses")
     if not all(_finite(*one[1:]) for one in (*poses, *commands)):
-        return Track(fault="hold what is no number, or none that a robot could follow")
+        return Track(fault="hold values that are not numbers, or that no robot could follow")
     if poses:
         return Track(tuple(poses))
     end_s = seconds(observed_until_ns(run) or run.end_ns)

@@ -1,15 +1,16 @@
-"""What the machine did in a stretch of a run: how late it woke who slept, by the arena's timer and its calibration."""
+"""How late the machine was in a stretch of a run, by the arena's timer and its calibration."""
 
 from __future__ import annotations
 
 import statistics
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 from grader.evidence.events import HostEvent
 from grader.evidence.run import Channel, Run
+from grader.model.verdict import Verdict, inconclusive
 
 CALIBRATION = "/grader/calibration"
 CALIBRATION_TYPE = "std_msgs/Header"
@@ -21,7 +22,7 @@ OWN_LEAST, OTHERS_MOST = 0.6, 0.25
 """Shares of the processors' time of half a second: a run that took so much itself, and left so little to all others,
 made the machine late in it. One busy loop takes half of two processors, and is not it; nor is who shares the machine.
 """
-NO_EXCUSE = "the grading machine was busy with this run's own processes, which excuses nothing"
+NO_EXCUSE = "the grading machine was busy with this run's own processes, which is no excuse"
 
 
 class Lateness(NamedTuple):
@@ -78,6 +79,23 @@ def lateness(run: Run, from_ns: int, to_ns: int, *, own: bool = False) -> Latene
     )
 
 
+def excused(verdict: Verdict, run: Run, from_ns: int, to_ns: int, why: Callable[[Lateness], str]) -> Verdict:
+    """Return the verdict, open where the machine was so late that nothing follows from it.
+
+    `why` gives what the machine was that explains the failure, or "". What the run's own processes did excuses nothing.
+    """
+    late, whole = (lateness(run, from_ns, to_ns, own=own) for own in (False, True))
+    if late is None or whole is None:
+        return verdict
+    if what := why(late):
+        message = f"{verdict.message}; but the grading machine was {what}"
+        hint = "grade again while the machine has less to do"
+        return inconclusive(message, hint=hint, measured=verdict.measured)
+    if why(whole):
+        return verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}"})
+    return verdict
+
+
 class _Window(NamedTuple):
     """What one event tells of."""
 
@@ -95,7 +113,7 @@ class _Window(NamedTuple):
 
 
 def _windows(run: Run, from_ns: int, to_ns: int) -> list[_Window]:
-    """All that touch this stretch of time."""
+    """Return all that touch this stretch of time."""
     starts = [run.start_ns, *(t for t, _ in run.host)]
     found = [_Window(start, t, event) for start, (t, event) in zip(starts, run.host, strict=False)]
     return [w for w in found if w.to_ns > from_ns and w.from_ns < to_ns]

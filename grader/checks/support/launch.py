@@ -1,4 +1,4 @@
-"""A launch file and its nodes, as far as the package's files tell."""
+"""A launch file and its nodes: what its text says, what roslaunch printed, and why a node is not there."""
 
 from __future__ import annotations
 
@@ -17,6 +17,44 @@ from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, un
 
 UNRESOLVED = "$("
 ATTRIBUTES = ("pkg", "type", "name")
+_ERRORS = (
+    "ERROR: cannot launch",
+    "RLException",
+    "Invalid ",
+    "ERROR:",
+    "process has died",
+    "roslaunch:",
+    "Resource not found",
+)
+_SUBSTITUTION = re.compile(r"\\\$\\\(([^)]*)\\\)")
+# Students print such lines too: between brackets is no other bracket, so that a line is looked through once.
+_STARTED = re.compile(r"process\[([^\s\[\]]+)-\d+\]: started with pid")
+_DIED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has died \[pid \d+, exit code (-?\d+)")
+_FINISHED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has finished cleanly")
+_REQUIRED = re.compile(r"REQUIRED process (\[[^\s\[\]]+-\d+\]) has died")
+# what roslaunch says when it starts nothing, what it means, and what to do ({0}: the pattern's group)
+_REFUSALS = (
+    (r"multiple nodes named \[([^\[\]\n]+)\]", "two nodes are named {0}", "give each <node> a name of its own"),
+    (r"cannot contain a namespace", "a node's name has a slash in it",
+     'write name="…" without a slash; a namespace goes into ns="…"'),
+    (r"missing required attribute: '?(\w+)", "a tag has no {0}", "add the attribute"),
+    (r"file does not exist \[([^\[\]\n]+)\]", "the file {0} that <rosparam> loads does not exist",
+     "write $(find <package>)/config/<file>, and push the file"),
+    (r"Resource not found: (\S+)", "there is no package {0}",
+     "$(find …) and pkg take the package's name, letter by letter"),
+    (r"requires the '(\w+)' arg to be set", 'its <arg name="{0}"> has no default',
+     'write <arg name="{0}" default="…"/>'),
+    (r"output must be one of", 'output is "screen" or "log", in small letters', 'write output="screen"'),
+    (r"multiple files named", "the package has two launch files of that name",
+     "delete one of them, also one in a folder of old files: find . -name '*.launch' lists them"),
+    (r"Unable to launch \[([^\s\[\]]+)-\d+\]", "the system cannot start the script of {0}",
+     "its first line has to be #!/usr/bin/env python3, or #!/bin/bash for a shell script"),
+    (r"Unknown substitution command \[([^\[\]\n]+)\]", "$({0}) is nothing that roslaunch knows",
+     "write $(find <package>)/…"),
+    (r"error loading <rosparam> tag", "<rosparam> cannot load its file",
+     "rosparam load <file> shows what is wrong with the file"),
+    (r"Invalid roslaunch XML syntax", "it is not well-formed", "close every element"),
+)  # fmt: skip
 
 
 class Slip(NamedTuple):
@@ -36,7 +74,7 @@ class Slip(NamedTuple):
 
 
 def find_launch(package: PackageFacts, name: str) -> LaunchFile | None:
-    """The launch file of that name in any folder, one in `launch/` first."""
+    """Return the launch file of that name in any folder, one in `launch/` first."""
     found = [f for f in package.launch_files if PurePosixPath(f.path).name == name]
     return min(found, key=lambda f: (PurePosixPath(f.path).parts[0] != "launch", f.path), default=None)
 
@@ -83,7 +121,7 @@ def has_program(package: PackageFacts, name: str) -> bool:
 
 
 def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip | None:
-    """Why a node cannot start by what the file says of it. Names with `$(…)` are roslaunch's to resolve.
+    """Return why a node cannot start by what the file says of it. Names with `$(…)` are roslaunch's to resolve.
 
     `said` is what roslaunch said: a package that it does not find is a slip, any other is not this package's.
     """
@@ -111,12 +149,12 @@ def illegal_name(node: LaunchNode) -> Slip | None:
     name = node.name or ""
     if UNRESOLVED in name or re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
         return None
-    why = f'name="{name}" is no legal name in ROS, and other tools stumble over it'
+    why = f'name="{name}" is not a legal name in ROS, and other tools stumble over it'
     return _slip(node, why, "begin it with a letter, and use letters, digits and _ only")
 
 
 def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
-    """What makes roslaunch start nothing at all."""
+    """Yield what makes roslaunch start nothing at all."""
     for fault in file.include_faults:
         yield Slip(
             fault.file or file.path, fault.line or 1, fault.message, "write $(find <package>)/launch/<file>"
@@ -137,13 +175,13 @@ def refusals(package: PackageFacts, file: LaunchFile) -> Iterator[Slip]:
 
 
 def nodes_of_script(package: PackageFacts, file: LaunchFile, script: str) -> tuple[LaunchNode, ...]:
-    """The nodes that run this script of the package, or may run it as far as can be seen."""
+    """Return the nodes that run this script of the package, or may run it as far as can be seen."""
     name = PurePosixPath(script).name
     return tuple(n for n in file.brings if _may_be(n.pkg, package.name) and _may_be(n.type, name))
 
 
 def nodes_of_program(file: LaunchFile, program: str) -> tuple[LaunchNode, ...]:
-    """The nodes that run `package/program`; a Python program's `.py` may be there or not."""
+    """Return the nodes that run `package/program`; a Python program's `.py` may be there or not."""
     pkg, _, name = program.partition("/")
     names = {name, name.removesuffix(".py"), f"{name}.py"}
     return tuple(n for n in file.brings if _may_be(n.pkg, pkg) and any(_may_be(n.type, one) for one in names))
@@ -184,47 +222,6 @@ def _slip(node: LaunchNode, why: str, fix: str) -> Slip:
     return Slip(node.file, node.line, why, fix)
 
 
-_ERRORS = (
-    "ERROR: cannot launch",
-    "RLException",
-    "Invalid ",
-    "ERROR:",
-    "process has died",
-    "roslaunch:",
-    "Resource not found",
-)
-_SUBSTITUTION = re.compile(r"\\\$\\\(([^)]*)\\\)")
-# Students print such lines too: between brackets is no other bracket, so that a line is looked through once.
-_STARTED = re.compile(r"process\[([^\s\[\]]+)-\d+\]: started with pid")
-_DIED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has died \[pid \d+, exit code (-?\d+)")
-_FINISHED = re.compile(r"\[([^\s\[\]]+)-\d+\] process has finished cleanly")
-_REQUIRED = re.compile(r"REQUIRED process (\[[^\s\[\]]+-\d+\]) has died")
-
-# what roslaunch says when it starts nothing, what it means, and what to do ({0}: the pattern's group)
-_REFUSALS = (
-    (r"multiple nodes named \[([^\[\]\n]+)\]", "two nodes are named {0}", "give each <node> a name of its own"),
-    (r"cannot contain a namespace", "a node's name has a slash in it",
-     'write name="…" without a slash; a namespace goes into ns="…"'),
-    (r"missing required attribute: '?(\w+)", "a tag has no {0}", "add the attribute"),
-    (r"file does not exist \[([^\[\]\n]+)\]", "the file {0} that <rosparam> loads does not exist",
-     "write $(find <package>)/config/<file>, and push the file"),
-    (r"Resource not found: (\S+)", "there is no package {0}",
-     "$(find …) and pkg take the package's name, letter by letter"),
-    (r"requires the '(\w+)' arg to be set", 'its <arg name="{0}"> has no default',
-     'write <arg name="{0}" default="…"/>'),
-    (r"output must be one of", 'output is "screen" or "log", in small letters', 'write output="screen"'),
-    (r"multiple files named", "the package has two launch files of that name",
-     "delete one of them, also one in a folder of old files: find . -name '*.launch' lists them"),
-    (r"Unable to launch \[([^\s\[\]]+)-\d+\]", "the system cannot start the script of {0}",
-     "its first line has to be #!/usr/bin/env python3, or #!/bin/bash for a shell script"),
-    (r"Unknown substitution command \[([^\[\]\n]+)\]", "$({0}) is nothing that roslaunch knows",
-     "write $(find <package>)/…"),
-    (r"error loading <rosparam> tag", "<rosparam> cannot load its file",
-     "rosparam load <file> shows what is wrong with the file"),
-    (r"Invalid roslaunch XML syntax", "it is not well-formed", "close every element"),
-)  # fmt: skip
-
-
 class Absence(NamedTuple):
     """Why a node is not there. `of_script`: the reason lies in the script, not in the launch file."""
 
@@ -240,7 +237,7 @@ class Absence(NamedTuple):
 
 
 def name_pattern(node: LaunchNode) -> re.Pattern[str]:
-    """The names that a node can come up under: `$(anon x)` becomes `x_<host>_<pid>_<digits>`.
+    """Return the names that a node can come up under: `$(anon x)` becomes `x_<host>_<pid>_<digits>`.
 
     However many substitutions there are, a name is looked through once: each takes the least that it can, and what it
     took stands (a group in a lookahead is not tried again).
@@ -260,7 +257,7 @@ def name_pattern(node: LaunchNode) -> re.Pattern[str]:
 
 
 def is_exact(node: LaunchNode) -> bool:
-    """Whether the file alone says the node's name."""
+    """Return whether the file alone says the node's name."""
     return "$(" not in node.full_name
 
 
@@ -271,7 +268,7 @@ def nodes_up(run: Run, node: LaunchNode) -> tuple[str, ...]:
 
 
 def refusal(run: Run) -> Absence | None:
-    """Why roslaunch started nothing, or broke off."""
+    """Return why roslaunch started nothing, or broke off."""
     text = "\n".join(line for line in _lines(run))
     for pattern, why, hint in _REFUSALS:
         if match := re.search(pattern, text):
@@ -281,7 +278,7 @@ def refusal(run: Run) -> Absence | None:
 
 
 def died(run: Run, node: LaunchNode) -> int | None:
-    """The exit code with which roslaunch saw it die before Ctrl-C; None where it did not."""
+    """Return the exit code with which roslaunch saw it die before Ctrl-C; None where it did not."""
     until_ns = observed_until_ns(run) or run.end_ns
     lines = _joined(bare(c.line) for t, c in run.console if t <= until_ns)
     codes = [int(m[2]) for line in lines if (m := _DIED.search(line)) and _is(node, m[1])]
@@ -289,12 +286,12 @@ def died(run: Run, node: LaunchNode) -> int | None:
 
 
 def finished(run: Run, node: LaunchNode) -> bool:
-    """Whether it ran to its own end without an error."""
+    """Return whether it ran to its own end without an error."""
     return any((m := _FINISHED.search(line)) and _is(node, m[1]) for line in _joined(_lines(run)))
 
 
 def why_not_up(package: PackageFacts, run: Run, node: LaunchNode) -> Absence:
-    """Why a node of the launch file did not come up."""
+    """Return why a node of the launch file did not come up."""
     return (
         _not_found(package, run, node)
         or why_died(package, run, node)
@@ -338,7 +335,7 @@ def quoted(run: Run) -> str:
 
 
 def roslaunch_error(run: Run) -> str:
-    """The first line in which roslaunch, or a node that it started, says what is wrong."""
+    """Return the first line in which roslaunch, or a node that it started, says what is wrong."""
     lines = [c.line for _, c in run.console if c.line.strip()]
     found = (line for mark in _ERRORS for line in lines if mark in line)
     return shown(next(found, ""))
@@ -383,7 +380,7 @@ def _is(node: LaunchNode, process: str) -> bool:
 
 
 def _substituted(inside: str) -> tuple[str, str]:
-    """What stands for `$(inside)` in a pattern: the name that is known, and what follows it."""
+    """Return what stands for `$(inside)` in a pattern: the name that is known, and what follows it."""
     words = re.sub(r"\\(.)", r"\1", inside).split()
     return (f"{re.escape(words[1])}_", ".+") if len(words) == 2 and words[0] == "anon" else ("", ".*")
 

@@ -1,4 +1,4 @@
-"""Which nodes a process registered, and whether a name is the one that was asked for."""
+"""Names of the ROS graph, which nodes a process registered, and whether a name is the one that was asked for."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from grader.evidence.run import Run
 Anonymous = Literal["allowed", "required", "forbidden"]
 _KINDS = {"allowed": "plain or anonymous", "required": "anonymous", "forbidden": "plain"}
 _SUFFIX = re.compile(r"_\d+_\d+$")
+_ANONYMOUS = r"(_\d+_\d+)?"
+TypeName = Annotated[str, Field(pattern=r"^[A-Za-z]\w*/[A-Za-z]\w*$")]
 
 
 def nodes_of(run: Run, process: str) -> tuple[str, ...]:
@@ -22,7 +24,7 @@ def nodes_of(run: Run, process: str) -> tuple[str, ...]:
 
 
 def are_noted(run: Run) -> bool:
-    """Whether the graph says which process each of the student's nodes belongs to."""
+    """Return whether the graph says which process each of the student's nodes belongs to."""
     return any(run.is_student_node(node) for _, event in run.graph for node in event.processes)
 
 
@@ -49,11 +51,11 @@ def wrong_name(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymou
     if {base_name(n) for n in there}.isdisjoint(_bases(names)):
         return f"the node is named {listed(there)}, not {listed(_bases(names), 'or')}"
     how = "without" if anonymous == "required" else "with"
-    return f"the node is named {listed(there)}, {how} the numbers that anonymous=True puts behind the name"
+    return f"the node is named {listed(there)}, {how} the numbers that anonymous=True adds to the name"
 
 
 def name_hint(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous) -> str:
-    """What to write into `init_node`."""
+    """Return what to write into `init_node`."""
     there = tuple(nodes)
     counted = [n for n in there if any(re.fullmatch(rf"{re.escape(b)}_*\d+", n) for b in _bases(names))]
     if counted and anonymous == "allowed":
@@ -70,9 +72,6 @@ def _bases(names: Iterable[str]) -> list[str]:
     return ["/" + name.lstrip("/") for name in names]
 
 
-_ANONYMOUS = r"(_\d+_\d+)?"
-
-
 def _global(name: str) -> str:
     if not name.startswith("/"):
         raise ValueError(f'a name of the graph begins with a slash: "/{name}"')
@@ -85,11 +84,9 @@ def plain_type(name: str) -> str:
 
 
 def is_called(node: str, name: str) -> bool:
-    """Whether a node has this name, given with its slash or without; an anonymous one counts."""
+    """Return whether a node has this name, given with its slash or without; an anonymous one counts."""
     return re.fullmatch(re.escape("/" + name.lstrip("/")) + _ANONYMOUS, node) is not None
 
 
 GlobalName = Annotated[str, AfterValidator(_global)]
 """A topic's, a service's or a parameter's full name."""
-
-TypeName = Annotated[str, Field(pattern=r"^[A-Za-z]\w*/[A-Za-z]\w*$")]

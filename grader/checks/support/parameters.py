@@ -1,4 +1,7 @@
-"""What was on the parameter server at a time; maps are taken apart into their leaves (`/details/name/first`)."""
+"""The parameter server over time, parameters that the grader made up, and what `rosparam load` says of a YAML file.
+
+Maps are taken apart into their leaves (`/details/name/first`).
+"""
 
 from __future__ import annotations
 
@@ -24,9 +27,34 @@ SYSTEM = (
     "/rosout_disable_topics_generation",
     "/roslaunch/",
 )
+NOT_IN_FILE = "not in the file"
+PRINTED_INDENT = 4
+_PLACE = re.compile(r"line (\d+), column (\d+)")
+_IN_LINE = "line {line} has a tab after a name or a value, which YAML does not accept"
+_INDENT = "indent with spaces alone, two for each level"
+# what is printed, what it means ({line}: where), and what to do
+_CAUSES = (
+    (r"found character '\\t'", "line {line} is indented with a tab, which YAML does not accept", _INDENT),
+    (r"cannot marshal None", "a name has no value: nothing follows it, and nothing is indented below it",
+     "write a value after the name; what belongs to a name is indented by two spaces more than the name"),
+    (r"exceeds XML-RPC limits|Overflow Error", "a number is larger than 2147483647, the largest that ROS can hold",
+     'write a long number in quotes, as text: phone: "9876543210"'),
+    (r"mapping values are not allowed here",
+     "in line {line} or above it, the space after a `:` is missing, or a `:` is part of a value",
+     'write `name: value` with a space, and a value that holds a `:` in "quotes"'),
+    (r"scanning a quoted scalar|found unexpected end of stream", "a closing quote is missing near line {line}",
+     'close every " on its own line'),
+    (r"expected <block end>|unindent does not match|expected ',' or '[\]}}]'|could not find expected ':'",
+     "line {line} does not fit those above it: names of one level begin in the same column", _INDENT),
+    (r"cannot start any token", "line {line} has a character that needs quotes", 'write the value in "quotes"'),
+    (r"can only be set to a dictionary", "it holds no `name: value`", "write `details:` and its values below it"),
+    (r"UnicodeDecodeError|codec can't decode|special characters are not allowed", "it is not saved as UTF-8",
+     "save it as UTF-8"),
+    (r"is not iterable|NoneType", "it is empty, or a part of it is", "write `details:` and its values below it"),
+)  # fmt: skip
 
 
-def absolute(name: str) -> str:
+def absolute_name(name: str) -> str:
     """With the slash in front, and none at the end."""
     return "/" + name.strip("/")
 
@@ -40,10 +68,10 @@ def leaves(name: str, value: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 
         yield name, value
 
 
-def tree(
+def params_on_server(
     run: Run, *, until_ns: int | None = None, by: Callable[[str], bool] = lambda _: True
 ) -> dict[str, Any]:
-    """The server's leaves after all changes up to `until_ns` by those callers that `by` wants."""
+    """Return the server's leaves after all changes up to `until_ns` by those callers that `by` wants."""
     found: dict[str, Any] = {}
     for at_ns, event in run.params:
         if (until_ns is None or at_ns <= until_ns) and by(event.caller_id):
@@ -51,13 +79,13 @@ def tree(
     return found
 
 
-def own(found: Mapping[str, Any]) -> dict[str, Any]:
+def without_system_params(found: Mapping[str, Any]) -> dict[str, Any]:
     """Without what ROS itself keeps there."""
     return {name: value for name, value in found.items() if not name.startswith(SYSTEM)}
 
 
 def _apply(found: dict[str, Any], event: ParamEvent) -> None:
-    name = absolute(event.name)
+    name = absolute_name(event.name)
     below = f"{name.rstrip('/')}/"
     for known in [n for n in found if n == name or n.startswith(below)]:
         del found[known]
@@ -67,16 +95,13 @@ def _apply(found: dict[str, Any], event: ParamEvent) -> None:
         found.update(leaves(name, event.value))
 
 
-def instead(found: Mapping[str, Any], name: str) -> str:
+def describe_missing(found: Mapping[str, Any], name: str) -> str:
     """`there is no /details/name/first` with what is there in its place."""
     last = name.rpartition("/")[2]
-    others = own(found)
+    others = without_system_params(found)
     same = [n for n in others if n.rpartition("/")[2] == last]
     near = same or near_names(name, others) or list(others)
     return f"there is no {name}" + (f"; there is {listed(near)}" if near else "")
-
-
-NOT_IN_FILE = "not in the file"
 
 
 class Given(NamedTuple):
@@ -87,10 +112,10 @@ class Given(NamedTuple):
     in_file: bool
 
 
-def given(run: Run) -> dict[str, Given]:
-    """What the grader set before anything started, by name."""
+def params_given(run: Run) -> dict[str, Given]:
+    """Return what the grader set before anything started, by name."""
     events = [e for _, e in run.actors if e.action == "param"]
-    names = (absolute(e.topic or "") for e in events)
+    names = (absolute_name(e.topic or "") for e in events)
     return {n: Given(n, e.value, NOT_IN_FILE not in e.detail) for n, e in zip(names, events, strict=True)}
 
 
@@ -104,7 +129,7 @@ def is_printed(value: object, lines: Sequence[Line]) -> bool:
     return any(word.search(line.text) for line in lines)
 
 
-def broken(package: PackageFacts, run: Run) -> Ending | None:
+def explain_failure(package: PackageFacts, run: Run) -> Ending | None:
     """An error that ended the node, or its last traceback."""
     ended = early_end(run)
     if ended is not None and ended.end is not None and ended.end.exit_code != 0:
@@ -116,39 +141,14 @@ def broken(package: PackageFacts, run: Run) -> Ending | None:
     key = re.match(r"KeyError: ['\"]?([^'\" (]+)", end.cause)
     if key is None:
         return end
-    parts = {part for name in own(tree(run)) for part in name.split("/") if part}
+    parts = {
+        part for name in without_system_params(params_on_server(run)) for part in name.split("/") if part
+    }
     last = PurePosixPath(key[1]).name
     near = near_names(last, parts - {last})
     seen = f"; there is {listed(near)}" if near else ""
     hint = "write the name as rosparam list shows it, one key for each level: get_param('details')['name']['first']"
     return end._replace(cause=f"{end.cause}: nothing is named {key[1]} there{seen}", hint=hint)
-
-
-PRINTED_INDENT = 4
-_PLACE = re.compile(r"line (\d+), column (\d+)")
-_IN_LINE = "line {line} has a tab behind a name or a value, which YAML does not take"
-_INDENT = "indent with spaces alone, two for each level"
-
-# what is printed, what it means ({line}: where), and what to do
-_CAUSES = (
-    (r"found character '\\t'", "line {line} is indented with a tab, which YAML does not take", _INDENT),
-    (r"cannot marshal None", "a name has no value: nothing stands behind it, and nothing is indented below it",
-     "write a value behind the name; what belongs to a name is indented by two spaces more than the name"),
-    (r"exceeds XML-RPC limits|Overflow Error", "a number is larger than 2147483647, the largest that ROS can hold",
-     'write a long number in quotes, as text: phone: "9876543210"'),
-    (r"mapping values are not allowed here",
-     "in line {line} or above it, the space behind a `:` is missing, or a `:` is part of a value",
-     'write `name: value` with a space, and a value that holds a `:` in "quotes"'),
-    (r"scanning a quoted scalar|found unexpected end of stream", "a closing quote is missing near line {line}",
-     'close every " on its own line'),
-    (r"expected <block end>|unindent does not match|expected ',' or '[\]}}]'|could not find expected ':'",
-     "line {line} does not fit those above it: names of one level begin in the same column", _INDENT),
-    (r"cannot start any token", "line {line} has a character that needs quotes", 'write the value in "quotes"'),
-    (r"can only be set to a dictionary", "it holds no `name: value`", "write `details:` and its values below it"),
-    (r"UnicodeDecodeError|codec can't decode|special characters are not allowed", "it is not saved as UTF-8",
-     "save it as UTF-8"),
-    (r"is not iterable|NoneType", "it is empty, or a part of it is", "write `details:` and its values below it"),
-)  # fmt: skip
 
 
 class Words(NamedTuple):

@@ -99,7 +99,7 @@ def observed_until_ns(run: Run) -> int | None:
 
 
 def fell_silent(one: Life, run: Run) -> bool:
-    """Whether it had to be killed, and neither printed nor published after Ctrl-C."""
+    """Return whether it had to be killed, and neither printed nor published after Ctrl-C."""
     if one.interrupt_ns is None or one.end is None or one.end.stopped_by != "KILL":
         return False
     quiet_ns = one.interrupt_ns + SILENT_AFTER_NS
@@ -114,7 +114,7 @@ def was_talking(one: Life, run: Run) -> bool:
 
 
 def is_flood(run: Run) -> bool:
-    """Whether so many messages came that Ctrl-C most likely comes in the middle of one."""
+    """Return whether so many messages came that Ctrl-C most likely comes in the middle of one."""
     return any(
         len(c.times_ns) > FLOOD_HZ
         and (len(c.times_ns) - 1) * 1e9 >= FLOOD_HZ * (c.times_ns[-1] - c.times_ns[0])

@@ -1,4 +1,4 @@
-"""Names that nearly fit, and numbers as a student reads them."""
+"""Text as a student reads it: names that nearly fit, numbers and lists, templates of messages and lines."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ NAMES_MAX, NAME_CHARS_MAX = 1_000, 60
 SHOWN_CHARS = 160
 SHOWN_BEFORE_CHARS = 10_000
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+SECONDS = "{seconds}"
+VALUE = "{value}"
+NUMBER = r"[-+]?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?"
 
 
 def near_names(wanted: str, names: Iterable[str]) -> tuple[str, ...]:
@@ -74,7 +77,7 @@ def shown(text: str) -> str:
 
 
 def in_one_line(text: str) -> str:
-    """The same of a message: its colours are part of it."""
+    """Return the same of a message: its colours are part of it."""
     line = visible(" ".join(text[:SHOWN_BEFORE_CHARS].split()))
     return line if len(line) <= SHOWN_CHARS else line[: SHOWN_CHARS - 1] + "…"
 
@@ -96,11 +99,6 @@ def plural(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-SECONDS = "{seconds}"
-VALUE = "{value}"
-NUMBER = r"[-+]?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?"
-
-
 def words_pattern(words: str) -> str:
     """A regular expression for words without regard to case and to how many blanks stand between them."""
     parts = r"\s+".join(re.escape(part) for part in re.split(r"\s+", words))
@@ -108,18 +106,18 @@ def words_pattern(words: str) -> str:
 
 
 def message_pattern(template: str, value: str) -> re.Pattern[str]:
-    """The whole text: the template's words, and `value` (a regular expression) where it says `{seconds}`."""
+    """Return the whole text: the template's words, and `value` (a regular expression) where it says `{seconds}`."""
     first, *others = template.strip().split(SECONDS)
     inner = "".join(f"({value}){words_pattern(words)}" for words in others)
     return re.compile(rf"\s*{words_pattern(first)}{inner}\s*", re.DOTALL)
 
 
 def line_pattern(template: str, value: str) -> re.Pattern[str]:
-    """The template's words around `value`, which has to stand there letter by letter, blanks squeezed."""
+    """Return the template's words around `value`, which has to stand there letter by letter, blanks squeezed."""
     squeezed = re.escape(" ".join(value.split()))
     return re.compile(squeezed.join(words_pattern(words) for words in template.strip().split(VALUE)))
 
 
 def in_words(template: str) -> str:
-    """The template as a student reads it: `hello world <seconds>`."""
+    """Return the template as a student reads it: `hello world <seconds>`."""
     return template.replace(SECONDS, "<seconds>").replace(VALUE, "<message>")

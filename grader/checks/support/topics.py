@@ -126,7 +126,7 @@ class Losses(Record):
 
 
 def losses(run: Run, topic: str) -> Losses | None:
-    """What is missing of a topic, None where the recorder took all that came."""
+    """Return what is missing of a topic, None where the recorder took all that came."""
     events = [(at_ns, e) for at_ns, e in run.recorder if e.topic == topic]
     lost = [at_ns for at_ns, e in events if e.event in {"limit", "behind"} or e.dropped]
     if not lost:
@@ -144,7 +144,7 @@ def whole_until_ns(run: Run, topic: str, until_ns: int | None = None) -> int | N
 
 
 def all_lost(run: Run, topic: str) -> Verdict | None:
-    """Where nothing came on a topic because the recorder dropped it."""
+    """Return the verdict where nothing is recorded of a topic because the recorder dropped it."""
     lost = losses(run, topic)
     if lost is None or lost.kept:
         return None
@@ -152,7 +152,7 @@ def all_lost(run: Run, topic: str) -> Verdict | None:
 
 
 def heed_losses(check: Check, facts: Mapping[str, object], verdict: Verdict) -> Verdict:
-    """The verdict with what the recorder lost of its topics.
+    """Return the verdict with what the recorder lost of its topics.
 
     A lost mark becomes `inconclusive`, unless the check rests on what came whole (`heeds_losses`).
     """
@@ -201,7 +201,7 @@ class NoField(LookupError):
 
 
 def values_at(message: Any, path: str) -> list[Any]:  # noqa: ANN401 - decoded messages hold anything
-    """All values that the path names, several where it holds `[*]`. Raises NoField."""
+    """Return all values that the path names, several where it holds `[*]`. Raises NoField."""
     found, done = [message], ""
     for part in _PARTS.findall(path):
         found = [item for one in found for item in _step(one, part, done)]

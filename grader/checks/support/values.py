@@ -1,4 +1,4 @@
-"""Two values of messages, services and parameters against each other: where they differ, in words."""
+"""Values of messages, services and parameters as text, and where two of them differ."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _is_number(value: object) -> bool:
 
 
 def _kinds(got: object, wanted: object) -> str:
-    """What `'3', not 3` means."""
+    """Return what `'3', not 3` means."""
     kinds = {str: "text", bool: "true or false", int: "a number", float: "a number"}
     first, second = kinds.get(type(got), ""), kinds.get(type(wanted), "")
     return f" ({first}, not {second})" if first and second and first != second else ""
