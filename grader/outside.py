@@ -12,6 +12,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 LISTS = ("PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "DYLD_FALLBACK_LIBRARY_PATH", "PYTHONPATH")
+LOADING = {
+    *("PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "DYLD_FALLBACK_LIBRARY_PATH", "TMPDIR", "TEMP", "TMP"),
+    *("SYSTEMROOT", "SYSTEMDRIVE", "WINDIR", "COMSPEC", "PATHEXT"),
+}
+"""Of the user's variables, what a program needs: to be found, to load, and on Windows to run at all."""
 _PATH = "/usr/bin:/bin"
 _SUFFIXES = (".exe", "") if sys.platform == "win32" else ("",)
 _MODULE = "import sys; sys.path[:] = filter(None, sys.path); from {} import main; sys.exit(main())"
@@ -27,6 +32,11 @@ def anywhere(environment: Mapping[str, str]) -> dict[str, str]:
         if entries:
             whole[name] = os.pathsep.join(entries)
     return {"PATH": _PATH, **whole}
+
+
+def loading_environment(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return only those variables that a program of this machine needs to be found and loaded."""
+    return {name: value for name, value in anywhere(environment).items() if name.upper() in LOADING}
 
 
 def program(name: str, environment: Mapping[str, str] = os.environ) -> str | None:

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import IO
 
 from grader.intake.credentials import Access, refused, scrubbed
-from grader.outside import anywhere, program
+from grader.outside import anywhere, loading_environment, program
 from grader.portable import kill_group
 
 _QUIET = {
@@ -47,11 +47,6 @@ _MEMORY_BYTES = 2 << 30
 _NETWORK_KEPT = re.compile(
     r"GIT_(SSH.*|SSL_.*|PROXY_.*|HTTP_.*|CONFIG_(GLOBAL|SYSTEM|NOSYSTEM|COUNT|(KEY|VALUE)_\d+)|EXEC_PATH)"
 )
-# Of the user's variables, what git on this machine needs: to be found, to load, and on Windows to run at all.
-_LOCAL_KEPT = {
-    "PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "DYLD_FALLBACK_LIBRARY_PATH", "TMPDIR", "TEMP", "TMP", "SYSTEMROOT",
-    "SYSTEMDRIVE", "WINDIR", "COMSPEC", "PATHEXT",
-}  # fmt: skip
 _ANSWER_BYTES = 16 << 20
 _SILENCE_S = 20.0
 _SAID_BYTES = 64 << 10
@@ -219,9 +214,8 @@ class Git:
 
     def _local_environment(self) -> dict[str, str]:
         """For repositories on this machine: no settings but ours, so no filter, no helper and no network."""
-        kept = {key: value for key, value in anywhere(os.environ).items() if key.upper() in _LOCAL_KEPT}
         return {
-            **kept,
+            **loading_environment(os.environ),
             **_ASK_NOTHING,
             "HOME": str(self.home),
             "GIT_CONFIG_GLOBAL": str(self.home / ".gitconfig"),
