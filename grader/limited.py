@@ -16,7 +16,6 @@ import tempfile
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 from grader.outside import loading_environment
 

@@ -12,12 +12,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from grader.intake.credentials import without_password
     from grader.intake.find import enclosing_package, find_packages
     from grader.intake.limits import Limits
     from grader.intake.names import safe_name
-    from grader.intake.open import open_recorded, open_recording, open_submission, unreadable
-    from grader.intake.passwords import without_password
-    from grader.intake.recordings import find_recordings
+    from grader.intake.open import find_recordings, open_recorded, open_recording, open_submission, unreadable
     from grader.intake.source import Source, parse_source
 
 __all__ = [
@@ -36,12 +35,11 @@ __all__ = [
 ]
 
 _PLACES = {
+    "credentials": ("without_password",),
     "find": ("enclosing_package", "find_packages"),
     "limits": ("Limits",),
     "names": ("safe_name",),
-    "open": ("open_recorded", "open_recording", "open_submission", "unreadable"),
-    "passwords": ("without_password",),
-    "recordings": ("find_recordings",),
+    "open": ("find_recordings", "open_recorded", "open_recording", "open_submission", "unreadable"),
     "source": ("Source", "parse_source"),
 }
 _MODULE_OF = {name: f"grader.intake.{module}" for module, names in _PLACES.items() for name in names}

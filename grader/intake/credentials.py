@@ -158,3 +158,22 @@ def _https_host(url: str) -> str:
     """The server of an https address as it is compared, "" where it is none."""
     match = _URL.fullmatch(url.strip())
     return match["host"].lower().removesuffix(":443") if match and match["scheme"] == "https" else ""
+
+
+# [intake.passwords] Addresses without what opens a server.
+
+_AUTHORITY = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<user>[^/?#]*)@")
+# A colon with no port after it: a password with a slash in it, which ends where nobody can tell.
+_TORN = re.compile(r"(?P<scheme>https?)://[^/?#@\[\]]*:(?!\d*(?:[/?#]|$)).*", re.IGNORECASE | re.DOTALL)
+
+
+def without_password(source: str) -> str:
+    """SOURCE as it may be kept and shown: of `https://` nothing before the `@` of the server (a token may stand in
+    place of a user), of other schemes the user alone. What is no address stays as it is."""
+    return _TORN.sub(r"\g<scheme>://…", _AUTHORITY.sub(_kept, source, count=1))
+
+
+def _kept(match: re.Match[str]) -> str:
+    scheme, user = match["scheme"], match["user"].split(":", 1)[0]
+    web = scheme.lower() in ("http", "https")
+    return f"{scheme}://" if web or not user else f"{scheme}://{user}@"

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.intake.find import BUILD_SPACES
 from grader.intake.git import Git, GitFailed, GitMissing, Repository
-from grader.intake.gitdir import Repositories, Unfit
+from grader.intake.gitdir import Repositories, Unfit, link_repository, repository_around
 from grader.intake.names import brief, listing, printable
 from grader.intake.source import GivenModes
 from grader.intake.tree import Entry, read_file
 from grader.model.submission import ModeSource
-from grader.portable import MODES_ON_DISK
+from grader.portable import MODES_ON_DISK, system
 
 _SCRIPTS = (".py", ".sh", ".bash")
 _MAX_TRACKED = 200_000
@@ -127,3 +127,35 @@ def _untracked(folder: Path, on_disk: Mapping[str, bool | None], tracked: Mappin
     return (
         [f"not in git yet, so not handed in by a push: {listing(new)} (git add, git commit)"] if new else []
     )
+
+
+# [intake.line_ends] Scripts whose Windows line ends are this disk's alone: git has them as they are to be, and hands them in so.
+
+_FIRST_LINE_BYTES = 4096
+_AT_MOST = 200
+
+
+def right_in_git(folder: Path, entries: Iterable[Entry], git: Git, base: Path) -> frozenset[str]:
+    """The paths, below the package's folder, of scripts that have CRLF here and LF in git's index.
+
+    On Linux there are none: there what lies on the disk is run, and its line ends count.
+    """
+    top = repository_around(folder.resolve()) if system() else None
+    suspects = list(_suspects(folder, entries))[:_AT_MOST] if top is not None else []
+    if top is None or not suspects:
+        return frozenset()
+    try:
+        view = link_repository(top, base / "git-line-ends", git, within=top, objects=True)
+        said = git.run("ls-files", "--eol", "-z", "--", *suspects, cwd=folder, repository=view)
+    except (GitFailed, Unfit, OSError):
+        return frozenset()
+    pairs = (record.partition(b"\t") for record in said.split(b"\0") if record)
+    return frozenset(os.fsdecode(path) for about, _, path in pairs if about.split()[:1] == [b"i/lf"])
+
+
+def _suspects(folder: Path, entries: Iterable[Entry]) -> Iterator[str]:
+    for entry in entries:
+        if entry.kind == "file" and is_script(folder, entry.path):
+            data = read_file(folder / entry.path, _FIRST_LINE_BYTES) or b""
+            if data.partition(b"\n")[0].endswith(b"\r"):
+                yield entry.path

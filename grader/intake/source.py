@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Literal
 from urllib.parse import unquote
 
-from grader.errors import SubmissionError, UsageError
-from grader.intake.credentials import split_address
-from grader.intake.names import archive_stem, brief, printable
+from grader.errors import GraderError, SubmissionError, UsageError
+from grader.intake.credentials import split_address, without_password
+from grader.intake.names import archive_stem, brief, printable, safe_name
 from grader.intake.tree import is_file, is_there
 
 GivenModes = Literal["kept", "lost", "granted"]
@@ -231,3 +231,20 @@ def _without_password(scheme: str, authority: str) -> str:
     """A token may stand in the place of the user of a web address, so nothing of that part is shown."""
     user, at, host = authority.rpartition("@")
     return host if scheme in ("http", "https") else f"{user.partition(':')[0]}{at}{host}"
+
+
+# [intake.identity] Who a submission is before it is opened, for one that cannot be.
+
+
+def identify(source: str | Source, submission_id: str | None = None) -> tuple[str, str] | None:
+    """The id and what may be shown of the source, as an opened submission has them; None for what is no source."""
+    if isinstance(source, Source):
+        return safe_name(submission_id if submission_id is not None else source.name), source.given
+    try:
+        parsed = parse_source(source)
+        name, given = parsed.name, parsed.given
+    except UsageError:
+        return None
+    except (GraderError, OSError, ValueError):
+        name, given = archive_stem(PurePath(source).name), printable(without_password(source))
+    return safe_name(submission_id if submission_id is not None else name), given

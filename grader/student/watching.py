@@ -24,7 +24,7 @@ from grader.arena.workspace import needed_packages
 from grader.errors import ExitCode, GraderError, SubmissionError, UsageError
 from grader.faults import Attempt, error_result
 from grader.intake import open_submission
-from grader.intake.identity import identify
+from grader.intake.source import identify
 from grader.model.package import SourceFile
 from grader.model.progress import Progress
 from grader.model.result import GradingResult, SubmissionInfo, TimingInfo

@@ -33,8 +33,8 @@ from grader.evidence.services import ServiceType
 from grader.evidence.timeline import build_runs
 from grader.evidence.writer import EvidenceStream
 from grader.intake import Limits, open_submission, safe_name
-from grader.intake.manifest import manifest_name
-from grader.intake.refs import choose_ref, parse_refs
+from grader.intake.find import manifest_name
+from grader.intake.repository import choose_ref, parse_refs
 from grader.intake.source import parse_source
 from grader.model.package import CMakeFacts
 from grader.model.record import Record

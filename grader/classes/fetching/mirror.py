@@ -12,8 +12,7 @@ from pathlib import Path
 
 from grader.classes.fetching.history import Commit, read_commit
 from grader.intake.git import Git, GitFailed, Repository
-from grader.intake.refs import Wanted, parse_refs
-from grader.intake.repository import ask
+from grader.intake.repository import Wanted, ask, parse_refs
 from grader.intake.source import Source
 
 _EVERYTHING = ("+refs/heads/*:refs/heads/*", "+refs/tags/*:refs/tags/*")

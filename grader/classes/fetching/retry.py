@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from grader.errors import SubmissionError
-from grader.intake.explain import explained, may_pass
 from grader.intake.git import GitFailed
+from grader.intake.git_errors import explained, may_pass
 from grader.intake.source import Source
 
 Answer = TypeVar("Answer")

@@ -10,8 +10,8 @@ from grader.classes.fetching.cache import Failure, Place, State, name_of
 from grader.classes.fetching.mirror import Listing, Mirror
 from grader.classes.fetching.retry import GivenUp, Patience, patiently
 from grader.intake.credentials import split_address
-from grader.intake.explain import may_pass
 from grader.intake.git import Git, GitFailed, GitTimeout
+from grader.intake.git_errors import may_pass
 from grader.intake.source import Source
 
 GIT_TIMEOUT_S = 120.0

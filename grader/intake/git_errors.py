@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 
 from grader.errors import SubmissionError, Unreachable
+from grader.intake.credentials import without_password
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.names import brief
-from grader.intake.passwords import without_password
 from grader.intake.source import Source
 
 _PRIVATE = (
