@@ -58,6 +58,7 @@ def run_limited(function: str, *arguments: object, limits: ChildLimits) -> Answe
         with contextlib.suppress(subprocess.TimeoutExpired):
             code = subprocess.run(
                 [sys.executable, "-I", "-S", "-c", BOOTSTRAP, str(ROOT)],
+                cwd="/",
                 env=loading_environment(os.environ),
                 input=json.dumps(request).encode("ascii"),
                 stdout=out,

@@ -56,8 +56,10 @@ STARTS = {
     "intake/git.py:_started": Start(
         "environment", "cwd", "its repository's data; no setting, hook or filter of it"
     ),
-    "package/python.py:_run": Start(
-        "anywhere(os.environ)", None, "its source files, which are parsed and not run"
+    "limited.py:run_limited": Start(
+        "loading_environment(os.environ)",
+        "'/'",
+        "its archive, and its source files, which are parsed and not run",
     ),
     "classes/review/serve.py:git_user": Start("anywhere(os.environ)", "'/'", "nothing"),
     "classes/similarity/comparing.py:_answer": Start(

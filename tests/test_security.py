@@ -14,7 +14,7 @@ from grader.arena.limits import Limits as RunLimits
 from grader.arena.ros_env import DUMP_BYTES, NAMES_MAX, VALUE_BYTES
 from grader.checks.support import text
 from grader.evidence import container, definitions, memory_budget, services
-from grader.intake import git, gitdir
+from grader.intake import archive, git, gitdir
 from grader.intake.limits import Limits as IntakeLimits
 from grader.package import cmake_parse, cmake_written, launch, launch_loader, python, reading
 
@@ -80,6 +80,7 @@ BOUNDS = {
     "remarks on Python files": (
         python.REPORT_BYTES_MAX // MB, "ros/syntax:SLIPS_LIMIT", "ros/syntax:ALL_SLIPS_LIMIT", build.STEP_S,
     ),
+    "archives": (archive.MEMORY_BYTES // MB, archive.CPU_S, int(archive.WALL_S)),
     "calls of the master": (
         ("ros/rpc:HEAD_BYTES_MAX", KB), ("ros/rpc:BODY_BYTES_MAX", MB), "ros/xmlrpc_parser:ELEMENTS_MAX",
         "ros/xmlrpc_parser:DEPTH_MAX", "ros/rpc:CONNECTIONS_MAX", "ros/rpc:CALLS_HZ", "ros/rpc:MULTICALLS_MAX",

@@ -9,7 +9,6 @@ from __future__ import annotations
 import bz2
 import errno
 import gzip
-import hashlib
 import json
 import lzma
 import re
@@ -27,10 +26,11 @@ from typing import IO, Any, cast
 from grader.errors import SubmissionError
 from grader.intake.limits import Limits, too_much
 from grader.intake.names import brief, is_archive_name
+from grader.intake.tree import file_digest
 from grader.intake.unpack import Unpacker
 from grader.limited import Answer, ChildLimits, run_limited
 
-MEMORY_BYTES, CPU_S, WALL_S = 512 << 20, 120, 300.0
+MEMORY_BYTES, CPU_S, WALL_S = 512 << 20, 60, 180.0
 CHUNK_BYTES = 1 << 20
 PACKINGS: dict[bytes, Callable[[Any], Any]] = {
     b"\x1f\x8b": gzip.open,
@@ -85,7 +85,7 @@ def unpack(path: Path, into: Path, limits: Limits) -> Unpacked:
     into.mkdir(parents=True)
     answer = run_limited(
         "grader.intake.archive:unpack_here",
-        *(str(path), str(into), asdict(limits)),
+        *(str(path.absolute()), str(into.absolute()), asdict(limits)),
         limits=ChildLimits(
             memory_bytes=MEMORY_BYTES, cpu_s=CPU_S, wall_s=WALL_S, file_bytes=limits.total_bytes
         ),
@@ -128,7 +128,7 @@ def _unpack(path: Path, into: Path, limits: Limits) -> dict[str, Any]:
     unpacker = Unpacker(into, name=name, limits=limits)
     try:
         if _looks_like_zip(path, head):
-            _unpack_zip(path, unpacker)
+            _unpack_zip(path, unpacker, name, limits)
         elif _opener(head) or _looks_like_tar(head):
             _unpack_tar(path, unpacker, name, limits)
         else:
@@ -147,7 +147,7 @@ def _unpack(path: Path, into: Path, limits: Limits) -> dict[str, Any]:
         if error.errno is not None:
             raise
         raise _damaged(name, error) from None
-    return {"sha256": _sha256(path), "executable": unpacker.executable, "hints": hints}
+    return {"sha256": file_digest(path).hexdigest(), "executable": unpacker.executable, "hints": hints}
 
 
 def _opener(head: bytes) -> Callable[[Any], Any] | None:
@@ -190,14 +190,6 @@ def _damaged(name: str, error: Exception) -> SubmissionError:
         f"{name} is damaged or incomplete ({brief(what) or type(error).__name__})",
         hint="Download or pack it again.",
     )
-
-
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as stream:
-        while block := stream.read(CHUNK_BYTES):
-            digest.update(block)
-    return digest.hexdigest()
 
 
 def _unpack_tar(path: Path, unpacker: Unpacker, name: str, limits: Limits) -> None:
@@ -272,10 +264,12 @@ def _unpack_member(archive: tarfile.TarFile, member: tarfile.TarInfo, unpacker: 
         unpacker.refuse(f"the entry '{brief(path)}' is a device or a pipe")
 
 
-def _unpack_zip(path: Path, unpacker: Unpacker) -> None:
+def _unpack_zip(path: Path, unpacker: Unpacker, name: str, limits: Limits) -> None:
     """Zip files as Windows, macOS, Linux, GitHub and Python write them."""
     with zipfile.ZipFile(path) as archive:
         by_git = GIT_COMMENT.fullmatch(archive.comment) is not None
+        if len(archive.infolist()) > limits.entries:
+            raise too_much(name, f"holds more than {limits.entries} files")
         # one packed content that many entries share would be unpacked over and over
         for one, two in pairwise(sorted(archive.infolist(), key=lambda info: info.header_offset)):
             if one.header_offset + LOCAL_HEADER_BYTES + one.compress_size > two.header_offset:

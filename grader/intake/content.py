@@ -1,4 +1,4 @@
-"""What of a package is read, and what is left out of it: giants, what may not be read, what is no file."""
+"""Which files of a package are read, which are left out (giants, what may not be read), and remarks on their names."""
 
 from __future__ import annotations
 
@@ -16,6 +16,11 @@ from grader.intake.tree import Entry, list_entries
 
 # What a build or an editor leaves in a package; it is copied nowhere, so it counts for nothing.
 _MADE = frozenset({"build", "devel", "install", ".catkin_tools"})
+_ODD_NAMES_SHOWN = 3
+_LFS = b"version https://git-lfs.github.com/spec/"
+_LFS_BYTES = 1024
+_DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
+_FORBIDDEN = re.compile(r'[<>:"|?*\\\x00-\x1f]|[. ]$')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,15 +83,6 @@ def _hints(closed: list[str], large: list[str], others: list[str]) -> Iterable[s
         yield f"not readable here, so left out: {listing(closed)} (`ls -l` shows the permissions)"
     if others:
         yield f"neither a file nor a folder, so left out: {listing(others)}"
-
-
-# [intake.remarks] Remarks on a package's files that cost nothing and explain much: names that clash elsewhere, pointers of Git LFS.
-
-_ODD_NAMES_SHOWN = 3
-_LFS = b"version https://git-lfs.github.com/spec/"
-_LFS_BYTES = 1024
-_DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
-_FORBIDDEN = re.compile(r'[<>:"|?*\\\x00-\x1f]|[. ]$')
 
 
 def remarks(folder: Path, entries: list[Entry], left_out: Collection[str]) -> tuple[str, ...]:

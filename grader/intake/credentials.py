@@ -23,6 +23,9 @@ _URL = re.compile(
 )
 _HOST = re.compile(r"(?:[\w.-]+|\[[0-9A-Fa-f:.]+\])(?::\d*)?")
 _UNFIT = re.compile(r"[\x00-\x1f\x7f]")
+_AUTHORITY = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<user>[^/?#]*)@")
+# A colon with no port after it: a password with a slash in it, which ends where nobody can tell.
+_TORN = re.compile(r"(?P<scheme>https?)://[^/?#@\[\]]*:(?!\d*(?:[/?#]|$)).*", re.IGNORECASE | re.DOTALL)
 _REFUSED = re.compile(
     r"could not read (?:Username|Password)|terminal prompts disabled|Authentication failed|Access denied"
     r"|error: 40[134]|HTTP 40[134]|[Nn]ot found"
@@ -158,13 +161,6 @@ def _https_host(url: str) -> str:
     """The server of an https address as it is compared, "" where it is none."""
     match = _URL.fullmatch(url.strip())
     return match["host"].lower().removesuffix(":443") if match and match["scheme"] == "https" else ""
-
-
-# [intake.passwords] Addresses without what opens a server.
-
-_AUTHORITY = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<user>[^/?#]*)@")
-# A colon with no port after it: a password with a slash in it, which ends where nobody can tell.
-_TORN = re.compile(r"(?P<scheme>https?)://[^/?#@\[\]]*:(?!\d*(?:[/?#]|$)).*", re.IGNORECASE | re.DOTALL)
 
 
 def without_password(source: str) -> str:

@@ -1,4 +1,4 @@
-"""Finds packages as catkin does, in any tree, however its neighbours are broken."""
+"""Finds packages as catkin does, in any tree, however its neighbours are broken, and chooses the lab's among them."""
 
 from __future__ import annotations
 
@@ -19,6 +19,9 @@ from grader.intake.tree import NO_CONTENT, Folder, is_file, is_there, read_file,
 BUILD_SPACES = frozenset({"build", "devel", "install"})
 FOLDERS_LOOKED_AT, ENTRIES_LOOKED_AT, SECONDS_LOOKED = 3000, 300_000, 3.0
 IGNORE_MARKERS = frozenset({"CATKIN_IGNORE", "AMENT_IGNORE", "COLCON_IGNORE"})
+MANIFEST = "package.xml"
+_LARGEST_BYTES = 1 << 20
+_LONGEST_NAME = 255
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,13 +171,6 @@ def _entered(root: Path, folder: Folder, leave_out: Path | None) -> list[str]:
     ]
 
 
-# [intake.manifest] The one thing that finding a package needs of its manifest: the name.
-
-MANIFEST = "package.xml"
-_LARGEST_BYTES = 1 << 20
-_LONGEST_NAME = 255
-
-
 def manifest_name(folder: Path, *, root: Path) -> str | None:
     """`<name>` in the folder's `package.xml`, as far as it can be read; None where it cannot.
 
@@ -205,9 +201,6 @@ def _name(data: bytes) -> str | None:
             name = " ".join("".join(text).split())
             return name if 0 < len(name) <= _LONGEST_NAME else None
     return None
-
-
-# [intake.choose] Which of the packages found is the lab's, and what to say where that is not plain.
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""What git says, in a user's words: one line with the cause, and what to do."""
+"""Errors of git in a user's words: one line with the cause, and what to do."""
 
 from __future__ import annotations
 

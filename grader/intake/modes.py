@@ -1,4 +1,4 @@
-"""Who may say whether a file is executable: git's index for tracked files, the archive, or else the disk."""
+"""Whether a file is executable, and how its lines end: git's index, the archive or else the disk may say."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ from grader.portable import MODES_ON_DISK, system
 _SCRIPTS = (".py", ".sh", ".bash")
 _MAX_TRACKED = 200_000
 _DIFFERENCES_SHOWN = 50
+_FIRST_LINE_BYTES = 4096
+_AT_MOST = 200
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,12 +129,6 @@ def _untracked(folder: Path, on_disk: Mapping[str, bool | None], tracked: Mappin
     return (
         [f"not in git yet, so not handed in by a push: {listing(new)} (git add, git commit)"] if new else []
     )
-
-
-# [intake.line_ends] Scripts whose Windows line ends are this disk's alone: git has them as they are to be, and hands them in so.
-
-_FIRST_LINE_BYTES = 4096
-_AT_MOST = 200
 
 
 def right_in_git(folder: Path, entries: Iterable[Entry], git: Git, base: Path) -> frozenset[str]:

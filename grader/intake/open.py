@@ -1,9 +1,8 @@
-"""SOURCE on disk: in place for a folder, below the work folder for an archive or a repository."""
+"""Opens SOURCE: in place for a folder, below the work folder for an archive or a repository; recordings too."""
 
 from __future__ import annotations
 
 import errno
-import hashlib
 import os
 import re
 import shutil
@@ -13,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import TypeVar
 
 from grader.errors import GraderError, OutputError, SubmissionError
 from grader.intake.archive import unpack
@@ -33,10 +33,15 @@ from grader.intake.modes import Modes, archive_modes, folder_modes, right_in_git
 from grader.intake.names import brief, encodable, printable, safe_name
 from grader.intake.repository import clone
 from grader.intake.source import Source, parse_source
-from grader.intake.tree import NO_CONTENT, Entry, is_there, list_entries, tree_digest, walk
+from grader.intake.tree import NO_CONTENT, Entry, file_digest, is_there, list_entries, tree_digest, walk
 from grader.model.submission import RecordedSubmission, SourcePackage, Submission
 
 _OTHERS_AT_MOST = 200
+_SUFFIX = re.compile(r"\.(bag|bag\.active|bag\.orig|mcap|db3)$", re.IGNORECASE)
+_MAGIC = (b"#ROSBAG V", b"\x89MCAP0\r\n")
+
+
+_AnySubmission = TypeVar("_AnySubmission", Submission, RecordedSubmission)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,9 +101,7 @@ def open_submission(
             submission = describe(located, git, limits)
         except OSError as error:
             raise unreadable(parsed.given, error) from error
-    if submission_id is None:
-        return submission
-    return submission.model_copy(update={"id": safe_name(submission_id)})
+    return _named(submission, submission_id)
 
 
 def open_recording(source: str | Source, *, submission_id: str | None = None) -> RecordedSubmission | None:
@@ -113,11 +116,7 @@ def open_recording(source: str | Source, *, submission_id: str | None = None) ->
         submission = single(parsed, parsed.path)
     except OSError as error:
         raise unreadable(parsed.given, error) from error
-    return (
-        submission
-        if submission_id is None
-        else submission.model_copy(update={"id": safe_name(submission_id)})
-    )
+    return _named(submission, submission_id)
 
 
 def open_recorded(
@@ -131,11 +130,13 @@ def open_recorded(
             submission = several(open_source(parsed, git, base, Limits()), git)
         except OSError as error:
             raise unreadable(parsed.given, error) from error
-    return (
-        submission
-        if submission_id is None
-        else submission.model_copy(update={"id": safe_name(submission_id)})
-    )
+    return _named(submission, submission_id)
+
+
+def _named(submission: _AnySubmission, submission_id: str | None) -> _AnySubmission:
+    if submission_id is None:
+        return submission
+    return submission.model_copy(update={"id": safe_name(submission_id)})
 
 
 def _parsed(source: str | Source) -> Source:
@@ -302,12 +303,6 @@ def _package(
     )
 
 
-# [intake.recordings] Recordings that are handed in: SOURCE itself, or files of what SOURCE holds.
-
-_SUFFIX = re.compile(r"\.(bag|bag\.active|bag\.orig|mcap|db3)$", re.IGNORECASE)
-_MAGIC = (b"#ROSBAG V", b"\x89MCAP0\r\n")
-
-
 def is_recording(path: Path) -> bool:
     """Whether a file is a recording by its name or its first bytes; a damaged one is one too.
 
@@ -335,7 +330,7 @@ def single(source: Source, path: Path) -> RecordedSubmission:
         root=path.parent,
         file=path,
         commit=None,
-        digest=_sha256(path),
+        digest=file_digest(path).hexdigest(),
     )
 
 
@@ -373,7 +368,7 @@ def find_recordings(root: Path, pattern: str) -> list[Path]:
         found += [root / path for path in map(folder.inside, names) if _fits(path, wanted)]
     if len(found) < 2 or any(path.stat().st_size > Limits().recording_bytes for path in found):
         return found
-    return list({_sha256(path): path for path in reversed(found)}.values())[::-1]
+    return list({file_digest(path).hexdigest(): path for path in reversed(found)}.values())[::-1]
 
 
 def _fits(path: str, wanted: str) -> bool:
@@ -381,11 +376,3 @@ def _fits(path: str, wanted: str) -> bool:
     if name.startswith("."):
         return False
     return fnmatchcase(path.casefold() if "/" in wanted else name.casefold(), wanted)
-
-
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()

@@ -1,4 +1,4 @@
-"""Brings one commit of a repository to disk: as little history as will do, and nothing of it is run."""
+"""Brings one commit of a repository to disk, with as little history as will do; nothing of it is run."""
 
 from __future__ import annotations
 
@@ -34,6 +34,10 @@ _LONGEST_NAME_BYTES = 255
 _LONGEST_LINK_BYTES = 4095
 # Of a commit's own attributes, those that make a file many times larger, or name a program.
 _ATTRIBUTES = "* !filter !ident !working-tree-encoding\n"
+_HASH = re.compile(r"[0-9a-fA-F]{4,64}")
+# Shorter ones may mean another commit than the one that a ref happens to point to.
+_TELLING_HASH = 7
+_USUAL_BRANCHES = ("main", "master")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,14 +216,6 @@ def _checkout(source: Source, git: Git, into: Path, commit: str, files: _Files) 
         (info / "sparse-checkout").write_bytes(os.fsencode("\n".join(lines) + "\n"))
         sparse = ("-c", "core.sparseCheckout=true")
     git.run(*(*sparse, "checkout", "--quiet", "--detach", "--force", commit), cwd=into, repository=_own(into))
-
-
-# [intake.refs] Which commit an `@ref` means, from what `git ls-remote` lists.
-
-_HASH = re.compile(r"[0-9a-fA-F]{4,64}")
-# Shorter ones may mean another commit than the one that a ref happens to point to.
-_TELLING_HASH = 7
-_USUAL_BRANCHES = ("main", "master")
 
 
 @dataclass(frozen=True, kw_only=True)

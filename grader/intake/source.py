@@ -1,4 +1,4 @@
-"""Reads SOURCE as it stands on the command line: which folder, archive or repository, and which `@ref`."""
+"""Reads SOURCE as it stands on the command line: which folder, archive or repository, which `@ref`, which id."""
 
 from __future__ import annotations
 
@@ -231,9 +231,6 @@ def _without_password(scheme: str, authority: str) -> str:
     """A token may stand in the place of the user of a web address, so nothing of that part is shown."""
     user, at, host = authority.rpartition("@")
     return host if scheme in ("http", "https") else f"{user.partition(':')[0]}{at}{host}"
-
-
-# [intake.identity] Who a submission is before it is opened, for one that cannot be.
 
 
 def identify(source: str | Source, submission_id: str | None = None) -> tuple[str, str] | None:

@@ -1,4 +1,4 @@
-"""Walks folders of any depth and size without following a link."""
+"""Walks folders of any depth and size without following a link, and gives their digest."""
 
 from __future__ import annotations
 
@@ -170,9 +170,6 @@ def _entry(folder: Folder, entry: os.DirEntry[str]) -> Entry:
     )
 
 
-# [intake.digest] One number for a package's tree, the same wherever and whenever it is unpacked.
-
-
 def tree_digest(
     root: Path,
     entries: Iterable[Entry],
@@ -199,8 +196,13 @@ def _content(path: Path, entry: Entry) -> bytes:
         return os.fsencode(path.readlink())
     if entry.kind == "other":
         return b""
+    return file_digest(path).digest()
+
+
+def file_digest(path: Path) -> hashlib._Hash:
+    """Return the sha256 of a file's contents."""
     digest = hashlib.sha256()
     with path.open("rb") as stream:
         while block := stream.read(1 << 20):
             digest.update(block)
-    return digest.digest()
+    return digest

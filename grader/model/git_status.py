@@ -8,8 +8,8 @@ from grader.model.record import Record
 class Point(Record):
     """One way in which what will be marked differs from what was checked, and the command that fixes it.
 
-    `kind` is a word for programs (`uncommitted`, `untracked`, `ignored`, `mode`, `unpushed`, `other-branch`, …), `text` one line for
-    people, `mend` a command or "". Of a `remark` nobody can say that anything differs.
+    `kind` is a word for programs (`uncommitted`, `untracked`, `ignored`, `mode`, `unpushed`, `other-branch`, …),
+    `text` one line for people, `mend` a command or "". Of a `remark` it is not known whether anything differs.
     """
 
     kind: str

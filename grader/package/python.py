@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
-import tempfile
 import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -14,17 +10,18 @@ from typing import Literal
 
 from pydantic import Field
 
+from grader.limited import ChildLimits, run_limited
 from grader.model.package import Fault, PythonSlip
 from grader.model.record import Record
-from grader.outside import anywhere
 from grader.package.python_causes import cause_of
 from grader.package.reading import printable
 
-SYNTAX_SCRIPT = Path(__file__).resolve().parents[1] / "arena" / "ros" / "syntax.py"
+CHECK = "grader.arena.ros.syntax:check_all"
+MEMORY_BYTES, CPU_S = 1 << 30, 20
 REPORT_BYTES_MAX = 8 << 20
 """More than `syntax.py` has to say of as many files as a package may have."""
-_CRASHES_LIMIT = 3
-_MESSAGE_LETTERS = 500
+CRASHES_MAX = 3
+MESSAGE_CHARS_MAX = 500
 
 
 class SyntaxReport(Record):
@@ -84,13 +81,13 @@ def _entry(line: bytes | str) -> _RawEntry | None:
 
 def _fault(file: str, raw: _RawFault) -> Fault:
     cause = cause_of(raw.message, raw.text, column=raw.column, opened=raw.opened, mixed=raw.mixed)
-    kind = printable(raw.kind[:_MESSAGE_LETTERS])
+    kind = printable(raw.kind[:MESSAGE_CHARS_MAX])
     return Fault(
         file=file,
         line=raw.line,
         column=raw.column if raw.column and raw.column > 0 else None,
         kind=kind,
-        message=printable(raw.message[:_MESSAGE_LETTERS]) or kind,
+        message=printable(raw.message[:MESSAGE_CHARS_MAX]) or kind,
         cause=printable(cause),
     )
 
@@ -103,7 +100,7 @@ def check_syntax(folder: Path, paths: Sequence[str], *, timeout_s: float = 10.0)
     """
     deadline = time.monotonic() + timeout_s
     report, left = SyntaxReport(), list(paths)
-    for _ in range(_CRASHES_LIMIT + 1):
+    for _ in range(CRASHES_MAX + 1):
         remaining_s = deadline - time.monotonic()
         if not left or remaining_s <= 0:
             break
@@ -120,24 +117,15 @@ def check_syntax(folder: Path, paths: Sequence[str], *, timeout_s: float = 10.0)
 
 
 def _run(folder: Path, paths: list[str], timeout_s: float) -> tuple[SyntaxReport, bool]:
-    command = [sys.executable, "-I", str(SYNTAX_SCRIPT), str(folder)]
-    names = json.dumps(paths).encode("ascii")
-    timed_out = False
-    with tempfile.TemporaryFile() as out:
-        try:
-            subprocess.run(
-                command,
-                env=anywhere(os.environ),
-                input=names,
-                stdout=out,
-                stderr=subprocess.DEVNULL,
-                timeout=timeout_s,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            timed_out = True
-        out.seek(0)
-        return read_syntax_report(out.read(REPORT_BYTES_MAX)), timed_out
+    limits = ChildLimits(
+        memory_bytes=MEMORY_BYTES,
+        cpu_s=CPU_S,
+        wall_s=timeout_s,
+        file_bytes=4 * REPORT_BYTES_MAX,
+        answer_bytes=REPORT_BYTES_MAX,
+    )
+    answer = run_limited(CHECK, str(folder.absolute()), paths, limits=limits)
+    return read_syntax_report(answer.lines), answer.timed_out
 
 
 def _without_result(paths: Iterable[str], kind: str, message: str) -> SyntaxReport:

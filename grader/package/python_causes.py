@@ -11,8 +11,7 @@ _TYPOGRAPHIC = (
     ("\u201c\u201d\u201e\u201f\u2033\u00ab\u00bb", "quote", '"'),
     ("\u2010\u2011\u2012\u2013\u2014\u2015\u2212", "dash", "-"),
 )
-_LETTERS = 1_000
-TEXT_LETTERS = 300
+TEXT_CHARS_MAX = 300
 _COPIED = "copied from a PDF or a web page"
 
 # On any message: the faulty line itself tells.
@@ -78,8 +77,7 @@ def cause_of(
     `text` is the faulty line, `column` the place in it (from 1), `opened` the line of a bracket that is never
     closed, `mixed` whether the file indents with tabs and with spaces.
     """
-    message, text = message[:TEXT_LETTERS], text[:TEXT_LETTERS]
-    message, text = message[:_LETTERS], text[:_LETTERS]
+    message, text = message[:TEXT_CHARS_MAX], text[:TEXT_CHARS_MAX]
     vague = message.startswith(("invalid syntax", "expected ':'", "invalid decimal", "unexpected EOF"))
     odd = "invalid decimal" in message and _strange(text)  # Python 3.10 on `1` and an invisible character
     if odd or "invalid character" in message or "non-printable" in message:
