@@ -16,7 +16,7 @@ from grader.checks.support import text
 from grader.evidence import container, definitions, memory_budget, services
 from grader.intake import archive, git, gitdir
 from grader.intake.limits import Limits as IntakeLimits
-from grader.package import cmake_parse, cmake_written, launch, launch_loader, python, reading
+from grader.package import cmake, cmake_parse, launch, launch_loader, python, reading
 
 KB, MB, RUN = 1 << 10, 1 << 20, RunLimits()
 ROOT = Path(__file__).resolve().parent.parent
@@ -76,7 +76,7 @@ BOUNDS = {
         RUN.built_bytes // MB, built.MEMBERS_MAX, built.HEADER_BYTES_MAX // KB, built.HEADERS_BYTES_MAX // MB,
         built.HEADERS_IN_A_ROW_MAX, len(built.ELF),
     ),
-    "CMake's trace": (recorded.READ_MAX // MB, cmake_written.LINES_MAX, cmake_written.FILES_BYTES_MAX // 1000),
+    "CMake's trace": (recorded.READ_MAX // MB, cmake.LINES_MAX, cmake.FILES_BYTES_MAX // 1000),
     "remarks on Python files": (
         python.REPORT_BYTES_MAX // MB, "ros/syntax:SLIPS_LIMIT", "ros/syntax:ALL_SLIPS_LIMIT", build.STEP_S,
     ),

@@ -9,8 +9,7 @@ from typing import NamedTuple
 from lxml import etree
 
 from grader.model.package import Fault, LaunchFile, LaunchNode
-from grader.package.launch_loader import Find, load
-from grader.package.launch_scope import Scope, wanted
+from grader.package.launch_loader import Find, Scope, load, wanted
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_xml
 

@@ -42,8 +42,7 @@ from grader.package.cmake import read_cmake, refine_cmake
 from grader.package.files import _text_facts
 from grader.package.launch import parse_launch, parse_launch_files
 from grader.package.manifest import parse_manifest, read_manifest
-from grader.package.python import read_syntax_report
-from grader.package.python_causes import cause_of
+from grader.package.python import cause_of, read_syntax_report
 from grader.rubric.load import load_rubric
 from grader.rubric.model import Param, Rubric
 from grader.rubric.source import read_source

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.package.python import check_syntax, read_syntax_report
-from grader.package.python_causes import cause_of
+from grader.package.python import cause_of, check_syntax, read_syntax_report
 
 # Each text, the line of its fault, and words of its cause; all hold under Python 3.8 as under the newest.
 CASES = {
