@@ -123,7 +123,7 @@ BOUNDS = {
         reading.MARKUP_LIMIT_BYTES // 10**6, launch._TAGS_MAX, launch._FILES_MAX, launch_loader.INCLUDES_MAX,
         launch_loader.DEPTH_MAX,
     ),
-    "`CMakeLists.txt`": (cmake_parse._FILE_LIMIT_BYTES // 1000, cmake_parse._STEPS_LIMIT),
+    "`CMakeLists.txt`": (cmake_parse.FILE_BYTES_MAX // 1000, cmake_parse.STEPS_MAX),
     "files of the package": (reading.SOURCE_LIMIT_BYTES // 10**6,),
     "files for the evidence": (recorded.ATTACHED_BYTES_MAX // KB, recorded.ATTACHED_FILES_MAX),
     "YAML files": (

@@ -1,4 +1,8 @@
-"""`CMakeLists.txt` as CMake reads it where a trace is at hand, and by `cmake_parser` where none is."""
+"""`CMakeLists.txt` as CMake reads it where a trace is at hand, and by `cmake_parse` where none is.
+
+A trace is what CMake writes by `--trace-expand --trace-format=json-v1`: one JSON object a line, perhaps cut short. The
+build runs the package's own programs, and those can write into it too, so it is compared with the files as handed in.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +29,22 @@ _LEFT_OUT = frozenset(
         *("function", "endfunction", "macro", "endmacro", "return", "break", "continue", "message"),
     },
 )
+_LINE_BYTES_MAX = 1_000_000
+_TRACE_LINES_MAX = 500_000
+_TRACE_BYTES_MAX = 64_000_000
+_CALLS_MAX = 20_000
+_CHARS_MAX = 4_000_000
+_SEPARATOR = re.compile(r"(?<!\\);")
+LINES_MAX = 20_000
+FILES_BYTES_MAX = 400_000
+"""Of all the files together that are parsed to hold the trace against them."""
+_SOURCE_BYTES_MAX = 200_000
+_BY_NAME = "cmake_language"
+_FLOW = frozenset({"if", "elseif", "while", "foreach"})
+_EXPANDED = frozenset("$@\\")
+
+_Commands = dict[tuple[int, str], list[tuple[str, ...] | None]]
+"""By line and name: the arguments, None where something in them is expanded."""
 
 
 def read_cmake(
@@ -71,17 +91,6 @@ def _kept(calls: tuple[CMakeCall, ...]) -> tuple[CMakeCall, ...]:
     return tuple(call for call in calls if call.name not in _LEFT_OUT)
 
 
-# [package.cmake_trace] What CMake wrote by `--trace-expand --trace-format=json-v1`: one JSON object a line, perhaps cut short.
-
-_LINE_LIMIT_BYTES = 1_000_000
-_LINES_LIMIT = 500_000
-_FILE_LIMIT_BYTES = 64_000_000
-_CALLS_LIMIT = 20_000
-_LETTERS_LIMIT = 4_000_000
-_CMAKE_FILE = "CMakeLists.txt"
-_SEPARATOR = re.compile(r"(?<!\\);")
-
-
 def read_trace(trace: Path, names: tuple[str, ...], root: str | None = None) -> tuple[CMakeCall, ...]:
     """The calls of the package's own CMake files, in order, with paths relative to the package.
 
@@ -99,12 +108,12 @@ def read_trace(trace: Path, names: tuple[str, ...], root: str | None = None) -> 
         for call in calls
         if call.file.startswith(prefix)
     )
-    return inside if any(call.file == _CMAKE_FILE for call in inside) else ()
+    return inside if any(call.file == CMAKE_FILE for call in inside) else ()
 
 
 def _guessed_root(calls: list[CMakeCall], names: tuple[str, ...]) -> str | None:
     folders = dict.fromkeys(
-        posixpath.dirname(c.file) for c in calls if posixpath.basename(c.file) == _CMAKE_FILE
+        posixpath.dirname(c.file) for c in calls if posixpath.basename(c.file) == CMAKE_FILE
     )
     named = [f for f in folders if posixpath.basename(f) in names]
     if named:
@@ -122,10 +131,10 @@ def _calls(trace: Path) -> list[CMakeCall]:
         call = _call(entry)
         if call is not None:
             letters += sum(map(len, call.args)) + 100 * len(call.args)
-            if letters > _LETTERS_LIMIT:
+            if letters > _CHARS_MAX:
                 break
             calls.append(call)
-        if len(calls) >= _CALLS_LIMIT:
+        if len(calls) >= _CALLS_MAX:
             break
     return calls
 
@@ -134,10 +143,10 @@ def _entries(trace: Path) -> Iterator[dict[str, Any]]:
     try:
         with trace.open("rb") as stream:
             read_bytes = 0
-            for _ in range(_LINES_LIMIT):
-                line = stream.readline(_LINE_LIMIT_BYTES)
+            for _ in range(_TRACE_LINES_MAX):
+                line = stream.readline(_LINE_BYTES_MAX)
                 read_bytes += len(line)
-                if not line or read_bytes > _FILE_LIMIT_BYTES:
+                if not line or read_bytes > _TRACE_BYTES_MAX:
                     return
                 entry = _decoded(line)
                 if isinstance(entry, dict):
@@ -173,22 +182,6 @@ def split_lists(args: list[str]) -> tuple[str, ...]:
     return tuple(printable(part.replace("\\;", ";")) for part in parts if part)
 
 
-# [package.cmake_written] Holds CMake's trace against the files as handed in: what was called has to be written there.
-#
-# The build runs the package's own programs, and those can write into the trace too.
-
-LINES_MAX = 20_000
-FILES_BYTES_MAX = 400_000
-"""Of all the files together that are parsed to hold the trace against them."""
-_FILE_LIMIT_BYTES_cmake_written = 200_000
-_BY_NAME = "cmake_language"
-_FLOW = frozenset({"if", "elseif", "while", "foreach"})
-_EXPANDED = frozenset("$@\\")
-
-_Commands = dict[tuple[int, str], list[tuple[str, ...] | None]]
-"""By line and name: the arguments, None where something in them is expanded."""
-
-
 class Written(NamedTuple):
     """The trace as far as the files bear it out, and what of it was too much to be looked at, in words, or ""."""
 
@@ -209,7 +202,7 @@ def written_calls(trace: bytes, folder: Path, root: str) -> Written:
     too_many = f"CMake's trace has more than {LINES_MAX} lines" if len(lines) > LINES_MAX else ""
     kept = []
     for line in lines[:LINES_MAX]:
-        call = _call_cmake_written(line)
+        call = _traced_call(line)
         path = posixpath.normpath(call["file"]) if call else ""
         if (
             call is None
@@ -220,7 +213,7 @@ def written_calls(trace: bytes, folder: Path, root: str) -> Written:
     return Written(b"\n".join(kept), too_many or files.too_much)
 
 
-def _call_cmake_written(line: bytes) -> dict[str, Any] | None:
+def _traced_call(line: bytes) -> dict[str, Any] | None:
     """An entry that names a call, None for whatever else is in the trace."""
     try:
         entry = json.loads(line)
@@ -251,7 +244,7 @@ class _Files:
         data = read_markup(self._folder, path)
         if isinstance(data, Fault):
             return {} if data.kind == "Missing" else None
-        if len(data) > _FILE_LIMIT_BYTES_cmake_written:
+        if len(data) > _SOURCE_BYTES_MAX:
             return None
         self._left_bytes -= len(data)
         if self._left_bytes < 0:

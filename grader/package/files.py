@@ -1,4 +1,4 @@
-"""Every file of a package: size, digest, mode, links, and how its text begins and is encoded."""
+"""Every file of a package: size, digest, mode, links, encoding, and what the system makes of its first line (`#!`)."""
 
 from __future__ import annotations
 
@@ -25,6 +25,21 @@ _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _SCRIPTS = frozenset({".py", ".sh", ".bash"})
 
 Interpreters = Callable[[str], bool]
+SYSTEM_PATH = "/usr/local/bin:/usr/bin:/bin"
+_LENGTH_LIMIT_BYTES = 255
+_LOOKED_AT_BYTES = 1 << 14
+_BOM = b"\xef\xbb\xbf"
+_EVERYWHERE = frozenset({"awk", "bash", "dash", "env", "perl", "rbash", "sed", "sh"})
+_ENV = frozenset({"/usr/bin/env", "/bin/env"})
+_SPLIT_STRING = re.compile(r"^(-[iv0]*S|--split-string[= ])\s*")
+_ADVICE = "write `#!/usr/bin/env python3`"
+_NO_SHEBANG = re.compile(r"#\s*!?\s*(/usr)?/bin/|#\s+!|!\s*#|/usr/bin/env ")
+
+# The arena provides these names wherever the system keeps its programs.
+_PYTHONS = frozenset(
+    {"python", "python3"}
+    | {f"{place}/{name}" for place in SYSTEM_PATH.split(":") for name in ("python", "python3")},
+)
 
 
 class Entry(NamedTuple):
@@ -140,25 +155,6 @@ def _encoding(data: bytes, *, python: bool) -> str:
         cut = len(data) >= SOURCE_LIMIT_BYTES and data[:-4].decode("utf-8", "replace").count("\ufffd") == 0
         return "utf-8" if cut else "unknown-8bit"
     return name
-
-
-# [package.shebang] The first line of a script as the kernel and `env` take it, and in plain words why they do not.
-
-SYSTEM_PATH = "/usr/local/bin:/usr/bin:/bin"
-_LENGTH_LIMIT_BYTES = 255
-_LOOKED_AT_BYTES = 1 << 14
-_BOM = b"\xef\xbb\xbf"
-_EVERYWHERE = frozenset({"awk", "bash", "dash", "env", "perl", "rbash", "sed", "sh"})
-_ENV = frozenset({"/usr/bin/env", "/bin/env"})
-_SPLIT_STRING = re.compile(r"^(-[iv0]*S|--split-string[= ])\s*")
-_ADVICE = "write `#!/usr/bin/env python3`"
-_NO_SHEBANG = re.compile(r"#\s*!?\s*(/usr)?/bin/|#\s+!|!\s*#|/usr/bin/env ")
-
-# The arena provides these names wherever the system keeps its programs.
-_PYTHONS = frozenset(
-    {"python", "python3"}
-    | {f"{place}/{name}" for place in SYSTEM_PATH.split(":") for name in ("python", "python3")},
-)
 
 
 def on_system(program: str) -> bool:

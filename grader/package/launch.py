@@ -15,7 +15,7 @@ from grader.package.xml import line_of, parse_xml
 
 _FILES_MAX = 100
 _TAGS_MAX = 20_000
-_LETTERS_MAX = 4_000
+_VALUE_CHARS_MAX = 4_000
 _SUFFIXES = (".launch", ".launch.xml", ".test")
 _TAGS = frozenset(
     {"arg", "env", "group", "include", "machine", "master", "node", "param", "remap", "rosparam", "test"}
@@ -101,9 +101,9 @@ def _parse(data: bytes, path: str) -> _Parsed:
         return _Parsed(None, fault)
     for tag in element.iter(etree.Element):
         for name, value in tag.attrib.items():
-            if len(value) > _LETTERS_MAX:
-                tag.set(name, value[:_LETTERS_MAX])
-    root = str(element.tag)[:_LETTERS_MAX]
+            if len(value) > _VALUE_CHARS_MAX:
+                tag.set(name, value[:_VALUE_CHARS_MAX])
+    root = str(element.tag)[:_VALUE_CHARS_MAX]
     if root != "launch":
         return _Parsed(None, _wrong_root(path, root, line_of(element)), root)
     nested = next((e for e in element.iter("launch") if e is not element), None)

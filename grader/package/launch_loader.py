@@ -1,4 +1,7 @@
-"""What `roslaunch` makes of a launch file with all that it includes of the same package; nothing is executed."""
+"""What `roslaunch` makes of a launch file with all that it includes of the same package; nothing is executed.
+
+`Scope` is what a tag sees where it stands: arguments, namespace, remaps, and `$(…)` as far as it is literal.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +21,14 @@ from grader.package.xml import line_of
 INCLUDES_MAX = 50
 DEPTH_MAX = 10
 WORK_MAX = 10_000
-
-
 _TOO_MUCH = "launch files that hold more than a robot can start"
+_SUBSTITUTION = re.compile(r"\$\(([^()]*)\)")
+_SLASHES = re.compile(r"//+")
+# Of one value: arguments that name each other can double at every step.
+_VALUE_CHARS_MAX = 4_000
+_TRUE, _FALSE = frozenset({"true", "1"}), frozenset({"false", "0"})
+
+Remaps = tuple[tuple[str, str], ...]
 
 
 class Find(Protocol):
@@ -213,17 +221,6 @@ def _fault(element: etree._Element, scope: Scope, message: str) -> Fault:
     return Fault(file=scope.file, line=line_of(element), kind="Include", message=message)
 
 
-# [package.launch_scope] What a launch file's tag sees where it stands: arguments, namespace, remaps; and `$(…)` as far as it is literal.
-
-_SUBSTITUTION = re.compile(r"\$\(([^()]*)\)")
-_SLASHES = re.compile(r"//+")
-# Of one value: arguments that name each other can double at every step.
-_LETTERS = 4_000
-_TRUE, _FALSE = frozenset({"true", "1"}), frozenset({"false", "0"})
-
-Remaps = tuple[tuple[str, str], ...]
-
-
 class Scope(Record):
     """`own` are the package's names, the first its usual one; `private` are `<param name="~…">` for later nodes.
 
@@ -240,8 +237,10 @@ class Scope(Record):
 
     def text(self, written: str) -> str:
         """`$(arg …)`, `$(dirname)` and `$(optenv NAME DEFAULT)` resolved; what only roslaunch knows stays as it is."""
-        text = _SUBSTITUTION.sub(lambda match: self._value(match[0], match[1].split()), written[:_LETTERS])
-        return text[:_LETTERS]
+        text = _SUBSTITUTION.sub(
+            lambda match: self._value(match[0], match[1].split()), written[:_VALUE_CHARS_MAX]
+        )
+        return text[:_VALUE_CHARS_MAX]
 
     def get(self, element: etree._Element, name: str) -> str | None:
         """An attribute resolved, None where it is not there."""
@@ -258,7 +257,7 @@ class Scope(Record):
         if not namespace:
             return self
         whole = namespace if namespace.startswith("/") else f"{self.namespace}{namespace}"
-        return self.model_copy(update={"namespace": _SLASHES.sub("/", f"/{whole[:_LETTERS]}/")})
+        return self.model_copy(update={"namespace": _SLASHES.sub("/", f"/{whole[:_VALUE_CHARS_MAX]}/")})
 
     def resolved(self, name: str) -> str:
         """A parameter's whole name."""

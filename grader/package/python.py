@@ -1,4 +1,4 @@
-"""Python files as a Python reads them, in a process of its own with limits; nothing is imported."""
+"""Python files as a Python reads them, in a child process with limits, and its errors in a student's words."""
 
 from __future__ import annotations
 
@@ -24,6 +24,67 @@ REPORT_BYTES_MAX = 8 << 20
 """More than `syntax.py` has to say of as many files as a package may have."""
 CRASHES_MAX = 3
 MESSAGE_CHARS_MAX = 500
+_TYPOGRAPHIC = (
+    ("\u2018\u2019\u201a\u201b\u2032\u00b4", "quote", "'"),
+    ("\u201c\u201d\u201e\u201f\u2033\u00ab\u00bb", "quote", '"'),
+    ("\u2010\u2011\u2012\u2013\u2014\u2015\u2212", "dash", "-"),
+)
+TEXT_CHARS_MAX = 300
+_COPIED = "copied from a PDF or a web page"
+
+# On any message: the faulty line itself tells.
+_MARKER = re.compile(r"(<{7}|={7}|>{7})(\s|$)")
+_LINES = (
+    (_MARKER.pattern, "git's merge markers (`<<<<<<<`) are still in the file: keep one version"),
+    (r"^\s*else\s+if\b", "Python writes `elif`, not `else if`"),
+    (r"^\s*except\s+[\w.]+\s*,\s*\w+\s*:", "this is Python 2: write `except Error as name:`"),
+    (r"^\s*raise\s+[\w.]+\s*,", 'this is Python 2: write `raise Error("text")`'),
+    (r"^\s*print\s+[^(=\s]", "this is Python 2: `print` needs brackets, `print(...)`"),
+    (r"^\s*exec\s+[^(=\s]", "this is Python 2: `exec` needs brackets, `exec(...)`"),
+    (r"`", "backticks are Python 2: write `repr(x)` or `str(x)`"),
+    (r"<>", "`<>` is Python 2: write `!=`"),
+    (r"\bur['\"]", '`ur"..."` is Python 2: write `r"..."`'),
+    (r"\b\d+[lL]\b", "a number that ends with `L` is Python 2: leave the `L` out"),
+    (r"\+\+|--\s*$", "Python has no `++` and `--`: write `x += 1`"),
+    (r"&&|\|\|", "Python writes `and`, `or` and `not`"),
+    (r"^\s*(\$|sudo |rosrun |roslaunch |cd |chmod )", "this is a command for the terminal, not Python"),
+    (r"^\s*(if|elif|while)\b[^=(:]*[^=!<>(:]=[^=]", "`=` gives a value to a name; to compare, write `==`"),
+    (r"\basync\b(?!\s+(def|for|with)\b)", "`async` is a reserved word since Python 3.7: use another name"),
+)  # fmt: skip
+
+_MESSAGES = (
+    (r"inconsistent use of tabs", "tabs and spaces are mixed in the indentation: use four spaces everywhere"),
+    (r"unindent does not match", "this line is indented like none of the lines above it"),
+    (r"unexpected indent", "this line is indented further than the one above, and nothing asks for it"),
+    (r"expected an indented block", "the line after a `:` must be indented (by four spaces)"),
+    (r"Missing parentheses in call to '(\w+)'", "this is Python 2: `{0}` needs brackets, `{0}(...)`"),
+    (r"multiple exception types", "this is Python 2: write `except Error as name:`"),
+    (r"leading zeros in decimal", "a number may not begin with 0: write 777, or 0o777 for an octal one"),
+    (r"expected ':'", "a colon `:` is missing at the end of the line"),
+    (r"'(.)' was never closed", "the bracket `{0}` is opened in this line and never closed"),
+    (r"unmatched '(.)'", "there is a `{0}` too many, or its opening bracket is missing"),
+    (r"closing parenthesis '(.)' does not match opening parenthesis '(.)'",
+     "a `{1}` is closed by `{0}`: the two must be of one kind"),
+    (r"triple-quoted", "a text in triple quotes is opened and never closed"),
+    (r"EOL while scanning|unterminated (f-)?string", "a quote is opened in this line and never closed"),
+    (r"Maybe you meant '=='|cannot assign to", "`=` gives a value to a name; to compare, write `==`"),
+    (r"forgot a comma", "a comma is missing between two values"),
+    (r"'return' outside function", "`return` stands outside every function: is its indentation right?"),
+    (r"'(break|continue)'? .*loop", "`{0}` stands outside every loop: is its indentation right?"),
+    (r"'yield' outside", "`yield` stands outside every function: is its indentation right?"),
+    (r"UTF-16", "the file is saved as UTF-16: save it as UTF-8"),
+    (r"Non-UTF-8 code|codec can't decode byte|invalid or missing encoding",
+     "the file is not saved as UTF-8 (accents of an old encoding): save it as UTF-8"),
+    (r"unicodeescape", r"a backslash in a text is read as `\U...`: write the text as r\"...\""),
+    (r"encoding", "line 1 or 2 names an encoding that Python does not know: write `# -*- coding: utf-8 -*-`"),
+    (r"null bytes", "the file holds null bytes: it is no text, or saved as UTF-16; save it as UTF-8"),
+    (r"after line continuation", r"nothing may follow a backslash `\` at the end of a line"),
+    (r"duplicate argument '(\w+)'", "two parameters are both called `{0}`"),
+    (r"unexpected EOF", "the file ends in the middle of something: a bracket, or a block without a body"),
+    (r"too many nested|overflow|too complex|recursion|^$", "the file is nested too deep for Python"),
+)  # fmt: skip
+
+_BLOCK = re.compile(r"\s*(if|elif|else|for|while|def|class|try|except|finally|with)\b")
 
 
 class SyntaxReport(Record):
@@ -145,71 +206,6 @@ def _joined(one: SyntaxReport, two: SyntaxReport) -> SyntaxReport:
         faults={**one.faults, **two.faults},
         slips=one.slips + two.slips,
     )
-
-
-# [package.python_causes] Python's own words about a syntax error, turned into a student's.
-
-_TYPOGRAPHIC = (
-    ("\u2018\u2019\u201a\u201b\u2032\u00b4", "quote", "'"),
-    ("\u201c\u201d\u201e\u201f\u2033\u00ab\u00bb", "quote", '"'),
-    ("\u2010\u2011\u2012\u2013\u2014\u2015\u2212", "dash", "-"),
-)
-TEXT_CHARS_MAX = 300
-_COPIED = "copied from a PDF or a web page"
-
-# On any message: the faulty line itself tells.
-_MARKER = re.compile(r"(<{7}|={7}|>{7})(\s|$)")
-_LINES = (
-    (_MARKER.pattern, "git's merge markers (`<<<<<<<`) are still in the file: keep one version"),
-    (r"^\s*else\s+if\b", "Python writes `elif`, not `else if`"),
-    (r"^\s*except\s+[\w.]+\s*,\s*\w+\s*:", "this is Python 2: write `except Error as name:`"),
-    (r"^\s*raise\s+[\w.]+\s*,", 'this is Python 2: write `raise Error("text")`'),
-    (r"^\s*print\s+[^(=\s]", "this is Python 2: `print` needs brackets, `print(...)`"),
-    (r"^\s*exec\s+[^(=\s]", "this is Python 2: `exec` needs brackets, `exec(...)`"),
-    (r"`", "backticks are Python 2: write `repr(x)` or `str(x)`"),
-    (r"<>", "`<>` is Python 2: write `!=`"),
-    (r"\bur['\"]", '`ur"..."` is Python 2: write `r"..."`'),
-    (r"\b\d+[lL]\b", "a number that ends with `L` is Python 2: leave the `L` out"),
-    (r"\+\+|--\s*$", "Python has no `++` and `--`: write `x += 1`"),
-    (r"&&|\|\|", "Python writes `and`, `or` and `not`"),
-    (r"^\s*(\$|sudo |rosrun |roslaunch |cd |chmod )", "this is a command for the terminal, not Python"),
-    (r"^\s*(if|elif|while)\b[^=(:]*[^=!<>(:]=[^=]", "`=` gives a value to a name; to compare, write `==`"),
-    (r"\basync\b(?!\s+(def|for|with)\b)", "`async` is a reserved word since Python 3.7: use another name"),
-)  # fmt: skip
-
-_MESSAGES = (
-    (r"inconsistent use of tabs", "tabs and spaces are mixed in the indentation: use four spaces everywhere"),
-    (r"unindent does not match", "this line is indented like none of the lines above it"),
-    (r"unexpected indent", "this line is indented further than the one above, and nothing asks for it"),
-    (r"expected an indented block", "the line after a `:` must be indented (by four spaces)"),
-    (r"Missing parentheses in call to '(\w+)'", "this is Python 2: `{0}` needs brackets, `{0}(...)`"),
-    (r"multiple exception types", "this is Python 2: write `except Error as name:`"),
-    (r"leading zeros in decimal", "a number may not begin with 0: write 777, or 0o777 for an octal one"),
-    (r"expected ':'", "a colon `:` is missing at the end of the line"),
-    (r"'(.)' was never closed", "the bracket `{0}` is opened in this line and never closed"),
-    (r"unmatched '(.)'", "there is a `{0}` too many, or its opening bracket is missing"),
-    (r"closing parenthesis '(.)' does not match opening parenthesis '(.)'",
-     "a `{1}` is closed by `{0}`: the two must be of one kind"),
-    (r"triple-quoted", "a text in triple quotes is opened and never closed"),
-    (r"EOL while scanning|unterminated (f-)?string", "a quote is opened in this line and never closed"),
-    (r"Maybe you meant '=='|cannot assign to", "`=` gives a value to a name; to compare, write `==`"),
-    (r"forgot a comma", "a comma is missing between two values"),
-    (r"'return' outside function", "`return` stands outside every function: is its indentation right?"),
-    (r"'(break|continue)'? .*loop", "`{0}` stands outside every loop: is its indentation right?"),
-    (r"'yield' outside", "`yield` stands outside every function: is its indentation right?"),
-    (r"UTF-16", "the file is saved as UTF-16: save it as UTF-8"),
-    (r"Non-UTF-8 code|codec can't decode byte|invalid or missing encoding",
-     "the file is not saved as UTF-8 (accents of an old encoding): save it as UTF-8"),
-    (r"unicodeescape", r"a backslash in a text is read as `\U...`: write the text as r\"...\""),
-    (r"encoding", "line 1 or 2 names an encoding that Python does not know: write `# -*- coding: utf-8 -*-`"),
-    (r"null bytes", "the file holds null bytes: it is no text, or saved as UTF-16; save it as UTF-8"),
-    (r"after line continuation", r"nothing may follow a backslash `\` at the end of a line"),
-    (r"duplicate argument '(\w+)'", "two parameters are both called `{0}`"),
-    (r"unexpected EOF", "the file ends in the middle of something: a bracket, or a block without a body"),
-    (r"too many nested|overflow|too complex|recursion|^$", "the file is nested too deep for Python"),
-)  # fmt: skip
-
-_BLOCK = re.compile(r"\s*(if|elif|else|for|while|def|class|try|except|finally|with)\b")
 
 
 def cause_of(
