@@ -242,7 +242,7 @@ class _Member(tarfile.TarInfo):
 def _next(archive: tarfile.TarFile) -> tarfile.TarInfo | None:
     """As `archive.next()`, which in Python 3.10 seeks before the beginning of a tar that holds nothing."""
     empty = archive.offset == 0 and archive.firstmember is None  # type: ignore[attr-defined]
-    archive.members = []  # type: ignore[attr-defined] # nobody looks back, and there may be many
+    archive.members = []  # type: ignore[attr-defined] # they are not needed again, and there may be many
     return None if empty else archive.next()
 
 

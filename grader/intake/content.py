@@ -25,7 +25,7 @@ _FORBIDDEN = re.compile(r'[<>:"|?*\\\x00-\x1f]|[. ]$')
 
 @dataclass(frozen=True, kw_only=True)
 class Content:
-    """`entries` is everything but folders, `left_out` the paths of those that nobody opens, `hints` say why."""
+    """`entries` is everything but folders, `left_out` the paths of those that are not opened, `hints` say why."""
 
     entries: list[Entry]
     left_out: frozenset[str]

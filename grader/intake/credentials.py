@@ -24,7 +24,7 @@ _URL = re.compile(
 _HOST = re.compile(r"(?:[\w.-]+|\[[0-9A-Fa-f:.]+\])(?::\d*)?")
 _UNFIT = re.compile(r"[\x00-\x1f\x7f]")
 _AUTHORITY = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<user>[^/?#]*)@")
-# A colon with no port after it: a password with a slash in it, which ends where nobody can tell.
+# A colon with no port after it: a password with a slash in it, of which the end is not known.
 _TORN = re.compile(r"(?P<scheme>https?)://[^/?#@\[\]]*:(?!\d*(?:[/?#]|$)).*", re.IGNORECASE | re.DOTALL)
 _REFUSED = re.compile(
     r"could not read (?:Username|Password)|terminal prompts disabled|Authentication failed|Access denied"

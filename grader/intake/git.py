@@ -1,4 +1,4 @@
-"""git as a subprocess that asks nothing, waits for nobody and runs nothing that a repository brings along."""
+"""git as a subprocess that asks nothing, ends in time, and runs nothing that a repository brings along."""
 
 from __future__ import annotations
 
@@ -169,7 +169,7 @@ class Git:
 
     @contextmanager
     def _ended_in_time(self, process: subprocess.Popen[bytes]) -> Iterator[None]:
-        """Where nobody can wait for output with a limit, the process is ended when its time is up."""
+        """Where output cannot be waited for with a limit (Windows), the process is ended when its time is up."""
         if sys.platform != "win32":
             yield
             return

@@ -27,7 +27,7 @@ _AT_MOST = 200
 
 @dataclass(frozen=True, kw_only=True)
 class Modes:
-    """`executable` maps every regular file's path below the package to its bit, None where nobody knows."""
+    """`executable` maps every regular file's path below the package to its bit, None where it is not known."""
 
     source: ModeSource
     executable: dict[str, bool | None]

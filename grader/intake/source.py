@@ -32,9 +32,9 @@ class Source:
     """`given` may be shown: it holds no password. `path` is set where the source lies on this machine.
 
     `url`, `ref` and `inside` (the folder of it that was asked for) are for a repository; `remote` tells
-    whether reaching it takes the user's own git settings. `top` is where one on this machine lies. `hints` are what
-    whoever brought it here has to say about it. `modes` says what a platform that takes uploads did to file modes:
-    `lost` where nobody knows them, `granted` where every file then counts as executable.
+    whether reaching it takes the user's own git settings. `top` is where one on this machine lies. `hints` are
+    remarks of the code that brought it here. `modes` says what a platform that takes uploads did to file modes:
+    `lost` where they are not known, `granted` where every file then counts as executable.
     """
 
     kind: Literal["folder", "archive", "repository"]
