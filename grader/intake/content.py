@@ -35,7 +35,7 @@ class Content:
 def package_content(
     folder: Path, *, limits: Limits, leave_out: Path | None = None, tolerant: bool = False
 ) -> Content:
-    """The content of a package's folder.
+    """Return the content of a package's folder.
 
     Raises OSError and SubmissionError as `walk` does, SubmissionError for more files than a package has, and for a
     file that may not be read and could be one that matters; `tolerant` leaves that one out.
@@ -86,7 +86,7 @@ def _hints(closed: list[str], large: list[str], others: list[str]) -> Iterable[s
 
 
 def remarks(folder: Path, entries: list[Entry], left_out: Collection[str]) -> tuple[str, ...]:
-    """What is worth saying of the files' names, and of those whose content is somewhere else."""
+    """Return what is worth saying of the files' names, and of those whose content is somewhere else."""
     paths = [entry.path for entry in entries]
     small = [e.path for e in entries if e.kind == "file" and 0 < e.size_bytes <= _LFS_BYTES]
     pointers = [path for path in small if path not in left_out and _is_pointer(folder / path)]

@@ -50,7 +50,7 @@ class Access:
 
 
 def split_address(url: str) -> tuple[str, Login | None]:
-    """The address without the login that stands in it, and that login; ssh and git know no password.
+    """Return the address without the login that stands in it, and that login; ssh and git know no password.
 
     Raises UsageError for an address in which they cannot be told apart.
     """
@@ -74,7 +74,7 @@ def split_address(url: str) -> tuple[str, Login | None]:
 
 
 def accesses(url: str, login: Login | None) -> tuple[Access, ...]:
-    """Every way to be let in at `url` (an address without a login), in the order in which they are tried.
+    """Return every way to be let in at `url` (an address without a login), in the order in which they are tried.
 
     A token of the environment is for its own server, and never for http://. A login of the address is for that alone.
     """
@@ -98,7 +98,7 @@ def refused(stderr: str) -> bool:
 
 
 def scrubbed(text: str, secrets: tuple[str, ...]) -> str:
-    """`text` without the secrets, should a server say them again."""
+    """Return `text` without the secrets, should a server say them again."""
     for secret in secrets:
         text = text.replace(secret, "***")
     return text

@@ -50,7 +50,7 @@ class Candidate:
 
 
 def find_candidates(root: Path, *, leave_out: Path | None = None) -> list[Candidate]:
-    """The packages below `root`, nearest first, and each folder that has only a `CMakeLists.txt` or `src/`.
+    """Return the packages below `root`, nearest first, and each folder that has only a `CMakeLists.txt` or `src/`.
 
     Not entered: packages, `build/`, `devel/`, `install/`, hidden folders, links, `leave_out`.
     Raises OSError where `root` itself cannot be read.
@@ -91,7 +91,8 @@ def _looked_at(root: Path, leave_out: Path | None) -> Iterator[tuple[Folder, Can
 
 
 def linked_candidate(root: Path, wanted: str) -> Candidate | None:
-    """A package of that name behind a link of that name, if the link stays inside of `root`; catkin follows such."""
+    """Return a package of that name behind a link of that name, if the link stays inside of `root`; catkin follows
+    such."""
     real_root = root.resolve()
     for folder in walk(root, tolerant=True):
         folder.folders[:] = [name for name in folder.folders if name not in NO_CONTENT]
@@ -107,7 +108,7 @@ def linked_candidate(root: Path, wanted: str) -> Candidate | None:
 
 
 def find_packages(root: Path) -> list[tuple[str, Path]]:
-    """The packages that catkin would find below `root`, nearest first, as (name, folder).
+    """Return the packages that catkin would find below `root`, nearest first, as (name, folder).
 
     If there are none, but `root` lies inside a package, then that one.
     Raises OSError where `root` cannot be read.
@@ -120,7 +121,7 @@ def find_packages(root: Path) -> list[tuple[str, Path]]:
 
 
 def enclosing_package(path: Path) -> Path | None:
-    """The package that `path` lies in or is, or None.
+    """Return the package that `path` lies in or is, or None.
 
     Within a repository the outermost, as catkin looks no further than the first manifest on its way down;
     elsewhere the nearest, as nothing tells where the student's own folders end.
@@ -210,7 +211,7 @@ class Choice:
 
 
 def choose(candidates: list[Candidate], wanted: str) -> Choice | None:
-    """The lab's package: by its manifest's name, by that in other case, by its folder's name, in this order.
+    """Return the lab's package: by its manifest's name, by that in other case, by its folder's name, in this order.
 
     What catkin does not see (a marker file, no manifest) comes after all that it does see.
     """
@@ -281,7 +282,7 @@ def _ignored_hint(chosen: Candidate) -> str:
 def not_found(
     root: Path, candidates: list[Candidate], wanted: str, git_links: tuple[str, ...]
 ) -> PackageNotFound:
-    """The error for a submission without the lab's package; it says what is there instead."""
+    """Return the error for a submission without the lab's package; it says what is there instead."""
     names = sorted({c.name for c in candidates if c.has_manifest})
     here = f"packages here: {listing(names)}" if names else f"no {MANIFEST} was found"
     usual = f"It is the folder whose {MANIFEST} says <name>{wanted}</name>: was it handed in (and pushed)?"

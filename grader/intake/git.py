@@ -103,7 +103,7 @@ class Git:
         remote: bool = False,
         accesses: tuple[Access, ...] = (Access(),),
     ) -> bytes:
-        """What `git *args` prints in `cwd`. `remote` lets it use the network and the user's own settings; of the
+        """Return what `git *args` prints in `cwd`. `remote` lets it use the network and the user's own settings; of the
         `accesses` each is tried where the server did not let git in with those before.
 
         Raises GitFailed, GitMissing or GitTimeout.
@@ -140,7 +140,7 @@ class Git:
         return answer
 
     def records(self, *args: str, cwd: Path, repository: Repository) -> Generator[bytes]:
-        """The NUL-ended records that git prints, one by one, so that a caller can stop an endless listing."""
+        """Yield the NUL-ended records that git prints, one by one, so that a caller can stop an endless listing."""
         whole = (*_place(repository), *args)
         environment = self._local_environment()
         with self._started(

@@ -105,7 +105,7 @@ _CAUSES: tuple[tuple[str, str, str], ...] = (
 
 
 def explained(failure: GitFailed, source: Source) -> SubmissionError:
-    """The error to raise for what git said about `source`."""
+    """Return the error to raise for what git said about `source`."""
     if isinstance(failure, GitMissing):
         return Unreachable(
             f"{source.given}: git is not installed here, so no repository can be read",
@@ -144,7 +144,7 @@ def _cause(failure: GitFailed) -> tuple[str, str] | None:
 
 
 def said(failure: GitFailed, source: Source) -> str:
-    """The line of git's that names the cause, without a password that the address may hold."""
+    """Return the line of git's that names the cause, without a password that the address may hold."""
     lines = [line.strip() for line in failure.stderr.splitlines() if line.strip()]
     fatal = [line for line in lines if line.startswith(("fatal:", "error:", "remote:"))]
     line = (fatal or lines or ["nothing"])[-1].removeprefix("fatal: ").removeprefix("error: ")

@@ -35,7 +35,7 @@ class Modes:
 
 
 def archive_modes(entries: Iterable[Entry], known: Mapping[str, bool | None], *, path: str) -> Modes:
-    """The archive's word. `path` is the package's folder in the archive."""
+    """Return the modes that the archive gives. `path` is the package's folder in the archive."""
     prefix = "" if path == "." else f"{path}/"
     executable = {entry.path: known.get(prefix + entry.path) for entry in entries if entry.kind == "file"}
     carried = any(bit is not None for bit in executable.values())
@@ -55,8 +55,8 @@ def folder_modes(entries: Iterable[Entry], folder: Path, repositories: Repositor
 
 
 def uploaded_modes(modes: Modes, given: GivenModes) -> Modes:
-    """What is known where an upload may have lost the modes: git and an archive that carries them are believed, and a
-    disk on which some files are executable and others are not."""
+    """Return what is known where an upload may have lost the modes: git and an archive that carries them are believed,
+    and a disk on which some files are executable and others are not."""
     mixed = len(set(modes.executable.values())) > 1
     if given == "kept" or modes.source in {"git", "archive"} or (modes.source == "disk" and mixed):
         return modes
@@ -132,7 +132,7 @@ def _untracked(folder: Path, on_disk: Mapping[str, bool | None], tracked: Mappin
 
 
 def right_in_git(folder: Path, entries: Iterable[Entry], git: Git, base: Path) -> frozenset[str]:
-    """The paths, below the package's folder, of scripts that have CRLF here and LF in git's index.
+    """Return the paths, below the package's folder, of scripts that have CRLF here and LF in git's index.
 
     On Linux there are none: there what lies on the disk is run, and its line ends count.
     """

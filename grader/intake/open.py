@@ -82,7 +82,7 @@ def open_submission(
     git_timeout_s: float = 120.0,
     limits: Limits | None = None,
 ) -> Submission:
-    """The submission that `source` names, with the lab's `package` found in it; it may be read already.
+    """Return the submission that `source` names, with the lab's `package` found in it; it may be read already.
 
     A folder is used in place and never written to. An archive or a repository comes to lie in a new folder
     below `workdir`, which is made where it is missing and belongs to the caller. All of git's work together
@@ -105,7 +105,8 @@ def open_submission(
 
 
 def open_recording(source: str | Source, *, submission_id: str | None = None) -> RecordedSubmission | None:
-    """The submission where `source` is itself a recording (a bag or an MCAP file), None where it is anything else.
+    """Return the submission where `source` is itself a recording (a bag or an MCAP file), None where it is anything
+    else.
 
     Raises what `open_submission` raises.
     """
@@ -113,7 +114,7 @@ def open_recording(source: str | Source, *, submission_id: str | None = None) ->
     try:
         if parsed.kind != "archive" or parsed.path is None or not is_recording(parsed.path):
             return None
-        submission = single(parsed, parsed.path)
+        submission = _one_recording(parsed, parsed.path)
     except OSError as error:
         raise unreadable(parsed.given, error) from error
     return _named(submission, submission_id)
@@ -122,12 +123,13 @@ def open_recording(source: str | Source, *, submission_id: str | None = None) ->
 def open_recorded(
     source: str | Source, *, workdir: Path, submission_id: str | None = None, git_timeout_s: float = 120.0
 ) -> RecordedSubmission:
-    """The submission of a lab that asks for recordings alone: as `open_submission`, and no package is looked for."""
+    """Return the submission of a lab that asks for recordings alone: as `open_submission`, and no package is looked
+    for."""
     parsed = _parsed(source)
     with _base(workdir) as base:
         try:
             git = Git(base / "git-home", timeout_s=git_timeout_s)
-            submission = several(open_source(parsed, git, base, Limits()), git)
+            submission = _all_recordings(open_source(parsed, git, base, Limits()), git)
         except OSError as error:
             raise unreadable(parsed.given, error) from error
     return _named(submission, submission_id)
@@ -149,7 +151,7 @@ def _parsed(source: str | Source) -> Source:
 
 
 def unreadable(given: str, error: OSError) -> GraderError:
-    """The error for a source that this machine could not read, or had no room for."""
+    """Return the error for a source that this machine could not read, or had no room for."""
     if error.errno in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)):
         return OutputError(f"{given}: the disk is full", hint="Free some room (`df -h`) and try again.")
     where = f" at {brief(str(error.filename))}" if error.filename else ""
@@ -203,7 +205,7 @@ def open_source(source: Source, git: Git, base: Path, limits: Limits) -> Opened:
 
 
 def locate(opened: Opened, wanted: str) -> Located:
-    """The lab's package in what was opened. A folder inside the package (`lab1/src`) stands for the package.
+    """Return the lab's package in what was opened. A folder inside the package (`lab1/src`) stands for the package.
 
     Raises PackageNotFound, or SubmissionError for an empty folder.
     """
@@ -231,7 +233,7 @@ def _locate(opened: Opened, wanted: str) -> Located | None:
 
 
 def describe(located: Located, git: Git, limits: Limits) -> Submission:
-    """The record that the next station reads. Raises OSError for a file that cannot be read."""
+    """Return the record that the next station reads. Raises OSError for a file that cannot be read."""
     opened, choice = located.opened, located.choice
     chosen = choice.package
     repositories = Repositories(git, opened.leave_out, root=opened.root, known=opened.repository)
@@ -316,8 +318,9 @@ def is_recording(path: Path) -> bool:
         return file.read(16).startswith(_MAGIC)
 
 
-def single(source: Source, path: Path) -> RecordedSubmission:
-    """The submission that is one recording. Raises OSError where it cannot be read, SubmissionError for its size."""
+def _one_recording(source: Source, path: Path) -> RecordedSubmission:
+    """Return the submission that is one recording. Raises OSError where it cannot be read, SubmissionError for its
+    size."""
     limit_bytes = Limits().recording_bytes
     if path.stat().st_size > limit_bytes:
         raise SubmissionError(
@@ -334,8 +337,8 @@ def single(source: Source, path: Path) -> RecordedSubmission:
     )
 
 
-def several(opened: Opened, git: Git) -> RecordedSubmission:
-    """The submission whose recordings lie somewhere in what was opened, with or without a package."""
+def _all_recordings(opened: Opened, git: Git) -> RecordedSubmission:
+    """Return the submission whose recordings lie somewhere in what was opened, with or without a package."""
     entries = list_entries(opened.root, leave_out=opened.leave_out, tolerant=True)
     left_out = {e.path for e in entries if e.size_bytes > Limits().recording_bytes or not _is_open(opened, e)}
     commit = opened.commit
@@ -356,7 +359,7 @@ def _is_open(opened: Opened, entry: Entry) -> bool:
 
 
 def find_recordings(root: Path, pattern: str) -> list[Path]:
-    """The files below `root` that fit a pattern, nearest first; each content once, links left out.
+    """Return the files below `root` that fit a pattern, nearest first; each content once, links left out.
 
     A pattern without a slash is for a file's name in any folder; capitals make no difference.
     """

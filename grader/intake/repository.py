@@ -60,7 +60,7 @@ class _Files:
 
 
 def clone(source: Source, git: Git, into: Path, limits: Limits) -> Clone:
-    """The commit of `source`, checked out in the new folder `into`.
+    """Return the commit of `source`, checked out in the new folder `into`.
 
     Raises SubmissionError where it cannot be had; the reason is named.
     """
@@ -160,7 +160,7 @@ def _ask(source: Source, git: Git, into: Path, command: tuple[str, ...], *refspe
 
 
 def ask(source: Source, git: Git, repository: Repository, command: tuple[str, ...], *refspecs: str) -> bytes:
-    """What the server of `source` answers to a command that takes an address. Raises GitFailed."""
+    """Return what the server of `source` answers to a command that takes an address. Raises GitFailed."""
     url, login = split_address(source.url) if source.remote else (source.url, None)
     return git.run(
         *(*command, "--", url, *refspecs),
@@ -234,7 +234,7 @@ def parse_refs(text: str) -> dict[str, str]:
 
 
 def choose_ref(refs: dict[str, str], ref: str | None, *, given: str) -> Wanted:
-    """What to fetch for `@ref`, or for none. Raises SubmissionError, naming what is there."""
+    """Return what to fetch for `@ref`, or for none. Raises SubmissionError, naming what is there."""
     if not refs:
         raise SubmissionError(
             f"{given}: the repository is empty, it has no commit", hint="Commit and `git push` first."
@@ -250,7 +250,7 @@ def choose_ref(refs: dict[str, str], ref: str | None, *, given: str) -> Wanted:
 
 
 def no_such_ref(refs: dict[str, str], ref: str, *, given: str) -> SubmissionError:
-    """The error for a ref that is not there, with the nearest that is."""
+    """Return the error for a ref that is not there, with the nearest that is."""
     names = [re.sub(r"^refs/(heads|tags)/", "", name) for name in refs if name.startswith("refs/heads/")]
     names += [name[len("refs/tags/") :] for name in refs if re.fullmatch(r"refs/tags/.*(?<!\^\{\})", name)]
     near = difflib.get_close_matches(ref, names, n=1)

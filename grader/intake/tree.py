@@ -36,7 +36,7 @@ class Folder:
     others: list[os.DirEntry[str]]
 
     def inside(self, name: str) -> str:
-        """The path of an entry of this folder."""
+        """Return the path of an entry of this folder."""
         return name if self.path == "." else f"{self.path}/{name}"
 
 
@@ -51,7 +51,7 @@ class Entry:
 
 
 def walk(root: Path, *, tolerant: bool = False) -> Iterator[Folder]:
-    """Every folder from `root` on, nearest first, in order of names; links are entries, never ways.
+    """Yield every folder from `root` on, nearest first, in order of names; links are entries, never ways.
 
     Raises OSError for a folder that cannot be read, hidden ones left out, and SubmissionError for more than MAX_DEPTH
     folders in each other or too much in one of them; `tolerant` passes over those below the root. Raises
@@ -96,7 +96,7 @@ def _is_hidden(path: str) -> bool:
 
 
 def too_deep(name: str) -> SubmissionError:
-    """The error for a tree that no student's work looks like."""
+    """Return the error for a tree that no student's work looks like."""
     return SubmissionError(
         f"{brief(name)} holds more than {MAX_DEPTH} folders in each other",
         hint="Hand in the package alone.",
@@ -110,7 +110,7 @@ def _too_many(name: str, number: int) -> SubmissionError:
 def list_entries(
     root: Path, *, leave_out: Path | None = None, tolerant: bool = False, max_folders: int = MAX_IN_TREE
 ) -> list[Entry]:
-    """Everything below `root` but folders, sorted by path; `leave_out` is a folder not to enter.
+    """Return everything below `root` but folders, sorted by path; `leave_out` is a folder not to enter.
 
     Raises what `walk` raises, and SubmissionError for more than `max_folders` folders.
     """
@@ -145,7 +145,7 @@ def is_there(path: Path) -> bool:
 
 
 def read_file(path: Path, limit_bytes: int) -> bytes | None:
-    """The file's first bytes; None for what is no regular file. A pipe is never waited for.
+    """Return the file's first bytes; None for what is no regular file. A pipe is never waited for.
 
     Raises OSError where it cannot be read.
     """

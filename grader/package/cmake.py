@@ -50,7 +50,7 @@ _Commands = dict[tuple[int, str], list[tuple[str, ...] | None]]
 def read_cmake(
     folder: Path, name: str, *, trace: Path | None = None, root: str | None = None
 ) -> CMakeFacts | None:
-    """The calls of the package's CMake files; None where there is no `CMakeLists.txt`.
+    """Return the calls of the package's CMake files; None where there is no `CMakeLists.txt`.
 
     `name` is the package's name for variables that catkin sets. For `trace` and `root` see `refine_cmake`.
     """
@@ -92,7 +92,7 @@ def _kept(calls: tuple[CMakeCall, ...]) -> tuple[CMakeCall, ...]:
 
 
 def read_trace(trace: Path, names: tuple[str, ...], root: str | None = None) -> tuple[CMakeCall, ...]:
-    """The calls of the package's own CMake files, in order, with paths relative to the package.
+    """Return the calls of the package's own CMake files, in order, with paths relative to the package.
 
     `root` is the package's folder as CMake saw it. Without it, that is the folder of a traced
     `CMakeLists.txt` that has one of the `names`, or the only one there is. Empty where the trace has none,
@@ -190,8 +190,8 @@ class Written(NamedTuple):
 
 
 def written_calls(trace: bytes, folder: Path, root: str) -> Written:
-    """The trace without the calls that the package's files do not bear out: no command of that name at that line, or
-    only with other arguments, where these are plain words.
+    """Return the trace without the calls that the package's files do not bear out: no command of that name at that
+    line, or only with other arguments, where these are plain words.
 
     `folder` holds the package as handed in, `root` is where CMake saw it. A file that the parser cannot read through
     bears out everything, one that was not handed in nothing, and so does one that there is no more time for.

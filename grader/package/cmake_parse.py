@@ -65,7 +65,7 @@ class _Variables(dict[str, str]):
 
 
 def parse_cmake(folder: Path, name: str) -> CMakeFacts | None:
-    """The calls of the package in `folder`, every command kept; None where it has no `CMakeLists.txt`.
+    """Return the calls of the package in `folder`, every command kept; None where it has no `CMakeLists.txt`.
 
     Never raises; `fault` says why CMake would not read the file, and the calls are then those before it.
     """
@@ -220,7 +220,7 @@ def _escaped(token: Token) -> Token:
 
 
 def parse_tree_of(data: bytes, file: str) -> tuple[list[nodes.AstFileNode], Fault | None]:
-    """The top-level commands and blocks of a CMake file, up to the fault where there is one. Never raises."""
+    """Return the top-level commands and blocks of a CMake file, up to the fault where there is one. Never raises."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         cause = f"`{file}` is saved as UTF-16: save it as UTF-8"
         return [], Fault(file=file, line=1, kind="ParseError", message="is UTF-16", cause=cause)
@@ -242,7 +242,7 @@ def parse_tree_of(data: bytes, file: str) -> tuple[list[nodes.AstFileNode], Faul
 
 
 def commands_of(data: bytes) -> list[nodes.Command] | None:
-    """Every command of a CMake file, those in blocks and definitions too; None where it cannot be read through."""
+    """Return every command of a CMake file, also those in blocks and definitions; None where it cannot be read."""
     text = _readable(data)
     commands, fault = ([], None) if text is None else _commands(text, "")
     return None if text is None or fault else commands

@@ -50,7 +50,7 @@ class Entry(NamedTuple):
 
 
 def read_files(package: SourcePackage, interpreters: Interpreters | None = None) -> tuple[Entry, ...]:
-    """All regular files and links of the package, by path; no link is followed out of it.
+    """Return all regular files and links of the package, by path; no link is followed out of it.
 
     What catkin and git leave behind (`build/`, `devel/`, `install/`, `.git/`, …), pipes and devices are left
     out.
@@ -169,7 +169,7 @@ def on_system(program: str) -> bool:
 def read_shebang(
     data: bytes, interpreters: Callable[[str], bool] | None = None
 ) -> tuple[Shebang | None, str]:
-    """The shebang of a file that begins with `data`, and why the system cannot use it ("" where it can).
+    """Return the shebang of a file that begins with `data`, and why the system cannot use it ("" where it can).
 
     `interpreters` is asked for absolute paths and names behind `env`; `python` and `python3` are always
     there.
@@ -191,7 +191,7 @@ def read_shebang(
 
 
 def resolve(text: str) -> tuple[str, str, str]:
-    """What `#!text` comes down to: the interpreter's name, the program to look for, and what is wrong."""
+    """Return what `#!text` comes down to: the interpreter's name, the program to look for, and what is wrong."""
     if not text:
         return "", "", f"nothing follows `#!`: {_ADVICE}"
     program, *rest = text.split(None, 1)

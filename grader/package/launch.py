@@ -40,7 +40,7 @@ def is_launch_file(path: str) -> bool:
 def read_launch_files(
     folder: Path, paths: Iterable[tuple[str, str]], names: Iterable[str] = ()
 ) -> tuple[LaunchFile, ...]:
-    """Each launch file; `paths` are pairs of the name to show and the path on disk relative to `folder`.
+    """Return each launch file; `paths` are pairs of the name to show and the path on disk relative to `folder`.
 
     `names` are the package's own, as `$(find …)` calls it.
     """
@@ -49,12 +49,12 @@ def read_launch_files(
 
 
 def parse_launch_files(texts: Mapping[str, bytes], names: Iterable[str] = ()) -> tuple[LaunchFile, ...]:
-    """The same from the files' bytes by path."""
+    """Return the same from the files' bytes by path."""
     return _records(_Library(texts, lambda path: texts[path]), names)
 
 
 def parse_launch(data: bytes, path: str) -> LaunchFile:
-    """One launch file from its bytes. Never raises: what is wrong with it is the record's `fault`."""
+    """Return one launch file from its bytes. Never raises: what is wrong with it is the record's `fault`."""
     return _record(path, _parse(data, path), (), lambda _: (None, None))
 
 

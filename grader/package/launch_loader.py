@@ -243,29 +243,29 @@ class Scope(Record):
         return text[:_VALUE_CHARS_MAX]
 
     def get(self, element: etree._Element, name: str) -> str | None:
-        """An attribute resolved, None where it is not there."""
+        """Return an attribute resolved, None where it is not there."""
         written = element.get(name)
         return None if written is None else self.text(written)
 
     def of(self, element: etree._Element) -> Scope:
-        """The scope in the element, as far as its own conditions go."""
+        """Return the scope in the element, as far as its own conditions go."""
         conditions = f"{self.get(element, 'if') or ''}{self.get(element, 'unless') or ''}"
         return self.model_copy(update={"uncertain": True}) if "$(" in conditions else self
 
     def below(self, namespace: str | None) -> Scope:
-        """The scope in a group, node or include with this `ns`."""
+        """Return the scope in a group, node or include with this `ns`."""
         if not namespace:
             return self
         whole = namespace if namespace.startswith("/") else f"{self.namespace}{namespace}"
         return self.model_copy(update={"namespace": _SLASHES.sub("/", f"/{whole[:_VALUE_CHARS_MAX]}/")})
 
     def resolved(self, name: str) -> str:
-        """A parameter's whole name."""
+        """Return a parameter's whole name."""
         whole = name if name.startswith("/") else f"{self.namespace}{name}"
         return _SLASHES.sub("/", whole.rstrip("/") or "/")
 
     def own_path(self, path: str) -> str | None:
-        """The package's own path behind `$(find <package>)/…`, None for any other."""
+        """Return the package's own path behind `$(find <package>)/…`, None for any other."""
         found = re.fullmatch(r"\$\(find\s+([^()\s]+)\s*\)/+(.+)", path.strip())
         return _plain(found[2]) if found and found[1] in self.own else None
 

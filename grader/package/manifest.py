@@ -68,7 +68,7 @@ _CAUSES = (
 
 
 def read_manifest(folder: Path) -> tuple[Manifest | None, Fault | None]:
-    """The manifest of the package in `folder`, or None and why `catkin_make` would not take it."""
+    """Return the manifest of the package in `folder`, or None and why `catkin_make` would not take it."""
     data = read_markup(folder, MANIFEST)
     if isinstance(data, Fault):
         return None, _missing(folder, data)
@@ -86,7 +86,7 @@ def _missing(folder: Path, fault: Fault) -> Fault:
 
 
 def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
-    """The manifest from its bytes. Never raises."""
+    """Return the manifest from its bytes. Never raises."""
     if not data.strip():
         return None, _fault(1, "XMLSyntaxError", "no element found", "`package.xml` is empty")
     try:
@@ -199,7 +199,7 @@ def _advice(package: Package, maintainers: tuple[Person, ...]) -> Iterator[str]:
 
 
 def explain(message: str, root: etree._Element) -> tuple[int | None, str]:
-    """The line and the causes, `; ` between them, of catkin_pkg's `message`; "" where it is not known."""
+    """Return the line and the causes, `; ` between them, of catkin_pkg's `message`; "" where it is not known."""
     known: dict[str, int | None] = {}
     for text in filter(None, (part.strip("- ") for part in message.split("\n"))):
         for pattern, tag, cause in _CAUSES:

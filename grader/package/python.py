@@ -118,8 +118,8 @@ class _RawEntry(Record):
 
 
 def read_syntax_report(output: bytes | str) -> SyntaxReport:
-    """The report of `grader/arena/ros/syntax.py` from what it printed; foreign lines are passed over, and what is past
-    `REPORT_BYTES_MAX` is not read."""
+    """Return the report of `grader/arena/ros/syntax.py` from what it printed; foreign lines are passed over, and what
+    is past `REPORT_BYTES_MAX` is not read."""
     checked: list[str] = []
     faults: dict[str, Fault] = {}
     slips: list[PythonSlip] = []
@@ -156,7 +156,7 @@ def _fault(file: str, raw: _RawFault) -> Fault:
 
 
 def check_syntax(folder: Path, paths: Sequence[str], *, timeout_s: float = 10.0) -> SyntaxReport:
-    """The report on files of `folder`, made by this Python in processes of their own with limits.
+    """Return the report on files of `folder`, made by this Python in processes of their own with limits.
 
     A file that crashes Python gets a fault of kind `PythonCrash`, those that the time does not reach
     `NotChecked`.
@@ -211,7 +211,7 @@ def _joined(one: SyntaxReport, two: SyntaxReport) -> SyntaxReport:
 def cause_of(
     message: str, text: str = "", *, column: int | None = None, opened: int | None = None, mixed: bool = False
 ) -> str:
-    """The cause in plain words, "" where Python's `message` says enough.
+    """Return the cause in plain words, "" where Python's `message` says enough.
 
     `text` is the faulty line, `column` the place in it (from 1), `opened` the line of a bracket that is never
     closed, `mixed` whether the file indents with tabs and with spaces.

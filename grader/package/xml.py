@@ -52,7 +52,7 @@ _LAST_LINE = 65_535
 def parse_xml(
     data: bytes, file: str, *, root: str, encoding: str | None = None, max_tags: int = 2_000
 ) -> tuple[etree._Element | None, Fault | None]:
-    """The root element, or None and the fault. `root` is the tag that the file should begin with.
+    """Return the root element, or None and the fault. `root` is the tag that the file should begin with.
 
     `encoding` overrides what the file says of itself. Nothing that a file declares is expanded or fetched, and
     nothing of more than `max_tags` tags is looked at.
