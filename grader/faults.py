@@ -25,8 +25,7 @@ from grader.errors import (
     UsageError,
 )
 from grader.files import FULL
-from grader.intake.identity import identify
-from grader.intake.source import Source
+from grader.intake.source import Source, identify
 from grader.model.result import (
     NO_TIME,
     CriterionResult,

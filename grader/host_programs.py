@@ -24,6 +24,20 @@ HOST_PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 HOST_ENV = {"PATH": HOST_PATH, "LANG": "C.UTF-8"}
 
 
+LOADING = {
+    *("PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "DYLD_FALLBACK_LIBRARY_PATH", "TMPDIR", "TEMP", "TMP"),
+    *("SYSTEMROOT", "SYSTEMDRIVE", "WINDIR", "COMSPEC", "PATHEXT"),
+}
+"""Of the user's variables, what a program needs: to be found, to load, and on Windows to run at all."""
+
+
+def loading_environment(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return only those variables that a program of this machine needs to be found and loaded."""
+    return {
+        name: value for name, value in with_absolute_paths(environment).items() if name.upper() in LOADING
+    }
+
+
 def with_absolute_paths(environment: Mapping[str, str]) -> dict[str, str]:
     """Return the same variables without the entries of `PATH` and its like that depend on the current folder."""
     whole = {name: value for name, value in environment.items() if name not in LISTS}

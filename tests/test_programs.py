@@ -53,8 +53,10 @@ STARTS = {
     "intake/git.py:_started": Start(
         "environment", "cwd", "its repository's data; no setting, hook or filter of it"
     ),
-    "package/python.py:_run": Start(
-        "with_absolute_paths(os.environ)", None, "its source files, which are parsed and not run"
+    "limited.py:run_limited": Start(
+        "loading_environment(os.environ)",
+        "'/'",
+        "its archive, and its source files, which are parsed and not run",
     ),
     "workers.py:_start": Start(
         "{**with_absolute_paths(os.environ), **self._env}",

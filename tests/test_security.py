@@ -15,9 +15,9 @@ from grader.arena.limits import Limits as RunLimits
 from grader.arena.ros_env import DUMP_BYTES, NAMES_MAX, VALUE_BYTES
 from grader.checks.support import text
 from grader.evidence import container, decode, definitions, memory_budget
-from grader.intake import git, gitdir
+from grader.intake import archive, git, gitdir
 from grader.intake.limits import Limits as IntakeLimits
-from grader.package import cmake_parse, cmake_written, launch, launch_loader, python, reading
+from grader.package import cmake, cmake_parse, launch, launch_loader, python, reading
 
 KB, MB, RUN = 1 << 10, 1 << 20, RunLimits()
 ROOT = Path(__file__).resolve().parent.parent
@@ -77,10 +77,11 @@ BOUNDS = {
         RUN.built_bytes // MB, workspace.MEMBERS_MAX, workspace.HEADER_BYTES_MAX // KB,
         workspace.HEADERS_BYTES_MAX // MB, workspace.HEADERS_IN_A_ROW_MAX, len(workspace.ELF),
     ),
-    "CMake's trace": (files.READ_MAX // MB, cmake_written.LINES_MAX, cmake_written.FILES_BYTES_MAX // 1000),
+    "CMake's trace": (files.READ_MAX // MB, cmake.LINES_MAX, cmake.FILES_BYTES_MAX // 1000),
     "remarks on Python files": (
         python.REPORT_BYTES_MAX // MB, "ros/syntax:SLIPS_LIMIT", "ros/syntax:ALL_SLIPS_LIMIT", build.STEP_S,
     ),
+    "archives": (archive.MEMORY_BYTES // MB, archive.CPU_S, int(archive.WALL_S)),
     "calls of the master": (
         ("ros/rpc:HEAD_BYTES_MAX", KB), ("ros/rpc:BODY_BYTES_MAX", MB), "ros/xmlrpc_parser:ELEMENTS_MAX",
         "ros/xmlrpc_parser:DEPTH_MAX", "ros/rpc:CONNECTIONS_MAX", "ros/rpc:CALLS_HZ", "ros/rpc:MULTICALLS_MAX",
@@ -124,14 +125,14 @@ BOUNDS = {
         reading.MARKUP_LIMIT_BYTES // 10**6, launch._TAGS_MAX, launch._FILES_MAX, launch_loader.INCLUDES_MAX,
         launch_loader.DEPTH_MAX,
     ),
-    "`CMakeLists.txt`": (cmake_parse._FILE_LIMIT_BYTES // 1000, cmake_parse._STEPS_LIMIT),
+    "`CMakeLists.txt`": (cmake_parse.FILE_BYTES_MAX // 1000, cmake_parse.STEPS_MAX),
     "files of the package": (reading.SOURCE_LIMIT_BYTES // 10**6,),
     "files for the evidence": (static_recorder.ATTACHED_BYTES_MAX // KB, static_recorder.ATTACHED_FILES_MAX),
     "YAML files": (
         scenario_inputs.FILE_BYTES_MAX // KB, scenario_inputs.EVENTS_MAX, scenario_inputs.VALUES_MAX,
         scenario_inputs.DEPTH_MAX, scenario_inputs.ALIASES_MAX,
     ),
-    "texts of services": (scenario_inputs.TEXT_BYTES_MAX // KB, decode._PARTS_MAX),
+    "texts of decode": (scenario_inputs.TEXT_BYTES_MAX // KB, decode._PARTS_MAX),
     "what git says": (git._ANSWER_BYTES // MB, git._FILE_BYTES // MB, git._MEMORY_BYTES >> 30, gitdir._MAX_FILES),
 }  # fmt: skip
 """By how a reading begins: the numbers in its bound, each a constant of the code, of ROS's side as `file:NAME`."""

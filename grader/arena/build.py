@@ -21,7 +21,7 @@ from grader.arena.workspace import read_member, run_in_place
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.files import READ_MAX, read_untrusted
-from grader.package.cmake_written import written_calls
+from grader.package.cmake import written_calls
 from grader.package.python import REPORT_BYTES_MAX
 
 BUILD_S = 120.0

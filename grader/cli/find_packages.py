@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.errors import UsageError
-from grader.intake.find import BUILD_SPACES, Candidate, enclosing_package, find_nearest
+from grader.intake.find import BUILD_SPACES, Candidate, enclosing_package, find_nearest, manifest_name
 from grader.intake.gitdir import repository_around
-from grader.intake.manifest import manifest_name
 from grader.intake.names import printable
 from grader.intake.tree import is_file, is_there
 

@@ -1,4 +1,4 @@
-"""Says how what was checked stands to what will be marked. Git is asked beside the grading, and holds nobody up."""
+"""Shows what git lacks of what was checked. git is asked beside the grading, which never waits long for it."""
 
 from __future__ import annotations
 

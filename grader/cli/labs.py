@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 from grader.cli.find_packages import Found, shown
 from grader.errors import UsageError
-from grader.intake.find import Candidate
-from grader.intake.manifest import MANIFEST
+from grader.intake.find import MANIFEST, Candidate
 from grader.intake.names import listing, printable
 from grader.rubric.load import find_rubric_for_package, packages_of_labs
 

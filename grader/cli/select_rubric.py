@@ -11,7 +11,7 @@ from grader.errors import UsageError
 from grader.intake import enclosing_package, find_packages
 from grader.intake.find import Candidate
 from grader.intake.names import is_archive_name
-from grader.intake.recordings import is_recording
+from grader.intake.open import is_recording
 from grader.rubric.load import LoadedRubric, load_rubric
 
 Package = tuple[str, Path]

@@ -1,25 +1,43 @@
-"""An archive becomes a folder. What kind it is, its content says, not its name."""
+"""An archive becomes a folder. What kind it is, its content says, not its name.
+
+A child process with limits unpacks it (`limited.py`): `unpack` starts it, and `unpack_here` is what runs there. What is
+written where, and how much of it, is decided in `unpack.py` and `limits.py`.
+"""
 
 from __future__ import annotations
 
+import bz2
 import errno
-import hashlib
+import gzip
+import json
 import lzma
+import re
+import stat
 import struct
 import tarfile
 import zipfile
 import zlib
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from itertools import pairwise
 from pathlib import Path
+from typing import IO, Any, cast
 
 from grader.errors import SubmissionError
 from grader.intake.limits import Limits, too_much
 from grader.intake.names import brief, is_archive_name
-from grader.intake.tars import is_packed, unpack_tar
+from grader.intake.tree import file_digest
 from grader.intake.unpack import Unpacker
-from grader.intake.zips import unpack_zip
+from grader.limited import Answer, ChildLimits, run_limited
 
-_DAMAGED = (
+MEMORY_BYTES, CPU_S, WALL_S = 512 << 20, 60, 180.0
+CHUNK_BYTES = 1 << 20
+PACKINGS: dict[bytes, Callable[[Any], Any]] = {
+    b"\x1f\x8b": gzip.open,
+    b"BZh": bz2.open,
+    b"\xfd7zXZ\x00": lzma.open,
+}
+DAMAGED = (
     zipfile.BadZipFile,
     tarfile.TarError,
     zlib.error,
@@ -33,8 +51,16 @@ _DAMAGED = (
     NotADirectoryError,
     IsADirectoryError,
 )
-_FOREIGN = {b"Rar!": "a rar archive", b"7z\xbc\xaf": "a 7z archive", b"\x28\xb5\x2f\xfd": "packed by zstd"}
-_KINDS = "Hand in a .zip or a .tar.gz."
+FOREIGN = {b"Rar!": "a rar archive", b"7z\xbc\xaf": "a 7z archive", b"\x28\xb5\x2f\xfd": "packed by zstd"}
+KINDS = "Hand in a .zip or a .tar.gz."
+UNIX = (3, 19)
+UTF8_NAME = 0x800
+ENCRYPTED = 0x41
+LOCAL_HEADER_BYTES = 30
+ZIP_PACKINGS = {zipfile.ZIP_BZIP2: "bzip2", zipfile.ZIP_LZMA: "LZMA"}
+LINK_BYTES = 1 << 12
+# `git archive`, and so GitHub and GitLab, puts the commit's hash here.
+GIT_COMMENT = re.compile(rb"[0-9a-f]{40}|[0-9a-f]{64}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,30 +74,71 @@ class Unpacked:
 
 
 def unpack(path: Path, into: Path, limits: Limits) -> Unpacked:
-    """The archive at `path`, unpacked into the new folder `into`.
+    """Unpack the archive at `path` into the new folder `into`, in a child process.
 
-    Raises SubmissionError for what is no archive, is damaged, has a password, is too large or reaches out.
+    Raises SubmissionError for what is no archive, is damaged, has a password, is too large or reaches out, OSError for
+    what this machine cannot read or write.
     """
     name = brief(path.name)
-    with path.open("rb") as stream:
-        head = stream.read(_BLOCK)
     if path.stat().st_size > limits.packed_bytes:
         raise too_much(name, f"is larger than {limits.packed_bytes >> 20} MiB")
     into.mkdir(parents=True)
+    answer = run_limited(
+        "grader.intake.archive:unpack_here",
+        *(str(path.absolute()), str(into.absolute()), asdict(limits)),
+        limits=ChildLimits(
+            memory_bytes=MEMORY_BYTES, cpu_s=CPU_S, wall_s=WALL_S, file_bytes=limits.total_bytes
+        ),
+    )
+    said = _parse(answer)
+    if said is None:
+        raise too_much(name, "takes more time or memory to unpack")
+    if "refused" in said:
+        message, hint = said["refused"]
+        raise SubmissionError(message, hint=hint)
+    if "errno" in said:
+        raise OSError(said["errno"], said["strerror"], said["filename"])
+    return Unpacked(
+        root=into, sha256=said["sha256"], executable=said["executable"], hints=tuple(said["hints"])
+    )
+
+
+def _parse(answer: Answer) -> dict[str, Any] | None:
+    """Return what the child said, None if it did not come to its end."""
+    try:
+        return cast("dict[str, Any]", json.loads(answer.lines)) if answer.done else None
+    except ValueError:
+        return None
+
+
+def unpack_here(path: str, into: str, limits: dict[str, int]) -> Iterator[dict[str, Any]]:
+    """Unpack the archive and yield one record for `unpack`: what was unpacked, or why it was not."""
+    try:
+        yield _unpack(Path(path), Path(into), Limits(**limits))
+    except SubmissionError as error:
+        yield {"refused": (error.message, error.hint)}
+    except OSError as error:
+        yield {"errno": error.errno, "strerror": error.strerror, "filename": str(error.filename or "")}
+
+
+def _unpack(path: Path, into: Path, limits: Limits) -> dict[str, Any]:
+    name = brief(path.name)
+    with path.open("rb") as stream:
+        head = stream.read(tarfile.BLOCKSIZE)
     unpacker = Unpacker(into, name=name, limits=limits)
     try:
         if _looks_like_zip(path, head):
-            unpack_zip(path, unpacker)
-        elif is_packed(head) or _looks_like_tar(head):
-            unpack_tar(path, unpacker, name=name, limits=limits)
+            _unpack_zip(path, unpacker, name, limits)
+        elif _opener(head) or _looks_like_tar(head):
+            _unpack_tar(path, unpacker, name, limits)
         else:
             raise _no_archive(path, head)
         hints = unpacker.finish()
     except NotImplementedError as error:
         raise SubmissionError(
-            f"{name} is packed in a way that is not read here ({error})", hint=_KINDS
+            f"{name} is packed in a way that is not read here ({error})", hint=KINDS
         ) from None
-    except _DAMAGED as error:
+    except DAMAGED as error:
         raise _damaged(name, error) from None
     except OSError as error:
         if error.errno == errno.ENAMETOOLONG:
@@ -80,16 +147,17 @@ def unpack(path: Path, into: Path, limits: Limits) -> Unpacked:
         if error.errno is not None:
             raise
         raise _damaged(name, error) from None
-    return Unpacked(root=into, sha256=_sha256(path), executable=unpacker.executable, hints=tuple(hints))
+    return {"sha256": file_digest(path).hexdigest(), "executable": unpacker.executable, "hints": hints}
 
 
-_BLOCK = tarfile.BLOCKSIZE
+def _opener(head: bytes) -> Callable[[Any], Any] | None:
+    return next((opener for magic, opener in PACKINGS.items() if head.startswith(magic)), None)
 
 
 def _looks_like_zip(path: Path, head: bytes) -> bool:
     if head.startswith((b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")):
         return True
-    return not is_packed(head) and not _looks_like_tar(head) and zipfile.is_zipfile(path)
+    return _opener(head) is None and not _looks_like_tar(head) and zipfile.is_zipfile(path)
 
 
 def _looks_like_tar(head: bytes) -> bool:
@@ -105,15 +173,15 @@ def _looks_like_tar(head: bytes) -> bool:
 def _no_archive(path: Path, head: bytes) -> SubmissionError:
     name = brief(path.name)
     if not head:
-        return SubmissionError(f"{name} is empty", hint=_KINDS)
-    foreign = next((what for magic, what in _FOREIGN.items() if head.startswith(magic)), None)
+        return SubmissionError(f"{name} is empty", hint=KINDS)
+    foreign = next((what for magic, what in FOREIGN.items() if head.startswith(magic)), None)
     if foreign:
-        return SubmissionError(f"{name} is {foreign}, which is not read here", hint=_KINDS)
+        return SubmissionError(f"{name} is {foreign}, which is not read here", hint=KINDS)
     if is_archive_name(path.name):
         return SubmissionError(
             f"{name} is damaged: it does not hold what its name says", hint="Pack it again."
         )
-    return SubmissionError(f"{name} is a file, not an archive", hint=f"Give the package's folder. {_KINDS}")
+    return SubmissionError(f"{name} is a file, not an archive", hint=f"Give the package's folder. {KINDS}")
 
 
 def _damaged(name: str, error: Exception) -> SubmissionError:
@@ -124,9 +192,125 @@ def _damaged(name: str, error: Exception) -> SubmissionError:
     )
 
 
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as stream:
-        while block := stream.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()
+def _unpack_tar(path: Path, unpacker: Unpacker, name: str, limits: Limits) -> None:
+    """Raises tarfile.TarError for a tar that is cut off."""
+    with path.open("rb") as packed:
+        opener = _opener(packed.read(8))
+        packed.seek(0)
+        stream = _Counted(opener(packed) if opener else packed, name, limits.stream_bytes)
+        with tarfile.open(
+            fileobj=cast("IO[bytes]", stream),
+            mode="r|",
+            encoding="utf-8",
+            errors="surrogateescape",
+            tarinfo=_Member,
+        ) as archive:
+            while (member := _next(archive)) is not None:
+                _unpack_member(archive, member, unpacker)
+        while stream.read(CHUNK_BYTES):  # a packed one has its checksum at the end
+            pass
+
+
+class _Counted:
+    """A stream that is read once. Raises SubmissionError for more than the limit."""
+
+    def __init__(self, stream: IO[bytes], name: str, limit_bytes: int) -> None:
+        self._stream, self._name, self._limit_bytes = stream, name, limit_bytes
+        self._bytes = 0
+
+    def read(self, size: int) -> bytes:
+        data = self._stream.read(size)
+        self._bytes += len(data)
+        if self._bytes > self._limit_bytes:
+            raise too_much(self._name, f"is larger than {self._limit_bytes >> 20} MiB when unpacked")
+        return data
+
+
+class _Member(tarfile.TarInfo):
+    """A header; `tarfile` would take one that is damaged or missing for the end of the archive."""
+
+    @classmethod
+    def frombuf(cls, buf: bytes | bytearray, encoding: str, errors: str) -> _Member:
+        try:
+            return super().frombuf(buf, encoding, errors)
+        except tarfile.EOFHeaderError:  # type: ignore[attr-defined]
+            raise
+        except tarfile.HeaderError:
+            raise tarfile.ReadError("the end is missing") from None
+
+
+def _next(archive: tarfile.TarFile) -> tarfile.TarInfo | None:
+    """As `archive.next()`, which in Python 3.10 seeks before the beginning of a tar that holds nothing."""
+    empty = archive.offset == 0 and archive.firstmember is None  # type: ignore[attr-defined]
+    archive.members = []  # type: ignore[attr-defined] # they are not needed again, and there may be many
+    return None if empty else archive.next()
+
+
+def _unpack_member(archive: tarfile.TarFile, member: tarfile.TarInfo, unpacker: Unpacker) -> None:
+    if member.issparse():
+        unpacker.refuse("it holds a sparse file (pack it without `--sparse`)")
+    path = unpacker.admit(member.name, member.size if member.isreg() else 0)
+    if path is None:
+        return
+    if member.isdir():
+        unpacker.folder(path)
+    elif member.issym():
+        unpacker.link(path, member.linkname)
+    elif member.islnk():
+        unpacker.hard_link(path, member.linkname)
+    elif member.isreg() and (content := archive.extractfile(member)) is not None:
+        unpacker.file(path, content, executable=bool(member.mode & 0o100))
+    else:
+        unpacker.refuse(f"the entry '{brief(path)}' is a device or a pipe")
+
+
+def _unpack_zip(path: Path, unpacker: Unpacker, name: str, limits: Limits) -> None:
+    """Zip files as Windows, macOS, Linux, GitHub and Python write them."""
+    with zipfile.ZipFile(path) as archive:
+        by_git = GIT_COMMENT.fullmatch(archive.comment) is not None
+        if len(archive.infolist()) > limits.entries:
+            raise too_much(name, f"holds more than {limits.entries} files")
+        # one packed content that many entries share would be unpacked over and over
+        for one, two in pairwise(sorted(archive.infolist(), key=lambda info: info.header_offset)):
+            if one.header_offset + LOCAL_HEADER_BYTES + one.compress_size > two.header_offset:
+                unpacker.refuse(f"the entry '{brief(two.filename)}' lies in another one")
+        for info in archive.infolist():
+            _unpack_entry(archive, info, unpacker, by_git=by_git)
+
+
+def _unpack_entry(
+    archive: zipfile.ZipFile, info: zipfile.ZipInfo, unpacker: Unpacker, *, by_git: bool
+) -> None:
+    name = _entry_name(info)
+    path = unpacker.admit(name, info.file_size)
+    if path is None:
+        return
+    mode = info.external_attr >> 16 if info.create_system in UNIX else 0
+    kind = stat.S_IFMT(mode)
+    if kind not in (0, stat.S_IFREG, stat.S_IFDIR, stat.S_IFLNK):
+        unpacker.refuse(f"the entry '{brief(path)}' is a device or a pipe")
+    if name.endswith("/") or kind == stat.S_IFDIR:
+        unpacker.folder(path)
+        return
+    if info.flag_bits & ENCRYPTED:
+        unpacker.refuse("it is protected by a password")
+    if info.compress_type in ZIP_PACKINGS:
+        raise NotImplementedError(f"by {ZIP_PACKINGS[info.compress_type]}")
+    with archive.open(info) as content:
+        if kind == stat.S_IFLNK:
+            unpacker.link(path, content.read(LINK_BYTES).decode("utf-8", "surrogateescape"))
+        else:
+            # git archive gives a mode to executable files alone.
+            known = bool(mode & stat.S_IXUSR) if mode or by_git else None
+            unpacker.file(path, content, executable=known)
+
+
+def _entry_name(info: zipfile.ZipInfo) -> str:
+    """The entry's name with `/`: old tools of Windows write `\\`, and many write UTF-8 without saying so."""
+    name = info.filename
+    if not info.flag_bits & UTF8_NAME:
+        try:
+            name = name.encode("cp437").decode("utf-8")
+        except UnicodeError:
+            name = info.filename
+    return name if info.create_system in UNIX else name.replace("\\", "/")

@@ -1,24 +1,31 @@
-"""What of a package is read, and what is left out of it: giants, what may not be read, what is no file."""
+"""Which files of a package are read, which are left out (giants, what may not be read), and remarks on their names."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+import re
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from grader.errors import SubmissionError
 from grader.intake.limits import NO_CODE, Limits, too_much
-from grader.intake.names import brief, listing
+from grader.intake.names import brief, encodable, listing
 from grader.intake.tree import Entry, list_entries
 
 # What a build or an editor leaves in a package; it is copied nowhere, so it counts for nothing.
 _MADE = frozenset({"build", "devel", "install", ".catkin_tools"})
+_ODD_NAMES_SHOWN = 3
+_LFS = b"version https://git-lfs.github.com/spec/"
+_LFS_BYTES = 1024
+_DEVICES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
+_FORBIDDEN = re.compile(r'[<>:"|?*\\\x00-\x1f]|[. ]$')
 
 
 @dataclass(frozen=True, kw_only=True)
 class Content:
-    """`entries` is everything but folders, `left_out` the paths of those that nobody opens, `hints` say why."""
+    """`entries` is everything but folders, `left_out` the paths of those that are not opened, `hints` say why."""
 
     entries: list[Entry]
     left_out: frozenset[str]
@@ -28,7 +35,7 @@ class Content:
 def package_content(
     folder: Path, *, limits: Limits, leave_out: Path | None = None, tolerant: bool = False
 ) -> Content:
-    """The content of a package's folder.
+    """Return the content of a package's folder.
 
     Raises OSError and SubmissionError as `walk` does, SubmissionError for more files than a package has, and for a
     file that may not be read and could be one that matters; `tolerant` leaves that one out.
@@ -76,3 +83,59 @@ def _hints(closed: list[str], large: list[str], others: list[str]) -> Iterable[s
         yield f"not readable here, so left out: {listing(closed)} (`ls -l` shows the permissions)"
     if others:
         yield f"neither a file nor a folder, so left out: {listing(others)}"
+
+
+def remarks(folder: Path, entries: list[Entry], left_out: Collection[str]) -> tuple[str, ...]:
+    """Return what is worth saying of the files' names, and of those whose content is somewhere else."""
+    paths = [entry.path for entry in entries]
+    small = [e.path for e in entries if e.kind == "file" and 0 < e.size_bytes <= _LFS_BYTES]
+    pointers = [path for path in small if path not in left_out and _is_pointer(folder / path)]
+    return (*_odd(paths), *_clashes(paths), *_foreign(paths), *_pointers(pointers))
+
+
+def _odd(paths: Iterable[str]) -> list[str]:
+    odd = [brief(path) for path in paths if not encodable(path)]
+    return [f"a file's name is not UTF-8, so it is left out: {name}" for name in odd[:_ODD_NAMES_SHOWN]]
+
+
+def _with_folders(paths: Iterable[str]) -> set[str]:
+    """The paths, and those of all folders on the way to them."""
+    found: set[str] = set()
+    for path in paths:
+        while path and path not in found:
+            found.add(path)
+            path = path.rpartition("/")[0]  # noqa: PLW2901 - up, as long as there is something new
+    return found
+
+
+def _clashes(paths: Iterable[str]) -> Iterator[str]:
+    alike: dict[str, list[str]] = defaultdict(list)
+    for path in _with_folders(paths):
+        folder, _, name = path.rpartition("/")
+        alike[f"{folder}/{name.casefold()}"].append(path)
+    clashing = sorted(name for names in alike.values() if len(names) > 1 for name in names)
+    if clashing:
+        yield f"names that differ in capitals only, of which Windows and macOS keep one: {listing(clashing)}"
+
+
+def _foreign(paths: Iterable[str]) -> Iterator[str]:
+    names = ((path, PurePosixPath(path).name) for path in _with_folders(paths) if encodable(path))
+    found = sorted(path for path, name in names if _FORBIDDEN.search(name) or _DEVICES.match(name))
+    if found:
+        yield f"names that Windows cannot hold: {listing(found)}"
+
+
+def _is_pointer(path: Path) -> bool:
+    try:
+        with path.open("rb") as stream:
+            return stream.read(len(_LFS)) == _LFS
+    except OSError:
+        return False
+
+
+def _pointers(paths: list[str]) -> Iterator[str]:
+    if paths:
+        yield (
+            f"only a pointer of Git LFS, the file itself is not in the submission: {listing(paths)} "
+            "(`git lfs pull`, then hand in the folder; or commit it without LFS)"
+        )

@@ -23,6 +23,9 @@ _URL = re.compile(
 )
 _HOST = re.compile(r"(?:[\w.-]+|\[[0-9A-Fa-f:.]+\])(?::\d*)?")
 _UNFIT = re.compile(r"[\x00-\x1f\x7f]")
+_AUTHORITY = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<user>[^/?#]*)@")
+# A colon with no port after it: a password with a slash in it, of which the end is not known.
+_TORN = re.compile(r"(?P<scheme>https?)://[^/?#@\[\]]*:(?!\d*(?:[/?#]|$)).*", re.IGNORECASE | re.DOTALL)
 _REFUSED = re.compile(
     r"could not read (?:Username|Password)|terminal prompts disabled|Authentication failed|Access denied"
     r"|error: 40[134]|HTTP 40[134]|[Nn]ot found"
@@ -47,7 +50,7 @@ class Access:
 
 
 def split_address(url: str) -> tuple[str, Login | None]:
-    """The address without the login that stands in it, and that login; ssh and git know no password.
+    """Return the address without the login that stands in it, and that login; ssh and git know no password.
 
     Raises UsageError for an address in which they cannot be told apart.
     """
@@ -71,7 +74,7 @@ def split_address(url: str) -> tuple[str, Login | None]:
 
 
 def accesses(url: str, login: Login | None) -> tuple[Access, ...]:
-    """Every way to be let in at `url` (an address without a login), in the order in which they are tried.
+    """Return every way to be let in at `url` (an address without a login), in the order in which they are tried.
 
     A token of the environment is for its own server, and never for http://. A login of the address is for that alone.
     """
@@ -95,7 +98,7 @@ def refused(stderr: str) -> bool:
 
 
 def scrubbed(text: str, secrets: tuple[str, ...]) -> str:
-    """`text` without the secrets, should a server say them again."""
+    """Return `text` without the secrets, should a server say them again."""
     for secret in secrets:
         text = text.replace(secret, "***")
     return text
@@ -158,3 +161,15 @@ def _https_host(url: str) -> str:
     """The server of an https address as it is compared, "" where it is none."""
     match = _URL.fullmatch(url.strip())
     return match["host"].lower().removesuffix(":443") if match and match["scheme"] == "https" else ""
+
+
+def without_password(source: str) -> str:
+    """SOURCE as it may be kept and shown: of `https://` nothing before the `@` of the server (a token may stand in
+    place of a user), of other schemes the user alone. What is no address stays as it is."""
+    return _TORN.sub(r"\g<scheme>://…", _AUTHORITY.sub(_kept, source, count=1))
+
+
+def _kept(match: re.Match[str]) -> str:
+    scheme, user = match["scheme"], match["user"].split(":", 1)[0]
+    web = scheme.lower() in ("http", "https")
+    return f"{scheme}://" if web or not user else f"{scheme}://{user}@"

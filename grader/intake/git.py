@@ -1,4 +1,4 @@
-"""git as a subprocess that asks nothing, waits for nobody and runs nothing that a repository brings along."""
+"""git as a subprocess that asks nothing, ends in time, and runs nothing that a repository brings along."""
 
 from __future__ import annotations
 
@@ -18,7 +18,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from grader.host_programs import find_user_program, with_absolute_paths
+from grader.host_programs import (
+    find_user_program,
+    loading_environment,
+    with_absolute_paths,
+)
 from grader.intake.credentials import Access, refused, scrubbed
 from grader.portable import kill_group
 
@@ -47,11 +51,6 @@ _MEMORY_BYTES = 2 << 30
 _NETWORK_KEPT = re.compile(
     r"GIT_(SSH.*|SSL_.*|PROXY_.*|HTTP_.*|CONFIG_(GLOBAL|SYSTEM|NOSYSTEM|COUNT|(KEY|VALUE)_\d+)|EXEC_PATH)"
 )
-# Of the user's variables, what git on this machine needs: to be found, to load, and on Windows to run at all.
-_LOCAL_KEPT = {
-    "PATH", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "DYLD_FALLBACK_LIBRARY_PATH", "TMPDIR", "TEMP", "TMP", "SYSTEMROOT",
-    "SYSTEMDRIVE", "WINDIR", "COMSPEC", "PATHEXT",
-}  # fmt: skip
 _ANSWER_BYTES = 16 << 20
 _SILENCE_S = 20.0
 _SAID_BYTES = 64 << 10
@@ -108,7 +107,7 @@ class Git:
         remote: bool = False,
         accesses: tuple[Access, ...] = (Access(),),
     ) -> bytes:
-        """What `git *args` prints in `cwd`. `remote` lets it use the network and the user's own settings; of the
+        """Return what `git *args` prints in `cwd`. `remote` lets it use the network and the user's own settings; of the
         `accesses` each is tried where the server did not let git in with those before.
 
         Raises GitFailed, GitMissing or GitTimeout.
@@ -145,7 +144,7 @@ class Git:
         return answer
 
     def records(self, *args: str, cwd: Path, repository: Repository) -> Generator[bytes]:
-        """The NUL-ended records that git prints, one by one, so that a caller can stop an endless listing."""
+        """Yield the NUL-ended records that git prints, one by one, so that a caller can stop an endless listing."""
         whole = (*_place(repository), *args)
         environment = self._local_environment()
         with self._started(
@@ -174,7 +173,7 @@ class Git:
 
     @contextmanager
     def _ended_in_time(self, process: subprocess.Popen[bytes]) -> Iterator[None]:
-        """Where nobody can wait for output with a limit, the process is ended when its time is up."""
+        """Where output cannot be waited for with a limit (Windows), the process is ended when its time is up."""
         if sys.platform != "win32":
             yield
             return
@@ -219,11 +218,8 @@ class Git:
 
     def _local_environment(self) -> dict[str, str]:
         """For repositories on this machine: no settings but ours, so no filter, no helper and no network."""
-        kept = {
-            key: value for key, value in with_absolute_paths(os.environ).items() if key.upper() in _LOCAL_KEPT
-        }
         return {
-            **kept,
+            **loading_environment(os.environ),
             **_ASK_NOTHING,
             "HOME": str(self.home),
             "GIT_CONFIG_GLOBAL": str(self.home / ".gitconfig"),

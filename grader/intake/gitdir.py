@@ -31,14 +31,14 @@ class Unfit(Exception):
 
 
 def repository_around(folder: Path) -> Path | None:
-    """The nearest folder from `folder` upwards that has a `.git` of any kind."""
+    """Return the nearest folder from `folder` upwards that has a `.git` of any kind."""
     return next((place for place in (folder, *folder.parents) if is_there(place / ".git")), None)
 
 
 def link_repository(
     top: Path, into: Path, git: Git, *, within: Path, bare: bool = False, objects: bool = False
 ) -> Repository:
-    """A view of the repository in `top`, or of `top` itself where it is `bare`, in the new folder `into`.
+    """Return a view of the repository in `top`, or of `top` itself where it is `bare`, in the new folder `into`.
 
     Nothing outside of `within` is read. `objects` are needed to fetch from it. Raises Unfit, GitMissing.
     """
@@ -202,7 +202,7 @@ class Repositories:
         self._found: dict[Path, Repository | Unfit | GitFailed] = {}
 
     def around(self, folder: Path) -> Repository | None:
-        """The one that tracks `folder`, or None. Raises Unfit, GitFailed."""
+        """Return the one that tracks `folder`, or None. Raises Unfit, GitFailed."""
         if self._known is not None:
             return self._known
         top = repository_around(folder)
@@ -221,7 +221,7 @@ class Repositories:
         raise found
 
     def head(self, folder: Path) -> str | None:
-        """The full hash that is checked out around `folder`; None where there is no repository or no commit."""
+        """Return the full hash that is checked out around `folder`; None where there is no repository or no commit."""
         try:
             repository = self.around(folder)
             if repository is None:

@@ -44,7 +44,7 @@ class Limits:
     links: int = 2_000
 
     def largest_bytes(self, path: str) -> int:
-        """How large the file of that name may be."""
+        """Return how large the file of that name may be."""
         return self.recording_bytes if path.lower().endswith(_RECORDINGS) else self.file_bytes
 
 
@@ -95,7 +95,7 @@ class Meter:
 
 
 def too_much(name: str, what: str) -> SubmissionError:
-    """The error for a source that goes beyond the limits."""
+    """Return the error for a source that goes beyond the limits."""
     return SubmissionError(
         f"{name} {what}, which is more than a lab's submission may be",
         hint="Hand in the package alone, without build/, devel/ and recordings.",

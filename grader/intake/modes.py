@@ -1,31 +1,33 @@
-"""Who may say whether a file is executable: git's index for tracked files, the archive, or else the disk."""
+"""Whether a file is executable, and how its lines end: git's index, the archive or else the disk may say."""
 
 from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.intake.find import BUILD_SPACES
 from grader.intake.git import Git, GitFailed, GitMissing, Repository
-from grader.intake.gitdir import Repositories, Unfit
+from grader.intake.gitdir import Repositories, Unfit, link_repository, repository_around
 from grader.intake.names import brief, listing, printable
 from grader.intake.source import GivenModes
 from grader.intake.tree import Entry, read_file
 from grader.model.submission import ModeSource
-from grader.portable import MODES_ON_DISK
+from grader.portable import MODES_ON_DISK, system
 
 _SCRIPTS = (".py", ".sh", ".bash")
 _MAX_TRACKED = 200_000
 _DIFFERENCES_SHOWN = 50
+_FIRST_LINE_BYTES = 4096
+_AT_MOST = 200
 
 
 @dataclass(frozen=True, kw_only=True)
 class Modes:
-    """`executable` maps every regular file's path below the package to its bit, None where nobody knows."""
+    """`executable` maps every regular file's path below the package to its bit, None where it is not known."""
 
     source: ModeSource
     executable: dict[str, bool | None]
@@ -33,7 +35,7 @@ class Modes:
 
 
 def archive_modes(entries: Iterable[Entry], known: Mapping[str, bool | None], *, path: str) -> Modes:
-    """The archive's word. `path` is the package's folder in the archive."""
+    """Return the modes that the archive gives. `path` is the package's folder in the archive."""
     prefix = "" if path == "." else f"{path}/"
     executable = {entry.path: known.get(prefix + entry.path) for entry in entries if entry.kind == "file"}
     carried = any(bit is not None for bit in executable.values())
@@ -53,8 +55,8 @@ def folder_modes(entries: Iterable[Entry], folder: Path, repositories: Repositor
 
 
 def uploaded_modes(modes: Modes, given: GivenModes) -> Modes:
-    """What is known where an upload may have lost the modes: git and an archive that carries them are believed, and a
-    disk on which some files are executable and others are not."""
+    """Return what is known where an upload may have lost the modes: git and an archive that carries them are believed,
+    and a disk on which some files are executable and others are not."""
     mixed = len(set(modes.executable.values())) > 1
     if given == "kept" or modes.source in {"git", "archive"} or (modes.source == "disk" and mixed):
         return modes
@@ -127,3 +129,29 @@ def _untracked(folder: Path, on_disk: Mapping[str, bool | None], tracked: Mappin
     return (
         [f"not in git yet, so not handed in by a push: {listing(new)} (git add, git commit)"] if new else []
     )
+
+
+def right_in_git(folder: Path, entries: Iterable[Entry], git: Git, base: Path) -> frozenset[str]:
+    """Return the paths, below the package's folder, of scripts that have CRLF here and LF in git's index.
+
+    On Linux there are none: there what lies on the disk is run, and its line ends count.
+    """
+    top = repository_around(folder.resolve()) if system() else None
+    suspects = list(_suspects(folder, entries))[:_AT_MOST] if top is not None else []
+    if top is None or not suspects:
+        return frozenset()
+    try:
+        view = link_repository(top, base / "git-line-ends", git, within=top, objects=True)
+        said = git.run("ls-files", "--eol", "-z", "--", *suspects, cwd=folder, repository=view)
+    except (GitFailed, Unfit, OSError):
+        return frozenset()
+    pairs = (record.partition(b"\t") for record in said.split(b"\0") if record)
+    return frozenset(os.fsdecode(path) for about, _, path in pairs if about.split()[:1] == [b"i/lf"])
+
+
+def _suspects(folder: Path, entries: Iterable[Entry]) -> Iterator[str]:
+    for entry in entries:
+        if entry.kind == "file" and is_script(folder, entry.path):
+            data = read_file(folder / entry.path, _FIRST_LINE_BYTES) or b""
+            if data.partition(b"\n")[0].endswith(b"\r"):
+                yield entry.path

@@ -18,7 +18,7 @@ _SHOWN_LETTERS = 120
 
 
 def safe_name(text: str) -> str:
-    """`text` as a file's name: `[A-Za-z0-9._-]`, 1 to 100 characters, not hidden, never `.` or `..`.
+    """Return `text` as a file's name: `[A-Za-z0-9._-]`, 1 to 100 characters, not hidden, never `.` or `..`.
 
     Nor is it a device of Windows (`CON`, `nul.txt`), where somebody may look at the results. Accents are dropped.
     Where letters had to be given up, or the name was too long, a short hash of the whole keeps two such names apart.
@@ -35,13 +35,13 @@ def safe_name(text: str) -> str:
 
 
 def printable(text: str) -> str:
-    """`text` on one line, with a readable escape (`\\xe9`) for what no terminal or JSON file can hold."""
+    """Return `text` on one line, with a readable escape (`\\xe9`) for what no terminal or JSON file can hold."""
     shown = text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
     return "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in shown)
 
 
 def brief(text: str) -> str:
-    """`text` as `printable` shows it, cut in the middle where it is too long for a message."""
+    """Return `text` as `printable` shows it, cut in the middle where it is too long for a message."""
     shown = printable(
         text[: _SHOWN_LETTERS * 2] + text[-_SHOWN_LETTERS:] if len(text) > 3 * _SHOWN_LETTERS else text
     )
@@ -55,7 +55,7 @@ def encodable(text: str) -> bool:
 
 
 def archive_stem(name: str) -> str:
-    """A file's name without the ending that makes it an archive: `lab1.tar.gz` is `lab1`."""
+    """Return a file's name without the ending that makes it an archive: `lab1.tar.gz` is `lab1`."""
     return _ARCHIVE_SUFFIX.sub("", name)
 
 
@@ -64,7 +64,7 @@ def is_archive_name(name: str) -> bool:
 
 
 def listing(names: list[str]) -> str:
-    """The first few of `names` for a message, and how many more there are."""
+    """Return the first few of `names` for a message, and how many more there are."""
     shown = ", ".join(brief(name) for name in names[:_SHOWN_AT_MOST])
     more = len(names) - _SHOWN_AT_MOST
     return f"{shown} and {more} more" if more > 0 else shown

@@ -1,30 +1,47 @@
-"""SOURCE on disk: in place for a folder, below the work folder for an archive or a repository."""
+"""Opens SOURCE: in place for a folder, below the work folder for an archive or a repository; recordings too."""
 
 from __future__ import annotations
 
+import errno
+import os
+import re
+import shutil
+import tempfile
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import TypeVar
 
-from grader.errors import SubmissionError
+from grader.errors import GraderError, OutputError, SubmissionError
 from grader.intake.archive import unpack
-from grader.intake.choose import Choice, choose, not_found
-from grader.intake.content import Content, package_content
-from grader.intake.digest import tree_digest
-from grader.intake.find import Candidate, enclosing_package, find_candidates, linked_candidate
+from grader.intake.content import Content, package_content, remarks
+from grader.intake.find import (
+    Candidate,
+    Choice,
+    choose,
+    enclosing_package,
+    find_candidates,
+    linked_candidate,
+    not_found,
+)
 from grader.intake.git import Git, Repository
 from grader.intake.gitdir import Repositories
 from grader.intake.limits import Limits
-from grader.intake.line_ends import right_in_git
-from grader.intake.modes import Modes, archive_modes, folder_modes, uploaded_modes
-from grader.intake.names import encodable, printable, safe_name
-from grader.intake.remarks import remarks
+from grader.intake.modes import Modes, archive_modes, folder_modes, right_in_git, uploaded_modes
+from grader.intake.names import brief, encodable, printable, safe_name
 from grader.intake.repository import clone
-from grader.intake.source import Source
-from grader.intake.tree import Entry, is_there
-from grader.model.submission import SourcePackage, Submission
+from grader.intake.source import Source, parse_source
+from grader.intake.tree import NO_CONTENT, Entry, file_digest, is_there, list_entries, tree_digest, walk
+from grader.model.submission import RecordedSubmission, SourcePackage, Submission
 
 _OTHERS_AT_MOST = 200
+_SUFFIX = re.compile(r"\.(bag|bag\.active|bag\.orig|mcap|db3)$", re.IGNORECASE)
+_MAGIC = (b"#ROSBAG V", b"\x89MCAP0\r\n")
+
+
+_AnySubmission = TypeVar("_AnySubmission", Submission, RecordedSubmission)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +73,113 @@ class Located:
     choice: Choice
 
 
+def open_submission(
+    source: str | Source,
+    *,
+    package: str,
+    workdir: Path,
+    submission_id: str | None = None,
+    git_timeout_s: float = 120.0,
+    limits: Limits | None = None,
+) -> Submission:
+    """Return the submission that `source` names, with the lab's `package` found in it; it may be read already.
+
+    A folder is used in place and never written to. An archive or a repository comes to lie in a new folder
+    below `workdir`, which is made where it is missing and belongs to the caller. All of git's work together
+    takes at most `git_timeout_s` seconds.
+
+    Raises UsageError for a source that does not exist, OutputError for a `workdir` that cannot be written,
+    PackageNotFound where the package is not there, SubmissionError for all else that is wrong with it.
+    """
+    parsed = _parsed(source)
+    with _base(workdir) as base:
+        try:
+            git = Git(base / "git-home", timeout_s=git_timeout_s)
+            limits = limits or Limits()
+            opened = open_source(parsed, git, base, limits)
+            located = locate(opened, package)
+            submission = describe(located, git, limits)
+        except OSError as error:
+            raise unreadable(parsed.given, error) from error
+    return _named(submission, submission_id)
+
+
+def open_recording(source: str | Source, *, submission_id: str | None = None) -> RecordedSubmission | None:
+    """Return the submission where `source` is itself a recording (a bag or an MCAP file), None where it is anything
+    else.
+
+    Raises what `open_submission` raises.
+    """
+    parsed = _parsed(source)
+    try:
+        if parsed.kind != "archive" or parsed.path is None or not is_recording(parsed.path):
+            return None
+        submission = _one_recording(parsed, parsed.path)
+    except OSError as error:
+        raise unreadable(parsed.given, error) from error
+    return _named(submission, submission_id)
+
+
+def open_recorded(
+    source: str | Source, *, workdir: Path, submission_id: str | None = None, git_timeout_s: float = 120.0
+) -> RecordedSubmission:
+    """Return the submission of a lab that asks for recordings alone: as `open_submission`, and no package is looked
+    for."""
+    parsed = _parsed(source)
+    with _base(workdir) as base:
+        try:
+            git = Git(base / "git-home", timeout_s=git_timeout_s)
+            submission = _all_recordings(open_source(parsed, git, base, Limits()), git)
+        except OSError as error:
+            raise unreadable(parsed.given, error) from error
+    return _named(submission, submission_id)
+
+
+def _named(submission: _AnySubmission, submission_id: str | None) -> _AnySubmission:
+    if submission_id is None:
+        return submission
+    return submission.model_copy(update={"id": safe_name(submission_id)})
+
+
+def _parsed(source: str | Source) -> Source:
+    if isinstance(source, Source):
+        return source
+    try:
+        return parse_source(source)
+    except OSError as error:
+        raise unreadable(printable(source), error) from error
+
+
+def unreadable(given: str, error: OSError) -> GraderError:
+    """Return the error for a source that this machine could not read, or had no room for."""
+    if error.errno in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)):
+        return OutputError(f"{given}: the disk is full", hint="Free some room (`df -h`) and try again.")
+    where = f" at {brief(str(error.filename))}" if error.filename else ""
+    return SubmissionError(
+        f"{given} cannot be read: {error.strerror or brief(str(error))}{where}",
+        hint="Check its permissions (`ls -l`).",
+    )
+
+
+@contextmanager
+def _base(workdir: Path) -> Iterator[Path]:
+    """A new folder below `workdir`. If opening fails nothing of it stays."""
+    try:
+        workdir.mkdir(parents=True, exist_ok=True)
+        base = Path(tempfile.mkdtemp(prefix="source-", dir=workdir)).resolve()
+    except OSError as error:
+        raise OutputError(
+            f"the work folder {workdir} cannot be written: {error.strerror}", hint="Choose another folder."
+        ) from error
+    try:
+        yield base
+    except BaseException:
+        shutil.rmtree(base, ignore_errors=True)
+        raise
+    if not (base / "tree").exists():
+        shutil.rmtree(base, ignore_errors=True)
+
+
 def open_source(source: Source, git: Git, base: Path, limits: Limits) -> Opened:
     """What `source` stands for, on disk. New folders are made below `base`, under the source's own name."""
     into = base / "tree" / safe_name(source.name)
@@ -81,7 +205,7 @@ def open_source(source: Source, git: Git, base: Path, limits: Limits) -> Opened:
 
 
 def locate(opened: Opened, wanted: str) -> Located:
-    """The lab's package in what was opened. A folder inside the package (`lab1/src`) stands for the package.
+    """Return the lab's package in what was opened. A folder inside the package (`lab1/src`) stands for the package.
 
     Raises PackageNotFound, or SubmissionError for an empty folder.
     """
@@ -109,7 +233,7 @@ def _locate(opened: Opened, wanted: str) -> Located | None:
 
 
 def describe(located: Located, git: Git, limits: Limits) -> Submission:
-    """The record that the next station reads. Raises OSError for a file that cannot be read."""
+    """Return the record that the next station reads. Raises OSError for a file that cannot be read."""
     opened, choice = located.opened, located.choice
     chosen = choice.package
     repositories = Repositories(git, opened.leave_out, root=opened.root, known=opened.repository)
@@ -179,3 +303,79 @@ def _package(
         right_in_git=frozenset(path for path in right if encodable(path)),
         left_out=frozenset(path.encode("utf-8", "backslashreplace").decode() for path in content.left_out),
     )
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a file is a recording by its name or its first bytes; a damaged one is one too.
+
+    Raises OSError where it cannot be read.
+    """
+    if not path.is_file():
+        return False
+    if _SUFFIX.search(path.name):
+        return True
+    with path.open("rb") as file:
+        return file.read(16).startswith(_MAGIC)
+
+
+def _one_recording(source: Source, path: Path) -> RecordedSubmission:
+    """Return the submission that is one recording. Raises OSError where it cannot be read, SubmissionError for its
+    size."""
+    limit_bytes = Limits().recording_bytes
+    if path.stat().st_size > limit_bytes:
+        raise SubmissionError(
+            f"{source.given} is larger than {limit_bytes >> 20} MiB",
+            hint="Record the lab's topics only: `rosbag record /topic …`, or cut it with `rosbag filter`.",
+        )
+    return RecordedSubmission(
+        id=safe_name(_SUFFIX.sub("", path.name)),
+        source=source.given,
+        root=path.parent,
+        file=path,
+        commit=None,
+        digest=file_digest(path).hexdigest(),
+    )
+
+
+def _all_recordings(opened: Opened, git: Git) -> RecordedSubmission:
+    """Return the submission whose recordings lie somewhere in what was opened, with or without a package."""
+    entries = list_entries(opened.root, leave_out=opened.leave_out, tolerant=True)
+    left_out = {e.path for e in entries if e.size_bytes > Limits().recording_bytes or not _is_open(opened, e)}
+    commit = opened.commit
+    if opened.in_place and is_there(opened.root / ".git"):
+        commit = Repositories(git, opened.leave_out, root=opened.root).head(opened.root)
+    return RecordedSubmission(
+        id=safe_name(opened.name),
+        source=opened.source.given,
+        root=opened.root,
+        file=None,
+        commit=commit,
+        digest=tree_digest(opened.root, entries, {}, left_out),
+    )
+
+
+def _is_open(opened: Opened, entry: Entry) -> bool:
+    return entry.kind != "file" or os.access(opened.root / entry.path, os.R_OK, effective_ids=True)
+
+
+def find_recordings(root: Path, pattern: str) -> list[Path]:
+    """Return the files below `root` that fit a pattern, nearest first; each content once, links left out.
+
+    A pattern without a slash is for a file's name in any folder; capitals make no difference.
+    """
+    wanted = pattern.casefold().removeprefix("./")
+    found: list[Path] = []
+    for folder in walk(root, tolerant=True):
+        folder.folders[:] = [n for n in folder.folders if n not in NO_CONTENT and not n.startswith(".")]
+        names = [entry.name for entry in folder.others if entry.is_file(follow_symlinks=False)]
+        found += [root / path for path in map(folder.inside, names) if _fits(path, wanted)]
+    if len(found) < 2 or any(path.stat().st_size > Limits().recording_bytes for path in found):
+        return found
+    return list({file_digest(path).hexdigest(): path for path in reversed(found)}.values())[::-1]
+
+
+def _fits(path: str, wanted: str) -> bool:
+    name = path.rpartition("/")[2]
+    if name.startswith("."):
+        return False
+    return fnmatchcase(path.casefold() if "/" in wanted else name.casefold(), wanted)

@@ -1,7 +1,8 @@
-"""Brings one commit of a repository to disk: as little history as will do, and nothing of it is run."""
+"""Brings one commit of a repository to disk, with as little history as will do; nothing of it is run."""
 
 from __future__ import annotations
 
+import difflib
 import os
 import re
 import shutil
@@ -12,12 +13,11 @@ from pathlib import Path
 
 from grader.errors import SubmissionError
 from grader.intake.credentials import Access, accesses, split_address
-from grader.intake.explain import explained
 from grader.intake.git import Git, GitFailed, GitTimeout, GitTooMuch, Repository
+from grader.intake.git_errors import explained
 from grader.intake.gitdir import Unfit, link_repository
 from grader.intake.limits import Limits, Meter
-from grader.intake.names import brief, listing
-from grader.intake.refs import Wanted, choose_ref, no_such_ref, parse_refs
+from grader.intake.names import brief, listing, printable
 from grader.intake.source import Source
 
 _FULL_HASHES = (40, 64)
@@ -34,6 +34,10 @@ _LONGEST_NAME_BYTES = 255
 _LONGEST_LINK_BYTES = 4095
 # Of a commit's own attributes, those that make a file many times larger, or name a program.
 _ATTRIBUTES = "* !filter !ident !working-tree-encoding\n"
+_HASH = re.compile(r"[0-9a-fA-F]{4,64}")
+# Shorter ones may mean another commit than the one that a ref happens to point to.
+_TELLING_HASH = 7
+_USUAL_BRANCHES = ("main", "master")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +60,7 @@ class _Files:
 
 
 def clone(source: Source, git: Git, into: Path, limits: Limits) -> Clone:
-    """The commit of `source`, checked out in the new folder `into`.
+    """Return the commit of `source`, checked out in the new folder `into`.
 
     Raises SubmissionError where it cannot be had; the reason is named.
     """
@@ -156,7 +160,7 @@ def _ask(source: Source, git: Git, into: Path, command: tuple[str, ...], *refspe
 
 
 def ask(source: Source, git: Git, repository: Repository, command: tuple[str, ...], *refspecs: str) -> bytes:
-    """What the server of `source` answers to a command that takes an address. Raises GitFailed."""
+    """Return what the server of `source` answers to a command that takes an address. Raises GitFailed."""
     url, login = split_address(source.url) if source.remote else (source.url, None)
     return git.run(
         *(*command, "--", url, *refspecs),
@@ -212,3 +216,71 @@ def _checkout(source: Source, git: Git, into: Path, commit: str, files: _Files) 
         (info / "sparse-checkout").write_bytes(os.fsencode("\n".join(lines) + "\n"))
         sparse = ("-c", "core.sparseCheckout=true")
     git.run(*(*sparse, "checkout", "--quiet", "--detach", "--force", commit), cwd=into, repository=_own(into))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """`refspec` can be fetched alone. Without one, `commit` (a hash, or its beginning) is looked for."""
+
+    refspec: str | None = None
+    commit: str | None = None
+    hint: str = ""
+
+
+def parse_refs(text: str) -> dict[str, str]:
+    """`git ls-remote`'s lines as ref to hash; `v1^{}` is the commit that the tag `v1` stands for."""
+    pairs = (line.split("\t", 1) for line in text.splitlines() if "\t" in line)
+    return {ref: commit for commit, ref in pairs}
+
+
+def choose_ref(refs: dict[str, str], ref: str | None, *, given: str) -> Wanted:
+    """Return what to fetch for `@ref`, or for none. Raises SubmissionError, naming what is there."""
+    if not refs:
+        raise SubmissionError(
+            f"{given}: the repository is empty, it has no commit", hint="Commit and `git push` first."
+        )
+    if ref is None:
+        return _default(refs, given)
+    for name in (f"refs/heads/{ref}", f"refs/tags/{ref}", f"refs/remotes/{ref}", ref):
+        if name in refs:
+            return Wanted(refspec=name)
+    if _HASH.fullmatch(ref):
+        return _by_hash(refs, ref.lower())
+    raise no_such_ref(refs, ref, given=given)
+
+
+def no_such_ref(refs: dict[str, str], ref: str, *, given: str) -> SubmissionError:
+    """Return the error for a ref that is not there, with the nearest that is."""
+    names = [re.sub(r"^refs/(heads|tags)/", "", name) for name in refs if name.startswith("refs/heads/")]
+    names += [name[len("refs/tags/") :] for name in refs if re.fullmatch(r"refs/tags/.*(?<!\^\{\})", name)]
+    near = difflib.get_close_matches(ref, names, n=1)
+    hint = (
+        f"Did you mean @{printable(near[0])}?" if near else f"There are: {listing(names) or 'no branches'}."
+    )
+    return SubmissionError(f"{given}: there is no branch, tag or commit '{printable(ref)}'", hint=hint)
+
+
+def _default(refs: dict[str, str], given: str) -> Wanted:
+    if "HEAD" in refs:
+        return Wanted(refspec="HEAD")
+    branches = [name for name in refs if name.startswith("refs/heads/")]
+    usual = [f"refs/heads/{name}" for name in _USUAL_BRANCHES if f"refs/heads/{name}" in branches]
+    chosen = (usual or branches)[:1]
+    if not chosen or (len(branches) > 1 and not usual):
+        names = listing([name.removeprefix("refs/heads/") for name in branches])
+        raise SubmissionError(
+            f"{given}: the repository's default branch does not exist",
+            hint=f"Add the branch to mark, as in @{names}." if branches else "Push a branch.",
+        )
+    branch = printable(chosen[0].removeprefix("refs/heads/"))
+    return Wanted(
+        refspec=chosen[0], hint=f"the repository's default branch does not exist: {branch} was taken instead"
+    )
+
+
+def _by_hash(refs: dict[str, str], commit: str) -> Wanted:
+    if len(commit) >= _TELLING_HASH:
+        for name, tip in refs.items():
+            if tip.startswith(commit):
+                return Wanted(refspec=name.removesuffix("^{}"))
+    return Wanted(commit=commit)

@@ -1,17 +1,17 @@
-"""Reads SOURCE as it stands on the command line: which folder, archive or repository, and which `@ref`."""
+"""Reads SOURCE as it stands on the command line: which folder, archive or repository, which `@ref`, which id."""
 
 from __future__ import annotations
 
 import os
 import re
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Literal
 from urllib.parse import unquote
 
-from grader.errors import SubmissionError, UsageError
-from grader.intake.credentials import split_address
-from grader.intake.names import archive_stem, brief, printable
+from grader.errors import GraderError, SubmissionError, UsageError
+from grader.intake.credentials import split_address, without_password
+from grader.intake.names import archive_stem, brief, printable, safe_name
 from grader.intake.tree import is_file, is_there
 
 GivenModes = Literal["kept", "lost", "granted"]
@@ -32,9 +32,9 @@ class Source:
     """`given` may be shown: it holds no password. `path` is set where the source lies on this machine.
 
     `url`, `ref` and `inside` (the folder of it that was asked for) are for a repository; `remote` tells
-    whether reaching it takes the user's own git settings. `top` is where one on this machine lies. `hints` are what
-    whoever brought it here has to say about it. `modes` says what a platform that takes uploads did to file modes:
-    `lost` where nobody knows them, `granted` where every file then counts as executable.
+    whether reaching it takes the user's own git settings. `top` is where one on this machine lies. `hints` are
+    remarks of the code that brought it here. `modes` says what a platform that takes uploads did to file modes:
+    `lost` where they are not known, `granted` where every file then counts as executable.
     """
 
     kind: Literal["folder", "archive", "repository"]
@@ -231,3 +231,17 @@ def _without_password(scheme: str, authority: str) -> str:
     """A token may stand in the place of the user of a web address, so nothing of that part is shown."""
     user, at, host = authority.rpartition("@")
     return host if scheme in ("http", "https") else f"{user.partition(':')[0]}{at}{host}"
+
+
+def identify(source: str | Source, submission_id: str | None = None) -> tuple[str, str] | None:
+    """Return the id and what may be shown of the source, as if it had been opened; None for what is no source."""
+    if isinstance(source, Source):
+        return safe_name(submission_id if submission_id is not None else source.name), source.given
+    try:
+        parsed = parse_source(source)
+        name, given = parsed.name, parsed.given
+    except UsageError:
+        return None
+    except (GraderError, OSError, ValueError):
+        name, given = archive_stem(PurePath(source).name), printable(without_password(source))
+    return safe_name(submission_id if submission_id is not None else name), given

@@ -1,11 +1,12 @@
-"""Walks folders of any depth and size without following a link."""
+"""Walks folders of any depth and size without following a link, and gives their digest."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import stat
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -35,7 +36,7 @@ class Folder:
     others: list[os.DirEntry[str]]
 
     def inside(self, name: str) -> str:
-        """The path of an entry of this folder."""
+        """Return the path of an entry of this folder."""
         return name if self.path == "." else f"{self.path}/{name}"
 
 
@@ -50,7 +51,7 @@ class Entry:
 
 
 def walk(root: Path, *, tolerant: bool = False) -> Iterator[Folder]:
-    """Every folder from `root` on, nearest first, in order of names; links are entries, never ways.
+    """Yield every folder from `root` on, nearest first, in order of names; links are entries, never ways.
 
     Raises OSError for a folder that cannot be read, hidden ones left out, and SubmissionError for more than MAX_DEPTH
     folders in each other or too much in one of them; `tolerant` passes over those below the root. Raises
@@ -95,7 +96,7 @@ def _is_hidden(path: str) -> bool:
 
 
 def too_deep(name: str) -> SubmissionError:
-    """The error for a tree that no student's work looks like."""
+    """Return the error for a tree that no student's work looks like."""
     return SubmissionError(
         f"{brief(name)} holds more than {MAX_DEPTH} folders in each other",
         hint="Hand in the package alone.",
@@ -109,7 +110,7 @@ def _too_many(name: str, number: int) -> SubmissionError:
 def list_entries(
     root: Path, *, leave_out: Path | None = None, tolerant: bool = False, max_folders: int = MAX_IN_TREE
 ) -> list[Entry]:
-    """Everything below `root` but folders, sorted by path; `leave_out` is a folder not to enter.
+    """Return everything below `root` but folders, sorted by path; `leave_out` is a folder not to enter.
 
     Raises what `walk` raises, and SubmissionError for more than `max_folders` folders.
     """
@@ -144,7 +145,7 @@ def is_there(path: Path) -> bool:
 
 
 def read_file(path: Path, limit_bytes: int) -> bytes | None:
-    """The file's first bytes; None for what is no regular file. A pipe is never waited for.
+    """Return the file's first bytes; None for what is no regular file. A pipe is never waited for.
 
     Raises OSError where it cannot be read.
     """
@@ -167,3 +168,41 @@ def _entry(folder: Folder, entry: os.DirEntry[str]) -> Entry:
         executable=bool(mode & stat.S_IXUSR),
         size_bytes=about.st_size if kind == "file" else 0,
     )
+
+
+def tree_digest(
+    root: Path,
+    entries: Iterable[Entry],
+    executable: Mapping[str, bool | None],
+    left_out: Collection[str] = frozenset(),
+) -> str:
+    """sha256 over the entries' paths, executable bits, link targets and contents; of what is left out, the size.
+
+    Raises OSError for a file that cannot be read.
+    """
+    digest = hashlib.sha256()
+    for entry in entries:
+        path = os.fsencode(entry.path)
+        content = b"%d" % entry.size_bytes if entry.path in left_out else _content(root / entry.path, entry)
+        bit = b"x" if executable.get(entry.path) else b"-"
+        digest.update(b"%s %s %d %d\n%s" % (entry.kind.encode(), bit, len(path), len(content), path))
+        digest.update(content)
+    return digest.hexdigest()
+
+
+def _content(path: Path, entry: Entry) -> bytes:
+    """A file stands for its sha256. Nothing but files is opened: a pipe would never end."""
+    if entry.kind == "link":
+        return os.fsencode(path.readlink())
+    if entry.kind == "other":
+        return b""
+    return file_digest(path).digest()
+
+
+def file_digest(path: Path) -> hashlib._Hash:
+    """Return the sha256 of a file's contents."""
+    digest = hashlib.sha256()
+    with path.open("rb") as stream:
+        while block := stream.read(1 << 20):
+            digest.update(block)
+    return digest

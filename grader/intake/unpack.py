@@ -39,8 +39,8 @@ class Unpacker:
         self._unnamed: list[str] = []
 
     def admit(self, name: str, size_bytes: int = 0) -> str | None:
-        """The path below the root for an entry's name; None for what is not looked at (`.git`, `__MACOSX`) and for
-        what is left out: a file too large, a name that no disk takes.
+        """Return the path below the root for an entry's name; None for what is not looked at (`.git`, `__MACOSX`) and
+        for what is left out: a file too large, a name that no disk takes.
 
         Raises SubmissionError for a name that leads outside and for more than the limits allow.
         """

@@ -1,10 +1,9 @@
 """What the files of a package say, with file and line, nothing of the student's executed."""
 
 from grader.package.facts import python_paths, read_package, with_build_facts
-from grader.package.python import SYNTAX_SCRIPT, SyntaxReport, check_syntax, read_syntax_report
+from grader.package.python import SyntaxReport, check_syntax, read_syntax_report
 
 __all__ = [
-    "SYNTAX_SCRIPT",
     "SyntaxReport",
     "check_syntax",
     "python_paths",

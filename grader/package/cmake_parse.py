@@ -1,4 +1,7 @@
-"""`CMakeLists.txt` without CMake: `cmake_parser` for the grammar; variables and loops where literal."""
+"""`CMakeLists.txt` without CMake: the library `cmake_parser` for the grammar; variables and loops where literal.
+
+Where the grammar fails, a fault with its line and a plain cause goes out beside the calls that come before it.
+"""
 
 from __future__ import annotations
 
@@ -7,21 +10,20 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from cmake_parser import CMakeError, Token, resolve_args
+from cmake_parser import CMakeError, Token, parse_raw, parse_tree, resolve_args, tokenize
 from cmake_parser import ast as nodes
 from cmake_parser.interpreter import Context
 
 from grader.model.package import CMakeCall, CMakeFacts, Fault
-from grader.package.cmake_syntax import parse_tree_of
 from grader.package.reading import printable, read_markup
 
 _CMAKE_FILE = "CMakeLists.txt"
-_CALLS_LIMIT = 5_000
-_DEPTH_LIMIT = 20
-_STEPS_LIMIT = 20_000
-_LETTERS_LIMIT = 2_000_000
-_VALUE_LETTERS = 20_000
-_FILE_LIMIT_BYTES = 200_000
+_CALLS_MAX = 5_000
+_DEPTH_MAX = 20
+STEPS_MAX = 20_000
+_CHARS_MAX = 2_000_000
+_VALUE_CHARS_MAX = 20_000
+FILE_BYTES_MAX = 200_000
 _FALSE = frozenset({"0", "OFF", "NO", "FALSE", "N", "IGNORE", "NOTFOUND"})
 _LONE_DOLLAR = re.compile(r"(\\.)|\$(?![A-Za-z]*\{)", re.DOTALL)
 
@@ -37,6 +39,18 @@ _CATKIN = {
     "CATKIN_PACKAGE_LIB_DESTINATION": "lib",
     "CATKIN_PACKAGE_SHARE_DESTINATION": "share/{0}",
 }
+_NESTING_MAX = 50
+_WORK_MAX = 20_000_000
+_BLOCKS = ("if", "foreach", "while", "function", "macro", "block")
+_MIDDLE = ("else", "elseif")
+_LINK_CHARS_MAX = 4_095
+_LINK_TEXT = re.compile(r"\s*(\.{0,2}/)?[\w./-]+/[\w./-]+\s*")
+
+# A `#[` that opens no bracket comment is a plain comment to CMake, but not to the library.
+_COMMENTS = re.compile(
+    r"""(?P<keep>"(?:\\.|[^\\"])*"|\#?\[(=*)\[.*?\]\2\]|\#(?!\[)[^\n]*|\\.)|\#\[""", re.DOTALL
+)
+_OPENERS = re.compile(r"\[=*\[")
 
 
 class _Variables(dict[str, str]):
@@ -51,11 +65,11 @@ class _Variables(dict[str, str]):
 
 
 def parse_cmake(folder: Path, name: str) -> CMakeFacts | None:
-    """The calls of the package in `folder`, every command kept; None where it has no `CMakeLists.txt`.
+    """Return the calls of the package in `folder`, every command kept; None where it has no `CMakeLists.txt`.
 
     Never raises; `fault` says why CMake would not read the file, and the calls are then those before it.
     """
-    data = read_markup(folder, _CMAKE_FILE, _FILE_LIMIT_BYTES)
+    data = read_markup(folder, _CMAKE_FILE, FILE_BYTES_MAX)
     if isinstance(data, Fault):
         is_link = (folder / _CMAKE_FILE).is_symlink()
         if data.kind == "Missing" and not is_link:
@@ -82,7 +96,7 @@ class _Reader:
         self.fault: Fault | None = None
         self.read = {_CMAKE_FILE}
         self.steps = self.letters = 0
-        self.left_bytes = _FILE_LIMIT_BYTES
+        self.left_bytes = FILE_BYTES_MAX
         self.variables = _Variables()
         self.variables["CMAKE_PROJECT_NAME"] = self.variables["PROJECT_NAME"] = name
         unknown = (_Variables("$ENV"), _Variables("$CACHE"))
@@ -91,7 +105,7 @@ class _Reader:
     def run(self, tree: Iterable[nodes.AstNode], file: str, depth: int) -> None:
         for node in tree:
             self.steps += 1
-            if self._is_enough() or depth > _DEPTH_LIMIT:
+            if self._is_enough() or depth > _DEPTH_MAX:
                 return
             if isinstance(node, nodes.If):
                 self._branch(node, file, depth)
@@ -104,7 +118,7 @@ class _Reader:
 
     def _is_enough(self) -> bool:
         """Loops in each other, and values made of each other, multiply without an end."""
-        return len(self.calls) >= _CALLS_LIMIT or self.steps > _STEPS_LIMIT or self.letters > _LETTERS_LIMIT
+        return len(self.calls) >= _CALLS_MAX or self.steps > STEPS_MAX or self.letters > _CHARS_MAX
 
     def _branch(self, node: nodes.If, file: str, depth: int) -> None:
         """Both branches, but for a literal `if(FALSE)`: conditions are CMake's to judge."""
@@ -148,7 +162,7 @@ class _Reader:
             self._set(args)
         elif name == "list" and args[:1] == ["APPEND"] and len(args) > 1:
             before = filter(None, [dict.get(self.variables, args[1])])
-            self.variables[args[1]] = ";".join([*before, *args[2:]])[:_VALUE_LETTERS]
+            self.variables[args[1]] = ";".join([*before, *args[2:]])[:_VALUE_CHARS_MAX]
         elif name == "unset" and args:
             self.variables.pop(args[0], None)
         elif name == "project" and args:
@@ -163,7 +177,7 @@ class _Reader:
         values = args[1:]
         for end in ("CACHE", "PARENT_SCOPE"):
             values = values[: values.index(end)] if end in values else values
-        self.variables[args[0]] = ";".join(values)[:_VALUE_LETTERS]
+        self.variables[args[0]] = ";".join(values)[:_VALUE_CHARS_MAX]
 
     def _include(self, name: str, place: str, file: str, depth: int) -> None:
         """A file of the same package; modules of CMake and of other packages are none of its facts."""
@@ -181,8 +195,8 @@ class _Reader:
 
     def _arguments(self, tokens: list[Token], file: str) -> list[str]:
         references = sum(token.value.count("${") for token in tokens)
-        if references * max(map(len, self.variables.values())) > _LETTERS_LIMIT:
-            return [printable(token.value[:_VALUE_LETTERS]) for token in tokens]
+        if references * max(map(len, self.variables.values())) > _CHARS_MAX:
+            return [printable(token.value[:_VALUE_CHARS_MAX]) for token in tokens]
         try:
             resolved = resolve_args(self.context, [_escaped(t) for t in tokens if t.kind != "COMMENT"])
         except (CMakeError, RecursionError) as error:
@@ -192,7 +206,7 @@ class _Reader:
                 file=file, line=line, kind=type(error).__name__, message=str(error), cause=cause
             )
             return [printable(token.value) for token in tokens]
-        args = [printable(token.value[:_VALUE_LETTERS]) for token in resolved]
+        args = [printable(token.value[:_VALUE_CHARS_MAX]) for token in resolved]
         self.letters += sum(map(len, args)) + 10 * len(args)
         return args
 
@@ -203,3 +217,104 @@ def _escaped(token: Token) -> Token:
     if token.kind == "BRACKETED" or value == token.value:
         return token
     return Token(kind=token.kind, value=value, span=token.span, line=token.line, column=token.column)
+
+
+def parse_tree_of(data: bytes, file: str) -> tuple[list[nodes.AstFileNode], Fault | None]:
+    """Return the top-level commands and blocks of a CMake file, up to the fault where there is one. Never raises."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        cause = f"`{file}` is saved as UTF-16: save it as UTF-8"
+        return [], Fault(file=file, line=1, kind="ParseError", message="is UTF-16", cause=cause)
+    text = _readable(data)
+    if text is None:
+        return [], _fault(file, None, "too many brackets", f"`{file}` holds too many `[[` to be read")
+    commands, fault = _commands(text, file)
+    whole, unbalanced = _balanced(commands, file)
+    fault = unbalanced or fault
+    if fault is not None and whole:
+        text = text[: whole[-1].span.stop]
+    tree: list[nodes.AstFileNode] = []
+    try:
+        tree.extend(parse_tree(text, skip_comments=True) if whole else ())
+    except CMakeError as error:  # break(1)
+        line = tree[-1].line if tree else 1
+        fault = fault or _fault(file, line, str(error), "")
+    return tree, fault
+
+
+def commands_of(data: bytes) -> list[nodes.Command] | None:
+    """Return every command of a CMake file, also those in blocks and definitions; None where it cannot be read."""
+    text = _readable(data)
+    commands, fault = ([], None) if text is None else _commands(text, "")
+    return None if text is None or fault else commands
+
+
+def _readable(data: bytes) -> str | None:
+    """The text as the library takes it; None where that would take it too long."""
+    text = data.decode("utf-8-sig", "replace").replace("\r\n", "\n").replace("\0", " ")
+    if len(_OPENERS.findall(text)) * len(text) > _WORK_MAX:
+        return None
+    return _COMMENTS.sub(lambda found: found["keep"] or "# ", text)
+
+
+def _commands(text: str, file: str) -> tuple[list[nodes.Command], Fault | None]:
+    commands: list[nodes.Command] = []
+    try:
+        commands.extend(parse_raw(text, skip_comments=True))
+    except RecursionError:
+        return commands, _fault(file, None, "nested too deep", "brackets are nested too deep")
+    except CMakeError as error:
+        return commands, _explained(text, commands[-1].span.stop if commands else 0, file, str(error))
+    return commands, None
+
+
+def _explained(text: str, end: int, file: str, message: str) -> Fault:
+    """The fault of the command that begins behind `end`, the place where the last good one stopped."""
+    tokens = [t for t in tokenize(text) if t.kind != "COMMENT" and t.span.start >= end]
+    first = tokens[0] if tokens else Token("RAW", "", slice(end, end), text.count("\n") + 1, 1)
+    unparsed = next((t for t in tokens if t.kind == "UNPARSEABLE"), None)
+    line, cause = first.line, f"`{_word(first)}` is no command: CMake expects name(...)"
+    if unparsed is not None and text[unparsed.span].startswith('"'):
+        line, cause = unparsed.line, 'a quote `"` is opened here and never closed'
+    elif first.kind == "RPAREN":
+        cause = "there is a `)` too many"
+    elif "unexpected end of file" in message and len(tokens) > 1 and tokens[1].kind == "LPAREN":
+        cause = f"the `(` of `{_word(first)}(` is never closed by `)`"
+    elif end == 0 and len(text) <= _LINK_CHARS_MAX and _LINK_TEXT.fullmatch(text):
+        cause = "the file holds only the path that a link should lead to, no CMake commands"
+    return _fault(file, line, message, cause)
+
+
+def _word(token: Token) -> str:
+    return str(token.value or "")[:40]
+
+
+def _balanced(commands: list[nodes.Command], file: str) -> tuple[list[nodes.Command], Fault | None]:
+    """The commands up to the last one outside every open block, and the fault where blocks do not match."""
+    open_blocks: list[nodes.Command] = []
+    whole = 0
+    for count, command in enumerate(commands, 1):
+        name = command.identifier.lower()
+        block = name.removeprefix("end")
+        if name in _BLOCKS:
+            open_blocks.append(command)
+        elif name in _MIDDLE or (name.startswith("end") and block in _BLOCKS):
+            wanted = "if" if name in _MIDDLE else block
+            if not open_blocks or open_blocks[-1].identifier.lower() != wanted:
+                cause = f"`{name}()` has no `{wanted}()` before it that is still open"
+                return commands[:whole], _fault(file, command.line, f"flow control: {name}", cause)
+            if name not in _MIDDLE:
+                open_blocks.pop()
+        if len(open_blocks) > _NESTING_MAX:
+            return commands[:whole], _fault(
+                file, command.line, "nested too deep", "blocks are nested too deep"
+            )
+        whole = whole if open_blocks else count
+    if open_blocks:
+        name = open_blocks[0].identifier.lower()
+        cause = f"`{name}()` is never closed by `end{name}()`"
+        return commands[:whole], _fault(file, open_blocks[0].line, f"flow control: {name}", cause)
+    return commands, None
+
+
+def _fault(file: str, line: int | None, message: str, cause: str) -> Fault:
+    return Fault(file=file, line=line, kind="ParseError", message=message, cause=cause)

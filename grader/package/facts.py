@@ -24,7 +24,7 @@ def read_package(
     python_faults: Mapping[str, Fault] | None = None,
     interpreters: Interpreters | None = None,
 ) -> PackageFacts:
-    """The facts of one package.
+    """Return the facts of one package.
 
     `cmake_trace` is a file that CMake wrote by `--trace-expand --trace-format=json-v1`, `cmake_root` the
     package's folder as CMake saw it; without a trace, a parser reads `CMakeLists.txt`. `python_faults` are
@@ -80,7 +80,7 @@ def with_build_facts(
 
 
 def python_paths(facts: PackageFacts) -> tuple[str, ...]:
-    """The files that ROS's Python is to look at, in a copy of the package as well as here.
+    """Return the files that ROS's Python is to look at, in a copy of the package as well as here.
 
     Python by name or shebang, not too large, no link by absolute path, and a name that is valid Unicode.
     """

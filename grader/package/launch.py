@@ -9,14 +9,13 @@ from typing import NamedTuple
 from lxml import etree
 
 from grader.model.package import Fault, LaunchFile, LaunchNode
-from grader.package.launch_loader import Find, load
-from grader.package.launch_scope import Scope, wanted
+from grader.package.launch_loader import Find, Scope, load, wanted
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_xml
 
 _FILES_MAX = 100
 _TAGS_MAX = 20_000
-_LETTERS_MAX = 4_000
+_VALUE_CHARS_MAX = 4_000
 _SUFFIXES = (".launch", ".launch.xml", ".test")
 _TAGS = frozenset(
     {"arg", "env", "group", "include", "machine", "master", "node", "param", "remap", "rosparam", "test"}
@@ -41,7 +40,7 @@ def is_launch_file(path: str) -> bool:
 def read_launch_files(
     folder: Path, paths: Iterable[tuple[str, str]], names: Iterable[str] = ()
 ) -> tuple[LaunchFile, ...]:
-    """Each launch file; `paths` are pairs of the name to show and the path on disk relative to `folder`.
+    """Return each launch file; `paths` are pairs of the name to show and the path on disk relative to `folder`.
 
     `names` are the package's own, as `$(find …)` calls it.
     """
@@ -50,12 +49,12 @@ def read_launch_files(
 
 
 def parse_launch_files(texts: Mapping[str, bytes], names: Iterable[str] = ()) -> tuple[LaunchFile, ...]:
-    """The same from the files' bytes by path."""
+    """Return the same from the files' bytes by path."""
     return _records(_Library(texts, lambda path: texts[path]), names)
 
 
 def parse_launch(data: bytes, path: str) -> LaunchFile:
-    """One launch file from its bytes. Never raises: what is wrong with it is the record's `fault`."""
+    """Return one launch file from its bytes. Never raises: what is wrong with it is the record's `fault`."""
     return _record(path, _parse(data, path), (), lambda _: (None, None))
 
 
@@ -102,9 +101,9 @@ def _parse(data: bytes, path: str) -> _Parsed:
         return _Parsed(None, fault)
     for tag in element.iter(etree.Element):
         for name, value in tag.attrib.items():
-            if len(value) > _LETTERS_MAX:
-                tag.set(name, value[:_LETTERS_MAX])
-    root = str(element.tag)[:_LETTERS_MAX]
+            if len(value) > _VALUE_CHARS_MAX:
+                tag.set(name, value[:_VALUE_CHARS_MAX])
+    root = str(element.tag)[:_VALUE_CHARS_MAX]
     if root != "launch":
         return _Parsed(None, _wrong_root(path, root, line_of(element)), root)
     nested = next((e for e in element.iter("launch") if e is not element), None)

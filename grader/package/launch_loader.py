@@ -1,22 +1,34 @@
-"""What `roslaunch` makes of a launch file with all that it includes of the same package; nothing is executed."""
+"""What `roslaunch` makes of a launch file with all that it includes of the same package; nothing is executed.
+
+`Scope` is what a tag sees where it stands: arguments, namespace, remaps, and `$(…)` as far as it is literal.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import PurePosixPath
 from typing import Protocol
 
 from lxml import etree
+from pydantic import Field
 
 from grader.model.package import Fault, LaunchLoad, LaunchNode, LaunchParam
-from grader.package.launch_scope import Remaps, Scope, wanted
+from grader.model.record import Record
 from grader.package.xml import line_of
 
 INCLUDES_MAX = 50
 DEPTH_MAX = 10
 WORK_MAX = 10_000
-
-
 _TOO_MUCH = "launch files that hold more than a robot can start"
+_SUBSTITUTION = re.compile(r"\$\(([^()]*)\)")
+_SLASHES = re.compile(r"//+")
+# Of one value: arguments that name each other can double at every step.
+_VALUE_CHARS_MAX = 4_000
+_TRUE, _FALSE = frozenset({"true", "1"}), frozenset({"false", "0"})
+
+Remaps = tuple[tuple[str, str], ...]
 
 
 class Find(Protocol):
@@ -207,3 +219,84 @@ def _private(param: LaunchParam, inside: Scope) -> LaunchParam:
 
 def _fault(element: etree._Element, scope: Scope, message: str) -> Fault:
     return Fault(file=scope.file, line=line_of(element), kind="Include", message=message)
+
+
+class Scope(Record):
+    """`own` are the package's names, the first its usual one; `private` are `<param name="~…">` for later nodes.
+
+    `uncertain`: an `if` or `unless` that only roslaunch can work out decides whether the tag counts.
+    """
+
+    file: str
+    own: tuple[str, ...]
+    namespace: str = "/"
+    args: Mapping[str, str] = Field(default_factory=dict)
+    remaps: Remaps = ()
+    private: tuple[LaunchParam, ...] = ()
+    uncertain: bool = False
+
+    def text(self, written: str) -> str:
+        """`$(arg …)`, `$(dirname)` and `$(optenv NAME DEFAULT)` resolved; what only roslaunch knows stays as it is."""
+        text = _SUBSTITUTION.sub(
+            lambda match: self._value(match[0], match[1].split()), written[:_VALUE_CHARS_MAX]
+        )
+        return text[:_VALUE_CHARS_MAX]
+
+    def get(self, element: etree._Element, name: str) -> str | None:
+        """Return an attribute resolved, None where it is not there."""
+        written = element.get(name)
+        return None if written is None else self.text(written)
+
+    def of(self, element: etree._Element) -> Scope:
+        """Return the scope in the element, as far as its own conditions go."""
+        conditions = f"{self.get(element, 'if') or ''}{self.get(element, 'unless') or ''}"
+        return self.model_copy(update={"uncertain": True}) if "$(" in conditions else self
+
+    def below(self, namespace: str | None) -> Scope:
+        """Return the scope in a group, node or include with this `ns`."""
+        if not namespace:
+            return self
+        whole = namespace if namespace.startswith("/") else f"{self.namespace}{namespace}"
+        return self.model_copy(update={"namespace": _SLASHES.sub("/", f"/{whole[:_VALUE_CHARS_MAX]}/")})
+
+    def resolved(self, name: str) -> str:
+        """Return a parameter's whole name."""
+        whole = name if name.startswith("/") else f"{self.namespace}{name}"
+        return _SLASHES.sub("/", whole.rstrip("/") or "/")
+
+    def own_path(self, path: str) -> str | None:
+        """Return the package's own path behind `$(find <package>)/…`, None for any other."""
+        found = re.fullmatch(r"\$\(find\s+([^()\s]+)\s*\)/+(.+)", path.strip())
+        return _plain(found[2]) if found and found[1] in self.own else None
+
+    def _value(self, whole: str, words: list[str]) -> str:
+        match words:
+            case ["arg", name] if name in self.args:
+                return self.args[name]
+            case ["dirname"] if self.own:
+                folder = PurePosixPath(self.file).parent.as_posix()
+                return f"$(find {self.own[0]})" + ("" if folder == "." else f"/{folder}")
+            case ["optenv", _, *default] if default:
+                return " ".join(default)
+        return whole
+
+
+def wanted(element: etree._Element, scope: Scope | None = None) -> bool:
+    """False where `if` or `unless` switches the element off; what is not known before run time does not."""
+    on, off = (element.get(name) or "" for name in ("if", "unless"))
+    if scope is not None:
+        on, off = scope.text(on), scope.text(off)
+    return on.strip().lower() not in _FALSE and off.strip().lower() not in _TRUE
+
+
+def _plain(path: str) -> str | None:
+    """`launch/../config/a.yaml` as `config/a.yaml`; None where it leads out of the package."""
+    parts: list[str] = []
+    for part in PurePosixPath(path).parts:
+        if part == ".." and not parts:
+            return None
+        if part == "..":
+            parts.pop()
+        elif part != ".":
+            parts.append(part)
+    return "/".join(parts)

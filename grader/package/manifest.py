@@ -1,7 +1,11 @@
-"""`package.xml`: catkin_pkg says what it means and whether `catkin_make` takes it, lxml where it stands."""
+"""`package.xml`: catkin_pkg says what it means and whether `catkin_make` takes it, lxml on which line.
+
+What catkin_pkg refuses is put in plain words.
+"""
 
 from __future__ import annotations
 
+import re
 import threading
 import warnings
 from collections.abc import Iterator
@@ -12,26 +16,59 @@ from catkin_pkg.package import InvalidPackage, Package, parse_package_string
 from lxml import etree
 
 from grader.model.package import Dependency, Fault, Manifest, Person
-from grader.package.manifest_causes import explain
 from grader.package.reading import read_markup
 from grader.package.xml import line_of, parse_xml
 
 MANIFEST = "package.xml"
-_TEXT_LETTERS = 4_000
+_TEXT_CHARS_MAX = 4_000
 _TAGS = 600
 _CONDITIONS = 200
-_CONDITION_LETTERS = 300
+_CONDITION_CHARS_MAX = 300
 _CONDITION_BRACKETS = 20
-_MESSAGE_LETTERS = 500
+_MESSAGE_CHARS_MAX = 500
 _FILTERS = threading.Lock()
 """Filters of warnings are the whole process's: two threads would leave each other's behind."""
 
 # What `condition="$ROS_VERSION == 1"` (REP 149) is measured by: the labs are ROS 1 on its last distribution.
 _CONTEXT = {"ROS_VERSION": "1", "ROS_DISTRO": "noetic", "ROS_PYTHON_VERSION": "3"}
+# catkin_pkg's message, the tag whose line is named, and the words ({0}, {1}: the pattern's groups)
+_CAUSES = (
+    (r'contain a single "package" root', "", "the file must hold one `<package> ... </package>`"),
+    (r'exactly one "(\w+)" tag', "{0}", "there must be exactly one `<{0}>` tag"),
+    (r'not contain more than one "(\w+)"', "{0}", "there may be only one `<{0}>` tag"),
+    (r'"(\w+)" tag must have the attribute "(\w+)"', "{0}", '`<{0}>` needs {1}="..."'),
+    (r'Invalid email ""', "maintainer", '`<maintainer>` needs email="name@place.org"'),
+    (r'Invalid email "(.*?)"', "maintainer", "`{0}` is no e-mail address: write name@place.org"),
+    (r"must have an email", "maintainer", '`<maintainer>` needs email="name@place.org"'),
+    (r"name must not be empty", "name", "`<name>` is empty"),
+    (r'Package name "(.*?)" does not follow naming', "name",
+     "`{0}` is no package name: it takes letters, digits, `_` and `-`, no spaces, and begins with a letter"),
+    (r"version must not be empty", "version", "`<version>` is empty: write 0.0.0"),
+    (r'version "(.*?)" does not follow version', "version", "`{0}` is no version: write 0.0.0"),
+    (r"description must not be empty", "description", "`<description>` is empty: write a sentence"),
+    (r"at least one maintainer", "", '`<maintainer email="...">` is missing'),
+    (r'at least one "license"', "", "`<license>` is missing"),
+    (r"license tag must neither", "license", "`<license>` is empty"),
+    (r"must not contain the following tags: (.*)", "{0}", "format {format} knows no `<{0}>`"),
+    (r"must not contain the following children: (.*)", "",
+     "there is a tag inside another where only text belongs (`<{0}>`): a closing tag is missing before it"),
+    (r'"(\w+)" tag must not have the following attributes: (.*)', "{0}", "`<{0}>` takes no attribute `{1}`"),
+    (r"replace <run_depend> tags with <exec_depend>", "run_depend",
+     "in format 2 and 3 `<run_depend>` is written `<exec_depend>`"),
+    (r"replace <exec_depend> tags with <run_depend>", "exec_depend",
+     'in format 1 `<exec_depend>` is written `<run_depend>`; or begin with `<package format="2">`'),
+    (r"generic dependency on '(.*?)' is redundant with: (.*)", "depend",
+     "`<depend>{0}</depend>` says it all: delete `<{1}>{0}</{1}>`"),
+    (r'test dependency on "(.*?)" is redundant', "test_depend", "delete `<test_depend>{0}</test_depend>`"),
+    (r'must not "\w+" on a package with the same name', "", "the package depends on itself: delete the line"),
+    (r"invalid literal for int|format version", "", 'the format must be 1, 2 or 3: `<package format="2">`'),
+    (r"condition '(.*)' failed to parse", "", "the condition `{0}` cannot be read"),
+    (r"Only one <build_type>", "export", "there may be only one `<build_type>`"),
+)  # fmt: skip
 
 
 def read_manifest(folder: Path) -> tuple[Manifest | None, Fault | None]:
-    """The manifest of the package in `folder`, or None and why `catkin_make` would not take it."""
+    """Return the manifest of the package in `folder`, or None and why `catkin_make` would not take it."""
     data = read_markup(folder, MANIFEST)
     if isinstance(data, Fault):
         return None, _missing(folder, data)
@@ -49,7 +86,7 @@ def _missing(folder: Path, fault: Fault) -> Fault:
 
 
 def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
-    """The manifest from its bytes. Never raises."""
+    """Return the manifest from its bytes. Never raises."""
     if not data.strip():
         return None, _fault(1, "XMLSyntaxError", "no element found", "`package.xml` is empty")
     try:
@@ -68,7 +105,7 @@ def parse_manifest(data: bytes) -> tuple[Manifest | None, Fault | None]:
             warnings.simplefilter("ignore", DeprecationWarning)  # catkin_pkg's own use of pyparsing
             return _manifest(_meaning(root, said), root, said), None
     except (InvalidPackage, AssertionError, ValueError, RecursionError) as error:
-        message = str(getattr(error, "msg", error))[:_MESSAGE_LETTERS]
+        message = str(getattr(error, "msg", error))[:_MESSAGE_CHARS_MAX]
     place, cause = explain(message, root)
     return None, _fault(place, "InvalidPackage", "; ".join(message.split("\n")), cause)
 
@@ -97,14 +134,14 @@ def _shorten(root: etree._Element) -> None:
     if sum("condition" in element.attrib for element in root.iter(etree.Element)) > _CONDITIONS:
         raise ValueError(f"more than {_CONDITIONS} conditions")
     for element in root.iter():
-        if element.text and len(element.text) > _TEXT_LETTERS:
-            element.text = element.text[:_TEXT_LETTERS]
-        if element.tail and len(element.tail) > _TEXT_LETTERS:
-            element.tail = element.tail[:_TEXT_LETTERS]
+        if element.text and len(element.text) > _TEXT_CHARS_MAX:
+            element.text = element.text[:_TEXT_CHARS_MAX]
+        if element.tail and len(element.tail) > _TEXT_CHARS_MAX:
+            element.tail = element.tail[:_TEXT_CHARS_MAX]
         for name, value in element.attrib.items():
-            element.set(name, value[:_TEXT_LETTERS])
+            element.set(name, value[:_TEXT_CHARS_MAX])
         condition = element.get("condition") or ""  # a comment has no attributes, not even the default
-        if len(condition) > _CONDITION_LETTERS or condition.count("(") > _CONDITION_BRACKETS:
+        if len(condition) > _CONDITION_CHARS_MAX or condition.count("(") > _CONDITION_BRACKETS:
             raise ValueError(f"condition '{condition[:40]}...' failed to parse")
 
 
@@ -159,3 +196,28 @@ def _advice(package: Package, maintainers: tuple[Person, ...]) -> Iterator[str]:
             yield f"the maintainer's address is still {person.email}"
     if not any(d.name == "catkin" for d in package.buildtool_depends):
         yield "there is no <buildtool_depend>catkin</buildtool_depend>"
+
+
+def explain(message: str, root: etree._Element) -> tuple[int | None, str]:
+    """Return the line and the causes, `; ` between them, of catkin_pkg's `message`; "" where it is not known."""
+    known: dict[str, int | None] = {}
+    for text in filter(None, (part.strip("- ") for part in message.split("\n"))):
+        for pattern, tag, cause in _CAUSES:
+            if found := re.search(pattern, text):
+                groups = found.groups()
+                said = cause.format(*groups, format=root.get("format", "1"))
+                known.setdefault(said, _line_of(root, tag.format(*groups)))
+                break
+    line = next((number for number in known.values() if number is not None), line_of(root))
+    return line, "; ".join(known)
+
+
+def _line_of(root: etree._Element, tags: str) -> int | None:
+    """The line of the last element with one of the tags: where a tag stands twice, the second is too much."""
+    wanted = tags.split(", ")
+    lines = [
+        line_of(element)
+        for element in root
+        if isinstance(element.tag, str) and etree.QName(element).localname in wanted
+    ]
+    return lines[-1] if lines else None

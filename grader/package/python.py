@@ -1,30 +1,90 @@
-"""Python files as a Python reads them, in a process of its own with limits; nothing is imported."""
+"""Python files as a Python reads them, in a child process with limits, and its errors in a student's words."""
 
 from __future__ import annotations
 
 import json
-import os
-import subprocess
+import re
 import sys
-import tempfile
 import time
+import unicodedata
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Literal
 
 from pydantic import Field
 
-from grader.host_programs import with_absolute_paths
+from grader.limited import ChildLimits, run_limited
 from grader.model.package import Fault, PythonSlip
 from grader.model.record import Record
-from grader.package.python_causes import cause_of
 from grader.package.reading import printable
 
-SYNTAX_SCRIPT = Path(__file__).resolve().parents[1] / "arena" / "ros" / "syntax.py"
+CHECK = "grader.arena.ros.syntax:check_all"
+MEMORY_BYTES, CPU_S = 1 << 30, 20
 REPORT_BYTES_MAX = 8 << 20
 """More than `syntax.py` has to say of as many files as a package may have."""
-_CRASHES_LIMIT = 3
-_MESSAGE_LETTERS = 500
+CRASHES_MAX = 3
+MESSAGE_CHARS_MAX = 500
+_TYPOGRAPHIC = (
+    ("\u2018\u2019\u201a\u201b\u2032\u00b4", "quote", "'"),
+    ("\u201c\u201d\u201e\u201f\u2033\u00ab\u00bb", "quote", '"'),
+    ("\u2010\u2011\u2012\u2013\u2014\u2015\u2212", "dash", "-"),
+)
+TEXT_CHARS_MAX = 300
+_COPIED = "copied from a PDF or a web page"
+
+# On any message: the faulty line itself tells.
+_MARKER = re.compile(r"(<{7}|={7}|>{7})(\s|$)")
+_LINES = (
+    (_MARKER.pattern, "git's merge markers (`<<<<<<<`) are still in the file: keep one version"),
+    (r"^\s*else\s+if\b", "Python writes `elif`, not `else if`"),
+    (r"^\s*except\s+[\w.]+\s*,\s*\w+\s*:", "this is Python 2: write `except Error as name:`"),
+    (r"^\s*raise\s+[\w.]+\s*,", 'this is Python 2: write `raise Error("text")`'),
+    (r"^\s*print\s+[^(=\s]", "this is Python 2: `print` needs brackets, `print(...)`"),
+    (r"^\s*exec\s+[^(=\s]", "this is Python 2: `exec` needs brackets, `exec(...)`"),
+    (r"`", "backticks are Python 2: write `repr(x)` or `str(x)`"),
+    (r"<>", "`<>` is Python 2: write `!=`"),
+    (r"\bur['\"]", '`ur"..."` is Python 2: write `r"..."`'),
+    (r"\b\d+[lL]\b", "a number that ends with `L` is Python 2: leave the `L` out"),
+    (r"\+\+|--\s*$", "Python has no `++` and `--`: write `x += 1`"),
+    (r"&&|\|\|", "Python writes `and`, `or` and `not`"),
+    (r"^\s*(\$|sudo |rosrun |roslaunch |cd |chmod )", "this is a command for the terminal, not Python"),
+    (r"^\s*(if|elif|while)\b[^=(:]*[^=!<>(:]=[^=]", "`=` gives a value to a name; to compare, write `==`"),
+    (r"\basync\b(?!\s+(def|for|with)\b)", "`async` is a reserved word since Python 3.7: use another name"),
+)  # fmt: skip
+
+_MESSAGES = (
+    (r"inconsistent use of tabs", "tabs and spaces are mixed in the indentation: use four spaces everywhere"),
+    (r"unindent does not match", "this line is indented like none of the lines above it"),
+    (r"unexpected indent", "this line is indented further than the one above, and nothing asks for it"),
+    (r"expected an indented block", "the line after a `:` must be indented (by four spaces)"),
+    (r"Missing parentheses in call to '(\w+)'", "this is Python 2: `{0}` needs brackets, `{0}(...)`"),
+    (r"multiple exception types", "this is Python 2: write `except Error as name:`"),
+    (r"leading zeros in decimal", "a number may not begin with 0: write 777, or 0o777 for an octal one"),
+    (r"expected ':'", "a colon `:` is missing at the end of the line"),
+    (r"'(.)' was never closed", "the bracket `{0}` is opened in this line and never closed"),
+    (r"unmatched '(.)'", "there is a `{0}` too many, or its opening bracket is missing"),
+    (r"closing parenthesis '(.)' does not match opening parenthesis '(.)'",
+     "a `{1}` is closed by `{0}`: the two must be of one kind"),
+    (r"triple-quoted", "a text in triple quotes is opened and never closed"),
+    (r"EOL while scanning|unterminated (f-)?string", "a quote is opened in this line and never closed"),
+    (r"Maybe you meant '=='|cannot assign to", "`=` gives a value to a name; to compare, write `==`"),
+    (r"forgot a comma", "a comma is missing between two values"),
+    (r"'return' outside function", "`return` stands outside every function: is its indentation right?"),
+    (r"'(break|continue)'? .*loop", "`{0}` stands outside every loop: is its indentation right?"),
+    (r"'yield' outside", "`yield` stands outside every function: is its indentation right?"),
+    (r"UTF-16", "the file is saved as UTF-16: save it as UTF-8"),
+    (r"Non-UTF-8 code|codec can't decode byte|invalid or missing encoding",
+     "the file is not saved as UTF-8 (accents of an old encoding): save it as UTF-8"),
+    (r"unicodeescape", r"a backslash in a text is read as `\U...`: write the text as r\"...\""),
+    (r"encoding", "line 1 or 2 names an encoding that Python does not know: write `# -*- coding: utf-8 -*-`"),
+    (r"null bytes", "the file holds null bytes: it is no text, or saved as UTF-16; save it as UTF-8"),
+    (r"after line continuation", r"nothing may follow a backslash `\` at the end of a line"),
+    (r"duplicate argument '(\w+)'", "two parameters are both called `{0}`"),
+    (r"unexpected EOF", "the file ends in the middle of something: a bracket, or a block without a body"),
+    (r"too many nested|overflow|too complex|recursion|^$", "the file is nested too deep for Python"),
+)  # fmt: skip
+
+_BLOCK = re.compile(r"\s*(if|elif|else|for|while|def|class|try|except|finally|with)\b")
 
 
 class SyntaxReport(Record):
@@ -58,8 +118,8 @@ class _RawEntry(Record):
 
 
 def read_syntax_report(output: bytes | str) -> SyntaxReport:
-    """The report of `grader/arena/ros/syntax.py` from what it printed; foreign lines are passed over, and what is past
-    `REPORT_BYTES_MAX` is not read."""
+    """Return the report of `grader/arena/ros/syntax.py` from what it printed; foreign lines are passed over, and what
+    is past `REPORT_BYTES_MAX` is not read."""
     checked: list[str] = []
     faults: dict[str, Fault] = {}
     slips: list[PythonSlip] = []
@@ -84,26 +144,26 @@ def _entry(line: bytes | str) -> _RawEntry | None:
 
 def _fault(file: str, raw: _RawFault) -> Fault:
     cause = cause_of(raw.message, raw.text, column=raw.column, opened=raw.opened, mixed=raw.mixed)
-    kind = printable(raw.kind[:_MESSAGE_LETTERS])
+    kind = printable(raw.kind[:MESSAGE_CHARS_MAX])
     return Fault(
         file=file,
         line=raw.line,
         column=raw.column if raw.column and raw.column > 0 else None,
         kind=kind,
-        message=printable(raw.message[:_MESSAGE_LETTERS]) or kind,
+        message=printable(raw.message[:MESSAGE_CHARS_MAX]) or kind,
         cause=printable(cause),
     )
 
 
 def check_syntax(folder: Path, paths: Sequence[str], *, timeout_s: float = 10.0) -> SyntaxReport:
-    """The report on files of `folder`, made by this Python in processes of their own with limits.
+    """Return the report on files of `folder`, made by this Python in processes of their own with limits.
 
     A file that crashes Python gets a fault of kind `PythonCrash`, those that the time does not reach
     `NotChecked`.
     """
     deadline = time.monotonic() + timeout_s
     report, left = SyntaxReport(), list(paths)
-    for _ in range(_CRASHES_LIMIT + 1):
+    for _ in range(CRASHES_MAX + 1):
         remaining_s = deadline - time.monotonic()
         if not left or remaining_s <= 0:
             break
@@ -120,24 +180,15 @@ def check_syntax(folder: Path, paths: Sequence[str], *, timeout_s: float = 10.0)
 
 
 def _run(folder: Path, paths: list[str], timeout_s: float) -> tuple[SyntaxReport, bool]:
-    command = [sys.executable, "-I", str(SYNTAX_SCRIPT), str(folder)]
-    names = json.dumps(paths).encode("ascii")
-    timed_out = False
-    with tempfile.TemporaryFile() as out:
-        try:
-            subprocess.run(
-                command,
-                env=with_absolute_paths(os.environ),
-                input=names,
-                stdout=out,
-                stderr=subprocess.DEVNULL,
-                timeout=timeout_s,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            timed_out = True
-        out.seek(0)
-        return read_syntax_report(out.read(REPORT_BYTES_MAX)), timed_out
+    limits = ChildLimits(
+        memory_bytes=MEMORY_BYTES,
+        cpu_s=CPU_S,
+        wall_s=timeout_s,
+        file_bytes=4 * REPORT_BYTES_MAX,
+        answer_bytes=REPORT_BYTES_MAX,
+    )
+    answer = run_limited(CHECK, str(folder.absolute()), paths, limits=limits)
+    return read_syntax_report(answer.lines), answer.timed_out
 
 
 def _without_result(paths: Iterable[str], kind: str, message: str) -> SyntaxReport:
@@ -155,3 +206,82 @@ def _joined(one: SyntaxReport, two: SyntaxReport) -> SyntaxReport:
         faults={**one.faults, **two.faults},
         slips=one.slips + two.slips,
     )
+
+
+def cause_of(
+    message: str, text: str = "", *, column: int | None = None, opened: int | None = None, mixed: bool = False
+) -> str:
+    """Return the cause in plain words, "" where Python's `message` says enough.
+
+    `text` is the faulty line, `column` the place in it (from 1), `opened` the line of a bracket that is never
+    closed, `mixed` whether the file indents with tabs and with spaces.
+    """
+    message, text = message[:TEXT_CHARS_MAX], text[:TEXT_CHARS_MAX]
+    vague = message.startswith(("invalid syntax", "expected ':'", "invalid decimal", "unexpected EOF"))
+    odd = "invalid decimal" in message and _strange(text)  # Python 3.10 on `1` and an invisible character
+    if odd or "invalid character" in message or "non-printable" in message:
+        return _character(message, text)
+    if "unindent does not match" in message and mixed:
+        return "tabs and spaces are mixed in the indentation of this file: use four spaces everywhere"
+    if (vague or _MARKER.match(text)) and (told := _first(_LINES, _without_texts(text))):
+        return told
+    if opened is not None and vague:
+        return f"a bracket that is opened in line {opened} is never closed"
+    if message.startswith("invalid syntax") and _lacks_colon(text, column):
+        message = "expected ':'"
+    return _first(_MESSAGES, message)
+
+
+def _first(table: tuple[tuple[str, str], ...], text: str) -> str:
+    for pattern, cause in table:
+        if found := re.search(pattern, text):
+            return cause.format(*found.groups()) if "{0}" in cause else cause
+    return ""
+
+
+def _without_texts(line: str) -> str:
+    """The line with its string literals emptied and its comment cut."""
+    return re.sub(r"""("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')|#.*""", lambda m: '""' if m[1] else "", line)
+
+
+def _lacks_colon(text: str, column: int | None) -> bool:
+    code = _without_texts(text).rstrip()
+    at_end = column is None or column > len(text.split("#", maxsplit=1)[0].rstrip())
+    return at_end and not code.endswith(":") and _BLOCK.match(code) is not None
+
+
+def _character(message: str, text: str) -> str:
+    """Python before 3.9 does not name the character; it is then looked for in the line."""
+    named = re.search(r"U\+([0-9A-Fa-f]{4,6})", message)
+    if named and int(named[1], 16) <= sys.maxunicode:
+        return _character_words(chr(int(named[1], 16)))
+    strange = sorted(_strange(text), key=lambda c: c.isprintable() and not _is_typographic(c))
+    return (
+        _character_words(strange[0]) if strange else "this line holds a character that Python does not know"
+    )
+
+
+def _strange(text: str) -> list[str]:
+    return [c for c in text if ord(c) > 127 and not c.isidentifier() and not unicodedata.combining(c)]
+
+
+def _is_typographic(char: str) -> bool:
+    return any(char in group for group, _, _ in _TYPOGRAPHIC)
+
+
+def _character_words(char: str) -> str:
+    code = f"U+{ord(char):04X}"
+    for group, name, plain in _TYPOGRAPHIC:
+        if char in group:
+            return f"a typographic {name} {char} ({code}) was {_COPIED}: type a plain {plain}"
+    if unicodedata.category(char) == "Zs":
+        name = "no-break space" if char == "\u00a0" else "special space"
+        return (
+            f"an invisible {name} ({code}) was {_COPIED}: delete the spaces of this line and type them anew"
+        )
+    if not char.isprintable():
+        return f"an invisible character ({code}) was {_COPIED}: delete this line and type it anew"
+    plain = unicodedata.normalize("NFKC", char)
+    if plain != char and plain.isascii():
+        return f"`{char}` ({code}) is not the plain `{plain}`: type it anew"
+    return f"`{char}` ({code}) cannot stand in Python code outside a text or a comment"

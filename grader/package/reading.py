@@ -26,12 +26,12 @@ class Unreadable(Exception):
 
 
 def printable(text: str) -> str:
-    """A file name or other foreign text as valid Unicode: what is none becomes `\\udce9`."""
+    """Return a file name or other foreign text as valid Unicode: what is none becomes `\\udce9`."""
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def regular_file(folder: Path, path: str) -> Path:
-    """The regular file that `path` leads to, links followed as long as they stay inside `folder`.
+    """Return the regular file that `path` leads to, links followed as long as they stay inside `folder`.
 
     Raises Unreadable.
     """
@@ -57,7 +57,7 @@ def _translated(error: OSError) -> Unreadable:
 
 
 def read_markup(folder: Path, path: str, limit_bytes: int = MARKUP_LIMIT_BYTES) -> bytes | Fault:
-    """The bytes of a file of at most that size (1 MB), or the fault that keeps it from being read."""
+    """Return the bytes of a file of at most that size (1 MB), or the fault that keeps it from being read."""
     try:
         file = regular_file(folder, path)
         with file.open("rb") as stream:

@@ -43,7 +43,7 @@ _TAGS = re.compile(
     rb"|<!DOCTYPE[^\[>]*(?:\[.*?(?:\]\s*>|\Z)|>|\Z)|(?P<tag><)[^\s/>!?]",
     re.DOTALL,
 )
-_MESSAGE_LETTERS = 300
+_MESSAGE_CHARS_MAX = 300
 _OPENERS_A_TAG = 20
 _MESSAGES = 50
 _LAST_LINE = 65_535
@@ -52,7 +52,7 @@ _LAST_LINE = 65_535
 def parse_xml(
     data: bytes, file: str, *, root: str, encoding: str | None = None, max_tags: int = 2_000
 ) -> tuple[etree._Element | None, Fault | None]:
-    """The root element, or None and the fault. `root` is the tag that the file should begin with.
+    """Return the root element, or None and the fault. `root` is the tag that the file should begin with.
 
     `encoding` overrides what the file says of itself. Nothing that a file declares is expanded or fetched, and
     nothing of more than `max_tags` tags is looked at.
@@ -113,23 +113,25 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
     line, column = error.position
     said = (error.msg or "not well-formed").strip()
     message = re.sub(
-        r", line \d+, column \d+$", "", said[:_MESSAGE_LETTERS] + said[_MESSAGE_LETTERS:][-40:]
+        r", line \d+, column \d+$", "", said[:_MESSAGE_CHARS_MAX] + said[_MESSAGE_CHARS_MAX:][-40:]
     ).strip()
     # the error's own log holds what went wrong with other files before, too
-    log = [str(entry.message)[:_MESSAGE_LETTERS] for entry in islice(parser.error_log, _MESSAGES)]
+    log = [str(entry.message)[:_MESSAGE_CHARS_MAX] for entry in islice(parser.error_log, _MESSAGES)]
     return Fault(
         file=file,
         line=line or None,
         column=column or None,
         kind="XMLSyntaxError",
-        message=message[:_MESSAGE_LETTERS],
-        cause=cause_of(message, log, _line(data, line), root=root)[:_MESSAGE_LETTERS],
+        message=message[:_MESSAGE_CHARS_MAX],
+        cause=cause_of(message, log, _line(data, line), root=root)[:_MESSAGE_CHARS_MAX],
     )
 
 
 def _line(data: bytes, number: int) -> str:
     lines = data.split(b"\n")
-    return lines[number - 1][:_MESSAGE_LETTERS].decode("utf-8", "replace") if 0 < number <= len(lines) else ""
+    return (
+        lines[number - 1][:_MESSAGE_CHARS_MAX].decode("utf-8", "replace") if 0 < number <= len(lines) else ""
+    )
 
 
 def cause_of(message: str, log: list[str], line: str, *, root: str) -> str:

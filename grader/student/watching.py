@@ -25,7 +25,7 @@ from grader.errors import ExitCode, GraderError, SubmissionError, UsageError
 from grader.faults import error_result
 from grader.files import temporary_folder
 from grader.intake import open_submission
-from grader.intake.identity import identify
+from grader.intake.source import identify
 from grader.model.package import SourceFile
 from grader.model.progress import Progress
 from grader.model.result import GradingResult, SubmissionInfo

@@ -9,8 +9,8 @@ import pytest
 from grader.classes.fetching import Patience, prefetch
 from grader.classes.fetching.mirror import GivenUp, patiently
 from grader.errors import SubmissionError, Unreachable
-from grader.intake.explain import explained, may_pass
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
+from grader.intake.git_errors import explained, may_pass
 from grader.intake.source import parse_source
 from tests.fetching.forge import forge
 from tests.fetching.samples import AT_ONCE, entry

@@ -31,8 +31,8 @@ from grader.evidence.reader import load_run, package_facts
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceStream
 from grader.intake import Limits, open_submission, safe_name
-from grader.intake.manifest import manifest_name
-from grader.intake.refs import choose_ref, parse_refs
+from grader.intake.find import manifest_name
+from grader.intake.repository import choose_ref, parse_refs
 from grader.intake.source import parse_source
 from grader.model.package import CMakeFacts
 from grader.model.record import Record
@@ -40,8 +40,7 @@ from grader.package.cmake import read_cmake, refine_cmake
 from grader.package.files import _text_facts
 from grader.package.launch import parse_launch, parse_launch_files
 from grader.package.manifest import parse_manifest, read_manifest
-from grader.package.python import read_syntax_report
-from grader.package.python_causes import cause_of
+from grader.package.python import cause_of, read_syntax_report
 from grader.rubric.load import load_rubric
 from grader.rubric.model import Param, Rubric
 from grader.rubric.source import read_source

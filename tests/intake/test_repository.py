@@ -14,9 +14,8 @@ import pytest
 
 from grader.errors import PackageNotFound, SubmissionError
 from grader.intake import open_recorded, open_recording, open_submission
-from grader.intake.identity import identify
 from grader.intake.limits import Limits
-from grader.intake.source import parse_source
+from grader.intake.source import identify, parse_source
 from tests.intake.samples import commit, git, lab, opened, repository, write
 
 

@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.package.cmake import read_cmake
-from grader.package.cmake_syntax import parse_tree_of
-from grader.package.cmake_trace import split_lists
+from grader.package.cmake import read_cmake, split_lists
+from grader.package.cmake_parse import parse_tree_of
 
 
 def facts_of(tmp_path, text, **fields):

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from grader.package.cmake_written import FILES_BYTES_MAX, LINES_MAX, written_calls
+from grader.package.cmake import FILES_BYTES_MAX, LINES_MAX, written_calls
 
 ROOT = "/home/student/catkin_ws/src/lab"
 WRITTEN = (

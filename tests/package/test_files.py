@@ -5,8 +5,7 @@ import os
 
 import pytest
 
-from grader.package.files import read_files
-from grader.package.shebang import on_system, read_shebang
+from grader.package.files import on_system, read_files, read_shebang
 from tests.package.trees import NODE, make_package
 
 

@@ -12,12 +12,11 @@ import pytest
 from grader.errors import SubmissionError
 from grader.intake import open_submission
 from grader.package import read_package
-from grader.package.cmake_trace import read_trace
+from grader.package.cmake import read_trace
+from grader.package.files import read_shebang
 from grader.package.launch import parse_launch, parse_launch_files
 from grader.package.manifest import parse_manifest
-from grader.package.python import REPORT_BYTES_MAX, check_syntax, read_syntax_report
-from grader.package.python_causes import cause_of
-from grader.package.shebang import read_shebang
+from grader.package.python import REPORT_BYTES_MAX, cause_of, check_syntax, read_syntax_report
 from tests.intake.samples import lab, write
 from tests.package.trees import CMAKE, MANIFEST, NODE, make_package
 

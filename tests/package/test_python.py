@@ -3,11 +3,11 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+from pathlib import Path
 
 import pytest
 
-from grader.package.python import SYNTAX_SCRIPT, check_syntax, read_syntax_report
-from grader.package.python_causes import cause_of
+from grader.package.python import cause_of, check_syntax, read_syntax_report
 
 # Each text, the line of its fault, and words of its cause; all hold under Python 3.8 as under the newest.
 CASES = {
@@ -62,6 +62,7 @@ GOOD = {
     "warns": b"x = 1 is 1\ny = '\\d'\n",
 }
 
+SYNTAX = Path(__file__).resolve().parents[2] / "grader/arena/ros/syntax.py"
 PYTHONS = [p for p in ("python3.8", "python3.9", "python3.10", "python3.12", "python3.13") if shutil.which(p)]
 
 
@@ -92,7 +93,7 @@ def test_faults_have_line_and_plain_cause(tmp_path):
 def test_other_pythons_lead_to_the_same_causes(tmp_path, python):
     paths = write(tmp_path, {name: text for name, (text, _, _) in CASES.items()}) + write(tmp_path, GOOD)
     done = subprocess.run(
-        [python, "-I", SYNTAX_SCRIPT, tmp_path, *paths], capture_output=True, check=False, timeout=60
+        [python, "-I", SYNTAX, tmp_path, *paths], capture_output=True, check=False, timeout=60
     )
     if done.returncode and not done.stdout:
         pytest.skip(f"{python} does not run here")
@@ -141,14 +142,7 @@ def test_hostile_source_does_not_stop_the_others(tmp_path):
 
 
 def test_a_crash_is_laid_to_its_file(tmp_path, monkeypatch):
-    script = tmp_path / "crashing.py"
-    script.write_text(
-        "import json, os, sys, time\n"
-        "for name in json.load(sys.stdin):\n"
-        "    os._exit(9) if name == 'crash' else time.sleep(60) if name == 'slow' else None\n"
-        "    print(json.dumps({'file': name, 'faults': [], 'slips': []}), flush=True)\n"
-    )
-    monkeypatch.setattr("grader.package.python.SYNTAX_SCRIPT", script)
+    monkeypatch.setattr("grader.package.python.CHECK", "tests.package.crashing:check_all")
     report = check_syntax(tmp_path, ["a", "crash", "b", "slow", "c"], timeout_s=2.0)
     assert {path: fault.kind for path, fault in report.faults.items()} == {
         "crash": "PythonCrash",

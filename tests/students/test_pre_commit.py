@@ -80,7 +80,7 @@ def test_what_is_staged_decides_and_not_the_disk(student: Path) -> None:
     done = _commit(student)
     assert (done.returncode, script.exists()) == (1, True)
     assert "src/numeric_talker.py is not in the package" in done.stderr
-    assert "1 file that was in the package is not in git: src/numeric_talker.py" in done.stderr
+    assert "1 file of the package is not in git: src/numeric_talker.py" in done.stderr
     git(student, "add", "-A")
     script.chmod(0o644)
     assert _commit(student, "--allow-empty").returncode == 0

@@ -35,13 +35,19 @@ ENCODINGS = (SyntaxError, LookupError, UnicodeDecodeError)
 def main(argv):
     if resource is not None:
         set_limits()
+    for report in check_all(argv[1], argv[2:] or json.load(sys.stdin)):
+        print(json.dumps(report), flush=True)
+
+
+def check_all(root, names):
+    """Yield the report on each file."""
     warnings.simplefilter("ignore")
     left = ALL_SLIPS_LIMIT
-    for name in argv[2:] or json.load(sys.stdin):
-        report = check(argv[1], name)
+    for name in names:
+        report = check(root, name)
         report["slips"] = report["slips"][:left]
         left -= len(report["slips"])
-        print(json.dumps(report), flush=True)
+        yield report
 
 
 def set_limits():

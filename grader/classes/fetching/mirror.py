@@ -20,10 +20,9 @@ from grader.classes.fetching.cache import Failure, Place, State, name_of
 from grader.classes.fetching.history import Commit, read_commit
 from grader.errors import SubmissionError
 from grader.intake.credentials import split_address
-from grader.intake.explain import explained, may_pass
 from grader.intake.git import Git, GitFailed, GitTimeout, Repository
-from grader.intake.refs import Wanted, parse_refs
-from grader.intake.repository import ask
+from grader.intake.git_errors import explained, may_pass
+from grader.intake.repository import Wanted, ask, parse_refs
 from grader.intake.source import Source
 
 _EVERYTHING = ("+refs/heads/*:refs/heads/*", "+refs/tags/*:refs/tags/*")

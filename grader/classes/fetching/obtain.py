@@ -28,8 +28,7 @@ from grader.errors import OutputError, SubmissionError
 from grader.intake import unreadable
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.names import brief, printable
-from grader.intake.refs import Wanted, choose_ref, no_such_ref
-from grader.intake.repository import served
+from grader.intake.repository import Wanted, choose_ref, no_such_ref, served
 from grader.intake.source import Source, as_repository, parse_source, with_ref
 from grader.intake.tree import is_there
 from grader.model.batch import Entry

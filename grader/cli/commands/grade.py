@@ -12,7 +12,7 @@ from grader.cli.sandbox_report import say_unwalled
 from grader.cli.show import show
 from grader.errors import ExitCode
 from grader.files import check_writable
-from grader.intake.recordings import is_recording
+from grader.intake.open import is_recording
 from grader.rubric.load import load_rubric
 
 if TYPE_CHECKING:

@@ -1,13 +1,13 @@
-"""What git says, in a user's words: one line with the cause, and what to do."""
+"""Errors of git in a user's words: one line with the cause, and what to do."""
 
 from __future__ import annotations
 
 import re
 
 from grader.errors import SubmissionError, Unreachable
+from grader.intake.credentials import without_password
 from grader.intake.git import GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.names import brief
-from grader.intake.passwords import without_password
 from grader.intake.source import Source
 
 _PRIVATE = (
@@ -105,7 +105,7 @@ _CAUSES: tuple[tuple[str, str, str], ...] = (
 
 
 def explained(failure: GitFailed, source: Source) -> SubmissionError:
-    """The error to raise for what git said about `source`."""
+    """Return the error to raise for what git said about `source`."""
     if isinstance(failure, GitMissing):
         return Unreachable(
             f"{source.given}: git is not installed here, so no repository can be read",
@@ -144,7 +144,7 @@ def _cause(failure: GitFailed) -> tuple[str, str] | None:
 
 
 def said(failure: GitFailed, source: Source) -> str:
-    """The line of git's that names the cause, without a password that the address may hold."""
+    """Return the line of git's that names the cause, without a password that the address may hold."""
     lines = [line.strip() for line in failure.stderr.splitlines() if line.strip()]
     fatal = [line for line in lines if line.startswith(("fatal:", "error:", "remote:"))]
     line = (fatal or lines or ["nothing"])[-1].removeprefix("fatal: ").removeprefix("error: ")

@@ -1,0 +1,96 @@
+"""Runs one of the grader's own functions on hostile data in a child process with limits on memory, CPU, files and time.
+
+The arguments, and each value that the function yields, travel as JSON. The child is this Python without site-packages,
+and inherits none of the user's variables but those that a program needs to be loaded. A process for many jobs is not
+its business (`classes/batch/child.py`), and neither are students' programs (`arena/`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict, dataclass
+from importlib import import_module
+from pathlib import Path
+
+from grader.host_programs import loading_environment
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None  # type: ignore[assignment]
+
+ROOT = Path(__file__).resolve().parents[1]
+BOOTSTRAP = "import sys; sys.path.append(sys.argv[1]); from grader.limited import main; main()"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChildLimits:
+    """What the child may take: `memory_bytes` of address space, `cpu_s` of processor time, `wall_s` in all,
+    `file_bytes` for each file that it writes; of its answer, `answer_bytes` are read."""
+
+    memory_bytes: int
+    cpu_s: int
+    wall_s: float
+    file_bytes: int
+    answer_bytes: int = 8 << 20
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """What the function yielded, a line of JSON each; `done` if it came to its end, `timed_out` if it took longer than
+    `wall_s`. Where it is neither, the child went beyond another limit, or crashed."""
+
+    lines: bytes
+    done: bool
+    timed_out: bool = False
+
+
+def run_limited(function: str, *arguments: object, limits: ChildLimits) -> Answer:
+    """Call `function` (`module:name`), which yields values for JSON, with these arguments."""
+    request = {"function": function, "arguments": arguments, "limits": asdict(limits)}
+    with tempfile.TemporaryFile() as out:
+        code: int | None = None
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            code = subprocess.run(
+                [sys.executable, "-I", "-S", "-c", BOOTSTRAP, str(ROOT)],
+                cwd="/",
+                env=loading_environment(os.environ),
+                input=json.dumps(request).encode("ascii"),
+                stdout=out,
+                stderr=subprocess.DEVNULL,
+                timeout=limits.wall_s,
+                check=False,
+            ).returncode
+        out.seek(0)
+        return Answer(lines=out.read(limits.answer_bytes), done=code == 0, timed_out=code is None)
+
+
+def main() -> None:
+    """The child: answer the request on standard input."""
+    request = json.load(sys.stdin)
+    _set_limits(ChildLimits(**request["limits"]))
+    module, _, name = request["function"].partition(":")
+    for value in getattr(import_module(module), name)(*request["arguments"]):
+        print(json.dumps(value), flush=True)
+
+
+def _set_limits(limits: ChildLimits) -> None:
+    """macOS refuses to limit a process's memory, and Windows knows no such limits."""
+    if resource is None:
+        return
+    refused = () if sys.platform == "linux" else (OSError, ValueError)
+    for kind, value in (
+        (resource.RLIMIT_AS, limits.memory_bytes),
+        (resource.RLIMIT_CPU, limits.cpu_s),
+        (resource.RLIMIT_FSIZE, limits.file_bytes),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        with contextlib.suppress(*refused):
+            _, most = resource.getrlimit(kind)
+            value = value if most == resource.RLIM_INFINITY else min(value, most)  # noqa: PLW2901
+            resource.setrlimit(kind, (value, value))

@@ -1,0 +1,47 @@
+"""What the child that reads hostile data may take, and what it is given."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import replace
+
+import pytest
+
+from grader.limited import Answer, ChildLimits, run_limited
+
+LIMITS = ChildLimits(memory_bytes=256 << 20, cpu_s=1, wall_s=30.0, file_bytes=1 << 20)
+
+
+def ask(name: str, *arguments: object, limits: ChildLimits = LIMITS) -> Answer:
+    return run_limited(f"tests.limited_child:{name}", *arguments, limits=limits)
+
+
+def test_values_come_back_as_they_are() -> None:
+    values = ["a\udce9", None, {"b": [1.5, True]}]
+    answer = ask("repeat", *values)
+    assert [json.loads(line) for line in answer.lines.splitlines()] == values
+    assert (answer.done, answer.timed_out) == (True, False)
+
+
+@pytest.mark.parametrize("what", ["take_memory", "take_processor_time", "write_much", "crash"])
+def test_what_goes_beyond_a_limit_ends_and_what_came_before_counts(what, tmp_path) -> None:
+    arguments = (str(tmp_path / "file"),) if what == "write_much" else ()
+    assert ask(what, *arguments) == Answer(lines=b"1\n", done=False)
+
+
+def test_what_takes_too_long_is_ended() -> None:
+    found = ask("take_time", limits=replace(LIMITS, wall_s=3.0))
+    assert found == Answer(lines=b"1\n", done=False, timed_out=True)
+
+
+def test_an_answer_without_end_is_cut() -> None:
+    assert len(ask("say_much", limits=replace(LIMITS, answer_bytes=1000)).lines) == 1000
+
+
+def test_nothing_is_inherited_but_what_loading_takes(monkeypatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", "/tmp")
+    monkeypatch.setenv("GRADER_GIT_TOKEN", "secret")
+    names, folder, packages = (json.loads(line) for line in ask("look_around").lines.splitlines())
+    assert not {"PYTHONPATH", "GRADER_GIT_TOKEN", "HOME"} & set(names)
+    assert (folder, packages) == (os.sep, [])
