@@ -10,7 +10,7 @@ from grader.authoring.mutation.tree import Entry, Tree
 from grader.rubric.load import load_rubric
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-LABS = sorted(path.stem for path in (ROOT / "rubrics" / "mutants").glob("*.yaml"))
+LABS = sorted(path.stem for path in (ROOT / "rubrics").glob("*.yaml"))
 
 TIMER = '''\
 #!/usr/bin/python3

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from grader.authoring.mutation import find
-from grader.authoring.mutation.find import find_reference, given_reference, load_solution, mutants_file
+from grader.authoring.mutation.declared import mutants_file
+from grader.authoring.mutation.find import find_reference, given_reference, load_solution
 from grader.authoring.mutation.tree import read_tree
 from grader.errors import UsageError
 from grader.rubric.load import load_rubric
@@ -19,7 +20,7 @@ LAB = LABS[0]
 @pytest.mark.parametrize("lab", LABS)
 def test_what_comes_with_the_grader(lab):
     loaded = load_rubric(lab)
-    assert mutants_file(loaded) == ROOT / "rubrics" / "mutants" / f"{lab}.yaml"
+    assert mutants_file(loaded) == ROOT / "fixtures" / f"{lab}.yaml"
     assert find_reference(loaded).folder == ROOT / "reference_solutions" / lab
     assert load_solution(find_reference(loaded), loaded.rubric.package).scripts
 
@@ -48,7 +49,7 @@ def test_a_copy_of_a_labs_rubric_is_tested_with_the_labs_own_files(tmp_path):
     copy = tmp_path / "mine.yaml"
     shutil.copy(ROOT / "rubrics" / f"{LAB}.yaml", copy)
     loaded = load_rubric(str(copy))
-    assert mutants_file(loaded) == ROOT / "rubrics" / "mutants" / f"{LAB}.yaml"
+    assert mutants_file(loaded) == ROOT / "fixtures" / f"{LAB}.yaml"
     assert find_reference(loaded).folder == ROOT / "reference_solutions" / LAB
 
 

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from grader.authoring.mutation.load import load_mutants, parameters_of
+from grader.authoring.mutation.declared import load_mutants, parse_parameters
 from grader.authoring.mutation.operators import OPERATORS
 from grader.errors import RubricError
+from grader.model.mutants import Mutant
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import LABS, ROOT
 from tests.rubric.samples import spoiled
@@ -14,16 +15,21 @@ from tests.rubric.samples import spoiled
 SOUND = """\
 schema: grader.mutants/1
 rubric: sample
+anchors: [&talker src/talker.py]
 mutants:
-  - operator: other-rate
-    at: {script: src/talker.py}
-    with: {factor: 2}
-    costs: {chatter-rate: fail}
-  - operator: bit-removed
-    also:
-      - operator: crlf
-        at: {script: src/talker.py}
-    costs: {talker-node: partial}
+  half-rate:
+    summary: The talker is slow.
+    expect: {chatter-rate: fail}
+    edits:
+      - operator: other-rate
+        at: {script: *talker}
+        with: {factor: 2}
+  two:
+    expect: {talker-node: partial}
+    edits:
+      - operator: bit-removed
+      - crlf: {file: *talker}
+      - operator: no-shebang
 """
 
 
@@ -46,29 +52,36 @@ def faults(folder: Path, *changes: tuple[str, str]) -> list[str]:
 
 def test_a_sound_file_loads(tmp_path):
     rubric = load_rubric(str(spoiled(tmp_path))).rubric
-    first, second = load_mutants(written(tmp_path), rubric).mutants
-    assert first.costs == {"chatter-rate": "fail"}
-    assert parameters_of(first.operator, first.parameters).model_dump() == {"factor": 2}
-    assert [step.operator for step in second.also] == ["crlf"]
+    mutants = load_mutants(written(tmp_path), rubric).mutants
+    first, second = mutants["half-rate"], mutants["two"]
+    assert first.expect == {"chatter-rate": "fail"}
+    assert first.edits[0].at == {"script": "src/talker.py"}
+    assert parse_parameters("other-rate", first.edits[0].parameters).model_dump() == {"factor": 2}
+    assert second.operators == ("bit-removed", "no-shebang")
+    assert [edit.kinds for edit in second.edits] == [["operator"], ["crlf"], ["operator"]]
 
 
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
-        ("other-rate", "other-rat", '4: mutants[0].operator: there is no operator "other-rat" (did you mean'),
-        ("factor: 2", "factor: much", '6: mutants[0].with.factor: must be a number, not "much"'),
-        ("factor: 2", "factor: 0", "6: mutants[0].with.factor: must be more than 0, not 0"),
-        ("factor: 2", "factr: 2", '6: mutants[0].with.factr: is not known here (did you mean "factor"?)'),
-        ("chatter-rate: fail", "chatter-rate: lost", '7: mutants[0].costs.chatter-rate: must be "fail", "partial"'),
-        ("{chatter-rate: fail}", "{}", "7: mutants[0].costs: needs at least 1, has 0"),
-        ("    costs: {chatter-rate: fail}\n", "", "4: mutants[0].costs: is missing"),
-        ("costs: {chatter", "cost: {chatter", '7: mutants[0].cost: is not known here (did you mean "costs"?)'),
+        ("other-rate", "other-rat", '9: mutants.half-rate.edits[0].operator: there is no operator "other-rat"'),
+        ("factor: 2", "factor: much", '11: mutants.half-rate.edits[0].with.factor: must be a number, not "much"'),
+        ("factor: 2", "factor: 0", "11: mutants.half-rate.edits[0].with.factor: must be more than 0, not 0"),
+        ("factor: 2", "factr: 2", "11: mutants.half-rate.edits[0].with.factr: is not known here (did you mean"),
+        ("chatter-rate: fail", "chatter-rate: lost", '7: mutants.half-rate.expect.chatter-rate: must be "fail", "pa'),
+        ("    expect: {chatter-rate: fail}\n", "", "5: mutants.half-rate.expect: is missing"),
+        ("expect: {chatter", "expects: {chatter", '7: mutants.half-rate.expects: is not known here (did you mean "ex'),
         ("rubric: sample", "rubric: other", "2: rubric: these mutants are for other, not for sample"),
         ("mutants/1", "mutants/2", "1: schema: written by a newer grader (grader.mutants/2); this one reads up to 1"),
-        ("operator: crlf", "operator: clrf", '10: mutants[1].also[0].operator: there is no operator "clrf"'),
-        ("src/talker.py}", "[a]}", "5: mutants[0].at.script"),
-        ("operator: bit-removed", "operator: 1", "8: mutants[1].operator: must be text, not 1: put it in quotes"),
-        ("    with: {factor", "    with: {}\n    with: {factor", "6: mutants[0].with: is given twice, again in line 7"),
+        ("operator: no-shebang", "operator: no-shebnag", '17: mutants.two.edits[2].operator: there is no operator "no'),
+        ("script: *talker}", "script: [a]}", "10: mutants.half-rate.edits[0].at.script"),
+        ("operator: bit-removed", "operator: 1", "15: mutants.two.edits[0].operator: must be text, not 1: put it in"),
+        ("        with: {factor", "        with: {}\n        with: {factor", "11: mutants.half-rate.edits[0].with: is"),
+        ("crlf: {file: *talker}", "crlf: {}", "16: mutants.two.edits[1].crlf.file: is missing"),
+        ("crlf: {file: *talker}", "at: {script: a}", "16: mutants.two.edits[1]: an edit is exactly one of operator, r"),
+        ("crlf: {file: *talker}", "crlf: {file: a}\n        bom: {file: a}", "16: mutants.two.edits[1]: an edit is"),
+        ("crlf: {file: *talker}", "crlf: {file: a}\n        at: {script: a}", "16: mutants.two.edits[1]: `at` and"),
+        ("half-rate:", "half/rate:", "5: mutants.half/rate"),
     ],
 )  # fmt: skip
 def test_a_fault_is_named_with_its_line(old, new, fault, tmp_path):
@@ -77,14 +90,16 @@ def test_a_fault_is_named_with_its_line(old, new, fault, tmp_path):
 
 
 def test_all_faults_are_named_at_once(tmp_path):
-    found = faults(tmp_path, ("factor: 2", "factor: much"), ("crlf", "clrf"), ("rubric: sample", "rubric: s"))
-    assert [line.split(":")[1] for line in found] == ["2", "6", "10"]
+    found = faults(
+        tmp_path, ("factor: 2", "factor: much"), ("no-shebang", "no-shebnag"), ("rubric: sample", "rubric: s")
+    )
+    assert [line.split(":")[1] for line in found] == ["2", "11", "17"]
 
 
 def test_the_same_mutant_twice(tmp_path):
-    again = "  - operator: other-rate\n    at: {script: src/talker.py}\n    with: {factor: 2}\n    costs: {x: fail}\n"
-    assert faults(tmp_path, ("mutants:\n", f"mutants:\n{again}")) == [
-        "sample.yaml:8: mutants[1]: is the same mutant as mutants[0]"
+    edits = "    edits:\n      - operator: bit-removed\n      - crlf: {file: *talker}\n      - operator: no-shebang\n"
+    assert faults(tmp_path, ("  two:\n", f"  one:\n    expect: {{}}\n{edits}  two:\n")) == [
+        "sample.yaml:18: mutants.two: has the same edits as mutants.one"
     ]
 
 
@@ -100,40 +115,28 @@ def test_what_is_no_mutants_file(text, tmp_path):
 def test_a_criterion_that_the_rubric_lacks_is_no_fault_of_the_file(tmp_path):
     rubric = load_rubric(str(spoiled(tmp_path))).rubric
     path = written(tmp_path, ("chatter-rate: fail", "no-such: fail"))
-    assert load_mutants(path, rubric).mutants[0].costs == {"no-such": "fail"}
+    assert load_mutants(path, rubric).mutants["half-rate"].expect == {"no-such": "fail"}
 
 
-@pytest.mark.parametrize("lab", LABS)
-def test_the_labs_have_enough_mutants_and_operators(lab):
+def mutants_of(lab: str) -> list[Mutant]:
     rubric = load_rubric(lab).rubric
-    mutants = load_mutants(ROOT / "rubrics" / "mutants" / f"{lab}.yaml", rubric).mutants
-    assert len(mutants) >= 20
-    assert len({mutant.operator for mutant in mutants}) >= 15
-    assert {name for mutant in mutants for name in mutant.costs} <= {c.id for c in rubric.criteria}
-
-
-def test_every_lab_has_mutants():
-    assert set(LABS) == {path.stem for path in (ROOT / "rubrics").glob("*.yaml")}
-
-
-def failed(costs: dict[str, str]) -> set[str]:
-    return {name for name, status in costs.items() if status != "blocked"}
+    return list(load_mutants(ROOT / "fixtures" / f"{lab}.yaml", rubric).mutants.values())
 
 
 @pytest.mark.parametrize("lab", LABS)
 def test_every_criterion_worth_points_is_lost_by_a_mutant(lab):
-    rubric = load_rubric(lab).rubric
-    mutants = load_mutants(ROOT / "rubrics" / "mutants" / f"{lab}.yaml", rubric).mutants
-    worth = {c.id for c in rubric.criteria if c.points > 0}
-    assert worth <= {name for mutant in mutants for name in failed(mutant.costs)}
+    worth = {c.id for c in load_rubric(lab).rubric.criteria if c.points > 0}
+    lost = {
+        name for mutant in mutants_of(lab) for name, status in mutant.expect.items() if status != "blocked"
+    }
+    assert worth <= lost
 
 
 def test_every_criterion_of_the_first_lab_is_lost_alone():
     """Such a mutant would cost nothing, were the criterion taken out of the rubric."""
-    rubric = load_rubric("leeds-comp3631-lab1").rubric
-    mutants = load_mutants(ROOT / "rubrics" / "mutants" / f"{rubric.id}.yaml", rubric).mutants
-    worth = {c.id for c in rubric.criteria if c.points > 0}
-    assert worth <= {name for mutant in mutants if len(mutant.costs) == 1 for name in mutant.costs}
+    lab = "leeds-comp3631-lab1"
+    worth = {c.id for c in load_rubric(lab).rubric.criteria if c.points > 0}
+    assert worth <= {name for mutant in mutants_of(lab) if len(mutant.expect) == 1 for name in mutant.expect}
 
 
 def test_every_operator_has_sound_defaults():

@@ -13,13 +13,13 @@ from pathlib import Path
 import pytest
 import yaml
 
+from fixtures.make import declared, faulty_package, rubric_of
 from grader.authoring.mutation.find import Reference, load_solution
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.registry import Operator, operator
 from grader.authoring.mutation.solution import Site, Solution
 from grader.authoring.mutation.tree import Tree, unified_diff
-from grader.rubric.load import load_rubric
-from tests.mutation.samples import LABS, ROOT, other_solution, reference_solution, tree_of
+from tests.mutation.samples import LABS, other_solution, reference_solution, tree_of
 
 GOLDEN = Path(__file__).parent / "golden"
 BREAK_PYTHON = {n for n, o in OPERATORS.items() if o.family == "syntax"} - {
@@ -28,7 +28,7 @@ BREAK_PYTHON = {n for n, o in OPERATORS.items() if o.family == "syntax"} - {
 }
 BREAK_XML = {"launch-malformed", "manifest-malformed"}
 BREAK_YAML = {"yaml-tabs", "yaml-malformed"}
-WRITTEN_OTHERWISE = sorted(p for lab in LABS for p in (ROOT / "fixtures" / lab).glob("ok-*") if p.is_dir())
+WRITTEN_OTHERWISE = [(lab, name) for lab in LABS for name in declared(lab) if name.startswith("ok-")]
 NO_PYTHON_3 = ("broken.py", "empty.py")
 
 
@@ -107,12 +107,10 @@ def is_yaml(data: bytes) -> bool:
     return True
 
 
-@pytest.mark.parametrize(
-    "folder", WRITTEN_OTHERWISE, ids=lambda folder: f"{folder.parent.name}/{folder.name}"
-)
-def test_correct_packages_of_every_kind_stay_sound_python(folder):
+@pytest.mark.parametrize(("lab", "package"), WRITTEN_OTHERWISE)
+def test_correct_packages_of_every_kind_stay_sound_python(lab, package):
     """Classes, timers, callbacks, one-liners: whatever is edited still compiles."""
-    solution = load_solution(Reference(folder=folder), load_rubric(folder.parent.name).rubric.package)
+    solution = load_solution(Reference(folder=faulty_package(lab, package)), rubric_of(lab).rubric.package)
     sound = {path for path, e in solution.tree.items() if path.endswith(".py") and compiles(e.data)}
     tried = [o for name, o in OPERATORS.items() if name not in BREAK_PYTHON and name != "byte-order-mark"]
     for site in (site for one in tried for site in one.sites(solution)):

@@ -34,7 +34,7 @@ class Lab:
 
     def plan(self, only: str = "bit-removed", **changes: object) -> Plan:
         solution = Solution(tree=tree_of({"lab1/src/talker.py": SCRIPT}, ""), folder="lab1/", name="lab1")
-        mutants = [m for m in plan_all(solution) if m.step.operator in only.split()]
+        mutants = [m for m in plan_all(solution) if m.mutant.operators[0] in only.split()]
         data = {
             "rubric": load_rubric(str(spoiled(self.folder))),
             "solution": solution,
@@ -75,7 +75,7 @@ def lab(tmp_path, monkeypatch):
 def costing(mutants: list[Planned], **costs: str) -> list[Planned]:
     named = {name.replace("_", "-"): status for name, status in costs.items()}
     return [
-        Planned(name=m.name, label=m.label, step=m.step, tree=m.tree, costs=named)
+        Planned(name=m.name, label=m.label, mutant=m.mutant, tree=m.tree, costs=named)
         for m in mutants
     ]  # fmt: skip
 
@@ -195,7 +195,7 @@ def test_launch_files_go_first_for_they_wait_longest(tmp_path, lab):
     launch = '<launch><node name="a" pkg="lab1" type="talker.py"/></launch>'
     tree = tree_of({"lab1/src/talker.py": SCRIPT, "lab1/a.launch": launch})
     solution = Solution(tree=tree, folder="lab1/", name="lab1")
-    found = {m.step.operator: m for m in plan_all(solution)}
+    found = {m.mutant.operators[0]: m for m in plan_all(solution)}
     mutants = [found["crlf"], found["launch-malformed"]]
     test = run_test(lab.plan(solution=solution, mutants=mutants, partial=True), Silence())
     assert [name for name, _ in lab.calls][1:] == ["launch-malformed-a.launch", "crlf-src-talker.py"]

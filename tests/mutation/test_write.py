@@ -1,8 +1,7 @@
 from __future__ import annotations
 
-from grader.authoring.mutation.load import load_mutants
+from grader.authoring.mutation.declared import load_mutants, mutants_text
 from grader.authoring.mutation.plan import plan_all
-from grader.authoring.mutation.write import mutants_text
 from grader.model.mutants import LostCriterion, MutantResult
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import other_solution
@@ -19,7 +18,7 @@ def test_a_written_file_declares_what_was_lost(tmp_path):
         MutantResult(
             name=mutant.name,
             label=mutant.label,
-            operator=mutant.step.operator,
+            operator=mutant.mutant.operators[0],
             mistake="",
             state=("survived", "killed", "inconclusive")[index % 3],
             expected=None,
@@ -29,11 +28,15 @@ def test_a_written_file_declares_what_was_lost(tmp_path):
         )
         for index, mutant in enumerate(planned)
     ]
-    text = mutants_text("sample", planned, results)
+    text = mutants_text("sample", {mutant.name: mutant.mutant for mutant in planned}, results)
     path = tmp_path / "m.yaml"
     path.write_text(text, encoding="utf-8")
     loaded = load_mutants(path, load_rubric(str(spoiled(tmp_path))).rubric)
     assert len(loaded.mutants) == sum(result.state == "killed" for result in results)
-    assert [m.at for m in loaded.mutants] == [p.step.at for i, p in enumerate(planned) if i % 3 == 1]
-    assert all(m.costs == {"chatter-rate": "fail", "talker-node": "blocked"} for m in loaded.mutants)
-    assert text.count("# costs nothing: the rubric does not see this mistake") == len(planned[::3])
+    assert [m.edits for m in loaded.mutants.values()] == [
+        p.mutant.edits for i, p in enumerate(planned) if i % 3 == 1
+    ]
+    assert all(
+        m.expect == {"chatter-rate": "fail", "talker-node": "blocked"} for m in loaded.mutants.values()
+    )
+    assert text.count("# costs nothing: the rubric does not notice this mistake") == len(planned[::3])

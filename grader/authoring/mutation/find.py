@@ -1,4 +1,4 @@
-"""Where a lab's correct package and its mutants file are: beside the rubric, or among what comes with the grader."""
+"""Where a lab's correct package is: beside the rubric, or among what comes with the grader."""
 
 from __future__ import annotations
 
@@ -21,13 +21,6 @@ class Reference:
 
     folder: Path
     modes: bool = True
-
-
-def mutants_file(rubric: LoadedRubric) -> Path | None:
-    """`mutants/<id>.yaml` beside the rubric, or the one that comes with the grader; None where neither is there."""
-    folders = (rubric.path.absolute().parent, rubrics_folder())
-    candidates = (folder / "mutants" / f"{rubric.rubric.id}.yaml" for folder in folders)
-    return next((path for path in candidates if path.is_file()), None)
 
 
 def references_folder() -> Path:

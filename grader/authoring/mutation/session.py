@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from grader.authoring.mutation.compare import DOUBTFUL, Comparison, compare, lost_criteria
-from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.plan import Planned
 from grader.authoring.mutation.solution import Solution
 from grader.authoring.mutation.tree import Tree, unified_diff, write_tree
@@ -138,7 +137,7 @@ def _mutants(
 
 def _waits_least(mutant: Planned) -> bool:
     """A launch file that does not bring up what a run waits for is watched to its limit: such mutants go first."""
-    return not any("launch" in name for name in mutant.operators)
+    return not any("launch" in name for name in (mutant.name, *mutant.mutant.operators))
 
 
 def _said(result: MutantResult) -> str:
@@ -154,8 +153,8 @@ def _mutant_result(
     return MutantResult(
         name=mutant.name,
         label=mutant.label,
-        operator=mutant.step.operator,
-        mistake="; ".join(OPERATORS[name].mistake for name in mutant.operators),
+        operator=" + ".join(mutant.mutant.operators),
+        mistake=mutant.mistake,
         state=compared.state,
         expected=mutant.costs,
         lost=lost_criteria(criteria, ignored),

@@ -9,12 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from grader.arena.sandbox import Mode
-from grader.authoring.mutation.find import find_reference, given_reference, load_solution, mutants_file
-from grader.authoring.mutation.load import load_mutants
+from grader.authoring.mutation.declared import load_mutants, mutants_file, mutants_text
+from grader.authoring.mutation.find import find_reference, given_reference, load_solution
 from grader.authoring.mutation.plan import Planned, chosen, plan_all, plan_declared, refuse_unfit
 from grader.authoring.mutation.session import Plan, run_test
 from grader.authoring.mutation.solution import Solution
-from grader.authoring.mutation.write import mutants_text
 from grader.cli.display import open_progress
 from grader.cli.inherited_limits import make_room
 from grader.cli.mutants import print_test
@@ -64,7 +63,8 @@ def run(
     say_unwalled(sandbox, loaded)
     test = _tested(plan, temporary=out is None)
     if write is not None and not test.reference.lost:
-        atomic_write(write, mutants_text(loaded.rubric.id, plan.mutants, test.mutants).encode(), public=True)
+        text = mutants_text(loaded.rubric.id, {m.name: m.mutant for m in plan.mutants}, test.mutants)
+        atomic_write(write, text.encode(), public=True)
     if as_json:
         say_json(test.model_dump(mode="json", by_alias=True))
     else:
