@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from fixtures.make import faulty_package, labs
-from grader.authoring.mutation.tree import read_tree
+from grader.authoring.mutation.package_tree import read_tree
 from grader.model.result import GradingResult
 from tests.fixture_runs import (
     GIT,

@@ -3,14 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
-from grader.authoring.discover import INTEGER_PROBES, STRING, TEXT_PROBES, Parts, probe_for
-from grader.authoring.observe import Observed, Topic, heard_template, wraps_of
-from grader.authoring.sheet import Entry, Sheet, given, label_of, plain, share_out
+from grader import pipeline
+from grader.authoring.discover import (
+    INTEGER_PROBES,
+    STRING,
+    TEXT_PROBES,
+    Parts,
+    find_parts,
+    first_look,
+    probe_for,
+    second_look,
+)
+from grader.authoring.observe import Observed, Topic, heard_template, observe, wraps_of
+from grader.authoring.rubric_draft import Entry, Sheet, given, label_of, plain, rubric_text, share_out
 from grader.checks.manifest import RUNTIME_KINDS
+from grader.errors import RosMissing, SubmissionError
+from grader.evidence.reader import load_evidence, package_facts
 from grader.evidence.run import Run
+from grader.intake import open_submission
 from grader.model.package import PackageFacts
+from grader.model.progress import Progress
+from grader.package import read_package
+from grader.rubric.load import LoadedRubric
+from grader.temporary import temporary_folder
 
 WINDOW_S = 6
 WRAPS = 2
@@ -268,3 +285,48 @@ class Proposal(Sheet):
 def _probe(topic: str, kind: str) -> Entry:
     made_up = {"text": TEXT_PROBES} if kind == STRING else {"integers": INTEGER_PROBES, "among": [0]}
     return {"topic": topic, "type": kind, **made_up}
+
+
+# [authoring.new] `grader rubric new`: two looks at a correct package, then a proposal.
+
+
+def propose_rubric(
+    source: str, package: str, rubric_id: str, options: pipeline.GradeOptions, progress: Progress
+) -> str:
+    """The text of a rubric for the correct package that `source` holds.
+
+    Raises GraderError: SubmissionError where nothing of it can be run, RosMissing without ROS.
+    """
+    with temporary_folder("new") as folder:
+        submission = open_submission(source, package=package, workdir=folder / "source")
+        facts = read_package(submission.package)
+        parts = find_parts(submission.package.folder, facts)
+        if not parts.nodes and not parts.launches:
+            raise SubmissionError(
+                f"{package} has no node and no launch file", hint="name a finished solution"
+            )
+        runs = _look(source, first_look(package, parts), folder / "first", options, progress)
+        seen = {name: observe(runs[name]) for name in (*parts.nodes, *parts.launches)}
+        again = second_look(package, parts, seen)
+        if again is not None:
+            runs |= _look(source, again, folder / "second", options, progress)
+        known = _facts(runs, facts)
+        proposal = Proposal(known, parts, seen, runs)
+        return rubric_text(package, rubric_id, proposal.scenarios, proposal.criteria, proposal.notes)
+
+
+def _look(
+    source: str, rubric: LoadedRubric, out: Path, options: pipeline.GradeOptions, progress: Progress
+) -> dict[str, Run]:
+    """Record, and read back. Raises RosMissing where nothing could be run."""
+    runs = load_evidence(pipeline.record(source, rubric, out, options, progress))
+    missing = [name for name in rubric.rubric.scenarios if name not in runs]
+    if missing:
+        reason = runs["package"].metadata.get("not_run", "")
+        raise RosMissing(f"nothing was run{': ' + reason if reason else ''}", hint="grader doctor")
+    return runs
+
+
+def _facts(runs: dict[str, Run], facts: PackageFacts) -> PackageFacts:
+    """With what the build said of CMakeLists.txt, where it was recorded."""
+    return package_facts(runs["package"]) if "package" in runs else facts

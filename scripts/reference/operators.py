@@ -6,9 +6,9 @@ from collections import Counter
 from dataclasses import dataclass
 
 from grader.authoring.mutation.declared import load_mutants, mutants_file
-from grader.authoring.mutation.find import find_reference, load_solution
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.registry import Operator
+from grader.authoring.mutation.solution import find_reference, load_solution
 from grader.rubric.load import LoadedRubric, all_rubrics
 
 EXAMPLE = """\

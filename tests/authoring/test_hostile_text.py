@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from grader.authoring.mutation.declared import mutants_text
-from grader.authoring.text import rubric_text
+from grader.authoring.rubric_draft import rubric_text
 from grader.model.mutants import LostCriterion, Mutant, MutantResult
 from tests.report.nasty import STEERING, TEXTS
 from tests.report.test_shown import TO_A_CI

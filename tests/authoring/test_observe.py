@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from grader.authoring.discover import Parts, find_parts, second_look
 from grader.authoring.observe import heard_template, nice_rate, observe, wraps_of
 from grader.authoring.propose import Proposal
-from grader.authoring.sheet import share_out
-from grader.authoring.text import rubric_text
+from grader.authoring.rubric_draft import rubric_text, share_out
 from grader.evidence.reader import package_facts
 from grader.evidence.run import Run
 from grader.evidence.timeline import build_runs

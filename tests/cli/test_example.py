@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.authoring.mutation.find import references_folder
-from grader.authoring.mutation.tree import read_tree
+from grader.authoring.mutation.package_tree import read_tree
+from grader.authoring.mutation.solution import references_folder
 from grader.cli.main import run
 from grader.rubric.find import rubric_ids, rubrics_folder
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fixtures.make import declared
-from grader.authoring.mutation import session
+from grader.authoring.mutation import rubric_test
 from grader.classes.batch.workers import Graded
 from grader.cli.main import run
 from grader.rubric.load import load_rubric
@@ -45,10 +45,10 @@ class Judge:
 @pytest.fixture
 def judge(tmp_path, monkeypatch):
     made = Judge(tmp_path)
-    monkeypatch.setattr(session, "grade_all", made.grade_all)
+    monkeypatch.setattr(rubric_test, "grade_all", made.grade_all)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
     (tmp_path / "tmp").mkdir()
-    original = session.run_test
+    original = rubric_test.run_test
 
     def noting(plan, progress):
         made.declared = {m.name: dict(m.costs or {}) for m in plan.mutants}

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from grader.authoring.mutation.compare import compare, lost_criteria
+from grader.authoring.mutation.rubric_test import compare, lost_criteria
 from grader.model.result import CriterionResult
 from tests.report.hostile import criterion
 

@@ -14,11 +14,10 @@ import pytest
 import yaml
 
 from fixtures.make import declared, faulty_package, rubric_of
-from grader.authoring.mutation.find import Reference, load_solution
 from grader.authoring.mutation.operators import OPERATORS
+from grader.authoring.mutation.package_tree import Tree, unified_diff
 from grader.authoring.mutation.registry import Operator, operator
-from grader.authoring.mutation.solution import Site, Solution
-from grader.authoring.mutation.tree import Tree, unified_diff
+from grader.authoring.mutation.solution import Reference, Site, Solution, load_solution
 from tests.mutation.samples import LABS, other_solution, reference_solution, tree_of
 
 GOLDEN = Path(__file__).parent / "golden"

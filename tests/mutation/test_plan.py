@@ -4,9 +4,9 @@ import pytest
 
 from grader.authoring.mutation.declared import LoadedMutants
 from grader.authoring.mutation.operators import OPERATORS
+from grader.authoring.mutation.package_tree import Entry, unified_diff
 from grader.authoring.mutation.plan import chosen, plan_all, plan_declared, refuse_unfit
 from grader.authoring.mutation.solution import Solution
-from grader.authoring.mutation.tree import Entry, unified_diff
 from grader.errors import RubricError, UsageError
 from grader.model.mutants import Mutant
 from grader.rubric.source import Source

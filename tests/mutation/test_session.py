@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.authoring.mutation import session
+from grader.authoring.mutation import rubric_test
 from grader.authoring.mutation.plan import Planned, plan_all
-from grader.authoring.mutation.session import Plan, run_test
+from grader.authoring.mutation.rubric_test import Plan, run_test
 from grader.authoring.mutation.solution import Solution
 from grader.classes.batch.workers import Graded, Job
 from grader.errors import HostError
@@ -68,7 +68,7 @@ class Lab:
 @pytest.fixture
 def lab(tmp_path, monkeypatch):
     made = Lab(tmp_path, lambda job: {} if job.name == "reference" else {"talker-node": "fail"})
-    monkeypatch.setattr(session, "grade_all", made.grade_all)
+    monkeypatch.setattr(rubric_test, "grade_all", made.grade_all)
     return made
 
 

@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from grader.authoring.mutation import tree as tree_module
-from grader.authoring.mutation.spans import Edit, applied
-from grader.authoring.mutation.tree import Entry, read_tree, unified_diff, write_tree
+from grader.authoring.mutation import package_tree as tree_module
+from grader.authoring.mutation.package_tree import Entry, read_tree, unified_diff, write_tree
+from grader.authoring.mutation.text_edits import Edit, applied
 from grader.errors import UsageError
 
 

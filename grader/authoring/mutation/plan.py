@@ -9,8 +9,8 @@ from fnmatch import fnmatchcase
 
 from grader.authoring.mutation.declared import LoadedMutants, parse_parameters
 from grader.authoring.mutation.operators import OPERATORS
+from grader.authoring.mutation.package_tree import Entry, Tree
 from grader.authoring.mutation.solution import Site, Solution
-from grader.authoring.mutation.tree import Entry, Tree
 from grader.errors import RubricError, UsageError
 from grader.model.mutants import (
     AppendText,

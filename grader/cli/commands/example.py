@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from grader.authoring.mutation.declared import load_mutants, mutants_file
-from grader.authoring.mutation.find import find_reference, load_solution
+from grader.authoring.mutation.package_tree import Tree, write_tree
 from grader.authoring.mutation.plan import Planned, plan_all, plan_declared
-from grader.authoring.mutation.solution import Solution
-from grader.authoring.mutation.tree import Tree, write_tree
+from grader.authoring.mutation.solution import Solution, find_reference, load_solution
 from grader.cli.output import say
 from grader.errors import ExitCode, UsageError
 from grader.files import check_writable

@@ -10,10 +10,9 @@ from pathlib import Path
 
 from grader.arena.sandbox import Mode
 from grader.authoring.mutation.declared import load_mutants, mutants_file, mutants_text
-from grader.authoring.mutation.find import find_reference, given_reference, load_solution
 from grader.authoring.mutation.plan import Planned, chosen, plan_all, plan_declared, refuse_unfit
-from grader.authoring.mutation.session import Plan, run_test
-from grader.authoring.mutation.solution import Solution
+from grader.authoring.mutation.rubric_test import Plan, run_test
+from grader.authoring.mutation.solution import Solution, find_reference, given_reference, load_solution
 from grader.cli.display import open_progress
 from grader.cli.inherited_limits import make_room
 from grader.cli.mutants import print_test

@@ -9,9 +9,8 @@ from pydantic import Field
 
 from grader.authoring.mutation.registry import NoParams, operator
 from grader.authoring.mutation.solution import Site, Solution
-from grader.authoring.mutation.spans import Edit, whole_lines
-from grader.authoring.mutation.words import misspelt_name
-from grader.authoring.mutation.xml import Document, Element
+from grader.authoring.mutation.text_edits import Edit, misspelt_name, whole_lines
+from grader.authoring.mutation.xml_document import Document, Element
 from grader.model.record import Record
 
 URL = re.compile(r"""https?://[^\s"'<>]+""")

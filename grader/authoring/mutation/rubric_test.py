@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from grader.authoring.mutation.compare import DOUBTFUL, Comparison, compare, lost_criteria
+from grader.authoring.mutation.package_tree import Tree, unified_diff, write_tree
 from grader.authoring.mutation.plan import Planned
 from grader.authoring.mutation.solution import Solution
-from grader.authoring.mutation.tree import Tree, unified_diff, write_tree
 from grader.classes.batch.workers import Graded, Job, Sandbox, grade_all
 from grader.errors import HostError
-from grader.model.mutants import MutantResult, ReferenceResult, RubricTest
+from grader.model.mutants import Cost, LostCriterion, MutantResult, ReferenceResult, RubricTest, State
 from grader.model.progress import Progress
-from grader.model.result import GradingResult, RubricInfo
+from grader.model.result import CriterionResult, GradingResult, RubricInfo
 from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric
 from grader.temporary import temporary_folder
@@ -203,3 +202,59 @@ def _kept(plan: Plan, name: str, tree: Tree, *, wanted: bool) -> str | None:
     write_tree(tree, folder / SOURCE)
     (folder / DIFF).write_text(unified_diff(plan.solution.tree, tree), encoding="utf-8")
     return str(folder)
+
+
+# [authoring.mutation.compare] What a mutant lost, against what it must cost.
+
+LOST = {Status.FAIL, Status.PARTIAL, Status.BLOCKED}
+DOUBTFUL = {Status.INCONCLUSIVE, Status.ERROR}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """See `MutantResult`."""
+
+    state: State
+    missing: tuple[str, ...] = ()
+    surplus: tuple[str, ...] = ()
+    differing: tuple[str, ...] = ()
+
+
+def lost_criteria(
+    criteria: Sequence[CriterionResult], ignored: Collection[str] = ()
+) -> tuple[LostCriterion, ...]:
+    """The criteria that were not reached; a person's points are nobody's loss."""
+    return tuple(
+        LostCriterion(id=c.id, status=c.status.value, message=c.message, hint=c.hint)
+        for c in criteria
+        if c.status not in {Status.PASS, Status.MANUAL} and c.id not in ignored
+    )
+
+
+def compare(
+    expected: dict[str, Cost] | None, criteria: Sequence[CriterionResult], ignored: Collection[str] = ()
+) -> Comparison:
+    """Without declared costs, a mutant is killed by whatever it costs. `ignored` are criteria that the reference
+    solution does not reach either: advice, where it has some."""
+    found = {c.id: c.status for c in criteria if c.id not in ignored}
+    if any(status in DOUBTFUL for status in found.values()):
+        return Comparison(state="inconclusive")
+    lost = {name: status.value for name, status in found.items() if status in LOST}
+    if expected is None:
+        return Comparison(state="killed" if lost else "survived")
+    known = {c.id for c in criteria}
+    missing = tuple(_missing(name, known) for name in expected if name not in lost)
+    surplus = tuple(name for name in lost if name not in expected)
+    differing = tuple(
+        f"{name} is {lost[name]}, not {wanted}"
+        for name, wanted in expected.items()
+        if name in lost and lost[name] != wanted
+    )
+    if not (missing or surplus or differing):
+        return Comparison(state="killed")
+    state: State = "differs" if lost else "survived"
+    return Comparison(state=state, missing=missing, surplus=surplus, differing=differing)
+
+
+def _missing(name: str, known: Collection[str]) -> str:
+    return name if name in known else f"{name} (the rubric has no such criterion)"

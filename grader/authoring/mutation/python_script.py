@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import TypeVar
 
-from grader.authoring.mutation.spans import Edit
+from grader.authoring.mutation.text_edits import Edit
 
 NodeT = TypeVar("NodeT", bound=ast.AST)
 Function = ast.FunctionDef | ast.AsyncFunctionDef
@@ -149,3 +149,16 @@ class Script:
     def _indented(self, statement: ast.stmt, lines: Sequence[str]) -> str:
         indentation = self.indentation(statement)
         return "".join(f"{indentation}{line}\n" for line in lines)
+
+
+# [authoring.mutation.every_second] The lines by which a mutant does something in every second turn only.
+
+PREAMBLE = ("import itertools", "every_second = itertools.cycle((True, False))")
+
+
+def every_second_time(script: Script, statements: Sequence[ast.stmt]) -> list[Edit]:
+    """Guards for statements of one block, all for the same turns; empty where they cannot be indented."""
+    if not script.can_wrap(statements):
+        return []
+    edits = [script.preamble(*PREAMBLE), script.before(statements[0], "turn = next(every_second)")]
+    return edits + [script.wrap([statement], "if turn:") for statement in statements]
