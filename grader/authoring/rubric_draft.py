@@ -1,4 +1,4 @@
-"""A rubric in the making: scenarios, criteria, points that add up, notes for its author."""
+"""A rubric in the making: scenarios, criteria and points that add up, and its text as YAML that people can edit."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ class Sheet:
         return name
 
 
-def given(**lists: list[str]) -> Entry:
-    """Those that hold something."""
+def drop_empty(**lists: list[str]) -> Entry:
+    """Return the lists that are not empty."""
     return {name: items for name, items in lists.items() if items}
 
 
-def share_out(criteria: list[Entry]) -> None:
-    """Points by weight, whole numbers, the largest remainders rounded up: together 100."""
+def assign_points(criteria: list[Entry]) -> None:
+    """Set each criterion's points by its check's weight: whole numbers, together 100."""
     weights = [WEIGHTS.get(c["check"], 1) for c in criteria]
     exact = [TOTAL_POINTS * w / sum(weights) for w in weights]
     for criterion, points in zip(criteria, exact, strict=True):
@@ -55,18 +55,18 @@ def share_out(criteria: list[Entry]) -> None:
         criteria[index]["points"] += 1
 
 
-def plain(number: float) -> float | int:
+def format_number(number: float) -> float | int:
     return int(number) if number == int(number) else number
 
 
 def label_of(name: str) -> str:
-    """A criterion's id from a topic or service: letters, digits and hyphens."""
+    """Return a topic's or service's name as part of a criterion's id: letters, digits and hyphens."""
     letters: Iterator[str] = (c if c.isalnum() and c.isascii() else "-" for c in name.lower())
     label = "-".join(part for part in "".join(letters).split("-") if part)
     return label if label[:1].isalpha() else f"t-{label}"
 
 
-# [authoring.text] A proposed rubric as YAML, laid out as people write it.
+# ---- as YAML
 
 NOTE_CHARS = 300
 HEAD = """\
@@ -103,7 +103,7 @@ def rubric_text(
     criteria: list[dict[str, Any]],
     notes: Iterable[str],
 ) -> str:
-    """The rubric's file."""
+    """Return the text of the rubric's file."""
     about = {
         "schema": "grader.rubric/1",
         "id": rubric_id,

@@ -5,10 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from grader.authoring.mutation import solution
 from grader.authoring.mutation.declared import mutants_file
 from grader.authoring.mutation.package_tree import read_tree
-from grader.authoring.mutation.solution import find_reference, given_reference, load_solution
+from grader.authoring.mutation.solution import Reference, find_reference, given_reference, load_solution
 from grader.errors import UsageError
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import LABS, ROOT
@@ -37,7 +36,7 @@ def test_an_installed_grader_does_not_trust_its_modes(tmp_path, monkeypatch):
     shutil.copytree(ROOT / "reference_solutions", data / "reference_solutions")
     for path in data.rglob("*.py"):
         path.chmod(0o644)
-    monkeypatch.setattr(solution, "rubrics_folder", lambda: data / "rubrics")
+    monkeypatch.setattr("grader.authoring.mutation.solution.rubrics_folder", lambda: data / "rubrics")
     loaded = load_rubric(str(data / "rubrics" / f"{LAB}.yaml"))
     reference = find_reference(loaded)
     assert reference.folder == data / "reference_solutions" / LAB
@@ -60,7 +59,7 @@ def test_what_lies_beside_a_rubric_comes_first(tmp_path):
     (tmp_path / "reference_solutions" / "sample").mkdir(parents=True)
     loaded = load_rubric(str(path))
     assert mutants_file(loaded) == tmp_path / "rubrics" / "mutants" / "sample.yaml"
-    assert find_reference(loaded) == solution.Reference(folder=tmp_path / "reference_solutions" / "sample")
+    assert find_reference(loaded) == Reference(folder=tmp_path / "reference_solutions" / "sample")
 
 
 def test_nothing_is_there(tmp_path):
@@ -82,7 +81,7 @@ def test_the_package_is_found_wherever_it_is(tmp_path):
         manifest.parent.mkdir(parents=True)
         manifest.write_text(f"<package><export><name>x</name></export><name>\n{name} </name></package>")
     (tmp_path / "package.xml").write_text("<package")
-    solution = load_solution(solution.Reference(folder=tmp_path), "Lab1")
+    solution = load_solution(Reference(folder=tmp_path), "Lab1")
     assert solution.folder == "a b/ws/src/lab1/"
     with pytest.raises(UsageError, match="no package lab2 in"):
-        load_solution(solution.Reference(folder=Path(tmp_path)), "lab2")
+        load_solution(Reference(folder=Path(tmp_path)), "lab2")

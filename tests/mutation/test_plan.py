@@ -79,7 +79,7 @@ def test_two_mistakes_in_one_mutant():
         {"operator": "no-shebang", "at": {"script": "src/b.py"}},
     )
     (planned,), _ = plan_declared(declared({"edits": edits}), two_nodes())
-    assert planned.mistake == "The student never makes the script executable and leaves the shebang away."
+    assert planned.mistake == "The student never makes the script executable and leaves out the shebang."
     assert not planned.tree["src/a.py"].executable
     assert planned.tree["src/b.py"].data.startswith(b"import rospy")
 

@@ -4,7 +4,7 @@ import pytest
 
 from grader.authoring.mutation import package_tree as tree_module
 from grader.authoring.mutation.package_tree import Entry, read_tree, unified_diff, write_tree
-from grader.authoring.mutation.text_edits import Edit, applied
+from grader.authoring.mutation.text_edits import Edit, apply_edits
 from grader.errors import UsageError
 
 
@@ -71,6 +71,6 @@ def test_a_diff_says_what_cannot_be_seen():
 
 
 def test_edits_are_made_from_their_places():
-    assert applied("abcdef", [Edit(4, 5, "E"), Edit(1, 3, ""), Edit(1, 1, "+")]) == "a+dEf"
+    assert apply_edits("abcdef", [Edit(4, 5, "E"), Edit(1, 3, ""), Edit(1, 1, "+")]) == "a+dEf"
     with pytest.raises(ValueError, match="overlap"):
-        applied("abcdef", [Edit(0, 3, ""), Edit(2, 4, "")])
+        apply_edits("abcdef", [Edit(0, 3, ""), Edit(2, 4, "")])

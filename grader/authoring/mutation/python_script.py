@@ -1,4 +1,7 @@
-"""A Python file with the exact place of everything in it."""
+"""A Python file with the exact position of every node, and edits of it that leave the rest as it is.
+
+Mistakes are edits of the text, not of a syntax tree: many of them are not valid Python, and a tree cannot hold those.
+"""
 
 from __future__ import annotations
 
@@ -151,13 +154,11 @@ class Script:
         return "".join(f"{indentation}{line}\n" for line in lines)
 
 
-# [authoring.mutation.every_second] The lines by which a mutant does something in every second turn only.
-
 PREAMBLE = ("import itertools", "every_second = itertools.cycle((True, False))")
 
 
 def every_second_time(script: Script, statements: Sequence[ast.stmt]) -> list[Edit]:
-    """Guards for statements of one block, all for the same turns; empty where they cannot be indented."""
+    """Return edits that run statements of one block in every second turn only; none where they cannot be indented."""
     if not script.can_wrap(statements):
         return []
     edits = [script.preamble(*PREAMBLE), script.before(statements[0], "turn = next(every_second)")]

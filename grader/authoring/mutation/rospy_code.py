@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 from grader.authoring.mutation.python_script import Function, Script
+from grader.authoring.mutation.solution import Place, Solution
 
 LOGS = frozenset({"logdebug", "loginfo", "logwarn", "logerr", "logfatal"})
 STREAMS = frozenset({"stdout", "stderr"})
@@ -107,6 +108,39 @@ def _function(script: Script, node: ast.AST | None) -> Function | ast.Lambda | N
     return next((f for f in script.of(ast.FunctionDef) if f.name == last_name(node)), None)
 
 
+def script_place(script: Script, node: ast.AST | None = None, **at: str) -> Place:
+    """Return a place in the script, in the line of `node`, or else of the first edit."""
+    return Place(path=script.path, at={"script": script.path, **at}, line=getattr(node, "lineno", None))
+
+
+def each_script(solution: Solution) -> Iterator[tuple[Place, Script]]:
+    """Find the scripts."""
+    return ((script_place(script), script) for script in solution.scripts)
+
+
+def each_publisher(solution: Solution) -> Iterator[tuple[Place, Script, Endpoint]]:
+    """Find the publishers."""
+    return _each_endpoint(solution, publishers)
+
+
+def each_subscriber(solution: Solution) -> Iterator[tuple[Place, Script, Endpoint]]:
+    """Find the subscribers."""
+    return _each_endpoint(solution, subscribers)
+
+
+def each_endpoint(solution: Solution) -> Iterator[tuple[Place, Script, Endpoint]]:
+    """Find the publishers and subscribers."""
+    return _each_endpoint(solution, lambda script: [*publishers(script), *subscribers(script)])
+
+
+def _each_endpoint(
+    solution: Solution, find: Callable[[Script], list[Endpoint]]
+) -> Iterator[tuple[Place, Script, Endpoint]]:
+    for script in solution.scripts:
+        for endpoint in find(script):
+            yield script_place(script, endpoint.call, topic=endpoint.topic), script, endpoint
+
+
 def publish_calls(script: Script, publisher: Endpoint) -> list[ast.Call]:
     """`pub.publish(…)` by the publisher's own name; of an only publisher, by whatever name."""
     found = [c for c in calls(script, "publish") if isinstance(c.func, ast.Attribute)]
@@ -157,7 +191,7 @@ def rate_sleeps(script: Script) -> list[ast.Expr]:
     ]
 
 
-# [authoring.mutation.data] Where the values come from that a script publishes.
+# ---- the values that a script publishes
 
 Assignment = ast.Assign | ast.AugAssign | ast.AnnAssign
 
@@ -206,7 +240,7 @@ def source_names(script: Script, publisher: Endpoint) -> set[str]:
     return {name for value in sources(script, publisher) for name in names_in(value)}
 
 
-# [authoring.mutation.counter] The counter of a script: where it begins, steps, and goes back to its beginning.
+# ---- counters
 
 INTEGER_TYPES = frozenset(f"{sign}{bits}" for sign in ("Int", "UInt") for bits in ("8", "16", "32", "64")) | {
     "Byte"

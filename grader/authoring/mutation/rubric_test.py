@@ -1,4 +1,4 @@
-"""A rubric's whole test: the reference solution, then its mutants, then what is to be said of them."""
+"""The test of a rubric: the reference solution and the mutants are graded, and what they lost is compared."""
 
 from __future__ import annotations
 
@@ -204,7 +204,7 @@ def _kept(plan: Plan, name: str, tree: Tree, *, wanted: bool) -> str | None:
     return str(folder)
 
 
-# [authoring.mutation.compare] What a mutant lost, against what it must cost.
+# ---- what a mutant lost, against what it must cost
 
 LOST = {Status.FAIL, Status.PARTIAL, Status.BLOCKED}
 DOUBTFUL = {Status.INCONCLUSIVE, Status.ERROR}

@@ -1,4 +1,4 @@
-"""A correct package as operators see it: its files in memory, parsed where somebody asks."""
+"""The correct package of a lab: where it is, and its files in memory as operators see and change them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cmake_parser.error import CMakeParseError
 
 from grader.authoring.mutation.package_tree import Entry, Tree, read_tree
 from grader.authoring.mutation.python_script import Script
-from grader.authoring.mutation.text_edits import Edit, applied
+from grader.authoring.mutation.text_edits import Edit, apply_edits, line_at
 from grader.authoring.mutation.xml_document import Document
 from grader.errors import UsageError
 from grader.rubric.find import rubrics_folder
@@ -33,6 +33,37 @@ class Site:
     at: Mapping[str, str | int]
     tree: Tree
     line: int | None = None
+
+
+Change = Sequence[Edit] | bytes | Tree | None
+"""What an operator makes of a place: edits of the file, its new content, or a whole new tree; None for nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A place that an operator may change. `at` tells it from the others; without `line`, the first edit does.
+
+    Positions in an XML file count bytes, those in any other file characters: `xml` is the file's document.
+    """
+
+    path: str
+    at: Mapping[str, str | int]
+    line: int | None = None
+    xml: Document | None = None
+
+    def site(self, solution: Solution, change: Sequence[Edit] | bytes | Tree) -> Site:
+        """Return the mutant that is made here."""
+        line = self.line
+        if isinstance(change, bytes):
+            tree = solution.with_data(self.path, change)
+        elif isinstance(change, dict):
+            tree = change
+        elif self.xml is not None:
+            tree = solution.edited_xml(self.xml, change)
+        else:
+            tree = solution.edited(self.path, change)
+            line = line or line_at(solution.text(self.path), min(change).start)
+        return Site(at=self.at, tree=tree, line=line)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,19 +155,19 @@ class Solution:
 
     def edited(self, path: str, edits: Sequence[Edit]) -> Tree:
         """The tree with edits in one text file."""
-        text = applied(self.text(path), edits)
+        text = apply_edits(self.text(path), edits)
         return self.with_data(path, text.encode(errors="surrogateescape"))
 
     def edited_xml(self, document: Document, edits: Sequence[Edit]) -> Tree:
         """The same for XML, whose places count bytes; what the edits insert is written as UTF-8."""
         wide = [Edit(e.start, e.end, e.text.encode().decode("latin-1")) for e in edits]
-        return self.with_data(document.path, applied(document.text, wide).encode("latin-1"))
+        return self.with_data(document.path, apply_edits(document.text, wide).encode("latin-1"))
 
     def then(self, tree: Tree) -> Solution:
         return replace(self, tree=tree)
 
 
-# [authoring.mutation.find] Where a lab's correct package is: beside the rubric, or among what comes with the grader.
+# ---- where a lab's correct package is
 
 REFERENCES = "reference_solutions"
 

@@ -1,4 +1,4 @@
-"""Edits of a text by exact positions."""
+"""Edits of a text by exact positions, and misspelt words."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ class Edit:
     text: str
 
 
-def applied(text: str, edits: Iterable[Edit]) -> str:
-    """The text with all edits made. Raises ValueError where two of them overlap."""
+def apply_edits(text: str, edits: Iterable[Edit]) -> str:
+    """Return the text with all edits made. Raises ValueError where two of them overlap."""
     parts, position = [], 0
     for edit in sorted(edits):
         if edit.start < position:
@@ -42,7 +42,7 @@ def whole_lines(text: str, start: int, end: int) -> tuple[int, int]:
     return (first, last) if alone else (start, end)
 
 
-# [authoring.mutation.words] Slips of the pen.
+# ---- misspellings
 
 OPENING = re.compile(r"""^[a-zA-Z]{0,2}(?:'''|\"\"\"|'|")""")
 WORD = re.compile(r"\{[^{}]*\}|%\(\w+\)\w|%[-+ #0-9.]*[a-z]|\\.|([^\W\d_]{3,})")

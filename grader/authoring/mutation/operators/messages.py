@@ -1,100 +1,81 @@
-"""What a message says."""
+"""What messages say, how counters count, and listeners that do not say what they hear."""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from pydantic import Field
 
 from grader.authoring.mutation.python_script import Function, Script, every_second_time
-from grader.authoring.mutation.registry import NoParams, operator
+from grader.authoring.mutation.registry import Finder, operator
 from grader.authoring.mutation.rospy_code import (
     INTEGER_TYPES,
     Counter,
-    Endpoint,
+    each_publisher,
+    each_subscriber,
     find_counter,
     message_name,
     publishers,
+    script_place,
     sources,
     speech,
-    subscribers,
 )
-from grader.authoring.mutation.solution import Site, Solution
+from grader.authoring.mutation.solution import Place, Solution
 from grader.authoring.mutation.text_edits import Edit, misspelt_literal, texts_in
 from grader.model.record import Record
+
+# ---- what a message says
 
 SECONDS = {"rospy.get_time()": "1700000000.0", "time.time()": "1700000000.0"}
 TIMES = {"rospy.Time.now()": "rospy.Time(1700000000)", "rospy.get_rostime()": "rospy.Time(1700000000)"}
 NANOSECONDS = "rospy.Time.now().to_nsec()"
 
 
-def _fed(solution: Solution) -> Iterator[tuple[Script, Endpoint, list[ast.AST]]]:
-    """Each publisher with everything that its messages are made of."""
-    for script in solution.scripts:
-        for publisher in publishers(script):
-            nodes = {id(n): n for value in sources(script, publisher) for n in ast.walk(value)}
-            yield script, publisher, list(nodes.values())
+def _messages(solution: Solution) -> Iterator[tuple[Place, Script, list[ast.expr]]]:
+    """Find the publishers, each with the expressions that its messages are made of."""
+    for place, script, publisher in each_publisher(solution):
+        yield script_place(script, topic=str(place.at["topic"])), script, sources(script, publisher)
 
 
-def _site(solution: Solution, script: Script, publisher: Endpoint, edits: list[Edit]) -> Iterator[Site]:
-    if edits:
-        at = {"script": script.path, "topic": publisher.topic}
-        line = script.text.count("\n", 0, min(edits).start) + 1
-        yield Site(at=at, tree=solution.edited(script.path, edits), line=line)
+def _calls(values: list[ast.expr]) -> list[ast.Call]:
+    return list(dict.fromkeys(n for value in values for n in ast.walk(value) if isinstance(n, ast.Call)))
 
 
-@operator("message-altered")
-def message_altered(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("message-altered", each=_messages)
+def message_altered(script: Script, values: list[ast.expr]) -> list[Edit]:
     """Misspells the message.
 
     Fits every publisher whose messages are made from a text.
     """
-    for script, publisher, _ in _fed(solution):
-        for value in sources(script, publisher):
-            texts = [t for t in texts_in(value) if misspelt_literal(script.source(t)) != script.source(t)]
-            if texts:
-                edit = script.replace(texts[0], misspelt_literal(script.source(texts[0])))
-                yield from _site(solution, script, publisher, [edit])
-                break
+    for text in (text for value in values for text in texts_in(value)):
+        misspelt = misspelt_literal(script.source(text))
+        if misspelt != script.source(text):
+            return [script.replace(text, misspelt)]
+    return []
 
 
-@operator("message-constant-time")
-def message_constant_time(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("message-constant-time", each=_messages)
+def message_constant_time(script: Script, values: list[ast.expr]) -> list[Edit]:
     """Sends the same time again and again.
 
     Fits every publisher whose messages carry the time.
     """
     constants = SECONDS | TIMES
-    for script, publisher, nodes in _fed(solution):
-        edits = [
-            script.replace(n, constants[s]) for n in _calls(nodes) if (s := script.source(n)) in constants
-        ]
-        yield from _site(solution, script, publisher, edits)
+    return [script.replace(c, constants[s]) for c in _calls(values) if (s := script.source(c)) in constants]
 
 
-@operator("message-nanoseconds")
-def message_nanoseconds(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("message-nanoseconds", each=_messages)
+def message_nanoseconds(script: Script, values: list[ast.expr]) -> list[Edit]:
     """Sends the time in nanoseconds, not in seconds.
 
     Fits every publisher whose messages carry the time in seconds.
     """
-    for script, publisher, nodes in _fed(solution):
-        found = [n for n in _calls(nodes) if script.source(n) in SECONDS or _seconds_of_time(script, n)]
-        yield from _site(solution, script, publisher, [script.replace(n, NANOSECONDS) for n in found])
+    in_seconds = {*SECONDS, *(f"{time}.to_sec()" for time in TIMES)}
+    return [script.replace(c, NANOSECONDS) for c in _calls(values) if script.source(c) in in_seconds]
 
 
-def _calls(nodes: list[ast.AST]) -> list[ast.Call]:
-    return [n for n in nodes if isinstance(n, ast.Call)]
-
-
-def _seconds_of_time(script: Script, call: ast.Call) -> bool:
-    """`rospy.Time.now().to_sec()`."""
-    head, _, tail = script.source(call).rpartition(".")
-    return head in TIMES and tail == "to_sec()"
-
-
-# [authoring.mutation.operators.counter] Counters that count otherwise.
+# ---- counters
 
 
 class ByParams(Record):
@@ -109,82 +90,77 @@ class EarlyParams(Record):
     by: int = Field(default=28, ge=2)
 
 
-def _sites(solution: Solution, change: Callable[[Script, Counter], list[Edit]]) -> Iterator[Site]:
+def _counters(solution: Solution) -> Iterator[tuple[Place, Script, Counter]]:
+    """Find the integer topics that are fed by a counter."""
     for script in solution.scripts:
         for publisher in publishers(script):
             counter = find_counter(script, publisher)
-            edits = change(script, counter) if counter is not None else []
-            if edits:
-                line = script.text.count("\n", 0, min(edits).start) + 1
-                yield Site(
-                    at={"script": script.path, "topic": publisher.topic},
-                    tree=solution.edited(script.path, edits),
-                    line=line,
-                )
+            if counter is not None:
+                yield script_place(script, topic=publisher.topic), script, counter
 
 
 def _add(script: Script, constants: list[ast.Constant], number: int) -> list[Edit]:
     """Each of the constants once, changed by `number`."""
-    distinct = {script.span(c): c for c in constants if isinstance(c.value, int)}
-    return [script.replace(c, str(c.value + number)) for c in distinct.values() if isinstance(c.value, int)]
+    distinct = {script.span(c): c for c in constants}.values()
+    return [script.replace(c, str(c.value + number)) for c in distinct if isinstance(c.value, int)]
 
 
 def _set(script: Script, constants: list[ast.Constant], number: int) -> list[Edit]:
     return [script.replace(c, str(number)) for c in {script.span(c): c for c in constants}.values()]
 
 
-@operator("counter-from-one")
-def counter_from_one(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("counter-from-one", each=_counters)
+def counter_from_one(script: Script, counter: Counter) -> list[Edit]:
     """Begins to count at 1.
 
     Fits every integer topic that is fed by a counter with a first value.
     """
-    yield from _sites(solution, lambda script, counter: _set(script, counter.starts, 1))
+    return _set(script, counter.starts, 1)
 
 
-@operator("counter-skips", params=ByParams)
-def counter_skips(solution: Solution, params: ByParams) -> Iterator[Site]:
+@operator("counter-skips", each=_counters, params=ByParams)
+def counter_skips(script: Script, counter: Counter, params: ByParams) -> list[Edit]:
     """Counts in steps that are too large.
 
     Fits every integer topic that is fed by a counter.
     """
-    yield from _sites(solution, lambda script, counter: _add(script, counter.steps, params.by))
+    return _add(script, counter.steps, params.by)
 
 
-@operator("reset-early", params=EarlyParams)
-def reset_early(solution: Solution, params: EarlyParams) -> Iterator[Site]:
+@operator("reset-early", each=_counters, params=EarlyParams)
+def reset_early(script: Script, counter: Counter, params: EarlyParams) -> list[Edit]:
     """Goes back to the beginning too early.
 
     Fits every counter with a limit that is written as a number.
     """
-    yield from _sites(solution, lambda script, counter: _add(script, counter.limits, -params.by))
+    return _add(script, counter.limits, -params.by)
 
 
-@operator("reset-late", params=ByParams)
-def reset_late(solution: Solution, params: ByParams) -> Iterator[Site]:
+@operator("reset-late", each=_counters, params=ByParams)
+def reset_late(script: Script, counter: Counter, params: ByParams) -> list[Edit]:
     """Goes back to the beginning too late.
 
     Fits every counter with a limit that is written as a number.
     """
-    yield from _sites(solution, lambda script, counter: _add(script, counter.limits, params.by))
+    return _add(script, counter.limits, params.by)
 
 
-@operator("reset-to-one")
-def reset_to_one(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("reset-to-one", each=_counters)
+def reset_to_one(script: Script, counter: Counter) -> list[Edit]:
     """Goes back to 1.
 
     Fits every counter that is set back, or taken modulo a number.
     """
-    yield from _sites(solution, lambda script, counter: _back_to(script, counter, 1))
+    return _back_to(script, counter, 1)
 
 
-@operator("wrap-to-minus-128")
-def wrap_to_minus_128(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("wrap-to-minus-128", each=_counters)
+def wrap_to_minus_128(script: Script, counter: Counter) -> list[Edit]:
     """Goes on at -128, as an 8-bit integer of C does.
 
     Fits every counter that is set back, or taken modulo a number.
     """
-    yield from _sites(solution, lambda script, counter: _back_to(script, counter, -128))
+    return _back_to(script, counter, -128)
 
 
 def _back_to(script: Script, counter: Counter, number: int) -> list[Edit]:
@@ -196,16 +172,12 @@ def _back_to(script: Script, counter: Counter, number: int) -> list[Edit]:
     return edits
 
 
-@operator("never-reset")
-def never_reset(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("never-reset", each=_counters)
+def never_reset(script: Script, counter: Counter) -> list[Edit]:
     """Never goes back to the beginning.
 
     Fits every counter that is set back by an `if`, or taken modulo a number.
     """
-    yield from _sites(solution, _without_reset)
-
-
-def _without_reset(script: Script, counter: Counter) -> list[Edit]:
     edits = [script.replace(modulo, script.source(modulo.left)) for modulo in counter.modulos]
     for test in counter.tests:
         if isinstance(test, ast.If):
@@ -231,149 +203,113 @@ def _sets_back(block: list[ast.stmt]) -> bool:
     return any(isinstance(s, ast.Assign) and isinstance(s.value, ast.Constant) for s in block)
 
 
-# [authoring.mutation.operators.listener] Listeners that do not say what they hear.
-
-Change = Callable[[Script, Function, str], list[Edit]]
+# ---- listeners
 
 
-def _sites_listener(solution: Solution, change: Change, *, numbers: bool = False) -> Iterator[Site]:
-    """One for each subscriber with a callback of this script's that the change fits; `numbers`: of integers."""
-    for script in solution.scripts:
-        for subscriber in subscribers(script):
-            if numbers and subscriber.type_name not in INTEGER_TYPES:
-                continue
-            yield from _site_listener(solution, script, subscriber, change)
+def _callbacks(*types: str) -> Finder:
+    """Return a finder of subscribers (of these types only, if any) with a callback that is a function of the script.
+
+    With the callback come the name of its message and the statements that print or log.
+    """
+
+    def find(solution: Solution) -> Iterator[tuple[Place, Script, Function, str, list[ast.Expr]]]:
+        for place, script, subscriber in each_subscriber(solution):
+            callback = subscriber.callback
+            message = message_name(callback) if isinstance(callback, Function) else ""
+            if isinstance(callback, Function) and message and (not types or subscriber.type_name in types):
+                there = script_place(script, callback, topic=str(place.at["topic"]))
+                yield there, script, callback, message, speech(script, callback)
+
+    return find
 
 
-def _site_listener(
-    solution: Solution, script: Script, subscriber: Endpoint, change: Change
-) -> Iterator[Site]:
-    callback = subscriber.callback
-    if not isinstance(callback, Function) or not message_name(callback):
-        return
-    edits = change(script, callback, message_name(callback))
-    if edits:
-        at = {"script": script.path, "topic": subscriber.topic}
-        yield Site(at=at, tree=solution.edited(script.path, edits), line=callback.lineno)
+any_callback = _callbacks()
+integer_callback = _callbacks(*INTEGER_TYPES)
 
 
-def _data(script: Script, callback: Function, message: str) -> list[ast.Attribute]:
-    """Where the callback reads the message's data."""
-    name = f"{message}.data"
-    return [n for n in ast.walk(callback) if isinstance(n, ast.Attribute) and script.source(n) == name]
+def _replace_data(script: Script, callback: Function, message: str, text: str) -> list[Edit]:
+    """Put `text` where the callback reads the message's data."""
+    data = f"{message}.data"
+    reads = [n for n in ast.walk(callback) if isinstance(n, ast.Attribute) and script.source(n) == data]
+    return [script.replace(node, text) for node in reads]
 
 
-@operator("listener-silent")
-def listener_silent(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("listener-silent", each=any_callback)
+def listener_silent(script: Script, _callback: Function, _message: str, said: list[ast.Expr]) -> list[Edit]:
     """Prints nothing of what it hears.
 
     Fits every subscriber whose callback prints or logs.
     """
-    yield from _sites_listener(
-        solution,
-        lambda script, callback, _: [script.replace(s, "pass") for s in speech(script, callback)],
-    )
+    return [script.replace(statement, "pass") for statement in said]
 
 
-@operator("listener-constant")
-def listener_constant(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("listener-constant", each=any_callback)
+def listener_constant(script: Script, _callback: Function, _message: str, said: list[ast.Expr]) -> list[Edit]:
     """Prints that it heard something, and not what.
 
     Fits every subscriber whose callback prints or logs.
     """
-    yield from _sites_listener(solution, _constant)
+    named = [(s, s.value.func) for s in said if isinstance(s.value, ast.Call)]
+    return [script.replace(s, f"{script.source(function)}('I heard a message')") for s, function in named]
 
 
-def _constant(script: Script, callback: Function, _message: str) -> list[Edit]:
-    found = [s for s in speech(script, callback) if isinstance(s.value, ast.Call)]
-    return [script.replace(s, f"{script.source(s.value.func)}('I heard a message')") for s in found]  # type: ignore[attr-defined]
-
-
-@operator("listener-drops-zero")
-def listener_drops_zero(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("listener-drops-zero", each=integer_callback)
+def listener_drops_zero(
+    script: Script, _callback: Function, message: str, said: list[ast.Expr]
+) -> list[Edit]:
     """Prints every number but 0.
 
     Fits every subscriber of integers whose callback prints or logs.
     """
-
-    def change(script: Script, callback: Function, message: str) -> list[Edit]:
-        found = [s for s in speech(script, callback) if script.can_wrap([s])]
-        return [script.wrap([s], f"if {message}.data:") for s in found]
-
-    yield from _sites_listener(solution, change, numbers=True)
+    return [script.wrap([s], f"if {message}.data:") for s in said if script.can_wrap([s])]
 
 
-@operator("listener-drops-negative")
-def listener_drops_negative(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("listener-drops-negative", each=integer_callback)
+def listener_drops_negative(script: Script, callback: Function, message: str, _said: object) -> list[Edit]:
     """Prints a number without its sign.
 
     Fits every subscriber of integers whose callback reads the message's data.
     """
-
-    def change(script: Script, callback: Function, message: str) -> list[Edit]:
-        return [script.replace(n, f"abs({message}.data)") for n in _data(script, callback, message)]
-
-    yield from _sites_listener(solution, change, numbers=True)
+    return _replace_data(script, callback, message, f"abs({message}.data)")
 
 
-@operator("listener-off-by-one")
-def listener_off_by_one(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("listener-off-by-one", each=integer_callback)
+def listener_off_by_one(script: Script, callback: Function, message: str, _said: object) -> list[Edit]:
     """Prints each number plus one.
 
     Fits every subscriber of integers whose callback reads the message's data.
     """
-
-    def change(script: Script, callback: Function, message: str) -> list[Edit]:
-        return [script.replace(n, f"({message}.data + 1)") for n in _data(script, callback, message)]
-
-    yield from _sites_listener(solution, change, numbers=True)
+    return _replace_data(script, callback, message, f"({message}.data + 1)")
 
 
-@operator("listener-drops-some")
-def listener_drops_some(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("listener-drops-some", each=any_callback)
+def listener_drops_some(
+    script: Script, _callback: Function, _message: str, said: list[ast.Expr]
+) -> list[Edit]:
     """Prints every second message only.
 
     Fits every subscriber whose callback prints or logs.
     """
-
-    def change(script: Script, callback: Function, _message: str) -> list[Edit]:
-        found = speech(script, callback)
-        together = [s for s in found if script.block(s) is script.block(found[0])]
-        return every_second_time(script, list(together)) if found else []
-
-    yield from _sites_listener(solution, change)
+    return every_second_time(script, [s for s in said if script.block(s) is script.block(said[0])])
 
 
-@operator("listener-late")
-def listener_late(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("listener-late", each=any_callback)
+def listener_late(script: Script, callback: Function, message: str, said: list[ast.Expr]) -> list[Edit]:
     """Prints each message only when the next one comes, so that the last is lost.
 
     Fits every subscriber whose callback prints or logs.
     """
-
-    def change(script: Script, callback: Function, message: str) -> list[Edit]:
-        if not speech(script, callback) or not script.has_lines(callback.body[0]):
-            return []
-        unit = script.unit
-        lines = (
-            f"waiting.append({message})",
-            "if len(waiting) < 2:",
-            f"{unit}return",
-            f"{message} = waiting.pop(0)",
-        )
-        return [script.preamble("waiting = []"), script.before(callback.body[0], *lines)]
-
-    yield from _sites_listener(solution, change)
+    if not said or not script.has_lines(callback.body[0]):
+        return []
+    wait = (f"waiting.append({message})", "if len(waiting) < 2:", f"{script.unit}return")
+    lines = (*wait, f"{message} = waiting.pop(0)")
+    return [script.preamble("waiting = []"), script.before(callback.body[0], *lines)]
 
 
-@operator("callback-error")
-def callback_error(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("callback-error", each=any_callback)
+def callback_error(script: Script, callback: Function, message: str, _said: object) -> list[Edit]:
     """Misspells the message's variable in the callback.
 
     Fits every subscriber whose callback reads the message's data.
     """
-
-    def change(script: Script, callback: Function, message: str) -> list[Edit]:
-        return [script.replace(n, f"the_{message}.data") for n in _data(script, callback, message)]
-
-    yield from _sites_listener(solution, change)
+    return _replace_data(script, callback, message, f"the_{message}.data")

@@ -1,23 +1,37 @@
-"""Names of nodes."""
+"""Names of nodes, how they live and end, what they log, and scripts that Python 3 does not run."""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Literal
 
 from pydantic import Field
 
 from grader.authoring.mutation.python_script import Function, Script
-from grader.authoring.mutation.registry import NoParams, operator
-from grader.authoring.mutation.rospy_code import LOGS, argument, calls, last_name, loops, speech, text_literal
-from grader.authoring.mutation.solution import Site, Solution
-from grader.authoring.mutation.text_edits import Edit, applied, misspelt_literal, texts_in
+from grader.authoring.mutation.registry import operator
+from grader.authoring.mutation.rospy_code import (
+    LOGS,
+    argument,
+    calls,
+    each_script,
+    last_name,
+    loops,
+    script_place,
+    speech,
+    text_literal,
+)
+from grader.authoring.mutation.solution import Place, Solution
+from grader.authoring.mutation.text_edits import Edit, apply_edits, misspelt_literal, texts_in
 from grader.model.record import Record
 
+# ---- names
 
-def _site(solution: Solution, script: Script, call: ast.Call, edit: Edit) -> Site:
-    return Site(at={"script": script.path}, tree=solution.edited(script.path, [edit]), line=call.lineno)
+
+def _init_nodes(solution: Solution) -> Iterator[tuple[Place, Script, ast.Call]]:
+    for script in solution.scripts:
+        for call in calls(script, "init_node"):
+            yield script_place(script, call), script, call
 
 
 def _anonymous(call: ast.Call) -> ast.keyword | None:
@@ -29,53 +43,42 @@ def _is_anonymous(call: ast.Call) -> bool:
     return keyword is not None and isinstance(keyword.value, ast.Constant) and bool(keyword.value.value)
 
 
-@operator("name-changed")
-def name_changed(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("name-changed", each=_init_nodes)
+def name_changed(script: Script, call: ast.Call) -> list[Edit]:
     """Gives the node another name.
 
     Fits every script with a node whose name is written out.
     """
-    for script in solution.scripts:
-        for call in calls(script, "init_node"):
-            name = text_literal(script, argument(call, 0, "name"))
-            if name is not None:
-                yield _site(solution, script, call, script.replace(name, repr(f"my_{name.value!s}")))
+    name = text_literal(script, argument(call, 0, "name"))
+    return [script.replace(name, repr(f"my_{name.value!s}"))] if name is not None else []
 
 
-@operator("not-anonymous")
-def not_anonymous(solution: Solution, _params: NoParams) -> Iterator[Site]:
-    """Leaves `anonymous=True` away.
+@operator("not-anonymous", each=_init_nodes)
+def not_anonymous(script: Script, call: ast.Call) -> list[Edit]:
+    """Leaves out `anonymous=True`.
 
     Fits every script with an anonymous node.
     """
-    for script in solution.scripts:
-        for call in calls(script, "init_node"):
-            keyword = _anonymous(call)
-            if keyword is not None and _is_anonymous(call):
-                yield _site(solution, script, call, script.replace(keyword.value, "False"))
+    keyword = _anonymous(call)
+    return [script.replace(keyword.value, "False")] if keyword is not None and _is_anonymous(call) else []
 
 
-@operator("made-anonymous")
-def made_anonymous(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("made-anonymous", each=_init_nodes)
+def made_anonymous(script: Script, call: ast.Call) -> list[Edit]:
     """Makes the node anonymous where its plain name is asked for.
 
     Fits every script with a node that is not anonymous.
     """
-    for script in solution.scripts:
-        for call in calls(script, "init_node"):
-            keyword = _anonymous(call)
-            if _is_anonymous(call) or argument(call, 0, "name") is None:
-                continue
-            if keyword is not None:
-                yield _site(solution, script, call, script.replace(keyword.value, "True"))
-            else:
-                last = script.span(max((*call.args, *call.keywords), key=lambda node: script.span(node)[1]))[
-                    1
-                ]
-                yield _site(solution, script, call, Edit(last, last, ", anonymous=True"))
+    keyword = _anonymous(call)
+    if _is_anonymous(call) or argument(call, 0, "name") is None:
+        return []
+    if keyword is not None:
+        return [script.replace(keyword.value, "True")]
+    end = max(script.span(node)[1] for node in (*call.args, *call.keywords))
+    return [Edit(end, end, ", anonymous=True")]
 
 
-# [authoring.mutation.operators.life] Nodes that end when they should not, or do not end when they should.
+# ---- how nodes live and end
 
 
 class EndsParams(Record):
@@ -84,70 +87,56 @@ class EndsParams(Record):
     turns: int = Field(default=30, ge=1)
 
 
-def _spins(script: Script) -> list[ast.Expr]:
-    return [s for call in calls(script, "spin") if isinstance(s := script.statement(call), ast.Expr)]
+def _lives(solution: Solution) -> Iterator[tuple[Place, Script, ast.While | ast.Expr]]:
+    """Find the loops that run until shutdown; in scripts without any, the calls of `spin`."""
+    for script in solution.scripts:
+        statements = (script.statement(call) for call in calls(script, "spin"))
+        spins = [statement for statement in statements if isinstance(statement, ast.Expr)]
+        for node in loops(script) or spins:
+            yield script_place(script, node), script, node
 
 
-def _sites(solution: Solution, script: Script, edits: Sequence[Edit], line: int) -> Site:
-    return Site(at={"script": script.path}, tree=solution.edited(script.path, edits), line=line)
-
-
-@operator("node-ends-by-itself", params=EndsParams)
-def node_ends_by_itself(solution: Solution, params: EndsParams) -> Iterator[Site]:
+@operator("node-ends-by-itself", each=_lives, params=EndsParams)
+def node_ends_by_itself(script: Script, life: ast.While | ast.Expr, params: EndsParams) -> list[Edit]:
     """Lets the node come to its end: a loop that is counted, or no rospy.spin().
 
     Fits every script with a loop until shutdown or a spin.
     """
-    for script in solution.scripts:
-        spins = _spins(script)
-        for loop in loops(script):
-            start, _ = script.span(loop)
-            edit = Edit(start, script.span(loop.test)[1], f"for _ in range({params.turns})")
-            yield _sites(solution, script, [edit], loop.lineno)
-        for spin in spins if not loops(script) else []:
-            yield _sites(solution, script, [script.remove(spin)], spin.lineno)
+    if isinstance(life, ast.Expr):
+        return [script.remove(life)]
+    return [Edit(script.span(life)[0], script.span(life.test)[1], f"for _ in range({params.turns})")]
 
 
-@operator("ctrl-c-swallowed")
-def ctrl_c_swallowed(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("ctrl-c-swallowed", each=_lives)
+def ctrl_c_swallowed(script: Script, life: ast.While | ast.Expr) -> list[Edit]:
     """Catches every exception and goes on, so that Ctrl-C does not end the node.
 
     Fits every script with a loop until shutdown or a spin.
     """
-    for script in solution.scripts:
-        unit = script.unit
-        except_pass = (f"{unit}except:", f"{unit * 2}pass")
-        for loop in loops(script):
-            if script.can_wrap(loop.body):
-                edits = [
-                    script.replace(loop.test, "True"),
-                    script.wrap(loop.body, "try:", footer=("except:", f"{unit}pass")),
-                ]
-                yield _sites(solution, script, edits, loop.lineno)
-        for spin in _spins(script) if not loops(script) else []:
-            if script.has_lines(spin):
-                sleep = f"{unit * 2}rospy.rostime.wallsleep(0.1)"
-                edits = [
-                    script.before(spin, "while True:", f"{unit}try:", sleep, *except_pass),
-                    script.remove(spin) if len(script.block(spin)) > 1 else script.replace(spin, "pass"),
-                ]
-                yield _sites(solution, script, edits, spin.lineno)
+    unit = script.unit
+    if isinstance(life, ast.While):
+        if not script.can_wrap(life.body):
+            return []
+        footer = ("except:", f"{unit}pass")
+        return [script.replace(life.test, "True"), script.wrap(life.body, "try:", footer=footer)]
+    if not script.has_lines(life):
+        return []
+    sleep = f"{unit * 2}rospy.rostime.wallsleep(0.1)"
+    lines = ("while True:", f"{unit}try:", sleep, f"{unit}except:", f"{unit * 2}pass")
+    return [script.before(life, *lines), script.remove(life)]
 
 
-@operator("traceback-on-exit")
-def traceback_on_exit(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("traceback-on-exit", each=_lives)
+def traceback_on_exit(script: Script, life: ast.While | ast.Expr) -> list[Edit]:
     """Uses a variable that is not there, once the node has been told to end.
 
     Fits every script with a loop until shutdown or a spin.
     """
-    for script in solution.scripts:
-        for node in loops(script) or _spins(script):
-            if script.has_lines(node):
-                edit = script.after(node, "print('stopped after', turns_so_far)")
-                yield _sites(solution, script, [edit], node.lineno)
+    wrong = "print('stopped after', turns_so_far)"
+    return [script.after(life, wrong)] if script.has_lines(life) else []
 
 
-# [authoring.mutation.operators.logs] What a node logs, and how.
+# ---- what nodes log
 
 TEXT_LIMIT = 30
 LEVELS = {"debug": "logdebug", "info": "loginfo", "warn": "logwarn", "error": "logerr", "fatal": "logfatal"}
@@ -159,199 +148,169 @@ class LevelParams(Record):
     level: Literal["debug", "info", "warn", "error", "fatal"] = "warn"
 
 
-def _spoken(solution: Solution) -> Iterator[tuple[Script, ast.Expr, ast.Call]]:
+def _logs(solution: Solution) -> Iterator[tuple[Place, Script, ast.Expr, ast.Call]]:
+    """Find what is printed or logged. A place has the first words, as they are in the source."""
     for script in solution.scripts:
         for statement in speech(script):
-            if isinstance(statement.value, ast.Call) and statement.value.args:
-                yield script, statement, statement.value
+            call = statement.value
+            if isinstance(call, ast.Call) and call.args:
+                yield script_place(script, call, text=_first_words(script, call)), script, statement, call
 
 
-def _site_logs(solution: Solution, script: Script, call: ast.Call, node: ast.AST, text: str) -> Site:
-    at = {"script": script.path, "text": _said(script, call)}
-    return Site(at=at, tree=solution.edited(script.path, [script.replace(node, text)]), line=call.lineno)
-
-
-def _said(script: Script, call: ast.Call) -> str:
-    """The first words of what is logged, as they stand in the source."""
+def _first_words(script: Script, call: ast.Call) -> str:
     for text in (t for a in call.args for t in texts_in(a)):
         words = str(text.value) if isinstance(text, ast.Constant) else script.source(text)
         return " ".join(words.split())[:TEXT_LIMIT].rstrip()
     return script.source(call.args[0])[:TEXT_LIMIT]
 
 
-@operator("log-level", params=LevelParams)
-def log_level(solution: Solution, params: LevelParams) -> Iterator[Site]:
+@operator("log-level", each=_logs, params=LevelParams)
+def log_level(script: Script, _statement: ast.Expr, call: ast.Call, params: LevelParams) -> list[Edit]:
     """Logs at another level.
 
     Fits every call of rospy's logging.
     """
-    for script, _, call in _spoken(solution):
-        if last_name(call.func) in LOGS and isinstance(call.func, ast.Attribute):
-            name = f"{script.source(call.func.value)}.{LEVELS[params.level]}"
-            yield _site_logs(solution, script, call, call.func, name)
+    if last_name(call.func) not in LOGS or not isinstance(call.func, ast.Attribute):
+        return []
+    return [script.replace(call.func, f"{script.source(call.func.value)}.{LEVELS[params.level]}")]
 
 
-@operator("log-text")
-def log_text(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("log-text", each=_logs)
+def log_text(script: Script, _statement: ast.Expr, call: ast.Call) -> list[Edit]:
     """Misspells what it prints or logs.
 
     Fits every line that prints or logs a text.
     """
-    for script, _, call in _spoken(solution):
-        for text in [t for a in call.args for t in texts_in(a)][:1]:
-            yield _site_logs(solution, script, call, text, misspelt_literal(script.source(text)))
+    texts = [t for a in call.args for t in texts_in(a)]
+    return [script.replace(text, misspelt_literal(script.source(text))) for text in texts[:1]]
 
 
-@operator("print-instead-of-log")
-def print_instead_of_log(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("print-instead-of-log", each=_logs)
+def print_instead_of_log(script: Script, _statement: ast.Expr, call: ast.Call) -> list[Edit]:
     """Prints where it should log.
 
     Fits every call of rospy's logging.
     """
-    for script, _, call in _spoken(solution):
-        if last_name(call.func) in LOGS and not call.keywords:
-            words, *values = [script.source(a) for a in call.args]
-            text = f"{words} % ({', '.join(values)},)" if values else words
-            yield _site_logs(solution, script, call, call, f"print({text})")
+    if last_name(call.func) not in LOGS or call.keywords:
+        return []
+    words, *values = [script.source(a) for a in call.args]
+    return [script.replace(call, f"print({words} % ({', '.join(values)},))" if values else f"print({words})")]
 
 
-@operator("log-dropped")
-def log_dropped(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("log-dropped", each=_logs)
+def log_dropped(script: Script, statement: ast.Expr, _call: ast.Call) -> list[Edit]:
     """Does not print or log this.
 
     Fits every line that prints or logs.
     """
-    for script, statement, call in _spoken(solution):
-        yield _site_logs(solution, script, call, statement, "pass")
+    return [script.replace(statement, "pass")]
 
 
-# [authoring.mutation.operators.syntax] Python files that Python 3 does not read, or that fail as soon as they run.
+# ---- scripts that Python 3 does not read, or that fail as soon as they run
 
 OPEN_QUOTE, CLOSE_QUOTE = "\u2018", "\u2019"
 
 
-def _broken(solution: Solution, script: Script, edits: list[Edit], line: int) -> Iterator[Site]:
-    """The site, if what comes out is really no Python 3."""
+def _if_broken(script: Script, *edits: Edit) -> list[Edit]:
+    """Return the edits if what comes out is really not Python 3."""
     try:
-        compile(applied(script.text, edits), script.path, "exec", dont_inherit=True)
+        compile(apply_edits(script.text, edits), script.path, "exec", dont_inherit=True)
     except SyntaxError:
-        yield Site(at={"script": script.path}, tree=solution.edited(script.path, edits), line=line)
+        return list(edits)
+    return []
 
 
-@operator("python2-print")
-def python2_print(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("python2-print", each=each_script)
+def python2_print(script: Script) -> list[Edit]:
     """Prints as Python 2 does.
 
     Fits every Python script that prints or logs something.
     """
-    for script in solution.scripts:
-        for statement in speech(script)[:1]:
-            call = statement.value
-            words = script.source(call.args[0]) if isinstance(call, ast.Call) and call.args else "'here'"
-            yield from _broken(
-                solution, script, [script.replace(statement, f"print {words}")], statement.lineno
-            )
+    for statement in speech(script):
+        call = statement.value
+        words = script.source(call.args[0]) if isinstance(call, ast.Call) and call.args else "'here'"
+        return _if_broken(script, script.replace(statement, f"print {words}"))
+    return []
 
 
-@operator("tabs-and-spaces")
-def tabs_and_spaces(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("tabs-and-spaces", each=each_script)
+def tabs_and_spaces(script: Script) -> list[Edit]:
     """Mixes tabs and spaces.
 
     Fits every Python script with a block of two lines.
     """
-    for script in solution.scripts:
-        found = (site for s in script.of(ast.stmt) for site in _tabbed(solution, script, s))
-        yield from [site for site, _ in zip(found, range(1), strict=False)]
+    return next((edits for s in script.of(ast.stmt) if (edits := _with_other_indentation(script, s))), [])
 
 
-def _tabbed(solution: Solution, script: Script, statement: ast.stmt) -> Iterator[Site]:
+def _with_other_indentation(script: Script, statement: ast.stmt) -> list[Edit]:
     indentation = script.indentation(statement)
     first = statement is script.block(statement)[0]
     if not indentation or first or not script.has_lines(statement):
-        return
+        return []
     start = script.starts[statement.lineno - 1]
     if "\t" in indentation:
         edit = Edit(start, start + len(indentation), indentation.expandtabs(8))
     else:
         edit = Edit(start, start + min(len(indentation), 8), "\t")
-    yield from _broken(solution, script, [edit], statement.lineno)
+    return _if_broken(script, edit)
 
 
-@operator("typographic-quote")
-def typographic_quote(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("typographic-quote", each=each_script)
+def typographic_quote(script: Script) -> list[Edit]:
     """Copies a text with its quotes from a PDF.
 
     Fits every Python script with a text as an argument.
     """
-    for script in solution.scripts:
-        texts = [
-            a
-            for call in script.of(ast.Call)
-            for a in call.args
-            if isinstance(a, ast.Constant) and isinstance(a.value, str) and script.source(a)[0] in "'\""
-        ]
-        for text in texts[:1]:
-            edit = script.replace(text, OPEN_QUOTE + str(text.value) + CLOSE_QUOTE)
-            yield from _broken(solution, script, [edit], text.lineno)
+    for text in (given for call in script.of(ast.Call) for given in call.args):
+        if isinstance(text, ast.Constant) and isinstance(text.value, str) and script.source(text)[0] in "'\"":
+            return _if_broken(script, script.replace(text, OPEN_QUOTE + str(text.value) + CLOSE_QUOTE))
+    return []
 
 
-@operator("no-break-space")
-def no_break_space(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("no-break-space", each=each_script)
+def no_break_space(script: Script) -> list[Edit]:
     """Copies a line from a PDF, with a space that is none for Python.
 
     Fits every Python script with an assignment that has spaces around its sign.
     """
-    for script in solution.scripts:
-        for statement in script.of(ast.Assign):
-            _, end = script.span(statement.targets[-1])
-            if script.text[end : end + 3] == " = ":
-                yield from _broken(solution, script, [Edit(end + 2, end + 3, "\u00a0")], statement.lineno)
-                break
+    for statement in script.of(ast.Assign):
+        _, end = script.span(statement.targets[-1])
+        if script.text[end : end + 3] == " = ":
+            return _if_broken(script, Edit(end + 2, end + 3, "\u00a0"))
+    return []
 
 
-@operator("syntax-error")
-def syntax_error(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("syntax-error", each=each_script)
+def syntax_error(script: Script) -> list[Edit]:
     """Forgets the colon after `def`, `class` or `while`.
 
     Fits every Python script that has one of them.
     """
-    for script in solution.scripts:
-        heads = [n for n in script.of(ast.stmt) if isinstance(n, Function | ast.ClassDef | ast.While)]
-        for node in heads[:1]:
-            start, _ = script.span(node)
-            end, _ = script.span(node.body[0])
-            colon = script.text.rfind(":", start, end)
-            yield from _broken(solution, script, [Edit(colon, colon + 1, "")], node.lineno)
+    for node in script.of(ast.stmt):
+        if isinstance(node, Function | ast.ClassDef | ast.While):
+            colon = script.text.rfind(":", script.span(node)[0], script.span(node.body[0])[0])
+            return _if_broken(script, Edit(colon, colon + 1, ""))
+    return []
 
 
-@operator("missing-module")
-def missing_module(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("missing-module", each=each_script)
+def missing_module(script: Script) -> list[Edit]:
     """Imports messages of a package that is not there.
 
     Fits every Python script that imports rospy.
     """
-    for script in solution.scripts:
-        imports = [n for n in script.of(ast.Import) if any(a.name == "rospy" for a in n.names)]
-        for statement in imports[:1]:
-            edit = script.after(statement, "from beginner_tutorials.msg import Num")
-            yield Site(
-                at={"script": script.path}, tree=solution.edited(script.path, [edit]), line=statement.lineno
-            )
+    imports = [n for n in script.of(ast.Import) if any(a.name == "rospy" for a in n.names)]
+    return [script.after(statement, "from beginner_tutorials.msg import Num") for statement in imports[:1]]
 
 
-@operator("asks-for-input")
-def asks_for_input(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("asks-for-input", each=each_script)
+def asks_for_input(script: Script) -> list[Edit]:
     """Waits for somebody to press Enter before it makes its node.
 
     Fits every Python script that makes a node.
     """
-    for script in solution.scripts:
-        for call in list(calls(script, "init_node"))[:1]:
-            statement = script.statement(call)
-            if argument(call, 0, "name") is not None and script.has_lines(statement):
-                edit = script.before(statement, "input('Press Enter to start')")
-                yield Site(
-                    at={"script": script.path},
-                    tree=solution.edited(script.path, [edit]),
-                    line=statement.lineno,
-                )
+    for call in calls(script, "init_node"):
+        statement = script.statement(call)
+        sound = argument(call, 0, "name") is not None and script.has_lines(statement)
+        return [script.before(statement, "input('Press Enter to start')")] if sound else []
+    return []
