@@ -5,7 +5,7 @@ import pytest
 from grader.authoring.mutation.declared import LoadedMutants
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.package_tree import Entry, unified_diff
-from grader.authoring.mutation.plan import chosen, plan_all, plan_declared, refuse_unfit
+from grader.authoring.mutation.plan import plan_all, plan_declared, refuse_unfit, select_mutants
 from grader.authoring.mutation.solution import Solution
 from grader.errors import RubricError, UsageError
 from grader.model.mutants import Mutant
@@ -103,14 +103,14 @@ def test_all_operators_are_tried_with_names_of_their_own():
 
 def test_some_mutants_are_chosen_by_name_by_operator_and_by_pattern():
     planned = plan_all(two_nodes())
-    assert [m.label for m in chosen(planned, ["crlf"])] == ["crlf: src/a.py", "crlf: src/b.py"]
-    assert [m.label for m in chosen(planned, ["crlf-src-b.py"])] == ["crlf: src/b.py"]
-    assert {m.mutant.operators[0] for m in chosen(planned, ["shebang-*"])} == {
+    assert [m.label for m in select_mutants(planned, ["crlf"])] == ["crlf: src/a.py", "crlf: src/b.py"]
+    assert [m.label for m in select_mutants(planned, ["crlf-src-b.py"])] == ["crlf: src/b.py"]
+    assert {m.mutant.operators[0] for m in select_mutants(planned, ["shebang-*"])} == {
         "shebang-typo", "shebang-commented", "shebang-python2"
     }  # fmt: skip
-    assert chosen(planned, []) == planned
+    assert select_mutants(planned, []) == planned
     with pytest.raises(UsageError, match="did you mean"):
-        chosen(planned, ["clrf"])
+        select_mutants(planned, ["clrf"])
 
 
 def test_every_kind_of_edit():

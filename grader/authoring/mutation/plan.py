@@ -94,7 +94,7 @@ def _label(operator: str, at: Place) -> str:
     return f"{operator}: {place}" if place else operator
 
 
-def chosen(planned: Sequence[Planned], only: Sequence[str]) -> list[Planned]:
+def select_mutants(planned: Sequence[Planned], only: Sequence[str]) -> list[Planned]:
     """Return those that `only` names, by mutant or operator, `*` allowed. Raises UsageError for an unknown name."""
     for pattern in only:
         if not any(_matches(mutant, pattern) for mutant in planned):

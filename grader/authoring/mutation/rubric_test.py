@@ -29,8 +29,10 @@ COSTING = {Status.FAIL.value, Status.PARTIAL.value}
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What is to be tried. `given` is how the solution is called. `partial` is set where the user chose some of the
-    mutants; with `keep_all`, what killed mutants left in `out` is kept too."""
+    """What is to be tried. `given` is the solution's folder as the user knows it.
+
+    `partial` is set where the user chose some of the mutants. With `keep_all`, folders of killed mutants stay, too.
+    """
 
     rubric: LoadedRubric
     solution: Solution
@@ -45,14 +47,14 @@ class Plan:
 
 
 def run_test(plan: Plan, progress: Progress) -> RubricTest:
-    """Grade everything. Raises HostError where not even the reference solution can be judged here."""
+    """Grade everything and return what came of it. Raises HostError if this machine cannot judge the reference."""
     begun_s = time.monotonic()
-    result = _reference(plan, progress)
-    reference = _reference_result(plan, result, progress)
+    result = _grade_reference(plan, progress)
+    reference = _judge_reference(plan, result, progress)
     mutants: list[MutantResult] = []
     if not reference.lost:
-        mutants = _mutants(plan, _not_reached(result), progress, time.monotonic() - begun_s)
-    known = None if plan.partial or reference.lost else _uncosted(plan, mutants)
+        mutants = _grade_mutants(plan, _find_ignored(result), progress, time.monotonic() - begun_s)
+    known = None if plan.partial or reference.lost else _find_uncosted(plan, mutants)
     killed = bool(mutants) and all(mutant.state == "killed" for mutant in mutants)
     rubric = plan.rubric
     return RubricTest(
@@ -70,8 +72,8 @@ def run_test(plan: Plan, progress: Progress) -> RubricTest:
 # ---- the reference solution
 
 
-def _reference(plan: Plan, progress: Progress) -> GradingResult:
-    (graded,) = _graded(
+def _grade_reference(plan: Plan, progress: Progress) -> GradingResult:
+    (graded,) = _grade_trees(
         plan, {REFERENCE: plan.solution.tree}, 1, lambda _: progress.step(REFERENCE, "running")
     )
     if graded.result is None:
@@ -85,31 +87,31 @@ def _reference(plan: Plan, progress: Progress) -> GradingResult:
     return graded.result
 
 
-def _reference_result(plan: Plan, result: GradingResult, progress: Progress) -> ReferenceResult:
-    """Every criterion that is worth points has to be reached."""
-    lost = lost_criteria([c for c in result.criteria if c.max_points > 0])
+def _judge_reference(plan: Plan, result: GradingResult, progress: Progress) -> ReferenceResult:
+    """Return how the reference solution fared: every criterion that is worth points has to be reached."""
+    lost = find_lost([c for c in result.criteria if c.max_points > 0])
     said = "lost: " + ", ".join(c.id for c in lost) if lost else "everything reached"
     progress.step(REFERENCE, "failed" if lost else "done", said)
     return ReferenceResult(
         points=result.points,
         max_points=result.max_points,
         lost=lost,
-        evidence=_kept(plan, REFERENCE, plan.solution.tree, wanted=bool(lost)),
+        evidence=_keep_folder(plan, REFERENCE, plan.solution.tree, wanted=bool(lost)),
     )
 
 
-def _not_reached(result: GradingResult) -> frozenset[str]:
-    """Advice that the correct package gets too, and what a person judges: no mutant is measured by it."""
+def _find_ignored(result: GradingResult) -> frozenset[str]:
+    """Return criteria that say nothing about mutants: advice that the correct package gets too, and manual ones."""
     return frozenset(c.id for c in result.criteria if c.status is not Status.PASS)
 
 
 # ---- the mutants
 
 
-def _mutants(
+def _grade_mutants(
     plan: Plan, ignored: frozenset[str], progress: Progress, expected_s: float
 ) -> list[MutantResult]:
-    """Side by side; what is inconclusive then is graded once more, alone."""
+    """Grade the mutants side by side, then once more, alone, those that are inconclusive."""
     results: dict[str, MutantResult] = {}
 
     def run(mutants: Iterable[Planned], jobs: int) -> None:
@@ -120,12 +122,14 @@ def _mutants(
             begun_s[name] = time.monotonic()
             progress.step(named[name].label, "running", expected_s=expected_s)
 
-        with closing(_graded(plan, {n: m.tree for n, m in named.items()}, jobs, begun)) as gradings:
+        with closing(_grade_trees(plan, {n: m.tree for n, m in named.items()}, jobs, begun)) as gradings:
             for graded in gradings:
                 took_s = time.monotonic() - begun_s[graded.name]
-                result = _mutant_result(plan, named[graded.name], graded, ignored, took_s)
+                result = _judge_mutant(plan, named[graded.name], graded, ignored, took_s)
                 results[graded.name] = result
-                progress.step(result.label, "done" if result.state == "killed" else "failed", _said(result))
+                progress.step(
+                    result.label, "done" if result.state == "killed" else "failed", _describe(result)
+                )
 
     run(sorted(plan.mutants, key=_waits_least), plan.jobs)
     for mutant in plan.mutants:
@@ -135,16 +139,16 @@ def _mutants(
 
 
 def _waits_least(mutant: Planned) -> bool:
-    """A launch file that does not bring up what a run waits for is watched to its limit: such mutants go first."""
+    """Sort key: faulty launch files first, because a run waits to its limit for what they do not bring up."""
     return not any("launch" in name for name in (mutant.name, *mutant.mutant.operators))
 
 
-def _said(result: MutantResult) -> str:
+def _describe(result: MutantResult) -> str:
     lost = ", ".join(criterion.id for criterion in result.lost) or "nothing"
     return f"{result.state}, lost: {result.error or lost}"
 
 
-def _mutant_result(
+def _judge_mutant(
     plan: Plan, mutant: Planned, graded: Graded, ignored: frozenset[str], took_s: float
 ) -> MutantResult:
     criteria = graded.result.criteria if graded.result else ()
@@ -156,19 +160,19 @@ def _mutant_result(
         mistake=mutant.mistake,
         state=compared.state,
         expected=mutant.costs,
-        lost=lost_criteria(criteria, ignored),
+        lost=find_lost(criteria, ignored),
         missing=compared.missing,
         surplus=compared.surplus,
         differing=compared.differing,
         diff=unified_diff(plan.solution.tree, mutant.tree),
-        evidence=_kept(plan, mutant.name, mutant.tree, wanted=compared.state != "killed"),
+        evidence=_keep_folder(plan, mutant.name, mutant.tree, wanted=compared.state != "killed"),
         error=graded.error,
         wall_s=round(took_s, 3),
     )
 
 
-def _uncosted(plan: Plan, results: Sequence[MutantResult]) -> tuple[str, ...]:
-    """Criteria that are worth points, and that no mutant fails."""
+def _find_uncosted(plan: Plan, results: Sequence[MutantResult]) -> tuple[str, ...]:
+    """Return the criteria that are worth points and that no mutant fails."""
     failed = {c.id for result in results for c in result.lost if c.status in COSTING}
     criteria = plan.rubric.rubric.criteria
     return tuple(c.id for c in criteria if c.points > 0 and c.check != "manual" and c.id not in failed)
@@ -177,11 +181,13 @@ def _uncosted(plan: Plan, results: Sequence[MutantResult]) -> tuple[str, ...]:
 # ---- gradings
 
 
-def _graded(
+def _grade_trees(
     plan: Plan, trees: Mapping[str, Tree], jobs: int, begun: Callable[[str], None]
 ) -> Generator[Graded, None, None]:
-    """Each tree's grading in `out/<name>/`. The trees are written where no repository of the user's is around them,
-    for a repository would know their modes better than the disk."""
+    """Grade each tree into `out/<name>/`.
+
+    The trees are written outside of any repository: the modes that git knows would count for more than the disk's.
+    """
     with temporary_folder("mutants") as folder:
         work = []
         for name, tree in trees.items():
@@ -193,8 +199,8 @@ def _graded(
         yield from grade_all(work, jobs, begun)
 
 
-def _kept(plan: Plan, name: str, tree: Tree, *, wanted: bool) -> str | None:
-    """The grading's folder with the graded files in `source/`, where it is to be kept."""
+def _keep_folder(plan: Plan, name: str, tree: Tree, *, wanted: bool) -> str | None:
+    """Return the grading's folder, with the graded files in `source/`, or remove it where it need not be kept."""
     folder = plan.out / name
     if not (plan.keep_all or wanted):
         shutil.rmtree(folder, ignore_errors=True)
@@ -212,7 +218,7 @@ DOUBTFUL = {Status.INCONCLUSIVE, Status.ERROR}
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """See `MutantResult`."""
+    """How what a mutant lost differs from what it must; see `MutantResult`."""
 
     state: State
     missing: tuple[str, ...] = ()
@@ -220,10 +226,10 @@ class Comparison:
     differing: tuple[str, ...] = ()
 
 
-def lost_criteria(
+def find_lost(
     criteria: Sequence[CriterionResult], ignored: Collection[str] = ()
 ) -> tuple[LostCriterion, ...]:
-    """The criteria that were not reached; a person's points are nobody's loss."""
+    """Return the criteria that were not reached, without those that a person judges."""
     return tuple(
         LostCriterion(id=c.id, status=c.status.value, message=c.message, hint=c.hint)
         for c in criteria
@@ -234,8 +240,10 @@ def lost_criteria(
 def compare(
     expected: dict[str, Cost] | None, criteria: Sequence[CriterionResult], ignored: Collection[str] = ()
 ) -> Comparison:
-    """Without declared costs, a mutant is killed by whatever it costs. `ignored` are criteria that the reference
-    solution does not reach either: advice, where it has some."""
+    """Compare a mutant's verdicts with what it must lose; without a declaration, anything lost kills it.
+
+    `ignored` are criteria that the reference solution does not reach either.
+    """
     found = {c.id: c.status for c in criteria if c.id not in ignored}
     if any(status in DOUBTFUL for status in found.values()):
         return Comparison(state="inconclusive")

@@ -204,7 +204,7 @@ def find_reference(rubric: LoadedRubric) -> Reference:
     )
 
 
-def given_reference(folder: Path) -> Reference:
+def reference_at(folder: Path) -> Reference:
     """The user's own correct package. Raises UsageError where it is no folder."""
     if not folder.is_dir():
         raise UsageError(f"{folder} is not a folder", hint="--solution takes the folder of a correct package")

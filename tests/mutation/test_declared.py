@@ -1,15 +1,19 @@
+"""A lab's file of faulty packages: read, written, and documented."""
+
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
 
-from grader.authoring.mutation.declared import load_mutants, parse_parameters
+from grader.authoring.mutation.declared import load_mutants, mutants_text, parse_parameters
 from grader.authoring.mutation.operators import OPERATORS
+from grader.authoring.mutation.plan import plan_all
 from grader.errors import RubricError
-from grader.model.mutants import Mutant
+from grader.model.mutants import LostCriterion, Mutant, MutantResult
 from grader.rubric.load import load_rubric
-from tests.mutation.samples import LABS, ROOT
+from scripts.reference.operators import EXAMPLE, operators_page
+from tests.mutation.samples import LABS, ROOT, other_solution
 from tests.rubric.samples import spoiled
 
 SOUND = """\
@@ -141,3 +145,49 @@ def test_every_criterion_of_the_first_lab_is_lost_alone():
 
 def test_every_operator_has_sound_defaults():
     assert all(operator.params() is not None for operator in OPERATORS.values())
+
+
+def lost(name: str, status: str) -> LostCriterion:
+    return LostCriterion(id=name, status=status, message="")
+
+
+def test_a_written_file_declares_what_was_lost(tmp_path):
+    planned = plan_all(other_solution())
+    results = [
+        MutantResult(
+            name=mutant.name,
+            label=mutant.label,
+            operator=mutant.mutant.operators[0],
+            mistake="",
+            state=("survived", "killed", "inconclusive")[index % 3],
+            expected=None,
+            lost=(lost("chatter-rate", "fail"), lost("talker-node", "blocked")) if index % 3 == 1 else (),
+            diff="",
+            wall_s=1,
+        )
+        for index, mutant in enumerate(planned)
+    ]
+    text = mutants_text("sample", {mutant.name: mutant.mutant for mutant in planned}, results)
+    path = tmp_path / "m.yaml"
+    path.write_text(text, encoding="utf-8")
+    loaded = load_mutants(path, load_rubric(str(spoiled(tmp_path))).rubric)
+    assert len(loaded.mutants) == sum(result.state == "killed" for result in results)
+    assert [m.edits for m in loaded.mutants.values()] == [
+        p.mutant.edits for i, p in enumerate(planned) if i % 3 == 1
+    ]
+    assert all(
+        m.expect == {"chatter-rate": "fail", "talker-node": "blocked"} for m in loaded.mutants.values()
+    )
+    assert text.count("# costs nothing: the rubric does not notice this mistake") == len(planned[::3])
+
+
+def test_the_example_is_sound(tmp_path):
+    rubric = load_rubric(str(spoiled(tmp_path, ("id: sample", "id: my-lab")))).rubric
+    (tmp_path / "m.yaml").write_text(EXAMPLE, encoding="utf-8")
+    assert len(load_mutants(tmp_path / "m.yaml", rubric).mutants) == 2
+
+
+def test_the_page_has_every_operator_and_lab():
+    page = operators_page()
+    assert all(page.count(f"| `{name}` |") == page.count(f"- `{name}`: ") == 1 for name in OPERATORS)
+    assert all(f" {lab.split('-')[0]} |" in page for lab in LABS)

@@ -7,7 +7,7 @@ import pytest
 
 from grader.authoring.mutation.declared import mutants_file
 from grader.authoring.mutation.package_tree import read_tree
-from grader.authoring.mutation.solution import Reference, find_reference, given_reference, load_solution
+from grader.authoring.mutation.solution import Reference, find_reference, load_solution, reference_at
 from grader.errors import UsageError
 from grader.rubric.load import load_rubric
 from tests.mutation.samples import LABS, ROOT
@@ -68,7 +68,7 @@ def test_nothing_is_there(tmp_path):
     with pytest.raises(UsageError, match="no reference solution for sample"):
         find_reference(loaded)
     with pytest.raises(UsageError, match="not a folder"):
-        given_reference(tmp_path / "nowhere")
+        reference_at(tmp_path / "nowhere")
 
 
 def test_the_package_is_found_wherever_it_is(tmp_path):
