@@ -90,10 +90,8 @@ class Script:
         """Whether its lines hold nothing else: no `;`, no `if x: y`. A comment after it counts as its own."""
         start, end = self.span(statement)
         before = self.text[self.starts[statement.lineno - 1] : start]
-        after = self.lines[(statement.end_lineno or 1) - 1][
-            end - self.starts[(statement.end_lineno or 1) - 1] :
-        ]
-        return not before.strip() and (not after.strip() or after.strip().startswith("#"))
+        after = self.text[end:].partition("\n")[0].strip()
+        return not before.strip() and (not after or after.startswith("#"))
 
     # ---- edits
 
@@ -101,7 +99,7 @@ class Script:
         return Edit(*self.span(node), text)
 
     def remove(self, statement: ast.stmt) -> Edit:
-        """Without its lines; `pass` where nothing else would be left of its block."""
+        """Remove the statement's lines, or replace it by `pass` where its block would be empty without it."""
         alone = len(self.block(statement)) == 1 or not self.has_lines(statement)
         return self.replace(statement, "pass") if alone else Edit(*self._line_span([statement]), "")
 
@@ -114,16 +112,13 @@ class Script:
         glue = "" if self.text[:end].endswith("\n") else "\n"
         return Edit(end, end, glue + self._indented(statement, lines))
 
-    def wrap(self, statements: Sequence[ast.stmt], *headers: str, footer: Sequence[str] = ()) -> Edit:
-        """The statements one step deeper for each header, under the headers; then the footer's lines."""
+    def wrap(self, statements: Sequence[ast.stmt], header: str, footer: Sequence[str] = ()) -> Edit:
+        """Put the statements one step deeper under the header; the footer's lines come after them."""
         start, end = self._line_span(statements)
-        depth = self.unit * len(headers)
-        inner = "".join(
-            f"{depth}{line}\n" if line.strip() else f"{line}\n" for line in self._body(start, end)
-        )
-        heads = [f"{self.unit * step}{header}" for step, header in enumerate(headers)]
+        lines = self.text[start:end].removesuffix("\n").split("\n")
+        inner = "".join(f"{self.unit}{line}\n" if line.strip() else f"{line}\n" for line in lines)
         first = statements[0]
-        return Edit(start, end, self._indented(first, heads) + inner + self._indented(first, footer))
+        return Edit(start, end, self._indented(first, [header]) + inner + self._indented(first, footer))
 
     def can_wrap(self, statements: Sequence[ast.stmt]) -> bool:
         """Whether deeper indentation keeps their meaning: lines of their own, and no string over several lines."""
@@ -132,7 +127,7 @@ class Script:
         return bool(statements) and not long and all(self.has_lines(s) for s in statements)
 
     def preamble(self, *lines: str) -> Edit:
-        """The lines at the top level, after the docstring and the imports that come first."""
+        """Insert lines at the top level, after the docstring and the first imports."""
         body = self.module.body
         docstring = isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant)
         ends = [statement for statement in body[:1] if docstring]
@@ -145,9 +140,6 @@ class Script:
     def _line_span(self, statements: Sequence[ast.stmt]) -> tuple[int, int]:
         last = statements[-1].end_lineno or statements[-1].lineno
         return self.starts[statements[0].lineno - 1], min(self.starts[last], len(self.text))
-
-    def _body(self, start: int, end: int) -> list[str]:
-        return self.text[start:end].removesuffix("\n").split("\n")
 
     def _indented(self, statement: ast.stmt, lines: Sequence[str]) -> str:
         indentation = self.indentation(statement)

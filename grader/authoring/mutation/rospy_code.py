@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
@@ -284,37 +285,26 @@ def _steps(script: Script, name: str) -> list[ast.Constant]:
         if isinstance(assignment, ast.AugAssign) and isinstance(assignment.op, ast.Add):
             found.append(assignment.value)
         elif assignment.value is not None:
-            sums = [
-                n
-                for n in ast.walk(assignment.value)
-                if isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add)
-            ]
-            found += [n.right for n in sums if ast.unparse(n.left) == name]
-    return [step for step in found if _whole_number(step) is not None and isinstance(step, ast.Constant)]
+            sums = [n for n in ast.walk(assignment.value) if isinstance(n, ast.BinOp)]
+            found += [n.right for n in sums if isinstance(n.op, ast.Add) and ast.unparse(n.left) == name]
+    return _constants(found)
 
 
 def _take(script: Script, counter: Counter, assignment: ast.AST, names: set[str]) -> None:
     value = assignment.value  # type: ignore[attr-defined]
     test = _test(script, assignment, names)
     choice = value if isinstance(value, ast.IfExp) and _compares(value.test, names) else None
-    if (
-        isinstance(value, ast.Constant)
-        and _whole_number(value) is not None
-        and isinstance(assignment, ast.Assign)
-    ):
-        (counter.starts if test is None else counter.resets).append(value)
+    if isinstance(assignment, ast.Assign) and (number := _constants([value])):
+        (counter.starts if test is None else counter.resets).extend(number)
     if choice is not None:
         counter.resets += [v for v in (choice.body, choice.orelse) if isinstance(v, ast.Constant)]
     for found in (test, choice):
         if found is not None and found not in counter.tests and _resets(found, names):
             counter.tests.append(found)
-            counter.limits += _limits(found.test)
+            counter.limits += _constants(ast.walk(found.test), SMALLEST_LIMIT)
+    sums = [n for n in (ast.walk(value) if value is not None else ()) if isinstance(n, ast.BinOp)]
     counter.modulos += [
-        n
-        for n in (ast.walk(value) if value is not None else ())
-        if isinstance(n, ast.BinOp)
-        and isinstance(n.op, ast.Mod)
-        and (_whole_number(n.right) or 0) >= SMALLEST_LIMIT
+        n for n in sums if isinstance(n.op, ast.Mod) and _constants([n.right], SMALLEST_LIMIT)
     ]
 
 
@@ -337,14 +327,10 @@ def _resets(test: ast.If | ast.IfExp, names: set[str]) -> bool:
     return any(isinstance(a.value, ast.Constant) and ast.unparse(a.targets[0]) in names for a in inner)
 
 
-def _limits(test: ast.expr) -> list[ast.Constant]:
-    numbers = [n for n in ast.walk(test) if isinstance(n, ast.Constant)]
-    return [n for n in numbers if (_whole_number(n) or 0) >= SMALLEST_LIMIT]
-
-
-def _whole_number(node: ast.AST) -> int | None:
-    value = node.value if isinstance(node, ast.Constant) else None
-    return value if isinstance(value, int) and not isinstance(value, bool) else None
+def _constants(nodes: Iterable[ast.AST], least: float = -math.inf) -> list[ast.Constant]:
+    """Return the whole numbers among the nodes that are not less than `least`."""
+    found = [n for n in nodes if isinstance(n, ast.Constant) and type(n.value) is int]
+    return [n for n in found if isinstance(n.value, int) and n.value >= least]
 
 
 def counted_names(script: Script, publisher: Endpoint) -> set[str]:
