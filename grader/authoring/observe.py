@@ -31,8 +31,8 @@ _TIME = re.compile(r"(?P<words>.*?)(?P<seconds>\d+(?:\.\d+)?)")
 class Topic(Record):
     """One published topic. `rate_hz` is None where it is not periodic.
 
-    `counts_from` is the first value of a counter, `wraps` its (last, first) values around a wrap where one was seen.
-    `template` is the text of messages that tell the time, with `{seconds}`.
+    `counts_from` is the first value of a counter, None where it does not count. `template` is the text of messages that
+    tell the time, with `{seconds}`.
     """
 
     name: str
@@ -40,7 +40,6 @@ class Topic(Record):
     rate_hz: float | None = None
     latched: bool = False
     counts_from: int | None = None
-    wraps: tuple[int, int] | None = None
     template: str = ""
 
 
