@@ -1,13 +1,13 @@
 # Each target does the set-up that it needs. `make` alone lists them.
 LAB := leeds-comp3631-lab1
-LABS := $(basename $(notdir $(wildcard rubrics/mutants/*.yaml)))
+LABS := $(basename $(notdir $(wildcard rubrics/*.yaml)))
 BIN := .venv/bin
 TIMES ?= 10
 MINUTES ?= 10
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup demo test lint docs reference links test-pure test-ros test-all stress fuzz bench fixtures screenshots mutants fmt clean
+.PHONY: help setup demo test lint docs reference links test-pure test-ros test-all stress fuzz bench screenshots mutants fmt clean
 
 help: ## list the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -19,7 +19,8 @@ demo: ## grade the reference solution and one faulty package, for real
 	@scripts/setup.sh --no-browser
 	@rm -rf demo
 	@$(BIN)/grader grade reference_solutions/$(LAB) --rubric $(LAB) --out demo
-	@$(BIN)/grader grade fixtures/$(LAB)/counter-resets-to-1 --rubric $(LAB) --out demo || test $$? -eq 1
+	@$(BIN)/python fixtures/make.py $(LAB) counter-resets-to-1 --out demo/packages
+	@$(BIN)/grader grade demo/packages/counter-resets-to-1 --rubric $(LAB) --out demo || test $$? -eq 1
 	@echo && echo "The reports:" && ls demo/*/report.md
 
 test: lint docs test-pure test-ros ## style, types, documents, tests without ROS, tests with ROS (see test-all)
@@ -55,9 +56,6 @@ fuzz: setup ## the parsers of foreign data at random, for MINUTES minutes; tests
 
 bench: setup ## the figures of benchmarks/README.md, measured here
 	@$(BIN)/python -m benchmarks.run --write
-
-fixtures: setup ## write fixtures/<lab>/ anew from fixtures/<lab>.yaml
-	@$(BIN)/python fixtures/make.py
 
 screenshots: setup ## the pictures of the README, taken anew of real gradings
 	@$(BIN)/python -m scripts.screenshots

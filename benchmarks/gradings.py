@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.figures import NotMeasured, Options
+from fixtures.make import faulty_package
 from grader.classes.batch.gradings import Job, grade_all
 from grader.evidence.reader import load_evidence
 from grader.model.result import CriterionResult, GradingResult
@@ -21,14 +22,9 @@ DATA = Path(__file__).resolve().parent / "data"
 LAB = "leeds-comp3631-lab1"
 RUBRIC = ROOT / "rubrics" / f"{LAB}.yaml"
 SOLUTION = ROOT / "reference_solutions" / LAB
-FIXTURES = ROOT / "fixtures" / LAB
+FAULTY = ("counter-resets-to-1", "chatter-5hz", "listener-silent")
 LAB_POINTS = 100
-KINDS = {
-    "reference": SOLUTION,
-    "counter-resets-to-1": FIXTURES / "counter-resets-to-1",
-    "chatter-5hz": FIXTURES / "chatter-5hz",
-    "listener-silent": FIXTURES / "listener-silent",
-}
+KINDS = {"reference": SOLUTION, **{name: faulty_package(LAB, name) for name in FAULTY}}
 """A correct submission, a counter that starts again wrongly, a wrong rate, a listener that prints nothing."""
 
 

@@ -14,18 +14,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.figures import Found, NotMeasured, Options, table
-from benchmarks.gradings import DATA, FIXTURES, SOLUTION, cores, folder_for
+from benchmarks.gradings import DATA, LAB, SOLUTION, cores, folder_for
+from fixtures.make import faulty_package
 
 COUNT = 10_000
 SHARES = (10, 1)
 """Classes of a tenth of the count, and of the count."""
 RUBRIC = DATA / "static.yaml"
-KINDS = (
-    SOLUTION,
-    FIXTURES / "cmake-project-name",
-    FIXTURES / "manifest-name",
-    FIXTURES / "ok-no-dependencies",
-)
+FAULTY = ("cmake-project-name", "manifest-name", "ok-no-dependencies")
+KINDS = (SOLUTION, *(faulty_package(LAB, name) for name in FAULTY))
 LEFT = re.compile(r"\[(\d+) of (\d+) done.*about (\d+(?::\d+)?) (s|min|h) to go\]")
 UNITS_S = {"s": 1, "min": 60}
 GRADER = (sys.executable, "-m", "grader", "batch")

@@ -17,11 +17,11 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
+from fixtures.make import declared, faulty_package
 from tests.browser.ground import chromium, missing
 
 ROOT = Path(__file__).resolve().parent.parent
 LAB = "leeds-comp3631-lab1"
-FIXTURES = ROOT / "fixtures" / LAB
 CORRECT = ROOT / "reference_solutions" / LAB
 IMAGES = ROOT / "docs" / "images"
 BYTES_MAX = 200_000
@@ -87,7 +87,7 @@ def main() -> int:
 def _student(folder: Path) -> Path:
     """The report of a package that counts from 1 after its wrap, at half the rate."""
     package = folder / "lab1"
-    shutil.copytree(FIXTURES / "counter-resets-to-1" / "lab1", package, dirs_exist_ok=True)
+    shutil.copytree(faulty_package(LAB, "counter-resets-to-1") / "lab1", package, dirs_exist_ok=True)
     talker = package / "src" / "numeric_talker.py"
     talker.write_text(talker.read_text(encoding="utf-8").replace("Rate(10)", "Rate(5)"), encoding="utf-8")
     _grader("grade", str(package), "--rubric", LAB, "--out", str(folder / "student"))
@@ -97,7 +97,7 @@ def _student(folder: Path) -> Path:
 def _class(folder: Path, jobs: str) -> Path:
     """The page of a class in which some faults are more frequent than others."""
     chance = random.Random(4)  # noqa: S311 - the same class each time
-    seldom = sorted(path.name for path in FIXTURES.iterdir() if path.is_dir())
+    seldom = sorted(declared(LAB))
     roster = folder / "roster.csv"
     with roster.open("w", encoding="utf-8", newline="") as file:
         rows = csv.writer(file)
@@ -105,7 +105,7 @@ def _class(folder: Path, jobs: str) -> Path:
         for number in range(CLASS):
             kind = chance.random()
             fault = chance.choice(OFTEN if kind < 0.55 else seldom)
-            source = CORRECT if kind < 0.3 else FIXTURES / fault
+            source = CORRECT if kind < 0.3 else faulty_package(LAB, fault)
             name = f"{chance.choice(FIRST)} {chance.choice(LAST)}"
             rows.writerow([f"sc26{number:03}", source, name, f"Group {number % 6 + 1}"])
     _grader("batch", roster.name, "--rubric", LAB, "--out", "class", "--jobs", jobs, within=folder)

@@ -14,48 +14,21 @@ from functools import cache
 from itertools import zip_longest
 from pathlib import Path
 
-import yaml
-from pydantic import Field
-
+from fixtures.make import declared, faulty_package
+from fixtures.make import rubric_of as loaded
+from grader.model.mutants import Mutant
 from grader.model.progress import Silence
-from grader.model.record import Record
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.pipeline import GradeOptions, grade
-from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.model import Rubric
 
 ROOT = Path(__file__).resolve().parent.parent
 GIT = shutil.which("git") or "git"
 REFERENCE = "reference"
+CORRECT = Mutant.model_construct(summary="The reference solution.", expect={}, message={})
 MANY = 10
-LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 SIDE_BY_SIDE = 4  # they wait most of the time, and take turns at starting
-
-
-class Fixture(Record):
-    """`fixture.yaml`. Criteria that `expect` does not name must pass; `message` holds patterns for what the report
-    says of a criterion (message, measured value, hint, case ignored); `points` only where a score is partial.
-    With `git_links`, what is graded is a git repository with links to other repositories at these paths and without
-    a .gitmodules."""
-
-    lab: str
-    summary: str = Field(min_length=10, pattern=r"^\S.*\.$")
-    expect: dict[str, Status]
-    message: dict[str, str] = Field(default_factory=dict)
-    points: float | None = None
-    git_links: tuple[str, ...] = ()
-
-
-def labs() -> list[str]:
-    """Those that have fixtures."""
-    return sorted(path.stem for path in (ROOT / "fixtures").glob("*.yaml"))
-
-
-def loaded(lab: str) -> LoadedRubric:
-    """The lab's rubric, or the example of that name."""
-    example = ROOT / "rubrics" / "examples" / f"{lab}.yaml"
-    return load_rubric(str(example) if example.is_file() else lab)
 
 
 @cache
@@ -64,7 +37,7 @@ def rubric_of(lab: str) -> Rubric:
 
 
 def fixture_names(lab: str) -> list[str]:
-    return sorted(path.parent.name for path in (ROOT / "fixtures" / lab).glob("*/fixture.yaml"))
+    return sorted(declared(lab))
 
 
 def shorter_round(lab: str) -> list[str]:
@@ -75,23 +48,21 @@ def shorter_round(lab: str) -> list[str]:
     chosen = set(correct[:: 2 if len(correct) > MANY else 1])
     for criterion in rubric_of(lab).criteria:
         for status in (Status.FAIL, Status.PARTIAL):
-            missed = [(len(lost), name) for name, lost in expect.items() if lost.get(criterion.id) is status]
+            missed = [
+                (len(lost), name) for name, lost in expect.items() if lost.get(criterion.id) == status.value
+            ]
             chosen.update(name for _, name in sorted(missed)[:1])
     return [name for name in expect if name in chosen]
 
 
 def source_of(lab: str, name: str) -> Path:
     """The folder to grade: of a fixture, or of the reference solution."""
-    return ROOT / "reference_solutions" / lab if name == REFERENCE else ROOT / "fixtures" / lab / name
+    return ROOT / "reference_solutions" / lab if name == REFERENCE else faulty_package(lab, name)
 
 
-@cache
-def read_fixture(lab: str, name: str) -> Fixture:
+def read_fixture(lab: str, name: str) -> Mutant:
     """What is expected; of the reference solution, that everything passes."""
-    if name == REFERENCE:
-        return Fixture(lab=lab, summary="The reference solution.", expect={})
-    text = (source_of(lab, name) / "fixture.yaml").read_text(encoding="utf-8")
-    return Fixture.model_validate(yaml.load(text, Loader=LOADER))  # noqa: S506 - as safe
+    return CORRECT if name == REFERENCE else declared(lab)[name]
 
 
 def grade_fixture(lab: str, name: str, out: Path) -> GradingResult:
@@ -133,13 +104,13 @@ def workers(count: int = SIDE_BY_SIDE) -> Iterator[ProcessPoolExecutor]:
         pool.shutdown(cancel_futures=True)
 
 
-def expected_points(fixture: Fixture, rubric: Rubric) -> float:
+def expected_points(fixture: Mutant, rubric: Rubric) -> float:
     if fixture.points is not None:
         return fixture.points
     return sum(c.points for c in rubric.criteria if c.id not in fixture.expect)
 
 
-def surprises(result: GradingResult, fixture: Fixture, rubric: Rubric) -> list[str]:
+def surprises(result: GradingResult, fixture: Mutant, rubric: Rubric) -> list[str]:
     """What is not as the fixture expects, a line each; empty where all is well."""
     found = [line for c in result.criteria for line in _surprises_of(c, fixture)]
     points = expected_points(fixture, rubric)
@@ -148,11 +119,11 @@ def surprises(result: GradingResult, fixture: Fixture, rubric: Rubric) -> list[s
     return found
 
 
-def _surprises_of(criterion: CriterionResult, fixture: Fixture) -> Iterator[str]:
+def _surprises_of(criterion: CriterionResult, fixture: Mutant) -> Iterator[str]:
     said = f"{criterion.message} [measured: {criterion.measured}] [hint: {criterion.hint}]"
-    wanted = fixture.expect.get(criterion.id, Status.PASS)
-    if criterion.status is not wanted:
-        yield f"{criterion.id}: wanted {wanted.value}, got {criterion.status.value}: {said}"
+    wanted = fixture.expect.get(criterion.id, Status.PASS.value)
+    if criterion.status.value != wanted:
+        yield f"{criterion.id}: wanted {wanted}, got {criterion.status.value}: {said}"
     pattern = fixture.message.get(criterion.id, "")
     if not re.search(pattern, said, re.IGNORECASE):
         yield f"{criterion.id}: says nothing like {pattern!r}: {said}"

@@ -12,6 +12,7 @@ import time
 from concurrent.futures import as_completed
 from pathlib import Path
 
+from fixtures.make import labs
 from grader.errors import GraderError
 from tests.fixture_runs import (
     REFERENCE,
@@ -19,7 +20,6 @@ from tests.fixture_runs import (
     fixture_names,
     grade_fixture,
     in_turn,
-    labs,
     read_fixture,
     rubric_of,
     surprises,

@@ -21,32 +21,8 @@ MESSAGES_MIN = 5
 INFO = 2
 PERIODIC_SHARE = 0.9
 NICE_HZ = (
-    0.1,
-    0.2,
-    0.25,
-    0.5,
-    1,
-    2,
-    2.5,
-    3,
-    4,
-    5,
-    8,
-    10,
-    12,
-    15,
-    16,
-    20,
-    24,
-    25,
-    30,
-    40,
-    50,
-    60,
-    75,
-    80,
-    100,
-)
+    0.1, 0.2, 0.25, 0.5, 1, 2, 2.5, 3, 4, 5, 8, 10, 12, 15, 16, 20, 24, 25, 30, 40, 50, 60, 75, 80, 100
+)  # fmt: skip
 NICE_WITHIN = 0.03
 _LEADING = re.compile(r"^\W+")
 _TIME = re.compile(r"(?P<words>.*?)(?P<seconds>\d+(?:\.\d+)?)")
@@ -55,8 +31,8 @@ _TIME = re.compile(r"(?P<words>.*?)(?P<seconds>\d+(?:\.\d+)?)")
 class Topic(Record):
     """One published topic. `rate_hz` is None where it is not periodic.
 
-    `counts_from` is the first value of a counter, `wraps` its (last, first) values around a wrap where one was seen.
-    `template` is the text of messages that tell the time, with `{seconds}`.
+    `counts_from` is the first value of a counter, None where it does not count. `template` is the text of messages that
+    tell the time, with `{seconds}`.
     """
 
     name: str
@@ -64,7 +40,6 @@ class Topic(Record):
     rate_hz: float | None = None
     latched: bool = False
     counts_from: int | None = None
-    wraps: tuple[int, int] | None = None
     template: str = ""
 
 

@@ -1,16 +1,41 @@
-"""From what was observed to a rubric's scenarios and criteria, with points that add up: pure."""
+"""`grader rubric new`: a correct package is run twice, and a rubric that asks for what was observed is proposed."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
-from grader.authoring.discover import INTEGER_PROBES, STRING, TEXT_PROBES, Parts, probe_for
-from grader.authoring.observe import Observed, Topic, heard_template, wraps_of
-from grader.authoring.sheet import Entry, Sheet, given, label_of, plain, share_out
+from grader import pipeline
+from grader.authoring.discover import (
+    INTEGER_PROBES,
+    STRING,
+    TEXT_PROBES,
+    Parts,
+    find_parts,
+    first_look,
+    probe_for,
+    second_look,
+)
+from grader.authoring.observe import Observed, Topic, heard_template, observe, wraps_of
+from grader.authoring.rubric_draft import (
+    Entry,
+    Sheet,
+    assign_points,
+    drop_empty,
+    format_number,
+    label_of,
+    rubric_text,
+)
 from grader.checks.manifest import RUNTIME_KINDS
+from grader.errors import RosMissing, SubmissionError
+from grader.evidence.reader import load_evidence, package_facts
 from grader.evidence.run import Run
+from grader.files import temporary_folder
+from grader.intake import open_submission
 from grader.model.package import PackageFacts
+from grader.model.progress import Progress
+from grader.package import read_package
+from grader.rubric.load import LoadedRubric
 
 WINDOW_S = 6
 WRAPS = 2
@@ -30,7 +55,7 @@ class Proposal(Sheet):
             self._node(name, script, seen[name])
         for name, launch in parts.launches.items():
             self._launch(name, launch, seen[name])
-        share_out(self.criteria)
+        assign_points(self.criteria)
 
     def _files(self) -> None:
         facts = self._facts
@@ -75,7 +100,7 @@ class Proposal(Sheet):
             requires = [
                 self.add(
                     f"{name}-executable", f"{file} can be run", "executable", {"path": script},
-                    reproduce=f"ls -lF {PurePosixPath(script).parent}",
+                    reproduce=f"ls -lF {PurePosixPath(script).parent}"
                 )
             ]  # fmt: skip
         if seen.failed or not seen.nodes:
@@ -146,7 +171,7 @@ class Proposal(Sheet):
         )  # fmt: skip
         needs: Entry = {"scenario": name, "requires": [kind, node]}
         if topic.rate_hz:
-            parameters: Entry = {"topic": topic.name, "rate_hz": plain(topic.rate_hz)}
+            parameters: Entry = {"topic": topic.name, "rate_hz": format_number(topic.rate_hz)}
             hz = f"{topic.name} has {topic.rate_hz:g} Hz"
             self.add(f"{label}-rate", hz, "rate", parameters, **needs, reproduce=f"rostopic hz {topic.name}")
         if topic.latched:
@@ -173,7 +198,7 @@ class Proposal(Sheet):
     def _counter(self, name: str, topic: Topic, requires: list[str], fast: Run | None) -> None:
         label, about = self._label(name, topic), {"topic": topic.name}
         wrap = wraps_of(fast, topic.name) if fast else None
-        rate: Entry = {"rate_hz": plain(topic.rate_hz)} if topic.rate_hz else {}
+        rate: Entry = {"rate_hz": format_number(topic.rate_hz)} if topic.rate_hz else {}
         needs: Entry = {"scenario": name, "requires": requires}
         if wrap:
             last, first = wrap
@@ -241,8 +266,8 @@ class Proposal(Sheet):
         own = {n.type for n in file.nodes if n.pkg == self._facts.name}
         others = [n for n in file.nodes if n.pkg != self._facts.name and n.pkg and n.type and n.name]
         wanted: Entry = {"launch": launch}
-        wanted |= given(scripts=[s for s in self._parts.nodes.values() if PurePosixPath(s).name in own])
-        programs = given(programs=[f"{n.pkg}/{n.type}" for n in others])
+        wanted |= drop_empty(scripts=[s for s in self._parts.nodes.values() if PurePosixPath(s).name in own])
+        programs = drop_empty(programs=[f"{n.pkg}/{n.type}" for n in others])
         if not seen.nodes:
             self.notes.append(
                 f"{launch} brought up no node ({seen.failed or 'none registered'}): not covered"
@@ -268,3 +293,44 @@ class Proposal(Sheet):
 def _probe(topic: str, kind: str) -> Entry:
     made_up = {"text": TEXT_PROBES} if kind == STRING else {"integers": INTEGER_PROBES, "among": [0]}
     return {"topic": topic, "type": kind, **made_up}
+
+
+# ---- the whole way from a package to a rubric's text
+
+
+def propose_rubric(
+    source: str, package: str, rubric_id: str, options: pipeline.GradeOptions, progress: Progress
+) -> str:
+    """Return the text of a rubric for the correct package that `source` holds.
+
+    Raises GraderError: SubmissionError where nothing of it can be run, RosMissing without ROS.
+    """
+    with temporary_folder("new") as folder:
+        submission = open_submission(source, package=package, workdir=folder / "source")
+        facts = read_package(submission.package)
+        parts = find_parts(submission.package.folder, facts)
+        if not parts.nodes and not parts.launches:
+            raise SubmissionError(
+                f"{package} has no node and no launch file", hint="name a finished solution"
+            )
+        runs = _record_runs(source, first_look(package, parts), folder / "first", options, progress)
+        seen = {name: observe(runs[name]) for name in (*parts.nodes, *parts.launches)}
+        again = second_look(package, parts, seen)
+        if again is not None:
+            runs |= _record_runs(source, again, folder / "second", options, progress)
+        if "package" in runs:  # with what the build said of CMakeLists.txt
+            facts = package_facts(runs["package"])
+        proposal = Proposal(facts, parts, seen, runs)
+        return rubric_text(package, rubric_id, proposal.scenarios, proposal.criteria, proposal.notes)
+
+
+def _record_runs(
+    source: str, rubric: LoadedRubric, out: Path, options: pipeline.GradeOptions, progress: Progress
+) -> dict[str, Run]:
+    """Record the rubric's runs and load them. Raises RosMissing where nothing could be run."""
+    runs = load_evidence(pipeline.record(source, rubric, out, options, progress))
+    missing = [name for name in rubric.rubric.scenarios if name not in runs]
+    if missing:
+        reason = runs["package"].metadata.get("not_run", "")
+        raise RosMissing(f"nothing was run{': ' + reason if reason else ''}", hint="grader doctor")
+    return runs

@@ -63,7 +63,7 @@ def _reference(test: RubricTest) -> Iterator[Text]:
 def _open(mutant: MutantResult) -> Iterator[Text]:
     """A mutant that was not killed."""
     yield Text(f"{mutant.state}: {visible(mutant.label)}", "bold red")
-    yield Text(f"  the student {mutant.mistake[:1].lower()}{mutant.mistake[1:]}")
+    yield Text(f"  {visible(mutant.mistake)}")
     if mutant.error:
         yield Text(f"  not graded: {line(mutant.error, TEXT_CHARS)}")
     for words, names in (
@@ -94,7 +94,7 @@ def _summary(test: RubricTest) -> Iterator[Text]:
         yield Text(f"not tried: {visible(fault)}", "yellow")
     if test.uncosted:
         names = ", ".join(test.uncosted)
-        yield Text(f"No mutant costs {names}: add mutants that do, or nobody knows whether they work", "red")
+        yield Text(f"No mutant costs {names}: add mutants that do, to see that these criteria work", "red")
     killed = sum(mutant.state == "killed" for mutant in test.mutants)
     text = f"{test.rubric.id}: {killed} of {len(test.mutants)} mutants killed, {test.wall_s:.0f} s"
     yield Text(text, "bold green" if test.passed else "bold red")

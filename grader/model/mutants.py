@@ -1,51 +1,133 @@
-"""`rubrics/mutants/<lab>.yaml` as records, and what a rubric's test comes to."""
+"""Faulty packages of a lab as their file declares them, and what a rubric's test with them comes to."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from grader.model.record import Record
 from grader.model.result import RubricInfo
-from grader.rubric.model import Name
 
 Cost = Literal["fail", "partial", "blocked"]
 State = Literal["killed", "survived", "differs", "inconclusive", "error"]
+MutantName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9.-]*$", max_length=100)]
+KINDS = ("operator", "replace", "write", "append", "mode", "crlf", "bom", "delete", "link", "move")
 
 
-class Step(Record):
-    """One operator at one place. `at` names the place where the operator fits in several; `with` its parameters."""
+class ReplaceText(Record):
+    """Replace `old`, which is in the file exactly `times` times, by `new`."""
 
-    operator: str
-    at: Annotated[dict[str, str | int], Field(default_factory=dict)]
-    parameters: Annotated[dict[str, Any], Field(alias="with", default_factory=dict)]
+    file: str
+    old: Annotated[str, Field(min_length=1)]
+    new: str
+    times: int = 1
 
 
-class Mutant(Step):
-    """What it must cost: criteria by id, with the status that each must get; all others must be reached.
+class WriteFile(Record):
+    """Write a file. One that was executable stays so."""
 
-    `also` are further mistakes in the same mutant, made one after the other.
+    file: str
+    text: str
+    executable: bool = False
+
+
+class AppendText(Record):
+    """Add text to the end of a file."""
+
+    file: str
+    text: str
+
+
+class SetMode(Record):
+    """Set or clear a file's executable bit."""
+
+    file: str
+    executable: bool
+
+
+class ChosenFile(Record):
+    """A file, for an edit that needs nothing else."""
+
+    file: str
+
+
+class SymbolicLink(Record):
+    """Put a symbolic link to `to` in the place of a file."""
+
+    file: str
+    to: str
+
+
+class MoveFiles(Record):
+    """Move every file whose path begins with `old`: the file itself, or all files of a folder (`old/`)."""
+
+    old: str
+    new: str
+
+
+class PackageEdit(Record):
+    """One edit of the correct package; exactly one of the keys says what kind.
+
+    `operator` names a mutation operator, with `at` for the place where it fits several and `with` for its parameters.
+    The other kinds take paths from the root of the reference solution.
     """
 
-    also: tuple[Step, ...] = ()
-    costs: Annotated[dict[str, Cost], Field(min_length=1)]
+    operator: str | None = None
+    at: Annotated[dict[str, str | int], Field(default_factory=dict)]
+    parameters: Annotated[dict[str, Any], Field(alias="with", default_factory=dict)]
+    replace: ReplaceText | None = None
+    write: WriteFile | None = None
+    append: AppendText | None = None
+    mode: SetMode | None = None
+    crlf: ChosenFile | None = None
+    bom: ChosenFile | None = None
+    delete: ChosenFile | None = None
+    link: SymbolicLink | None = None
+    move: MoveFiles | None = None
+
+    @property
+    def kinds(self) -> list[str]:
+        """The kinds of edit that are given."""
+        return [kind for kind in KINDS if getattr(self, kind) is not None]
+
+    @model_validator(mode="after")
+    def _is_one_edit(self) -> Self:
+        if len(self.kinds) != 1:
+            raise ValueError(f"an edit is exactly one of {', '.join(KINDS)}")
+        if self.operator is None and (self.at or self.parameters):
+            raise ValueError("`at` and `with` belong to an operator")
+        return self
+
+
+class Mutant(Record):
+    """A package: the reference solution with `edits`, and the criteria that it must not reach, with their statuses.
+
+    All other criteria must pass. With an empty `expect` it is another correct package. The grader's own tests also use
+    `message` (a pattern, case ignored, for what the report says of a criterion), `points` (where a score is partial)
+    and `git_links` (the package is handed in as a repository with submodules at these paths and no .gitmodules).
+    """
+
+    summary: str = ""
+    edits: Annotated[tuple[PackageEdit, ...], Field(min_length=1)]
+    expect: dict[str, Cost]
+    message: Annotated[dict[str, str], Field(default_factory=dict)]
+    points: float | None = None
+    git_links: tuple[str, ...] = ()
+
+    @property
+    def operators(self) -> tuple[str, ...]:
+        """The mutation operators among its edits."""
+        return tuple(edit.operator for edit in self.edits if edit.operator is not None)
 
 
 class MutantsFile(Record):
-    """The mutants of one lab's reference solution."""
+    """The faulty packages of one lab, by name. `anchors` holds values that the file refers to by YAML's `*name`."""
 
     schema_: Annotated[Literal["grader.mutants/1"], Field(alias="schema")]
-    rubric: Name
-    mutants: Annotated[tuple[Mutant, ...], Field(min_length=1)]
-
-
-def label(operator: str, at: Mapping[str, str | int], parameters: Mapping[str, Any]) -> str:
-    """How a mutant is called: `other-rate: src/talker.py (factor 0.5)`."""
-    place = ", ".join(str(value) for value in at.values())
-    given = ", ".join(f"{name} {value}" for name, value in parameters.items())
-    return operator + (f": {place}" if place else "") + (f" ({given})" if given else "")
+    rubric: str
+    anchors: Any = None
+    mutants: Annotated[dict[MutantName, Mutant], Field(min_length=1)]
 
 
 class LostCriterion(Record):
@@ -58,7 +140,7 @@ class LostCriterion(Record):
 
 
 class MutantResult(Record):
-    """One mutant's grading. `expected` is None where nothing was declared.
+    """One mutant's grading. `expected` is None where nothing was declared, `operator` empty where none was used.
 
     `missing` are declared criteria that were reached or are not in the rubric, `surplus` those that were lost
     though not declared, `differing` those with another status, each with its reason in words. `evidence` is the

@@ -81,7 +81,7 @@ METADATA = {
 
 CHANNELS = {
     "/grader/package": "What the package's files say (`PackageFacts`): manifest, CMake, scripts, launch files, each "
-    "with file and line. Its records are in the schema.",
+    "with file and line. Its records are in the schema."
 }
 
 PAGE, SCHEMAS = "formats.md", "schemas"
@@ -113,10 +113,7 @@ def _formats_page() -> str:
 
 
 def _overview() -> Iterator[str]:
-    yield from (
-        "| format | version | file | its version is in | a newer version |",
-        "|---|---|---|---|---|",
-    )
+    yield from ("| format | version | file | its version is in | a newer version |", "|---|---|---|---|---|")
     for about in FORMATS.values():
         link = f"[{about.name}](#{about.title.lower().replace(' ', '-')})"
         yield f"| {link} | `{about.is_}` | {about.where} | {about.says} | {about.newer} |"

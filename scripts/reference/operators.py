@@ -5,50 +5,54 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from grader.authoring.mutation.find import find_reference, load_solution, mutants_file
-from grader.authoring.mutation.load import load_mutants
+from grader.authoring.mutation.declared import load_mutants, mutants_file
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.registry import Operator
+from grader.authoring.mutation.solution import find_reference, load_solution
 from grader.rubric.load import LoadedRubric, all_rubrics
 
 EXAMPLE = """\
 schema: grader.mutants/1
 rubric: my-lab
 mutants:
-  - operator: other-rate
-    at: {script: scripts/talker.py}
-    with: {factor: 0.92}
-    costs: {chatter-rate: fail}
-  - operator: bit-removed
-    at: {script: scripts/talker.py}
-    also:
-      - {operator: install-dropped, at: {script: scripts/talker.py}}
-    costs: {cmake-install: fail, talker-executable: fail}
+  slow-talker:
+    summary: The talker is 8 % too slow.
+    edits:
+      - {operator: other-rate, at: {script: scripts/talker.py}, with: {factor: 0.92}}
+    expect: {chatter-rate: fail}
+  talker-not-installed:
+    edits:
+      - {operator: bit-removed, at: {script: scripts/talker.py}}
+      - replace: {file: my_lab/CMakeLists.txt, old: scripts/talker.py, new: ""}
+    expect: {cmake-install: fail, talker-executable: fail}
 """
 INTRODUCTION = f"""# Mutation operators
 
-`grader rubric test LAB` grades a lab's reference solution, which must get everything, and then mutants of it: each
-with a mistake that students make, by one of the operators below. `rubrics/mutants/<lab>.yaml` says which criteria each
-mutant must cost; it is killed when it costs these, with these statuses, and no others.
-`grader rubric test LAB --write FILE` tries every operator and writes what each mutant cost as a first mutants file.
+`grader rubric test LAB` grades a lab's reference solution, which must get everything, and then mutants of it: packages
+with a mistake that students make. A file declares the mutants with the criteria that each must not reach. A mutant is
+killed when it loses these, with these statuses, and no others. The labs that come with the grader have their files in
+`fixtures/`; for a rubric of your own, the file is `mutants/<id>.yaml` beside it.
+`grader rubric test LAB --write FILE` tries every operator and writes what each mutant cost as a first file.
 
 ```yaml
 {EXAMPLE}```
 
-`at` says where, as far as an operator fits in more than one place: any part of the place that tells it from the others
-will do (`script`, `topic`, `file`, `node`, `line`, …). `with` are the operator's parameters. `also` makes further
-mistakes in the same mutant. `costs` names criteria with their statuses: `fail`, `partial` or `blocked`.
+`edits` change the reference solution, one after the other, by one of the operators below or by hand (`replace`,
+`write`, `append`, `mode`, `crlf`, `bom`, `delete`, `link`, `move`; the repository's `fixtures/README.md` says what they
+take). `at` says where, if an operator fits in more than one place: any part of the place that tells it from the others
+will do (`script`, `topic`, `file`, `node`, `line`, …). `with` are the operator's parameters. `expect` names criteria
+with their statuses: `fail`, `partial` or `blocked`.
 
-In the table, a number is how many of the lab's mutants the operator makes; a dot stands where the operator fits the
-lab's reference solution and its mutants file does not use it. This page is made from the operators and the mutants
-files (`python -m scripts.reference`).
+In the table, a number is how many of the lab's packages use the operator; a dot means that the operator fits the lab's
+reference solution and no package uses it. This page is made from the operators and the files of the labs
+(`python -m scripts.reference`).
 """
 FITS = "·"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """One lab: how many mutants each operator makes, and which operators fit."""
+    """One lab: how many packages use each operator, and which operators fit."""
 
     lab: str
     used: Counter[str]
@@ -65,7 +69,7 @@ def operators_page() -> str:
         f"| operator | {' | '.join(short)} |",
         f"|---|{'---|' * len(columns)}",
         *(_row(operator, columns) for operator in _operators()),
-        _total("mutants", [column.mutants for column in columns]),
+        _total("packages", [column.mutants for column in columns]),
         _total("operators used", [len(column.used) for column in columns]),
         _total("operators that fit", [len(column.fitting) for column in columns]),
         "",
@@ -80,8 +84,8 @@ def operators_page() -> str:
 def _column(loaded: LoadedRubric) -> Column:
     solution = load_solution(find_reference(loaded), loaded.rubric.package)
     path = mutants_file(loaded)
-    mutants = load_mutants(path, loaded.rubric).mutants if path is not None else ()
-    used = Counter(step.operator for mutant in mutants for step in (mutant, *mutant.also))
+    mutants = load_mutants(path, loaded.rubric).mutants.values() if path is not None else ()
+    used = Counter(name for mutant in mutants for name in mutant.operators)
     fitting = frozenset(name for name, operator in OPERATORS.items() if operator.sites(solution))
     return Column(lab=loaded.rubric.id, used=used, fitting=fitting, mutants=len(mutants))
 

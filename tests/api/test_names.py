@@ -119,11 +119,11 @@ def test_the_page_s_programs_are_sound_and_the_one_that_judges_works(
     assert len(blocks) == 3
     for block in blocks:
         compile(block, "page", "exec")
-    shutil.copytree(ROOT / "fixtures" / "formats" / "class" / "cyd", tmp_path / "results" / "cyd")
+    shutil.copytree(ROOT / "fixtures" / "formats" / "class" / "bob", tmp_path / "results" / "bob")
     rubric = (ROOT / "rubrics" / "leeds-comp3631-lab1.yaml").read_text()
     head, tail = rubric.replace("points: 5", "points: 4", 1).split("  - id: numeric-rate\n")
     changed = "  - id: numeric-rate\n".join([head, tail.replace("points: 5", "points: 6", 1)])
     (tmp_path / "my-rubric.yaml").write_text(changed)
     monkeypatch.chdir(tmp_path)
     exec(blocks[1], {})  # noqa: S102 - the page's own
-    assert capsys.readouterr().out == "cyd 85.0 84.0\n"
+    assert capsys.readouterr().out == "bob 65.7 84.0\n"

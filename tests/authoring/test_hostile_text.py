@@ -6,10 +6,9 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from grader.authoring.mutation.plan import Planned
-from grader.authoring.mutation.write import mutants_text
-from grader.authoring.text import rubric_text
-from grader.model.mutants import LostCriterion, MutantResult, Step
+from grader.authoring.mutation.declared import mutants_text
+from grader.authoring.rubric_draft import rubric_text
+from grader.model.mutants import LostCriterion, Mutant, MutantResult
 from tests.report.nasty import STEERING, TEXTS
 from tests.report.test_shown import TO_A_CI
 
@@ -45,10 +44,8 @@ def test_a_proposed_rubric_reads_back(name, text, notes):
 @SOME
 @given(TEXTS, TEXTS)
 def test_a_written_mutants_file_reads_back(place, value):
-    step = Step.model_validate({"operator": "o", "at": {"script": place}, "with": {"to": value}})
-    planned = [
-        Planned(name=state, label="", step=step, costs=None, tree={}) for state in ("killed", "survived")
-    ]
+    edit = {"operator": "o", "at": {"script": place}, "with": {"to": value}}
+    mutant = Mutant.model_validate({"edits": (edit,), "expect": {}})
     lost = (LostCriterion(id="rate", status="fail", message=""),)
     results = [
         MutantResult(
@@ -57,12 +54,6 @@ def test_a_written_mutants_file_reads_back(place, value):
         )
         for state in ("killed", "survived")
     ]  # fmt: skip
-    made = mutants_text("sample", planned, results)
-    (read,) = yaml.safe_load(made)["mutants"]
-    assert read == {
-        "operator": "o",
-        "at": {"script": place},
-        "with": {"to": value},
-        "costs": {"rate": "fail"},
-    }
+    made = mutants_text("sample", {"killed": mutant, "survived": mutant}, results)
+    assert yaml.safe_load(made)["mutants"] == {"killed": {"expect": {"rate": "fail"}, "edits": [edit]}}
     assert STEERING.search(made) is None

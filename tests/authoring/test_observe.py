@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from grader.authoring.discover import Parts, find_parts, second_look
 from grader.authoring.observe import heard_template, nice_rate, observe, wraps_of
 from grader.authoring.propose import Proposal
-from grader.authoring.sheet import share_out
-from grader.authoring.text import rubric_text
+from grader.authoring.rubric_draft import assign_points, rubric_text
 from grader.evidence.reader import package_facts
 from grader.evidence.run import Run
 from grader.rubric.load import load_rubric
@@ -146,6 +145,6 @@ def test_nodes_are_found_by_reading_alone(tmp_path):
 )
 def test_points_are_whole_and_add_up(checks):
     criteria = [{"check": name} for name in checks]
-    share_out(criteria)
+    assign_points(criteria)
     assert sum(c["points"] for c in criteria) == 100
     assert all(isinstance(c["points"], int) and c["points"] >= 0 for c in criteria)

@@ -8,13 +8,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from fixtures.make import faulty_package
 from grader.cli.main import run
 
 ROOT = Path(__file__).parent.parent.parent
 RUBRIC = ROOT / "benchmarks" / "data" / "static.yaml"
 CORRECT = ROOT / "reference_solutions" / "leeds-comp3631-lab1"
-FAULTY = ROOT / "fixtures" / "leeds-comp3631-lab1"
-WRONG_NAME = FAULTY / "cmake-project-name"
+WRONG_NAME = faulty_package("leeds-comp3631-lab1", "cmake-project-name")
 
 
 def handed_in(folder: Path, names: Iterable[str], source: Path = CORRECT) -> Path:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from fixtures.make import faulty_package
 from grader.checks import CHECKS
 from grader.report.html.page import render_html
 from tests.browser.conftest import DESKTOP, PHONE
@@ -190,7 +191,7 @@ def test_texts_of_others_stay_texts(visit, axe, validate, tmp_path, size) -> Non
 
 @pytest.mark.ros
 def test_a_real_grading_shows_what_was_recorded(visit, axe, validate, tmp_path) -> None:
-    source = ROOT / "fixtures" / LAB / "counter-resets-to-1"
+    source = faulty_package(LAB, "counter-resets-to-1")
     command = [sys.executable, "-m", "grader", "grade", str(source), "--rubric", LAB, "--out", str(tmp_path)]
     subprocess.run(
         command, check=False, capture_output=True, timeout=240

@@ -10,7 +10,7 @@ import pytest
 
 from grader.cli.completing.answer import completing_parser
 from grader.cli.completing.choosing import BY_VALUE, SPECIAL, completer_of
-from grader.cli.completing.labs import explained, lab_ids, mistakes, operators
+from grader.cli.completing.labs import explained, lab_ids, mistakes, mutants
 from grader.cli.completing.paths import paths
 from grader.cli.main import run
 from grader.cli.parsing.reports import FORMS
@@ -124,10 +124,10 @@ def test_a_rubric_that_is_no_rubric_offers_checks_only(tmp_path, text):
     assert offered == explained(prefix="", parsed_args=argparse.Namespace(rubric=str(tmp_path / "missing")))
 
 
-def test_operators_are_those_of_the_lab():
-    offered = operators(parsed_args=argparse.Namespace(rubric=LAB))
-    assert "crlf" in offered
-    assert operators(parsed_args=argparse.Namespace(rubric="own.yaml")) == {}
+def test_mutants_are_those_of_the_lab():
+    offered = mutants(parsed_args=argparse.Namespace(rubric=LAB))
+    assert "talker-crlf" in offered
+    assert mutants(parsed_args=argparse.Namespace(rubric="own.yaml")) == {}
 
 
 def test_every_mistake_that_is_offered_is_one(tmp_path, capsys):

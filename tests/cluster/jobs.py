@@ -6,24 +6,24 @@ import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from fixtures.make import declared, faulty_package
 from grader.classes.batch.job import Job, Outcome
 from grader.model.batch import Entry
 from grader.results import RESULT
 from grader.rubric.load import load_rubric
 
 LAB = "leeds-comp3631-lab1"
-FIXTURES = Path(__file__).resolve().parents[2] / "fixtures" / LAB
 
 
 def sources() -> list[Path]:
     """Packages, right and wrong ones."""
-    return sorted(path for path in FIXTURES.iterdir() if path.is_dir())
+    return [faulty_package(LAB, name) for name in sorted(declared(LAB))]
 
 
 def jobs_for(out: Path, count: int, *, static_only: bool = True, names: Iterable[str] = ()) -> Iterator[Job]:
     """`count` submissions, made of the fixtures in turn."""
     rubric = load_rubric(LAB)
-    chosen = [FIXTURES / name for name in names] or sources()
+    chosen = [faulty_package(LAB, name) for name in names] or sources()
     for number in range(count):
         entry = Entry(id=f"s{number:03}", source=str(chosen[number % len(chosen)]))
         yield Job(entry=entry, rubric=rubric, out=out, static_only=static_only)

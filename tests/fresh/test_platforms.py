@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+from fixtures.make import faulty_package
 from grader.cli.main import run
 from tests.fresh.images import Image, build
 from tests.fresh.room import Rooms, Root
@@ -24,7 +25,7 @@ pytestmark = [pytest.mark.ros, pytest.mark.slow, pytest.mark.timeout(900)]
 REPO = Path(__file__).resolve().parents[2]
 LAB = "mcr2-basic-comms"
 CORRECT = REPO / "reference_solutions" / LAB / "basic_comms"
-NO_TIME = REPO / "fixtures" / LAB / "message-without-time" / "basic_comms"
+NO_TIME = faulty_package(LAB, "message-without-time") / "basic_comms"
 FORGED = '{"score": 100, "tests": []}'
 FORGER = f"""#!/usr/bin/env python3
 import glob, os, signal

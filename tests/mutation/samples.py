@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from grader.authoring.mutation.find import find_reference, load_solution
-from grader.authoring.mutation.solution import Solution
-from grader.authoring.mutation.tree import Entry, Tree
+from grader.authoring.mutation.package_tree import Entry, Tree
+from grader.authoring.mutation.solution import Solution, find_reference, load_solution
 from grader.rubric.load import load_rubric
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-LABS = sorted(path.stem for path in (ROOT / "rubrics" / "mutants").glob("*.yaml"))
+LABS = sorted(path.stem for path in (ROOT / "rubrics").glob("*.yaml"))
 
 TIMER = '''\
 #!/usr/bin/python3

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.authoring.mutation import session
+from fixtures.make import declared
+from grader.authoring.mutation import rubric_test
 from grader.classes.batch.gradings import Graded
 from grader.cli.main import run
 from grader.rubric.load import load_rubric
@@ -45,10 +46,10 @@ class Judge:
 @pytest.fixture
 def judge(tmp_path, monkeypatch):
     made = Judge(tmp_path)
-    monkeypatch.setattr(session, "grade_all", made.grade_all)
+    monkeypatch.setattr(rubric_test, "grade_all", made.grade_all)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
     (tmp_path / "tmp").mkdir()
-    original = session.run_test
+    original = rubric_test.run_test
 
     def noting(plan, progress):
         made.declared = {m.name: dict(m.costs or {}) for m in plan.mutants}
@@ -65,31 +66,29 @@ def left(judge: Judge) -> list[Path]:
 def test_all_killed(judge, capsys):
     assert run(["rubric", "test", LAB]) == 0
     out, err = capsys.readouterr()
-    assert f"{LAB}: 40 of 40 mutants killed" in out
+    assert f"{LAB}: 70 of 70 mutants killed" in out
     assert "✓ killed" in out
     assert max(len(line) for line in out.splitlines()) <= 80
-    assert "bit-removed: src/numeric_talker.py  done" in err
+    assert "talker-not-executable  done" in err
     assert left(judge) == []
 
 
 def test_a_survivor_is_shown_with_its_diff_and_its_evidence(judge, capsys):
-    judge.instead = {"bit-removed-src-numeric-talker.py": {}}
+    judge.instead = {"talker-not-executable": {}}
     assert run(["rubric", "test", LAB]) == 1
     out, _ = capsys.readouterr()
     text = " ".join(out.split())
-    assert "survived: bit-removed: src/numeric_talker.py" in text
-    assert "the student never makes the script executable" in text
+    assert "survived: talker-not-executable" in text
+    assert "numeric_talker.py was never made executable." in text
     assert "should cost, and does not: talker-executable" in text
     assert "old mode 100755" in text
-    assert "39 of 40 mutants killed" in text
+    assert "69 of 70 mutants killed" in text
     (folder,) = left(judge)
-    assert [path.name for path in folder.iterdir()] == ["bit-removed-src-numeric-talker.py"]
+    assert [path.name for path in folder.iterdir()] == ["talker-not-executable"]
 
 
 def test_what_costs_too_much_is_shown_with_the_reports_words(judge, capsys):
-    judge.instead = {
-        "never-reset-src-numeric-talker.py-numeric-chatter": {"counter-wrap": "blocked", "launch": "fail"}
-    }
+    judge.instead = {"counter-dies-at-128": {"counter-wrap": "blocked", "launch": "fail"}}
     assert run(["rubric", "test", LAB]) == 1
     out, _ = capsys.readouterr()
     text = " ".join(out.split())
@@ -100,34 +99,31 @@ def test_what_costs_too_much_is_shown_with_the_reports_words(judge, capsys):
 
 
 def test_json(judge, capsys):
-    judge.instead = {"no-catkin-package": {"cmake": "fail", "build": "fail"}}
+    judge.instead = {"cmake-no-catkin-package": {"cmake": "fail", "build": "fail"}}
     assert run(["rubric", "test", LAB, "--json", "--out", str(judge.folder / "kept")]) == 1
     data = json.loads(capsys.readouterr().out)
     assert data["schema"] == "grader.rubric-test/1"
-    assert (data["passed"], data["uncosted"], len(data["mutants"])) == (False, [], 40)
+    assert (data["passed"], data["uncosted"], len(data["mutants"])) == (False, [], 70)
     (differs,) = [m for m in data["mutants"] if m["state"] != "killed"]
     assert (differs["state"], differs["surplus"], differs["expected"]) == (
         "differs",
         ["build"],
         {"cmake": "fail"},
     )
-    assert differs["evidence"] == str(judge.folder / "kept" / "no-catkin-package")
-    assert (judge.folder / "kept" / "crlf-src-numeric-talker.py" / "mutant.diff").is_file()
+    assert differs["evidence"] == str(judge.folder / "kept" / "cmake-no-catkin-package")
+    assert (judge.folder / "kept" / "talker-crlf" / "mutant.diff").is_file()
 
 
 def test_some_mutants_only(judge, capsys):
-    assert run(["rubric", "test", LAB, "--only", "crlf", "reset-*", "--json"]) == 0
+    assert run(["rubric", "test", LAB, "--only", "talker-crlf", "reset-*", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
-    assert {m["operator"] for m in data["mutants"]} == {"crlf", "reset-early", "reset-late", "reset-to-one"}
+    assert {m["name"] for m in data["mutants"]} == {"talker-crlf", "counter-resets-to-1"}
     assert data["uncosted"] is None
 
 
 def test_a_criterion_that_nothing_costs_is_named(judge, capsys):
     judge.instead = {
-        "other-rate-src-numeric-talker.py-factor-0.92": {"chatter-rate": "fail"},
-        "burst-src-numeric-talker.py": {"chatter-rate": "fail"},
-        "sleep-without-brackets-src-numeric-talker.py": {"chatter-rate": "fail"},
-        "publish-half-src-numeric-talker.py-numeric-chatter": {},
+        name: {} for name, mutant in declared(LAB).items() if mutant.expect.get("numeric-rate") == "fail"
     }
     assert run(["rubric", "test", LAB]) == 1
     assert "No mutant costs numeric-rate" in " ".join(capsys.readouterr().out.split())
@@ -143,7 +139,7 @@ def test_a_criterion_taken_out_fails_the_test(judge, capsys, tmp_path):
     assert run(["rubric", "test", str(path), "--only", "reset-*"]) == 1
     text = " ".join(capsys.readouterr().out.split())
     assert "should cost, and does not: counter-wrap (the rubric has no such criterion)" in text
-    assert "0 of 3 mutants killed" in text
+    assert "0 of 1 mutants killed" in text
 
 
 def test_the_reference_solution_has_to_get_everything(judge, capsys):
@@ -172,9 +168,9 @@ def test_a_solution_of_ones_own_may_lack_places(judge, capsys, tmp_path):
         (package / name).write_bytes((ROOT / "reference_solutions" / LAB / "lab1" / name).read_bytes())
     assert run(["rubric", "test", LAB, "--solution", str(tmp_path / "mine"), "--json"]) == 1
     data = json.loads(capsys.readouterr().out)
-    assert len(data["mutants"]) == 6
-    assert len(data["unfit"]) == 34
-    assert "fits nowhere in this package" in data["unfit"][0]
+    assert len(data["mutants"]) == 10
+    assert len(data["unfit"]) == 60
+    assert "fits nowhere in this package" in " ".join(data["unfit"])
     assert "listener-numeric" in data["uncosted"]
 
 
@@ -182,7 +178,7 @@ def test_a_solution_of_ones_own_may_lack_places(judge, capsys, tmp_path):
     ("argv", "message"),
     [
         (["no-such-lab"], 'there is no rubric "no-such-lab"'),
-        ([LAB, "--only", "crfl"], 'there is no mutant "crfl" (did you mean "crlf"?)'),
+        ([LAB, "--only", "talker-clrf"], 'there is no mutant "talker-clrf" (did you mean "talker-crlf"?)'),
         ([LAB, "--jobs", "0"], "argument --jobs: '0' is not a number from 1 to 64"),
         ([LAB, "--jobs", "many"], "argument --jobs: 'many' is not a number from 1 to 64"),
         ([LAB, "--solution", "/nowhere"], "/nowhere is not a folder"),
@@ -201,12 +197,15 @@ def test_a_wrong_command_line(argv, message, judge, capsys):
 def test_a_mutants_file_that_does_not_fit_its_solution_is_an_error(judge, capsys, tmp_path):
     rubrics = tmp_path / "course" / "rubrics"
     (rubrics / "mutants").mkdir(parents=True)
-    for name in (f"{LAB}.yaml", f"mutants/{LAB}.yaml"):
-        (rubrics / name).write_bytes((ROOT / "rubrics" / name).read_bytes())
+    for name, folder in ((f"{LAB}.yaml", "rubrics"), (f"mutants/{LAB}.yaml", "fixtures")):
+        (rubrics / name).write_bytes((ROOT / folder / f"{LAB}.yaml").read_bytes())
     lab1 = tmp_path / "course" / "reference_solutions" / LAB / "lab1"
     lab1.mkdir(parents=True)
     (lab1 / "package.xml").write_text("<package><name>lab1</name></package>")
     assert run(["rubric", "test", str(rubrics / f"{LAB}.yaml")]) == 2
     err = capsys.readouterr().err
-    assert f"mutants/{LAB}.yaml:12: mutants[1]: manifest-malformed fits nowhere in this package" in err
-    assert err.count("error") == 39
+    assert (
+        f"mutants/{LAB}.yaml:29: mutants.manifest-malformed: manifest-malformed fits nowhere in this package"
+        in err
+    )
+    assert err.count(": mutants.") == 69

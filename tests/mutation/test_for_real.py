@@ -15,7 +15,7 @@ pytestmark = [pytest.mark.ros, pytest.mark.slow]
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 LAB = "leeds-comp3631-lab1"
-MUTANTS = ("bit-removed", "reset-to-one")
+MUTANTS = ("talker-not-executable", "reset-to-one")
 
 
 @pytest.fixture
@@ -40,8 +40,8 @@ def test_a_rubric_with_a_criterion_taken_out_lets_a_mutant_survive(grader, tmp_p
     assert code == 1, err
     test = json.loads(out)
     assert test["reference"]["lost"] == []
-    states = {mutant["operator"]: mutant["state"] for mutant in test["mutants"]}
-    assert states == {"bit-removed": "killed", "reset-to-one": "survived"}
+    states = {mutant["name"]: mutant["state"] for mutant in test["mutants"]}
+    assert states == {"talker-not-executable": "killed", "counter-resets-to-1": "survived"}
     (survivor,) = [mutant for mutant in test["mutants"] if mutant["state"] == "survived"]
     assert survivor["missing"] == ["counter-wrap (the rubric has no such criterion)"]
     assert "-            counter = 0\n+            counter = 1\n" in survivor["diff"]
@@ -54,7 +54,7 @@ def test_stopping_leaves_nothing_behind(how, grader):
     process = grader.start("rubric", "test", LAB, "--only", *MUTANTS, "--jobs", "2")
     assert process.stderr is not None
     for line in process.stderr:
-        if "running" in line and "reset-to-one" in line:
+        if "running" in line and "counter-resets-to-1" in line:
             break
     process.send_signal(
         {"interrupt": signal.SIGINT, "terminate": signal.SIGTERM, "kill": signal.SIGKILL}[how]

@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import pytest
 
-from grader.authoring.mutation.load import LoadedMutants
+from grader.authoring.mutation.declared import LoadedMutants
 from grader.authoring.mutation.operators import OPERATORS
-from grader.authoring.mutation.plan import chosen, plan_all, plan_declared, refuse_unfit
+from grader.authoring.mutation.package_tree import Entry, unified_diff
+from grader.authoring.mutation.plan import plan_all, plan_declared, refuse_unfit, select_mutants
 from grader.authoring.mutation.solution import Solution
-from grader.authoring.mutation.tree import unified_diff
 from grader.errors import RubricError, UsageError
 from grader.model.mutants import Mutant
 from grader.rubric.source import Source
@@ -20,15 +20,19 @@ def two_nodes() -> Solution:
 
 
 def declared(*mutants: dict[str, object]) -> LoadedMutants:
-    records = tuple(Mutant.model_validate({"costs": {"x": "fail"}, **mutant}) for mutant in mutants)
-    lines = {("mutants", index): 10 * (index + 1) for index in range(len(records))}
+    """Mutants `a`, `b`, … in lines 10, 20, …; each is given by its one edit, or whole."""
+    records = {}
+    for name, mutant in zip("abc", mutants, strict=False):
+        whole = mutant if "edits" in mutant else {"edits": (mutant,)}
+        records[name] = Mutant.model_validate({"expect": {"x": "fail"}, **whole})
+    lines = {("mutants", name): 10 * (index + 1) for index, name in enumerate(records)}
     return LoadedMutants(mutants=records, source=Source(name="m.yaml", raw=b"", data=None, lines=lines))
 
 
 def test_one_place_needs_no_at():
     planned, faults = plan_declared(declared({"operator": "yaml-key-misspelt"}), other_solution())
     assert faults == []
-    assert planned[0].label == "yaml-key-misspelt: config/room.yaml, plain/key"
+    assert planned[0].name == planned[0].label == "a"
     assert planned[0].costs == {"x": "fail"}
 
 
@@ -42,7 +46,7 @@ def test_a_part_of_the_place_is_enough():
 def test_several_places_have_to_be_told_apart():
     _, faults = plan_declared(declared({"operator": "crlf"}), two_nodes())
     assert faults == [
-        "m.yaml:10: mutants[0]: crlf fits in 2 places: say in `at` which: {script: src/a.py}; {script: src/b.py}"
+        "m.yaml:10: mutants.a: crlf fits in 2 places: say in `at` which: {script: src/a.py}; {script: src/b.py}"
     ]
 
 
@@ -51,8 +55,8 @@ def test_a_place_where_it_does_not_fit():
     _, faults = plan_declared(declared(mutant, {"operator": "burst"}), two_nodes())
     both = "{script: src/a.py}; {script: src/b.py}"
     assert faults == [
-        f"m.yaml:10: mutants[0]: crlf does not fit at {{script: src/c.py}}; it fits at {both}",
-        f"m.yaml:20: mutants[1]: burst fits nowhere in this package; it fits {OPERATORS['burst'].fits}",
+        f"m.yaml:10: mutants.a: crlf does not fit at {{script: src/c.py}}; it fits at {both}",
+        f"m.yaml:20: mutants.b: burst fits nowhere in this package; it fits {OPERATORS['burst'].fits}",
     ]
     with pytest.raises(RubricError, match="fits nowhere"):
         refuse_unfit(faults)
@@ -65,18 +69,17 @@ def test_every_operator_says_where_it_would_fit(name):
     planned, faults = plan_declared(declared({"operator": name}), bare)
     assert planned == []
     assert faults == [
-        f"m.yaml:10: mutants[0]: {name} fits nowhere in this package; it fits {OPERATORS[name].fits}"
+        f"m.yaml:10: mutants.a: {name} fits nowhere in this package; it fits {OPERATORS[name].fits}"
     ]
 
 
 def test_two_mistakes_in_one_mutant():
-    mutant = {
-        "operator": "bit-removed",
-        "at": {"script": "src/a.py"},
-        "also": [{"operator": "no-shebang", "at": {"script": "src/b.py"}}],
-    }
-    (planned,), _ = plan_declared(declared(mutant), two_nodes())
-    assert planned.label == "bit-removed: src/a.py + no-shebang: src/b.py"
+    edits = (
+        {"operator": "bit-removed", "at": {"script": "src/a.py"}},
+        {"operator": "no-shebang", "at": {"script": "src/b.py"}},
+    )
+    (planned,), _ = plan_declared(declared({"edits": edits}), two_nodes())
+    assert planned.mistake == "The student never makes the script executable and leaves out the shebang."
     assert not planned.tree["src/a.py"].executable
     assert planned.tree["src/b.py"].data.startswith(b"import rospy")
 
@@ -94,17 +97,67 @@ def test_lines_tell_apart_what_nothing_else_does():
 def test_all_operators_are_tried_with_names_of_their_own():
     planned = plan_all(other_solution())
     assert len({mutant.name for mutant in planned}) == len(planned)
-    assert {mutant.step.operator for mutant in planned} >= {"crlf", "burst", "yaml-key-missing"}
+    assert {mutant.mutant.operators[0] for mutant in planned} >= {"crlf", "burst", "yaml-key-missing"}
     assert all(mutant.name.strip("-.") and "/" not in mutant.name for mutant in planned)
 
 
 def test_some_mutants_are_chosen_by_name_by_operator_and_by_pattern():
     planned = plan_all(two_nodes())
-    assert [m.label for m in chosen(planned, ["crlf"])] == ["crlf: src/a.py", "crlf: src/b.py"]
-    assert [m.label for m in chosen(planned, ["crlf-src-b.py"])] == ["crlf: src/b.py"]
-    assert {m.step.operator for m in chosen(planned, ["shebang-*"])} == {
+    assert [m.label for m in select_mutants(planned, ["crlf"])] == ["crlf: src/a.py", "crlf: src/b.py"]
+    assert [m.label for m in select_mutants(planned, ["crlf-src-b.py"])] == ["crlf: src/b.py"]
+    assert {m.mutant.operators[0] for m in select_mutants(planned, ["shebang-*"])} == {
         "shebang-typo", "shebang-commented", "shebang-python2"
     }  # fmt: skip
-    assert chosen(planned, []) == planned
+    assert select_mutants(planned, []) == planned
     with pytest.raises(UsageError, match="did you mean"):
-        chosen(planned, ["clrf"])
+        select_mutants(planned, ["clrf"])
+
+
+def test_every_kind_of_edit():
+    a, b = "src/a.py", "src/b.py"
+    edits = (
+        {"replace": {"file": a, "old": "'a'", "new": "'c'"}},
+        {"append": {"file": a, "text": "# end\n"}},
+        {"crlf": {"file": a}},
+        {"bom": {"file": a}},
+        {"mode": {"file": a, "executable": False}},
+        {"write": {"file": b, "text": "new"}},
+        {"write": {"file": "src/c.py", "text": "", "executable": True}},
+        {"link": {"file": "src/d.py", "to": "c.py"}},
+        {"move": {"old": "src/", "new": "scripts/"}},
+        {"delete": {"file": "scripts/c.py"}},
+    )
+    (planned,), faults = plan_declared(declared({"edits": edits, "summary": "All of it."}), two_nodes())
+    assert faults == []
+    assert planned.mistake == "All of it."
+    made = NODE.replace("'a'", "'c'").replace("\n", "\r\n") + "# end\r\n"
+    assert planned.tree == {
+        "scripts/a.py": Entry(data=b"\xef\xbb\xbf" + made.encode()),
+        "scripts/b.py": Entry(data=b"new", executable=True),
+        "scripts/d.py": Entry(data=b"", link="c.py"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("edit", "fault"),
+    [
+        (
+            {"replace": {"file": "src/a.py", "old": "rospy", "new": ""}},
+            "src/a.py has 'rospy' 3 times, not 1 times",
+        ),
+        (
+            {"replace": {"file": "src/x.py", "old": "rospy", "new": ""}},
+            "replace: there is no file 'src/x.py'",
+        ),
+        ({"move": {"old": "lab/", "new": ""}}, "move: there is no file 'lab/'"),
+        ({"delete": {"file": "lab"}}, "delete: there is no file 'lab'"),
+    ],
+)
+def test_an_edit_that_does_not_fit(edit, fault):
+    assert plan_declared(declared(edit), two_nodes()) == ([], [f"m.yaml:10: mutants.a: {fault}"])
+
+
+def test_a_correct_package_is_not_a_mutant():
+    assert plan_declared(
+        declared({"edits": ({"crlf": {"file": "src/a.py"}},), "expect": {}}), two_nodes()
+    ) == ([], [])

@@ -9,10 +9,10 @@ import tokenize
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from fixtures.make import declared, faulty_package
 from grader.evidence.writer import EvidenceWriter
 
 HERE = Path(__file__).parent
-FIXTURES = HERE.parent.parent / "fixtures"
 Files = dict[str, bytes]
 
 
@@ -38,13 +38,11 @@ def class_of(folder: Path, submissions: Mapping[str, Mapping[str, bytes]]) -> di
 def fixture_variants(lab: str, count: int) -> dict[str, Files]:
     """Fixtures of a lab: one solution, each with a small change of its own."""
     found = {}
-    for folder in sorted((FIXTURES / lab).iterdir()):
-        package = folder / "lab1"
+    for name in sorted(declared(lab)):
+        package = faulty_package(lab, name) / "lab1"
         programs = [path for path in package.rglob("*") if path.suffix in {".py", ".xml", ".txt"}]
         if programs and len(found) < count:
-            found[folder.name] = {
-                path.relative_to(package).as_posix(): path.read_bytes() for path in programs
-            }
+            found[name] = {path.relative_to(package).as_posix(): path.read_bytes() for path in programs}
     return found
 
 

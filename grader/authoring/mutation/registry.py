@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import inspect
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
-from grader.authoring.mutation.solution import Site, Solution
+from grader.authoring.mutation.solution import Change, Site, Solution
 from grader.model.record import Record
 
 FITS = "Fits "
+Finder = Callable[[Solution], Iterable[tuple[Any, ...]]]
+Function = TypeVar("Function", bound=Callable[..., Change])
 
 
 class NoParams(Record):
@@ -22,7 +25,8 @@ class Operator:
     """`mistake` is what the student does wrong, `fits` what of the package the operator works on."""
 
     name: str
-    function: Callable[[Solution, Record], Iterator[Site]]
+    each: Finder
+    function: Callable[..., Change]
     params: type[Record]
     mistake: str
     fits: str
@@ -32,8 +36,8 @@ class Operator:
         return self.function.__module__.rpartition(".")[2]
 
     def sites(self, solution: Solution, params: Record | None = None) -> tuple[Site, ...]:
-        """Every place where it fits, each under another `at`; empty where it fits nowhere."""
-        found = [s for s in self.function(solution, params or self.params()) if s.tree != solution.tree]
+        """Return every place where it fits, each under another `at`; empty where it fits nowhere."""
+        found = [s for s in self._sites(solution, params or self.params()) if s.tree != solution.tree]
         alike = Counter(frozenset(site.at.items()) for site in found)
         return tuple(
             replace(site, at={**site.at, "line": site.line})
@@ -42,19 +46,26 @@ class Operator:
             for site in found
         )
 
+    def _sites(self, solution: Solution, params: Record) -> Iterator[Site]:
+        own = () if self.params is NoParams else (params,)
+        for place, *found in self.each(solution):
+            change = self.function(*found, *own)
+            if change or isinstance(change, bytes):
+                yield place.site(solution, change)
+
 
 OPERATORS: dict[str, Operator] = {}
 
 
-def operator(
-    name: str, *, params: type[Record] = NoParams
-) -> Callable[[Callable[..., Iterator[Site]]], Callable[..., Iterator[Site]]]:
+def operator(name: str, *, each: Finder, params: type[Record] = NoParams) -> Callable[[Function], Function]:
     """Put a function into `OPERATORS`. Its docstring's first line is the mistake, a line `Fits …` where it fits.
 
-    Raises ValueError for a name that is taken and for a docstring that lacks one of the two.
+    `each` finds where the operator may fit: it yields a `Place` and what is there. The function is called with what is
+    there, and with the parameters if it has any; it returns the change, or nothing where it does not fit after all.
+    Raises ValueError for a name that is taken and for a docstring that lacks one of the two lines.
     """
 
-    def register(function: Callable[..., Iterator[Site]]) -> Callable[..., Iterator[Site]]:
+    def register(function: Function) -> Function:
         mistake, *rest = (inspect.getdoc(function) or "").splitlines() or [""]
         fits = next((line.removeprefix(FITS) for line in rest if line.startswith(FITS)), "")
         if name in OPERATORS or not mistake or not fits:
@@ -62,7 +73,12 @@ def operator(
                 f"operator {name}: {'twice' if name in OPERATORS else 'its docstring says too little'}"
             )
         OPERATORS[name] = Operator(
-            name=name, function=function, params=params, mistake=mistake.rstrip("."), fits=fits.rstrip(".")
+            name=name,
+            each=each,
+            function=function,
+            params=params,
+            mistake=mistake.rstrip("."),
+            fits=fits.rstrip("."),
         )
         return function
 

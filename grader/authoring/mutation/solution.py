@@ -1,4 +1,4 @@
-"""A correct package as operators see it: its files in memory, parsed where somebody asks."""
+"""The correct package of a lab: where it is, and its files in memory as operators see and change them."""
 
 from __future__ import annotations
 
@@ -6,16 +6,19 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
 import cmake_parser
 from cmake_parser.ast import Command
 from cmake_parser.error import CMakeParseError
 
-from grader.authoring.mutation.python import Script
-from grader.authoring.mutation.spans import Edit, applied
-from grader.authoring.mutation.tree import Entry, Tree
-from grader.authoring.mutation.xml import Document
+from grader.authoring.mutation.package_tree import Entry, Tree, read_tree
+from grader.authoring.mutation.python_script import Script
+from grader.authoring.mutation.text_edits import Edit, apply_edits, line_at
+from grader.authoring.mutation.xml_document import Document
+from grader.errors import UsageError
+from grader.rubric.find import rubrics_folder
+from grader.rubric.load import LoadedRubric
 
 MANIFEST = "package.xml"
 CMAKE = "CMakeLists.txt"
@@ -30,6 +33,37 @@ class Site:
     at: Mapping[str, str | int]
     tree: Tree
     line: int | None = None
+
+
+Change = Sequence[Edit] | bytes | Tree | None
+"""What an operator makes of a place: edits of the file, its new content, or a whole new tree; None for nothing."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A place that an operator may change. `at` tells it from the others; without `line`, the first edit does.
+
+    Positions in an XML file count bytes, those in any other file characters: `xml` is the file's document.
+    """
+
+    path: str
+    at: Mapping[str, str | int]
+    line: int | None = None
+    xml: Document | None = None
+
+    def site(self, solution: Solution, change: Sequence[Edit] | bytes | Tree) -> Site:
+        """Return the mutant that is made here."""
+        line = self.line
+        if isinstance(change, bytes):
+            tree = solution.with_data(self.path, change)
+        elif isinstance(change, dict):
+            tree = change
+        elif self.xml is not None:
+            tree = solution.edited_xml(self.xml, change)
+        else:
+            tree = solution.edited(self.path, change)
+            line = line or line_at(solution.text(self.path), min(change).start)
+        return Site(at=self.at, tree=tree, line=line)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,13 +155,80 @@ class Solution:
 
     def edited(self, path: str, edits: Sequence[Edit]) -> Tree:
         """The tree with edits in one text file."""
-        text = applied(self.text(path), edits)
+        text = apply_edits(self.text(path), edits)
         return self.with_data(path, text.encode(errors="surrogateescape"))
 
     def edited_xml(self, document: Document, edits: Sequence[Edit]) -> Tree:
         """The same for XML, whose places count bytes; what the edits insert is written as UTF-8."""
         wide = [Edit(e.start, e.end, e.text.encode().decode("latin-1")) for e in edits]
-        return self.with_data(document.path, applied(document.text, wide).encode("latin-1"))
+        return self.with_data(document.path, apply_edits(document.text, wide).encode("latin-1"))
 
     def then(self, tree: Tree) -> Solution:
         return replace(self, tree=tree)
+
+
+# ---- where a lab's correct package is
+
+REFERENCES = "reference_solutions"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reference:
+    """A correct package's folder. `modes` is False where its executable bits cannot be trusted."""
+
+    folder: Path
+    modes: bool = True
+
+
+def references_folder() -> Path:
+    """The folder of the reference solutions that come with the grader."""
+    return rubrics_folder().parent / REFERENCES
+
+
+def find_reference(rubric: LoadedRubric) -> Reference:
+    """The rubric's reference solution. Raises UsageError where there is none.
+
+    A checkout has its executable bits from git. A wheel is unpacked by installers that need not keep them: there,
+    what begins with a shebang is executable.
+    """
+    name = rubric.rubric.id
+    own = rubric.path.absolute().parent.parent / REFERENCES / name
+    if own.is_dir() and own.parent != references_folder():
+        return Reference(folder=own)
+    shipped = references_folder() / name
+    if shipped.is_dir():
+        return Reference(folder=shipped, modes=shipped.parent.parent.name != "_data")
+    raise UsageError(
+        f"there is no reference solution for {name}",
+        hint="give the folder of a correct package with --solution",
+    )
+
+
+def reference_at(folder: Path) -> Reference:
+    """The user's own correct package. Raises UsageError where it is no folder."""
+    if not folder.is_dir():
+        raise UsageError(f"{folder} is not a folder", hint="--solution takes the folder of a correct package")
+    return Reference(folder=folder)
+
+
+def load_solution(reference: Reference, package: str) -> Solution:
+    """The package of that name within the folder. Raises UsageError where it is not there."""
+    tree = read_tree(reference.folder, modes=reference.modes)
+    manifests = sorted(
+        (p for p in tree if PurePosixPath(p).name == MANIFEST), key=lambda p: (p.count("/"), p)
+    )
+    for path in manifests:
+        if _name(tree, path).lower() == package.lower():
+            return Solution(tree=tree, folder=path.removesuffix(MANIFEST), name=package)
+    raise UsageError(
+        f"there is no package {package} in {reference.folder}",
+        hint="a solution's package.xml has to name the package of the rubric",
+    )
+
+
+def _name(tree: Tree, path: str) -> str:
+    try:
+        document = Document(path, tree[path].data)
+    except ValueError:
+        return ""
+    return next((document.content(e) for e in document.elements("name") if e.parent is document.root), "")

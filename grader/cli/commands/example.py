@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from grader.authoring.mutation.find import find_reference, load_solution, mutants_file
-from grader.authoring.mutation.load import load_mutants
-from grader.authoring.mutation.operators import OPERATORS
+from grader.authoring.mutation.declared import load_mutants, mutants_file
+from grader.authoring.mutation.package_tree import Tree, write_tree
 from grader.authoring.mutation.plan import Planned, plan_all, plan_declared
-from grader.authoring.mutation.solution import Solution
-from grader.authoring.mutation.tree import Tree, write_tree
+from grader.authoring.mutation.solution import Solution, find_reference, load_solution
 from grader.cli.output import say
 from grader.errors import ExitCode, UsageError
 from grader.files import check_writable
@@ -33,7 +31,7 @@ def run(*, lab: str, folder: Path | None = None, mistake: str | None = None) -> 
     if wanted is None:
         say(f"{package}: a correct package for {loaded.rubric.id}")
     else:
-        say(f"{package}: a package for {loaded.rubric.id} with a mistake: the student {_words(wanted)}")
+        say(f"{package}: a package for {loaded.rubric.id} with a mistake: {wanted.mistake}")
     return ExitCode.PASSED
 
 
@@ -56,7 +54,7 @@ def _mistakes(loaded: LoadedRubric, correct: Solution) -> list[Planned]:
 
 def _chosen(planned: list[Planned], name: str) -> Planned:
     """The mistake of that name; an operator's name will do where it makes one mistake only. Raises UsageError."""
-    found = [m for m in planned if m.name == name] or [m for m in planned if m.operators == (name,)]
+    found = [m for m in planned if m.name == name] or [m for m in planned if m.mutant.operators == (name,)]
     if len(found) == 1:
         return found[0]
     if found:
@@ -66,11 +64,6 @@ def _chosen(planned: list[Planned], name: str) -> Planned:
         f'there is no mistake "{name}"{did_you_mean(name, [mutant.name for mutant in planned])}',
         hint="without DIR, grader example lists the lab's mistakes",
     )
-
-
-def _words(mutant: Planned) -> str:
-    said = (OPERATORS[name].mistake.removesuffix(".") for name in mutant.operators)
-    return " and ".join(words[:1].lower() + words[1:] for words in said)
 
 
 def _write(tree: Tree, folder: Path) -> None:

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from grader import pipeline
-from grader.authoring.new import propose_rubric
+from grader.authoring.propose import propose_rubric
 from grader.cli.display import open_progress
 from grader.cli.output import say, say_document
 from grader.cli.sandbox_report import say_unwalled

@@ -8,12 +8,21 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from grader.authoring.mutation.find import find_reference, given_reference, load_solution, mutants_file
-from grader.authoring.mutation.load import load_mutants
-from grader.authoring.mutation.plan import Planned, chosen, plan_all, plan_declared, refuse_unfit
-from grader.authoring.mutation.session import Plan, run_test
-from grader.authoring.mutation.solution import Solution
-from grader.authoring.mutation.write import mutants_text
+from grader.authoring.mutation.declared import load_mutants, mutants_file, mutants_text
+from grader.authoring.mutation.plan import (
+    Planned,
+    plan_all,
+    plan_declared,
+    refuse_unfit,
+    select_mutants,
+)
+from grader.authoring.mutation.rubric_test import Plan, run_test
+from grader.authoring.mutation.solution import (
+    Solution,
+    find_reference,
+    load_solution,
+    reference_at,
+)
 from grader.cli.display import open_progress
 from grader.cli.inherited_limits import make_room
 from grader.cli.mutants import print_test
@@ -42,10 +51,10 @@ def run(
     """Test, show, and write what was lost to the file `write`, where one is given."""
     make_room(gradings=jobs)
     loaded = load_rubric(rubric)
-    reference = given_reference(solution) if solution else find_reference(loaded)
+    reference = reference_at(solution) if solution else find_reference(loaded)
     correct = load_solution(reference, loaded.rubric.package)
     mutants, unfit = _planned(loaded, correct, own=solution is not None, everything=write is not None)
-    picked = chosen(mutants, only)
+    picked = select_mutants(mutants, only)
     for place in filter(None, (out, write and write.absolute().parent)):
         check_writable(place)
     folder = out or Path(tempfile.mkdtemp(prefix="grader-mutants-"))
@@ -64,7 +73,8 @@ def run(
     say_unwalled(sandbox, loaded)
     test = _tested(plan, temporary=out is None)
     if write is not None and not test.reference.lost:
-        atomic_write(write, mutants_text(loaded.rubric.id, plan.mutants, test.mutants).encode(), public=True)
+        text = mutants_text(loaded.rubric.id, {m.name: m.mutant for m in plan.mutants}, test.mutants)
+        atomic_write(write, text.encode(), public=True)
     if as_json:
         say_json(test.model_dump(mode="json", by_alias=True))
     else:

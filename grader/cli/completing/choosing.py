@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from grader.cli.completing.labs import explained, lab_ids, mistakes, operators
+from grader.cli.completing.labs import explained, lab_ids, mistakes, mutants
 from grader.cli.completing.paths import paths
 from grader.cli.parsing.walk import value_of
 
@@ -48,7 +48,7 @@ BY_VALUE: dict[str, Completer] = {
     "ID|FILE": _either(lab_ids, partial(paths, endings=RUBRICS)),
     "LAB": lab_ids,
     "LAB|FILE": _either(lab_ids, partial(paths, endings=RUBRICS)),
-    "MUTANT": operators,
+    "MUTANT": mutants,
     "N": nothing,
     "NAME": nothing,
     "PATH": ANY,

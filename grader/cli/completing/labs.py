@@ -6,7 +6,6 @@ Read from the files as YAML alone. To load rubrics properly takes longer than so
 from __future__ import annotations
 
 import argparse
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -37,15 +36,14 @@ def explained(*, prefix: str, parsed_args: argparse.Namespace, **_asked: object)
     return {**_checks(), **criteria, **labs}
 
 
-def operators(*, parsed_args: argparse.Namespace, **_asked: object) -> dict[str, str]:
-    """The operators that the mutants of the named lab are made with."""
-    return dict.fromkeys(sorted(set(_mutants(str(getattr(parsed_args, "rubric", ""))))), "")
+def mutants(*, parsed_args: argparse.Namespace, **_asked: object) -> dict[str, str]:
+    """The faulty packages that the named lab's rubric is tested with."""
+    return _mutants(str(getattr(parsed_args, "rubric", "")))
 
 
 def mistakes(*, parsed_args: argparse.Namespace, **_asked: object) -> dict[str, str]:
-    """Those operators of the named lab that make one mutant only: the mistake has the operator's name, too."""
-    counted = Counter(_mutants(str(getattr(parsed_args, "lab", ""))))
-    return {name: "" for name, times in sorted(counted.items()) if times == 1}
+    """The faulty packages of the named lab, for `grader example --mistake`."""
+    return _mutants(str(getattr(parsed_args, "lab", "")))
 
 
 def _checks() -> dict[str, str]:
@@ -61,10 +59,18 @@ def _criteria(path: Path) -> Iterator[tuple[str, str]]:
             yield str(criterion.get("id", "")), _line(criterion.get("title"))
 
 
-def _mutants(lab: str) -> Iterator[str]:
-    if lab in rubric_ids():
-        for mutant in _entries(rubrics_folder() / "mutants" / f"{lab}.yaml", "mutants"):
-            yield str(mutant.get("operator", ""))
+def _mutants(lab: str) -> dict[str, str]:
+    declared = (
+        _read(rubrics_folder().parent / "fixtures" / f"{lab}.yaml").get("mutants")
+        if lab in rubric_ids()
+        else {}
+    )
+    found = declared.items() if isinstance(declared, dict) else ()
+    return {
+        str(name): _line(mutant.get("summary"))
+        for name, mutant in found
+        if isinstance(mutant, dict) and mutant.get("expect")
+    }
 
 
 def _shipped(lab: str) -> Path:

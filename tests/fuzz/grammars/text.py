@@ -159,8 +159,8 @@ def mutants() -> SearchStrategy[bytes]:
         "schema: grader.mutants/1\nrubric: leeds-comp3631-lab1\n",
         ("mutants", "rubric", "schema"),
         (
-            "[{operator: other-rate, at: {script: src/a.py}, with: {factor: 2}, costs: {chatter-rate: fail}}]",
-            "[{operator: crlf, costs: {x: blocked}, also: [{operator: bit-removed}]}]",
+            "{a: {edits: [{operator: other-rate, at: {script: src/a.py}, with: {factor: 2}}], expect: {rate: fail}}}",
+            "{b: {expect: {x: blocked}, edits: [{operator: crlf}, {replace: {file: a, old: b, new: c}}]}}",
         ),
     )
 

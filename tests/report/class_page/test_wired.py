@@ -6,12 +6,13 @@ import html
 import shlex
 
 from grader.cli.main import run
-from tests.batch.a_class import CORRECT, ROOT, RUBRIC, WRONG_NAME, batch, roster_of
+from tests.batch.a_class import CORRECT, ROOT, RUBRIC, WRONG_NAME, batch, handed_in, roster_of
 from tests.report.class_page.test_page import data_of
 
 
 def test_a_batch_writes_the_page_beside_the_gradebook(tmp_path, capsys) -> None:
-    rows = [f"ada,{CORRECT},Ada", f"b b,{WRONG_NAME},Bob", f"zoe,{tmp_path}/nowhere/at/all,Zoe"]
+    handed_in(tmp_path, ["bob"], WRONG_NAME)
+    rows = [f"ada,{CORRECT},Ada", "b b,bob,Bob", f"zoe,{tmp_path}/nowhere/at/all,Zoe"]
     roster, out = roster_of(tmp_path, rows, "id,source,name"), tmp_path / "out"
     batch(roster, out, "--allow-local", str(ROOT))
     data = data_of(out / "index.html")

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 
 from pydantic import Field
 
-from grader.authoring.mutation.registry import NoParams, operator
-from grader.authoring.mutation.solution import Site, Solution
-from grader.authoring.mutation.spans import Edit, whole_lines
-from grader.authoring.mutation.words import misspelt_name
-from grader.authoring.mutation.xml import Document, Element
+from grader.authoring.mutation.registry import Finder, operator
+from grader.authoring.mutation.solution import Place, Solution
+from grader.authoring.mutation.text_edits import Edit, misspelt_name, whole_lines
+from grader.authoring.mutation.xml_document import Document, Element
 from grader.model.record import Record
 
 URL = re.compile(r"""https?://[^\s"'<>]+""")
+FIREFOX = re.compile(r"^[ \t]*firefox\b.*$", re.MULTILINE)
 
 
 class RemapParams(Record):
@@ -23,194 +23,165 @@ class RemapParams(Record):
     topic: str = Field(default="chatter", min_length=1)
 
 
-def _nodes(solution: Solution, *needed: str) -> Iterator[tuple[Document, Element]]:
-    """Every `<node>` that has these attributes."""
+def _elements(tag: str, *needed: str, named: bool = True) -> Finder:
+    """Return a finder of the elements with this tag and these attributes."""
+
+    def find(solution: Solution) -> Iterator[tuple[Place, Document, Element]]:
+        for document in solution.launch_files:
+            for element in document.elements(tag):
+                if set(needed) <= element.attributes.keys():
+                    name = element.attributes.get("name") or element.attributes.get("type") or tag
+                    at = {"file": document.path, **({tag: name} if named else {})}
+                    line = document.line(element)
+                    yield Place(path=document.path, at=at, line=line, xml=document), document, element
+
+    return find
+
+
+def _documents(solution: Solution) -> Iterator[tuple[Place, Document]]:
     for document in solution.launch_files:
-        for node in document.elements("node"):
-            if set(needed) <= node.attributes.keys():
-                yield document, node
+        yield Place(path=document.path, at={"file": document.path}, xml=document), document
 
 
-def _site(solution: Solution, document: Document, element: Element, *edits: Edit, **at: str) -> Site:
-    shown = element.attributes.get("name") or element.attributes.get("type") or element.tag
-    key = at or {element.tag: shown}
-    return Site(
-        at={"file": document.path, **key},
-        tree=solution.edited_xml(document, edits),
-        line=document.line(element),
-    )
+def _matches(pattern: re.Pattern[str], *endings: str) -> Finder:
+    """Return a finder of what fits the pattern in files with these endings."""
+
+    def find(solution: Solution) -> Iterator[tuple[Place, str, re.Match[str]]]:
+        for path in (path for path in solution.files if path.endswith(endings)):
+            text = solution.text(path)
+            for match in pattern.finditer(text):
+                yield Place(path=path, at={"file": path}), text, match
+
+    return find
 
 
-@operator("launch-type-without-py")
-def launch_type_without_py(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("launch-type-without-py", each=_elements("node", "type"))
+def launch_type_without_py(document: Document, node: Element) -> list[Edit]:
     """Leaves .py away in a node's type.
 
     Fits every node whose type ends in .py.
     """
-    for document, node in _nodes(solution, "type"):
-        kind = node.attributes["type"]
-        if kind.endswith(".py"):
-            edit = document.set_attribute(node, "type", kind.removesuffix(".py"))
-            yield _site(solution, document, node, edit)
+    kind = node.attributes["type"]
+    return [document.set_attribute(node, "type", kind.removesuffix(".py"))] if kind.endswith(".py") else []
 
 
-@operator("launch-malformed")
-def launch_malformed(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("launch-malformed", each=_documents)
+def launch_malformed(document: Document) -> list[Edit]:
     """Forgets to close a node's tag.
 
     Fits every launch file with a node.
     """
-    for document in solution.launch_files:
-        for node in document.elements("node")[:1]:
-            closed_itself = document.data[node.inner - 2 : node.inner] == b"/>"
-            end = node.inner if closed_itself else node.end
-            start = end - 2 if closed_itself else document.data.rfind(b"</", 0, end)
-            edit = Edit(start, end, ">" if closed_itself else "")
-            yield Site(
-                at={"file": document.path},
-                tree=solution.edited_xml(document, [edit]),
-                line=document.line(node),
-            )
+    for node in document.elements("node"):
+        if document.data[node.inner - 2 : node.inner] == b"/>":
+            return [Edit(node.inner - 2, node.inner, ">")]
+        return [Edit(document.data.rfind(b"</", 0, node.end), node.end, "")]
+    return []
 
 
-@operator("launch-remapped-apart", params=RemapParams)
-def launch_remapped_apart(solution: Solution, params: RemapParams) -> Iterator[Site]:
+@operator("launch-remapped-apart", each=_elements("node"), params=RemapParams)
+def launch_remapped_apart(document: Document, node: Element, params: RemapParams) -> list[Edit]:
     """Remaps a topic for one node only, so that the nodes miss each other.
 
     Fits every node of a launch file that starts two or more.
     """
     remap = f'<remap from="{params.topic}" to="my_{params.topic}"/>'
-    for document, node in _nodes(solution):
-        if len(document.elements("node")) < 2:
-            continue
-        if document.data[node.inner - 2 : node.inner] == b"/>":
-            edit = Edit(node.inner - 2, node.inner, f">{remap}</node>")
-        else:
-            edit = Edit(node.inner, node.inner, remap)
-        yield _site(solution, document, node, edit)
+    if len(document.elements("node")) < 2:
+        return []
+    if document.data[node.inner - 2 : node.inner] == b"/>":
+        return [Edit(node.inner - 2, node.inner, f">{remap}</node>")]
+    return [Edit(node.inner, node.inner, remap)]
 
 
-@operator("launch-node-dropped")
-def launch_node_dropped(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("launch-node-dropped", each=_elements("node"))
+def launch_node_dropped(document: Document, node: Element) -> list[Edit]:
     """Does not start one of the nodes.
 
     Fits every node of a launch file.
     """
-    for document, node in _nodes(solution):
-        yield _site(solution, document, node, document.remove(node))
+    return [document.remove(node)]
 
 
-@operator("launch-name-missing")
-def launch_name_missing(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("launch-name-missing", each=_elements("node", "name"))
+def launch_name_missing(document: Document, node: Element) -> list[Edit]:
     """Gives a node no name.
 
     Fits every node of a launch file with a name.
     """
-    for document, node in _nodes(solution, "name"):
-        yield _site(solution, document, node, document.remove_attribute(node, "name"))
+    return [document.remove_attribute(node, "name")]
 
 
-@operator("launch-name-changed")
-def launch_name_changed(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("launch-name-changed", each=_elements("node", "name"))
+def launch_name_changed(document: Document, node: Element) -> list[Edit]:
     """Gives a node another name in the launch file.
 
     Fits every node of a launch file with a name.
     """
-    for document, node in _nodes(solution, "name"):
-        edit = document.set_attribute(node, "name", f"my_{node.attributes['name']}")
-        yield _site(solution, document, node, edit)
+    return [document.set_attribute(node, "name", f"my_{node.attributes['name']}")]
 
 
-@operator("launch-pkg-misspelt")
-def launch_pkg_misspelt(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("launch-pkg-misspelt", each=_elements("node", "pkg"))
+def launch_pkg_misspelt(document: Document, node: Element) -> list[Edit]:
     """Misspells the package of a node.
 
     Fits every node of a launch file with a package.
     """
-    for document, node in _nodes(solution, "pkg"):
-        edit = document.set_attribute(node, "pkg", misspelt_name(node.attributes["pkg"]))
-        yield _site(solution, document, node, edit)
+    return [document.set_attribute(node, "pkg", misspelt_name(node.attributes["pkg"]))]
 
 
-@operator("launch-root-misspelt")
-def launch_root_misspelt(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("launch-root-misspelt", each=_documents)
+def launch_root_misspelt(document: Document) -> list[Edit]:
     """Begins the launch file with another tag than <launch>.
 
     Fits every launch file.
     """
-    for document in solution.launch_files:
-        root = document.root
-        close = document.data.rfind(b"</launch") if root is not None and root.tag == "launch" else -1
-        if root is not None and close >= 0:
-            edits = [Edit(root.start + 1, root.start + 7, "lauch"), Edit(close + 2, close + 8, "lauch")]
-            yield Site(at={"file": document.path}, tree=solution.edited_xml(document, edits), line=1)
+    root = document.root
+    close = document.data.rfind(b"</launch") if root is not None and root.tag == "launch" else -1
+    if root is None or close < 0:
+        return []
+    return [Edit(root.start + 1, root.start + 7, "lauch"), Edit(close + 2, close + 8, "lauch")]
 
 
-@operator("launch-param-altered")
-def launch_param_altered(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("launch-param-altered", each=_elements("param"))
+def launch_param_altered(document: Document, param: Element) -> list[Edit]:
     """Sets a parameter to another value.
 
     Fits every parameter of a launch file with a number as its value.
     """
-    for document in solution.launch_files:
-        for element in document.elements("param"):
-            value = element.attributes.get("value", "")
-            if value.strip().isdigit():
-                edit = document.set_attribute(element, "value", str(int(value) + 1))
-                yield _site(solution, document, element, edit)
+    value = param.attributes.get("value", "").strip()
+    return [document.set_attribute(param, "value", str(int(value) + 1))] if value.isdigit() else []
 
 
-@operator("launch-param-dropped")
-def launch_param_dropped(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("launch-param-dropped", each=_elements("param"))
+def launch_param_dropped(document: Document, param: Element) -> list[Edit]:
     """Does not set a parameter.
 
     Fits every parameter of a launch file.
     """
-    for document in solution.launch_files:
-        for element in document.elements("param"):
-            yield _site(solution, document, element, document.remove(element))
+    return [document.remove(param)]
 
 
-@operator("launch-load-dropped")
-def launch_load_dropped(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("launch-load-dropped", each=_elements("rosparam", "file", named=False))
+def launch_load_dropped(document: Document, load: Element) -> list[Edit]:
     """Does not load the parameters' file.
 
     Fits every <rosparam> of a launch file with a file.
     """
-    for document in solution.launch_files:
-        for element in document.elements("rosparam"):
-            if "file" in element.attributes:
-                edit = document.remove(element)
-                yield Site(
-                    at={"file": document.path},
-                    tree=solution.edited_xml(document, [edit]),
-                    line=document.line(element),
-                )
+    return [document.remove(load)]
 
 
-@operator("url-changed")
-def url_changed(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("url-changed", each=_matches(URL, ".sh", ".launch"))
+def url_changed(_text: str, match: re.Match[str]) -> list[Edit]:
     """Opens another page.
 
     Fits every address in a launch file or a shell script.
     """
-    for path in solution.files:
-        if path.endswith((".sh", ".launch")):
-            for match in URL.finditer(solution.text(path)):
-                edit = Edit(*match.span(), "https://www.example.org/")
-                line = solution.text(path).count("\n", 0, match.start()) + 1
-                yield Site(at={"file": path}, tree=solution.edited(path, [edit]), line=line)
+    return [Edit(*match.span(), "https://www.example.org/")]
 
 
-@operator("command-dropped")
-def command_dropped(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("command-dropped", each=_matches(FIREFOX, ".sh"))
+def command_dropped(text: str, match: re.Match[str]) -> list[Edit]:
     """Leaves the shell script without the command that opens the page.
 
     Fits every shell script with a line that runs firefox.
     """
-    for path in solution.files:
-        text = solution.text(path) if path.endswith(".sh") else ""
-        for match in re.finditer(r"^[ \t]*firefox\b.*$", text, re.MULTILINE):
-            edit = Edit(*whole_lines(text, *match.span()), "")
-            line = text.count("\n", 0, match.start()) + 1
-            yield Site(at={"file": path}, tree=solution.edited(path, [edit]), line=line)
+    return [Edit(*whole_lines(text, *match.span()), "")]

@@ -1,27 +1,37 @@
-"""Topics that are missing, misnamed or of another type."""
+"""Topics that are missing, misnamed or of another type, and when messages come."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
-from grader.authoring.mutation.counter import counted_names
-from grader.authoring.mutation.data import Assignment, sources, targets
-from grader.authoring.mutation.every_second import every_second_time
-from grader.authoring.mutation.python import Script
-from grader.authoring.mutation.registry import NoParams, operator
-from grader.authoring.mutation.ros import Endpoint, calls, last_name, publish_calls, publishers, subscribers
-from grader.authoring.mutation.solution import Site, Solution
-from grader.authoring.mutation.spans import Edit
-from grader.authoring.mutation.words import misspelt_name
+from pydantic import Field
+
+from grader.authoring.mutation.python_script import Function, Script, every_second_time
+from grader.authoring.mutation.registry import operator
+from grader.authoring.mutation.rospy_code import (
+    Assignment,
+    Endpoint,
+    argument,
+    calls,
+    counted_names,
+    each_endpoint,
+    each_publisher,
+    each_subscriber,
+    last_name,
+    literal,
+    loops,
+    publish_calls,
+    rate_sleeps,
+    script_place,
+    sources,
+    targets,
+)
+from grader.authoring.mutation.solution import Place, Solution
+from grader.authoring.mutation.text_edits import Edit, misspelt_name
 from grader.model.record import Record
-
-
-class OtherTypeParams(Record):
-    """`to`: the name of the other type, of the same package; by default a near one."""
-
-    to: str = ""
-
 
 OTHER_TYPES = {
     "Int8": "Int16",
@@ -35,50 +45,39 @@ OTHER_TYPES = {
 }
 
 
-def _endpoints(solution: Solution) -> Iterator[tuple[Script, Endpoint]]:
-    for script in solution.scripts:
-        for endpoint in (*publishers(script), *subscribers(script)):
-            yield script, endpoint
+class OtherTypeParams(Record):
+    """`to`: the name of the other type, of the same package; by default a near one."""
+
+    to: str = ""
 
 
-def _site(solution: Solution, script: Script, endpoint: Endpoint, edits: Sequence[Edit]) -> Site:
-    at = {"script": script.path, "topic": endpoint.topic}
-    return Site(at=at, tree=solution.edited(script.path, edits), line=endpoint.call.lineno)
-
-
-@operator("topic-misspelt")
-def topic_misspelt(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("topic-misspelt", each=each_endpoint)
+def topic_misspelt(script: Script, endpoint: Endpoint) -> list[Edit]:
     """Misspells the topic.
 
     Fits every publisher and subscriber whose topic is written out.
     """
-    for script, endpoint in _endpoints(solution):
-        name = str(endpoint.name.value)
-        yield _site(solution, script, endpoint, [script.replace(endpoint.name, repr(misspelt_name(name)))])
+    return [script.replace(endpoint.name, repr(misspelt_name(str(endpoint.name.value))))]
 
 
-@operator("topic-capital")
-def topic_capital(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("topic-capital", each=each_endpoint)
+def topic_capital(script: Script, endpoint: Endpoint) -> list[Edit]:
     """Writes the topic with a capital letter.
 
     Fits every publisher and subscriber whose topic is written out.
     """
-    for script, endpoint in _endpoints(solution):
-        head, slash, tail = str(endpoint.name.value).rpartition("/")
-        name = f"{head}{slash}{tail[:1].upper()}{tail[1:]}"
-        yield _site(solution, script, endpoint, [script.replace(endpoint.name, repr(name))])
+    head, slash, tail = str(endpoint.name.value).rpartition("/")
+    return [script.replace(endpoint.name, repr(f"{head}{slash}{tail[:1].upper()}{tail[1:]}"))]
 
 
-@operator("private-topic")
-def private_topic(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("private-topic", each=each_endpoint)
+def private_topic(script: Script, endpoint: Endpoint) -> list[Edit]:
     """Puts the topic into the node's private namespace.
 
     Fits every publisher and subscriber whose topic is written out.
     """
-    for script, endpoint in _endpoints(solution):
-        name = str(endpoint.name.value).lstrip("/~")
-        edits = [script.replace(endpoint.name, repr(f"~{name}"))]
-        yield _site(solution, script, endpoint, edits + _node_first(script, endpoint))
+    name = str(endpoint.name.value).lstrip("/~")
+    return [script.replace(endpoint.name, repr(f"~{name}")), *_node_first(script, endpoint)]
 
 
 def _node_first(script: Script, endpoint: Endpoint) -> list[Edit]:
@@ -91,55 +90,42 @@ def _node_first(script: Script, endpoint: Endpoint) -> list[Edit]:
     return [script.before(made, script.source(later[0])), script.remove(later[0])]
 
 
-@operator("publisher-dropped")
-def publisher_dropped(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("publisher-dropped", each=each_publisher)
+def publisher_dropped(script: Script, publisher: Endpoint) -> list[Edit]:
     """Removes a publisher that should stay.
 
     Fits every publisher that is kept in a variable.
     """
-    for script in solution.scripts:
-        for publisher in publishers(script):
-            statements = [script.statement(call) for call in publish_calls(script, publisher)]
-            if publisher.target and all(isinstance(s, ast.Expr) for s in statements):
-                edits = [script.remove(script.statement(publisher.call))]
-                edits += [script.replace(s, "pass") for s in statements]
-                yield _site(solution, script, publisher, edits)
+    statements = [script.statement(call) for call in publish_calls(script, publisher)]
+    if not publisher.target or not all(isinstance(s, ast.Expr) for s in statements):
+        return []
+    return [script.remove(script.statement(publisher.call)), *(script.replace(s, "pass") for s in statements)]
 
 
-@operator("subscriber-dropped")
-def subscriber_dropped(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("subscriber-dropped", each=each_subscriber)
+def subscriber_dropped(script: Script, subscriber: Endpoint) -> list[Edit]:
     """Removes a subscriber that should stay.
 
     Fits every subscriber.
     """
-    for script in solution.scripts:
-        for subscriber in subscribers(script):
-            yield _site(solution, script, subscriber, [script.remove(script.statement(subscriber.call))])
+    return [script.remove(script.statement(subscriber.call))]
 
 
-@operator("other-type", params=OtherTypeParams)
-def other_type(solution: Solution, params: OtherTypeParams) -> Iterator[Site]:
+@operator("other-type", each=each_endpoint, params=OtherTypeParams)
+def other_type(script: Script, endpoint: Endpoint, params: OtherTypeParams) -> list[Edit]:
     """Takes another message type.
 
     Fits every publisher and subscriber of a number or a text of std_msgs.
     """
-    for script, endpoint in _endpoints(solution):
-        to = params.to or OTHER_TYPES.get(endpoint.type_name, "")
-        edits = _retyped(script, endpoint, to) if to else []
-        if edits:
-            yield _site(solution, script, endpoint, edits)
-
-
-def _retyped(script: Script, endpoint: Endpoint, to: str) -> list[Edit]:
-    if endpoint.type is None:
+    to = params.to or OTHER_TYPES.get(endpoint.type_name, "")
+    if not to or endpoint.type is None:
         return []
-    publishes = last_name(endpoint.call.func) == "Publisher"
-    uses: list[ast.expr] = [endpoint.type]
-    edits: list[Edit] = []
-    if publishes and endpoint.type_name == "String":
-        edits += _numbers_for_texts(script, endpoint)
-    elif publishes:
-        uses += _made(script, endpoint)
+    uses, edits = [endpoint.type], list[Edit]()
+    if last_name(endpoint.call.func) == "Publisher":
+        if endpoint.type_name == "String":
+            edits = _send_time(script, endpoint)
+        else:
+            uses += _made(script, endpoint)
     for use in uses:
         name = f"{script.source(use.value)}.{to}" if isinstance(use, ast.Attribute) else to
         edits.append(script.replace(use, name))
@@ -153,15 +139,13 @@ def _made(script: Script, publisher: Endpoint) -> list[ast.expr]:
     return [call.func for call in dict.fromkeys(made) if last_name(call.func) == publisher.type_name]
 
 
-def _numbers_for_texts(script: Script, publisher: Endpoint) -> list[Edit]:
+def _send_time(script: Script, publisher: Endpoint) -> list[Edit]:
     """A text cannot be sent as a number: the time is sent in its place."""
     found = []
     for call in publish_calls(script, publisher):
-        arguments = [*call.args, *(k.value for k in call.keywords)]
-        if arguments:
-            start = min(script.span(a)[0] for a in (*call.args, *call.keywords))
-            end = max(script.span(a)[1] for a in (*call.args, *call.keywords))
-            found.append(Edit(start, end, "rospy.get_time()"))
+        spans = [script.span(given) for given in (*call.args, *call.keywords)]
+        if spans:
+            found.append(Edit(min(spans)[0], max(end for _, end in spans), "rospy.get_time()"))
     return found
 
 
@@ -179,42 +163,174 @@ def _import(script: Script, kind: ast.expr, to: str) -> list[Edit] | None:
     return None
 
 
-@operator("publish-half")
-def publish_half(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("publish-half", each=each_publisher)
+def publish_half(script: Script, publisher: Endpoint) -> list[Edit]:
     """Publishes this topic in every second turn only, its counter with it.
 
     Fits every publisher whose messages are sent by a statement of their own.
     """
-    for script in solution.scripts:
-        for publisher in publishers(script):
-            statements = _sending(script, publisher)
-            edits = every_second_time(script, statements) if statements else []
-            if edits:
-                yield _site(solution, script, publisher, edits)
-
-
-def _sending(script: Script, publisher: Endpoint) -> list[ast.stmt]:
-    """The statement that publishes, and those of the same block that count what is published."""
     sent = [script.statement(call) for call in publish_calls(script, publisher)]
     if len(sent) != 1 or not isinstance(sent[0], ast.Expr):
         return []
     counted = counted_names(script, publisher)
-    return [s for s in script.block(sent[0]) if s is sent[0] or _assigns(s, counted)]
+    block = [s for s in script.block(sent[0]) if s is sent[0] or _assigns(s, counted)]
+    return every_second_time(script, block)
 
 
 def _assigns(statement: ast.stmt, names: set[str]) -> bool:
     return any(isinstance(n, Assignment) and targets(n) & names for n in ast.walk(statement))
 
 
-@operator("published-twice")
-def published_twice(solution: Solution, _params: NoParams) -> Iterator[Site]:
+@operator("published-twice", each=each_publisher)
+def published_twice(script: Script, publisher: Endpoint) -> list[Edit]:
     """Publishes each message twice.
 
     Fits every publisher whose messages are sent by a statement of their own.
     """
+    sent = [script.statement(call) for call in publish_calls(script, publisher)][:1]
+    own = [s for s in sent if isinstance(s, ast.Expr) and script.has_lines(s)]
+    return [script.after(statement, script.source(statement)) for statement in own]
+
+
+# ---- when messages come
+
+
+class RateParams(Record):
+    """`factor`: how many times as fast as it should be."""
+
+    factor: float = Field(default=0.5, gt=0)
+
+
+class BurstParams(Record):
+    """`count`: how many messages at once."""
+
+    count: int = Field(default=10, ge=2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pace:
+    """A number that sets how often something happens: a rate in Hz, or a period in seconds."""
+
+    node: ast.expr
+    value: float
+    unit: Literal["hz", "s"]
+
+    def times(self, factor: float) -> str:
+        """The number, as source, for `factor` times as often."""
+        value = self.value * factor if self.unit == "hz" else self.value / factor
+        return f"{value:.6g}"
+
+
+def paces(script: Script) -> list[Pace]:
+    """Rates, timers' periods, and sleeps in a loop."""
+    found = [_pace(script, argument(call, 0, "hz"), "hz") for call in calls(script, "Rate")]
+    for call in calls(script, "Timer"):
+        period = argument(call, 0, "period")
+        within = [c.args[0] for c in ast.walk(period or call) if isinstance(c, ast.Call) and _is_duration(c)]
+        found += [_pace(script, node, "s") for node in within]
+    for call in calls(script, "sleep"):
+        if call.args and any(isinstance(n, ast.While | ast.For) for n in script.above(call)):
+            found.append(_pace(script, call.args[0], "s"))
+    return [pace for pace in found if pace is not None]
+
+
+def _is_duration(call: ast.Call) -> bool:
+    return last_name(call.func) in {"Duration", "from_sec"} and bool(call.args)
+
+
+def _pace(script: Script, node: ast.expr | None, unit: Literal["hz", "s"]) -> Pace | None:
+    """`node` may be a constant, the name of one, or a quotient such as `1.0 / 10`."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Div):
+        above, below = _number(node.left), _number(node.right)
+        return Pace(node=node, value=above / below, unit=unit) if above and below else None
+    if isinstance(node, ast.Call) and _is_duration(node):
+        return _pace(script, node.args[0], unit)
+    constant = literal(script, node)
+    value = _number(constant)
+    return Pace(node=constant, value=value, unit=unit) if constant and value else None
+
+
+def _number(node: ast.AST | None) -> float:
+    value = node.value if isinstance(node, ast.Constant) else None
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else 0.0
+
+
+def _paces(solution: Solution) -> Iterator[tuple[Place, Script, Pace]]:
     for script in solution.scripts:
-        for publisher in publishers(script):
-            sent = [script.statement(call) for call in publish_calls(script, publisher)]
-            if sent and isinstance(sent[0], ast.Expr) and script.has_lines(sent[0]):
-                edits = [script.after(sent[0], script.source(sent[0]))]
-                yield _site(solution, script, publisher, edits)
+        for pace in paces(script):
+            yield script_place(script, pace.node), script, pace
+
+
+def _turns(solution: Solution) -> Iterator[tuple[Place, Script, Pace, list[ast.stmt]]]:
+    """Find what a loop or a timer's callback does in each turn, without the sleep, and the script's first pace."""
+    for script in solution.scripts:
+        names = {last_name(a) for call in calls(script, "Timer") if (a := argument(call, 1, "callback"))}
+        bodies = [loop.body for loop in loops(script)]
+        bodies += [f.body for f in script.of(ast.FunctionDef) if f.name in names]
+        first = paces(script)[:1]
+        for pace, body in ((pace, body) for pace in first for body in bodies):
+            kept = [s for s in body if not (_sleeps(s) or _declares(s))]
+            together = body[body.index(kept[0]) : body.index(kept[-1]) + 1] == kept if kept else False
+            publishes = any(last_name(c.func) == "publish" for c in _calls_in(script, kept))
+            if together and publishes and script.can_wrap(kept):
+                yield script_place(script, kept[0]), script, pace, kept
+
+
+def _declares(statement: ast.stmt) -> bool:
+    """A docstring, or names of variables from outside."""
+    text = isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+    return text or isinstance(statement, ast.Global | ast.Nonlocal)
+
+
+def _sleeps(statement: ast.stmt) -> bool:
+    return any(isinstance(n, ast.Call) and last_name(n.func) == "sleep" for n in ast.walk(statement))
+
+
+def _calls_in(script: Script, statements: Sequence[ast.stmt]) -> Iterator[ast.Call]:
+    """The calls in the statements, and in the script's own functions that they call."""
+    own = {f.name: f for f in script.of(ast.FunctionDef)}
+    waiting: list[ast.AST] = list(statements)
+    seen: set[Function] = set()
+    while waiting:
+        for node in ast.walk(waiting.pop()):
+            if isinstance(node, ast.Call):
+                yield node
+                called = own.get(last_name(node.func))
+                if called is not None and called not in seen:
+                    seen.add(called)
+                    waiting.append(called)
+
+
+@operator("other-rate", each=_paces, params=RateParams)
+def other_rate(script: Script, pace: Pace, params: RateParams) -> list[Edit]:
+    """Publishes at another rate.
+
+    Fits every script with a rate, a timer, or a sleep in a loop.
+    """
+    return [script.replace(pace.node, pace.times(params.factor))]
+
+
+@operator("burst", each=_turns, params=BurstParams)
+def burst(script: Script, pace: Pace, turn: list[ast.stmt], params: BurstParams) -> list[Edit]:
+    """Sends many messages at once and then none for long, with the right number in the mean.
+
+    Fits every script with a rate, a timer, or a sleep in a loop that publishes.
+    """
+    slower = script.replace(pace.node, pace.times(1 / params.count))
+    return [slower, script.wrap(turn, f"for _ in range({params.count}):")]
+
+
+def _rate_sleeps(solution: Solution) -> Iterator[tuple[Place, Script, ast.Expr]]:
+    for script in solution.scripts:
+        for statement in rate_sleeps(script):
+            yield script_place(script, statement), script, statement
+
+
+@operator("sleep-without-brackets", each=_rate_sleeps)
+def sleep_without_brackets(script: Script, statement: ast.Expr) -> list[Edit]:
+    """Names rate.sleep but does not call it, so that the loop floods its topics.
+
+    Fits every script with a statement rate.sleep().
+    """
+    call = statement.value
+    return [script.replace(statement, script.source(call.func))] if isinstance(call, ast.Call) else []

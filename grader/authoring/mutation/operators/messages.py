@@ -1,0 +1,315 @@
+"""What messages say, how counters count, and listeners that do not say what they hear."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+from pydantic import Field
+
+from grader.authoring.mutation.python_script import Function, Script, every_second_time
+from grader.authoring.mutation.registry import Finder, operator
+from grader.authoring.mutation.rospy_code import (
+    INTEGER_TYPES,
+    Counter,
+    each_publisher,
+    each_subscriber,
+    find_counter,
+    message_name,
+    publishers,
+    script_place,
+    sources,
+    speech,
+)
+from grader.authoring.mutation.solution import Place, Solution
+from grader.authoring.mutation.text_edits import Edit, misspelt_literal, texts_in
+from grader.model.record import Record
+
+# ---- what a message says
+
+SECONDS = {"rospy.get_time()": "1700000000.0", "time.time()": "1700000000.0"}
+TIMES = {"rospy.Time.now()": "rospy.Time(1700000000)", "rospy.get_rostime()": "rospy.Time(1700000000)"}
+NANOSECONDS = "rospy.Time.now().to_nsec()"
+
+
+def _messages(solution: Solution) -> Iterator[tuple[Place, Script, list[ast.expr]]]:
+    """Find the publishers, each with the expressions that its messages are made of."""
+    for place, script, publisher in each_publisher(solution):
+        yield script_place(script, topic=str(place.at["topic"])), script, sources(script, publisher)
+
+
+def _calls(values: list[ast.expr]) -> list[ast.Call]:
+    return list(dict.fromkeys(n for value in values for n in ast.walk(value) if isinstance(n, ast.Call)))
+
+
+@operator("message-altered", each=_messages)
+def message_altered(script: Script, values: list[ast.expr]) -> list[Edit]:
+    """Misspells the message.
+
+    Fits every publisher whose messages are made from a text.
+    """
+    for text in (text for value in values for text in texts_in(value)):
+        misspelt = misspelt_literal(script.source(text))
+        if misspelt != script.source(text):
+            return [script.replace(text, misspelt)]
+    return []
+
+
+@operator("message-constant-time", each=_messages)
+def message_constant_time(script: Script, values: list[ast.expr]) -> list[Edit]:
+    """Sends the same time again and again.
+
+    Fits every publisher whose messages carry the time.
+    """
+    constants = SECONDS | TIMES
+    return [script.replace(c, constants[s]) for c in _calls(values) if (s := script.source(c)) in constants]
+
+
+@operator("message-nanoseconds", each=_messages)
+def message_nanoseconds(script: Script, values: list[ast.expr]) -> list[Edit]:
+    """Sends the time in nanoseconds, not in seconds.
+
+    Fits every publisher whose messages carry the time in seconds.
+    """
+    in_seconds = {*SECONDS, *(f"{time}.to_sec()" for time in TIMES)}
+    return [script.replace(c, NANOSECONDS) for c in _calls(values) if script.source(c) in in_seconds]
+
+
+# ---- counters
+
+
+class ByParams(Record):
+    """`by`: how far from the right number."""
+
+    by: int = Field(default=1, ge=1)
+
+
+class EarlyParams(Record):
+    """`by`: how many numbers too early."""
+
+    by: int = Field(default=28, ge=2)
+
+
+def _counters(solution: Solution) -> Iterator[tuple[Place, Script, Counter]]:
+    """Find the integer topics that are fed by a counter."""
+    for script in solution.scripts:
+        for publisher in publishers(script):
+            counter = find_counter(script, publisher)
+            if counter is not None:
+                yield script_place(script, topic=publisher.topic), script, counter
+
+
+def _add(script: Script, constants: list[ast.Constant], number: int) -> list[Edit]:
+    """Each of the constants once, changed by `number`."""
+    distinct = {script.span(c): c for c in constants}.values()
+    return [script.replace(c, str(c.value + number)) for c in distinct if isinstance(c.value, int)]
+
+
+def _set(script: Script, constants: list[ast.Constant], number: int) -> list[Edit]:
+    return [script.replace(c, str(number)) for c in {script.span(c): c for c in constants}.values()]
+
+
+@operator("counter-from-one", each=_counters)
+def counter_from_one(script: Script, counter: Counter) -> list[Edit]:
+    """Begins to count at 1.
+
+    Fits every integer topic that is fed by a counter with a first value.
+    """
+    return _set(script, counter.starts, 1)
+
+
+@operator("counter-skips", each=_counters, params=ByParams)
+def counter_skips(script: Script, counter: Counter, params: ByParams) -> list[Edit]:
+    """Counts in steps that are too large.
+
+    Fits every integer topic that is fed by a counter.
+    """
+    return _add(script, counter.steps, params.by)
+
+
+@operator("reset-early", each=_counters, params=EarlyParams)
+def reset_early(script: Script, counter: Counter, params: EarlyParams) -> list[Edit]:
+    """Goes back to the beginning too early.
+
+    Fits every counter with a limit that is written as a number.
+    """
+    return _add(script, counter.limits, -params.by)
+
+
+@operator("reset-late", each=_counters, params=ByParams)
+def reset_late(script: Script, counter: Counter, params: ByParams) -> list[Edit]:
+    """Goes back to the beginning too late.
+
+    Fits every counter with a limit that is written as a number.
+    """
+    return _add(script, counter.limits, params.by)
+
+
+@operator("reset-to-one", each=_counters)
+def reset_to_one(script: Script, counter: Counter) -> list[Edit]:
+    """Goes back to 1.
+
+    Fits every counter that is set back, or taken modulo a number.
+    """
+    return _back_to(script, counter, 1)
+
+
+@operator("wrap-to-minus-128", each=_counters)
+def wrap_to_minus_128(script: Script, counter: Counter) -> list[Edit]:
+    """Goes on at -128, as an 8-bit integer of C does.
+
+    Fits every counter that is set back, or taken modulo a number.
+    """
+    return _back_to(script, counter, -128)
+
+
+def _back_to(script: Script, counter: Counter, number: int) -> list[Edit]:
+    edits = _set(script, counter.resets, number)
+    for modulo in counter.modulos:
+        if isinstance(modulo.right, ast.Constant) and isinstance(modulo.right.value, int):
+            limit, value = modulo.right.value, script.source(modulo.left)
+            edits.append(script.replace(modulo, f"({value} if {value} < {limit} else {number})"))
+    return edits
+
+
+@operator("never-reset", each=_counters)
+def never_reset(script: Script, counter: Counter) -> list[Edit]:
+    """Never goes back to the beginning.
+
+    Fits every counter that is set back by an `if`, or taken modulo a number.
+    """
+    edits = [script.replace(modulo, script.source(modulo.left)) for modulo in counter.modulos]
+    for test in counter.tests:
+        if isinstance(test, ast.If):
+            edits += _without_if(script, test)
+        else:
+            counted = test.orelse if isinstance(test.body, ast.Constant) else test.body
+            edits.append(script.replace(test, script.source(counted)))
+    return edits
+
+
+def _without_if(script: Script, test: ast.If) -> list[Edit]:
+    """What is left where the branch that sets back is never taken."""
+    if not script.has_lines(test):
+        return []
+    counts = [b for b in (test.body, test.orelse) if b and not _sets_back(b)]
+    if not counts:
+        return [script.remove(test)]
+    lines = [script.source(statement) for statement in counts[0]]
+    return [script.replace(test, f"\n{script.indentation(test)}".join(lines))]
+
+
+def _sets_back(block: list[ast.stmt]) -> bool:
+    return any(isinstance(s, ast.Assign) and isinstance(s.value, ast.Constant) for s in block)
+
+
+# ---- listeners
+
+
+def _callbacks(*types: str) -> Finder:
+    """Return a finder of subscribers (of these types only, if any) with a callback that is a function of the script.
+
+    With the callback come the name of its message and the statements that print or log.
+    """
+
+    def find(solution: Solution) -> Iterator[tuple[Place, Script, Function, str, list[ast.Expr]]]:
+        for place, script, subscriber in each_subscriber(solution):
+            callback = subscriber.callback
+            message = message_name(callback) if isinstance(callback, Function) else ""
+            if isinstance(callback, Function) and message and (not types or subscriber.type_name in types):
+                there = script_place(script, callback, topic=str(place.at["topic"]))
+                yield there, script, callback, message, speech(script, callback)
+
+    return find
+
+
+any_callback = _callbacks()
+integer_callback = _callbacks(*INTEGER_TYPES)
+
+
+def _replace_data(script: Script, callback: Function, message: str, text: str) -> list[Edit]:
+    """Put `text` where the callback reads the message's data."""
+    data = f"{message}.data"
+    reads = [n for n in ast.walk(callback) if isinstance(n, ast.Attribute) and script.source(n) == data]
+    return [script.replace(node, text) for node in reads]
+
+
+@operator("listener-silent", each=any_callback)
+def listener_silent(script: Script, _callback: Function, _message: str, said: list[ast.Expr]) -> list[Edit]:
+    """Prints nothing of what it hears.
+
+    Fits every subscriber whose callback prints or logs.
+    """
+    return [script.replace(statement, "pass") for statement in said]
+
+
+@operator("listener-constant", each=any_callback)
+def listener_constant(script: Script, _callback: Function, _message: str, said: list[ast.Expr]) -> list[Edit]:
+    """Prints that it heard something, and not what.
+
+    Fits every subscriber whose callback prints or logs.
+    """
+    named = [(s, s.value.func) for s in said if isinstance(s.value, ast.Call)]
+    return [script.replace(s, f"{script.source(function)}('I heard a message')") for s, function in named]
+
+
+@operator("listener-drops-zero", each=integer_callback)
+def listener_drops_zero(
+    script: Script, _callback: Function, message: str, said: list[ast.Expr]
+) -> list[Edit]:
+    """Prints every number but 0.
+
+    Fits every subscriber of integers whose callback prints or logs.
+    """
+    return [script.wrap([s], f"if {message}.data:") for s in said if script.can_wrap([s])]
+
+
+@operator("listener-drops-negative", each=integer_callback)
+def listener_drops_negative(script: Script, callback: Function, message: str, _said: object) -> list[Edit]:
+    """Prints a number without its sign.
+
+    Fits every subscriber of integers whose callback reads the message's data.
+    """
+    return _replace_data(script, callback, message, f"abs({message}.data)")
+
+
+@operator("listener-off-by-one", each=integer_callback)
+def listener_off_by_one(script: Script, callback: Function, message: str, _said: object) -> list[Edit]:
+    """Prints each number plus one.
+
+    Fits every subscriber of integers whose callback reads the message's data.
+    """
+    return _replace_data(script, callback, message, f"({message}.data + 1)")
+
+
+@operator("listener-drops-some", each=any_callback)
+def listener_drops_some(
+    script: Script, _callback: Function, _message: str, said: list[ast.Expr]
+) -> list[Edit]:
+    """Prints every second message only.
+
+    Fits every subscriber whose callback prints or logs.
+    """
+    return every_second_time(script, [s for s in said if script.block(s) is script.block(said[0])])
+
+
+@operator("listener-late", each=any_callback)
+def listener_late(script: Script, callback: Function, message: str, said: list[ast.Expr]) -> list[Edit]:
+    """Prints each message only when the next one comes, so that the last is lost.
+
+    Fits every subscriber whose callback prints or logs.
+    """
+    if not said or not script.has_lines(callback.body[0]):
+        return []
+    wait = (f"waiting.append({message})", "if len(waiting) < 2:", f"{script.unit}return")
+    lines = (*wait, f"{message} = waiting.pop(0)")
+    return [script.preamble("waiting = []"), script.before(callback.body[0], *lines)]
+
+
+@operator("callback-error", each=any_callback)
+def callback_error(script: Script, callback: Function, message: str, _said: object) -> list[Edit]:
+    """Misspells the message's variable in the callback.
+
+    Fits every subscriber whose callback reads the message's data.
+    """
+    return _replace_data(script, callback, message, f"the_{message}.data")

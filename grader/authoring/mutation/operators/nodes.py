@@ -1,0 +1,316 @@
+"""Names of nodes, how they live and end, what they log, and scripts that Python 3 does not run."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from typing import Literal
+
+from pydantic import Field
+
+from grader.authoring.mutation.python_script import Function, Script
+from grader.authoring.mutation.registry import operator
+from grader.authoring.mutation.rospy_code import (
+    LOGS,
+    argument,
+    calls,
+    each_script,
+    last_name,
+    loops,
+    script_place,
+    speech,
+    text_literal,
+)
+from grader.authoring.mutation.solution import Place, Solution
+from grader.authoring.mutation.text_edits import Edit, apply_edits, misspelt_literal, texts_in
+from grader.model.record import Record
+
+# ---- names
+
+
+def _init_nodes(solution: Solution) -> Iterator[tuple[Place, Script, ast.Call]]:
+    for script in solution.scripts:
+        for call in calls(script, "init_node"):
+            yield script_place(script, call), script, call
+
+
+def _anonymous(call: ast.Call) -> ast.keyword | None:
+    return next((k for k in call.keywords if k.arg == "anonymous"), None)
+
+
+def _is_anonymous(call: ast.Call) -> bool:
+    keyword = _anonymous(call)
+    return keyword is not None and isinstance(keyword.value, ast.Constant) and bool(keyword.value.value)
+
+
+@operator("name-changed", each=_init_nodes)
+def name_changed(script: Script, call: ast.Call) -> list[Edit]:
+    """Gives the node another name.
+
+    Fits every script with a node whose name is written out.
+    """
+    name = text_literal(script, argument(call, 0, "name"))
+    return [script.replace(name, repr(f"my_{name.value!s}"))] if name is not None else []
+
+
+@operator("not-anonymous", each=_init_nodes)
+def not_anonymous(script: Script, call: ast.Call) -> list[Edit]:
+    """Leaves out `anonymous=True`.
+
+    Fits every script with an anonymous node.
+    """
+    keyword = _anonymous(call)
+    return [script.replace(keyword.value, "False")] if keyword is not None and _is_anonymous(call) else []
+
+
+@operator("made-anonymous", each=_init_nodes)
+def made_anonymous(script: Script, call: ast.Call) -> list[Edit]:
+    """Makes the node anonymous where its plain name is asked for.
+
+    Fits every script with a node that is not anonymous.
+    """
+    keyword = _anonymous(call)
+    if _is_anonymous(call) or argument(call, 0, "name") is None:
+        return []
+    if keyword is not None:
+        return [script.replace(keyword.value, "True")]
+    end = max(script.span(node)[1] for node in (*call.args, *call.keywords))
+    return [Edit(end, end, ", anonymous=True")]
+
+
+# ---- how nodes live and end
+
+
+class EndsParams(Record):
+    """`turns`: how many rounds a loop makes before it ends."""
+
+    turns: int = Field(default=30, ge=1)
+
+
+def _lives(solution: Solution) -> Iterator[tuple[Place, Script, ast.While | ast.Expr]]:
+    """Find the loops that run until shutdown; in scripts without any, the calls of `spin`."""
+    for script in solution.scripts:
+        statements = (script.statement(call) for call in calls(script, "spin"))
+        spins = [statement for statement in statements if isinstance(statement, ast.Expr)]
+        for node in loops(script) or spins:
+            yield script_place(script, node), script, node
+
+
+@operator("node-ends-by-itself", each=_lives, params=EndsParams)
+def node_ends_by_itself(script: Script, life: ast.While | ast.Expr, params: EndsParams) -> list[Edit]:
+    """Lets the node come to its end: a loop that is counted, or no rospy.spin().
+
+    Fits every script with a loop until shutdown or a spin.
+    """
+    if isinstance(life, ast.Expr):
+        return [script.remove(life)]
+    return [Edit(script.span(life)[0], script.span(life.test)[1], f"for _ in range({params.turns})")]
+
+
+@operator("ctrl-c-swallowed", each=_lives)
+def ctrl_c_swallowed(script: Script, life: ast.While | ast.Expr) -> list[Edit]:
+    """Catches every exception and goes on, so that Ctrl-C does not end the node.
+
+    Fits every script with a loop until shutdown or a spin.
+    """
+    unit = script.unit
+    if isinstance(life, ast.While):
+        if not script.can_wrap(life.body):
+            return []
+        footer = ("except:", f"{unit}pass")
+        return [script.replace(life.test, "True"), script.wrap(life.body, "try:", footer=footer)]
+    if not script.has_lines(life):
+        return []
+    sleep = f"{unit * 2}rospy.rostime.wallsleep(0.1)"
+    lines = ("while True:", f"{unit}try:", sleep, f"{unit}except:", f"{unit * 2}pass")
+    return [script.before(life, *lines), script.remove(life)]
+
+
+@operator("traceback-on-exit", each=_lives)
+def traceback_on_exit(script: Script, life: ast.While | ast.Expr) -> list[Edit]:
+    """Uses a variable that is not there, once the node has been told to end.
+
+    Fits every script with a loop until shutdown or a spin.
+    """
+    wrong = "print('stopped after', turns_so_far)"
+    return [script.after(life, wrong)] if script.has_lines(life) else []
+
+
+# ---- what nodes log
+
+TEXT_LIMIT = 30
+LEVELS = {"debug": "logdebug", "info": "loginfo", "warn": "logwarn", "error": "logerr", "fatal": "logfatal"}
+
+
+class LevelParams(Record):
+    """`level`: the level that is taken."""
+
+    level: Literal["debug", "info", "warn", "error", "fatal"] = "warn"
+
+
+def _logs(solution: Solution) -> Iterator[tuple[Place, Script, ast.Expr, ast.Call]]:
+    """Find what is printed or logged. A place has the first words, as they are in the source."""
+    for script in solution.scripts:
+        for statement in speech(script):
+            call = statement.value
+            if isinstance(call, ast.Call) and call.args:
+                yield script_place(script, call, text=_first_words(script, call)), script, statement, call
+
+
+def _first_words(script: Script, call: ast.Call) -> str:
+    for text in (t for a in call.args for t in texts_in(a)):
+        words = str(text.value) if isinstance(text, ast.Constant) else script.source(text)
+        return " ".join(words.split())[:TEXT_LIMIT].rstrip()
+    return script.source(call.args[0])[:TEXT_LIMIT]
+
+
+@operator("log-level", each=_logs, params=LevelParams)
+def log_level(script: Script, _statement: ast.Expr, call: ast.Call, params: LevelParams) -> list[Edit]:
+    """Logs at another level.
+
+    Fits every call of rospy's logging.
+    """
+    if last_name(call.func) not in LOGS or not isinstance(call.func, ast.Attribute):
+        return []
+    return [script.replace(call.func, f"{script.source(call.func.value)}.{LEVELS[params.level]}")]
+
+
+@operator("log-text", each=_logs)
+def log_text(script: Script, _statement: ast.Expr, call: ast.Call) -> list[Edit]:
+    """Misspells what it prints or logs.
+
+    Fits every line that prints or logs a text.
+    """
+    texts = [t for a in call.args for t in texts_in(a)]
+    return [script.replace(text, misspelt_literal(script.source(text))) for text in texts[:1]]
+
+
+@operator("print-instead-of-log", each=_logs)
+def print_instead_of_log(script: Script, _statement: ast.Expr, call: ast.Call) -> list[Edit]:
+    """Prints where it should log.
+
+    Fits every call of rospy's logging.
+    """
+    if last_name(call.func) not in LOGS or call.keywords:
+        return []
+    words, *values = [script.source(a) for a in call.args]
+    return [script.replace(call, f"print({words} % ({', '.join(values)},))" if values else f"print({words})")]
+
+
+@operator("log-dropped", each=_logs)
+def log_dropped(script: Script, statement: ast.Expr, _call: ast.Call) -> list[Edit]:
+    """Does not print or log this.
+
+    Fits every line that prints or logs.
+    """
+    return [script.replace(statement, "pass")]
+
+
+# ---- scripts that Python 3 does not read, or that fail as soon as they run
+
+OPEN_QUOTE, CLOSE_QUOTE = "\u2018", "\u2019"
+
+
+def _if_broken(script: Script, *edits: Edit) -> list[Edit]:
+    """Return the edits if what comes out is really not Python 3."""
+    try:
+        compile(apply_edits(script.text, edits), script.path, "exec", dont_inherit=True)
+    except SyntaxError:
+        return list(edits)
+    return []
+
+
+@operator("python2-print", each=each_script)
+def python2_print(script: Script) -> list[Edit]:
+    """Prints as Python 2 does.
+
+    Fits every Python script that prints or logs something.
+    """
+    for statement in speech(script):
+        call = statement.value
+        words = script.source(call.args[0]) if isinstance(call, ast.Call) and call.args else "'here'"
+        return _if_broken(script, script.replace(statement, f"print {words}"))
+    return []
+
+
+@operator("tabs-and-spaces", each=each_script)
+def tabs_and_spaces(script: Script) -> list[Edit]:
+    """Mixes tabs and spaces.
+
+    Fits every Python script with a block of two lines.
+    """
+    return next((edits for s in script.of(ast.stmt) if (edits := _with_other_indentation(script, s))), [])
+
+
+def _with_other_indentation(script: Script, statement: ast.stmt) -> list[Edit]:
+    indentation = script.indentation(statement)
+    first = statement is script.block(statement)[0]
+    if not indentation or first or not script.has_lines(statement):
+        return []
+    start = script.starts[statement.lineno - 1]
+    if "\t" in indentation:
+        edit = Edit(start, start + len(indentation), indentation.expandtabs(8))
+    else:
+        edit = Edit(start, start + min(len(indentation), 8), "\t")
+    return _if_broken(script, edit)
+
+
+@operator("typographic-quote", each=each_script)
+def typographic_quote(script: Script) -> list[Edit]:
+    """Copies a text with its quotes from a PDF.
+
+    Fits every Python script with a text as an argument.
+    """
+    for text in (given for call in script.of(ast.Call) for given in call.args):
+        if isinstance(text, ast.Constant) and isinstance(text.value, str) and script.source(text)[0] in "'\"":
+            return _if_broken(script, script.replace(text, OPEN_QUOTE + str(text.value) + CLOSE_QUOTE))
+    return []
+
+
+@operator("no-break-space", each=each_script)
+def no_break_space(script: Script) -> list[Edit]:
+    """Copies a line from a PDF, with a space that is none for Python.
+
+    Fits every Python script with an assignment that has spaces around its sign.
+    """
+    for statement in script.of(ast.Assign):
+        _, end = script.span(statement.targets[-1])
+        if script.text[end : end + 3] == " = ":
+            return _if_broken(script, Edit(end + 2, end + 3, "\u00a0"))
+    return []
+
+
+@operator("syntax-error", each=each_script)
+def syntax_error(script: Script) -> list[Edit]:
+    """Forgets the colon after `def`, `class` or `while`.
+
+    Fits every Python script that has one of them.
+    """
+    for node in script.of(ast.stmt):
+        if isinstance(node, Function | ast.ClassDef | ast.While):
+            colon = script.text.rfind(":", script.span(node)[0], script.span(node.body[0])[0])
+            return _if_broken(script, Edit(colon, colon + 1, ""))
+    return []
+
+
+@operator("missing-module", each=each_script)
+def missing_module(script: Script) -> list[Edit]:
+    """Imports messages of a package that is not there.
+
+    Fits every Python script that imports rospy.
+    """
+    imports = [n for n in script.of(ast.Import) if any(a.name == "rospy" for a in n.names)]
+    return [script.after(statement, "from beginner_tutorials.msg import Num") for statement in imports[:1]]
+
+
+@operator("asks-for-input", each=each_script)
+def asks_for_input(script: Script) -> list[Edit]:
+    """Waits for somebody to press Enter before it makes its node.
+
+    Fits every Python script that makes a node.
+    """
+    for call in calls(script, "init_node"):
+        statement = script.statement(call)
+        sound = argument(call, 0, "name") is not None and script.has_lines(statement)
+        return [script.before(statement, "input('Press Enter to start')")] if sound else []
+    return []

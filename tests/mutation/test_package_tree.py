@@ -1,0 +1,76 @@
+from __future__ import annotations
+
+import pytest
+
+from grader.authoring.mutation import package_tree as tree_module
+from grader.authoring.mutation.package_tree import Entry, read_tree, unified_diff, write_tree
+from grader.authoring.mutation.text_edits import Edit, apply_edits
+from grader.errors import UsageError
+
+
+def test_what_is_written_is_read_back(tmp_path):
+    tree = {
+        "a/ü b.py": Entry(data=b"#!/bin/sh\r\n", executable=True),
+        "link": Entry(data=b"", link="nowhere/at/all"),
+        "bytes": Entry(data=bytes(range(256))),
+    }
+    write_tree(tree, tmp_path / "x")
+    assert read_tree(tmp_path / "x") == tree
+
+
+def test_writing_takes_the_place_of_what_was_there(tmp_path):
+    write_tree({"old": Entry(data=b"1")}, tmp_path / "x")
+    write_tree({"new": Entry(data=b"2")}, tmp_path / "x")
+    assert sorted(p.name for p in (tmp_path / "x").iterdir()) == ["new"]
+
+
+def test_without_modes_what_has_a_shebang_is_executable(tmp_path):
+    (tmp_path / "a.py").write_text("#!/usr/bin/env python\n")
+    (tmp_path / "b.py").write_text("x = 1\n")
+    (tmp_path / "b.py").chmod(0o755)
+    assert {n: e.executable for n, e in read_tree(tmp_path, modes=False).items()} == {
+        "a.py": True,
+        "b.py": False,
+    }
+
+
+def test_what_git_and_python_leave_is_left_out(tmp_path):
+    for name in (".git/HEAD", "src/__pycache__/a.pyc", "src/a.py"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    assert list(read_tree(tmp_path)) == ["src/a.py"]
+
+
+def test_a_folder_that_is_no_package_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(tree_module, "MAX_FILES", 2)
+    for name in "abc":
+        (tmp_path / name).touch()
+    with pytest.raises(UsageError, match="more than a package"):
+        read_tree(tmp_path)
+
+
+def test_a_diff_says_what_cannot_be_seen():
+    before = {
+        "mode": Entry(data=b"x\n", executable=True),
+        "gone": Entry(data=b"1\n"),
+        "ends": Entry(data=b"a\nb"),
+        "same": Entry(data=b"same"),
+    }
+    after = {
+        "mode": Entry(data=b"x\n"),
+        "new": Entry(data=b"2\n"),
+        "ends": Entry(data=b"\xef\xbb\xbfa\r\nb"),
+        "same": Entry(data=b"same"),
+    }
+    text = unified_diff(before, after)
+    assert "old mode 100755\nnew mode 100644\n" in text
+    assert "deleted file\n--- a/gone\n+++ /dev/null\n" in text
+    assert "new file\n--- /dev/null\n+++ b/new\n" in text
+    assert "-a\n+<BOM>a^M\n b\n" in text
+    assert "same" not in text
+
+
+def test_edits_are_made_from_their_places():
+    assert apply_edits("abcdef", [Edit(4, 5, "E"), Edit(1, 3, ""), Edit(1, 1, "+")]) == "a+dEf"
+    with pytest.raises(ValueError, match="overlap"):
+        apply_edits("abcdef", [Edit(0, 3, ""), Edit(2, 4, "")])
