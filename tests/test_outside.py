@@ -12,7 +12,7 @@ import pytest
 from grader.arena.ros_env import RosInstallation
 from grader.classes.batch.job import Outcome
 from grader.classes.batch.pool import SAFE_PATH, workers
-from grader.cli.diagnosis import _modules
+from grader.cli.doctor import _modules
 from grader.intake.git import Git
 from grader.outside import anywhere, own_module, program
 from tests.intake.samples import write

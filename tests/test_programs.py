@@ -41,12 +41,12 @@ STARTS = {
     "classes/batch/child.py:_started": Start(
         "anywhere(os.environ)", None, "nothing: jobs come through a pipe, as JSON"
     ),
-    "cli/diagnosis.py:_hostname": Start("HOST_ENV", "'/'", "nothing"),
-    "cli/diagnosis.py:_modules": Start("ros.env", "'/'", "nothing"),
-    "cli/scope.py:_moved": Start(
+    "cli/doctor.py:_hostname": Start("HOST_ENV", "'/'", "nothing"),
+    "cli/doctor.py:_modules": Start("ros.env", "'/'", "nothing"),
+    "cli/systemd_scope.py:_moved": Start(
         "_environment()", "'/'", "nothing: systemd is asked for this process's number"
     ),
-    "cli/sandbox_report.py:_probe": Start("HOST_ENV", "'/'", "nothing"),
+    "cli/host_support.py:_probe": Start("HOST_ENV", "'/'", "nothing"),
     "rubric/own_checks/testing.py:_run": Start(
         "_environment()", "folder", "nothing: the instructor's tests, beside a copy of the evidence"
     ),

@@ -5,13 +5,17 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-
 from grader.errors import UsageError
 from grader.intake.find import BUILD_SPACES, Candidate, enclosing_package, find_nearest
 from grader.intake.gitdir import repository_around
 from grader.intake.manifest import manifest_name
 from grader.intake.names import printable
 from grader.intake.tree import is_file, is_there
+from collections.abc import Iterator
+from grader.intake import find_packages
+from grader.model.result import GradingResult
+from grader.model.verdict import FileCitation
+
 
 _MADE = BUILD_SPACES | {"logs"}
 _MARKS = (".catkin_workspace", ".catkin_tools", "src/CMakeLists.txt")
@@ -108,3 +112,32 @@ def shown(folder: Path) -> str:
         return printable(str(folder))
     whole = str(folder.resolve())
     return printable(near if len(near) < len(whole) else whole)
+
+
+# [cli.prefix] Where the package lies in its repository, which results do not say: looked for around the current folder.
+
+def package_prefix(result: GradingResult, here: Path) -> str | None:
+    """The package's folder relative to the repository around `here` (or to `here`), `.` for the root itself.
+
+    It is the one of that name in which all files are that the result cites. None where there is none.
+    """
+    root = _root(here.resolve())
+    cited = {
+        c.file for criterion in result.criteria for c in criterion.citations if isinstance(c, FileCitation)
+    }
+    for name, folder in _packages(root):
+        if name == result.submission.package and all((folder / file).exists() for file in cited):
+            return folder.relative_to(root).as_posix()
+    return None
+
+
+def _root(here: Path) -> Path:
+    return next((folder for folder in (here, *here.parents) if (folder / ".git").exists()), here)
+
+
+def _packages(root: Path) -> Iterator[tuple[str, Path]]:
+    try:
+        found = find_packages(root)
+    except OSError:
+        return
+    yield from ((name, folder) for name, folder in found if folder.is_relative_to(root))

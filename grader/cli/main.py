@@ -42,7 +42,7 @@ def _dispatch(argv: Sequence[str]) -> int:
             make_room(begin=True)  # before more is loaded: under short limits that would end without a word
         module = import_module(f"grader.cli.commands.{name}")
     if name in {*RUNNING, "doctor"} and not options.get("static"):  # doctor says what the others would find
-        import_module("grader.cli.scope").enter_scope()
+        import_module("grader.cli.systemd_scope").enter_scope()
     return int(module.run(**options))
 
 

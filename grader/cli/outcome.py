@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-
 from grader.errors import ExitCode
 from grader.judging.summary import OPEN, overall_status, reached_pass_mark
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
+import sys
+from pathlib import Path
+from grader.cli.errors import report
+from grader.cli.output import say, say_document
+from grader.errors import ExitCode, GraderError
+from grader.model.result import GradingResult
+from grader.report.result_json import result_text
+from grader.report.terminal import open_console, print_report
+
 
 EXACT_DIGITS = 6
 """More than points have, and fewer than show how floating point multiplies."""
@@ -52,3 +60,47 @@ def _in_proportion(rubric: Rubric, shown: tuple[CriterionResult, ...]) -> Rubric
         return rubric
     share = sum(c.max_points for c in shown) / (rubric.max_points or 1.0)
     return rubric.model_copy(update={"pass_mark": round(rubric.pass_mark * share, EXACT_DIGITS)})
+
+
+# [cli.show] How `grade` and `check` end: the report on stdout, where the files are, the exit code.
+
+REPORTS = ("report.html", "result.json", "report.md", "junit.xml", "console.log")
+
+
+def show(
+    result: GradingResult,
+    rubric: Rubric,
+    folder: Path | None,
+    *,
+    hidden: int = 0,
+    as_json: bool = False,
+    static: bool = False,
+    unrun: str = "",
+) -> ExitCode:
+    """Print the result (`hidden` criteria are left out of it already) and give its exit code.
+
+    With `static` nothing was run on purpose: the exit code is that of the criteria that could be judged. `unrun` says
+    why nothing was run, on purpose or not: what is open is then only counted.
+    """
+    if as_json:
+        say_document(lambda ascii_only: result_text(result, ascii_only=ascii_only))
+    else:
+        print_report(result, rubric, open_console(sys.stdout), hidden=hidden, static=static, unrun=unrun)
+        _paths(folder)
+    if result.error is not None:
+        report(GraderError(result.error.message, hint=result.error.hint))
+    if result.status == "error":
+        return ExitCode.NOT_GRADED
+    return exit_code(settled(result.criteria) if static else result.criteria, rubric)
+
+
+def _paths(folder: Path | None) -> None:
+    if folder is None:
+        return
+    say("")
+    say("Reports:")
+    for name in REPORTS:
+        if (folder / name).is_file():
+            say(f"  {folder / name}")
+    if (folder / "evidence").is_dir():
+        say(f"  {folder / 'evidence'}/")

@@ -6,9 +6,9 @@ import pytest
 
 from grader.cli.outcome import exit_code
 from grader.errors import ExitCode, UsageError
-from grader.integrations.ci.outcome import Outcome
-from grader.integrations.ci.pass_mark import Mark, needed_words, read_mark, with_mark
-from grader.integrations.ci.settings import FAILING, read_settings
+from grader.integrations.ci_results import Outcome
+from grader.integrations.ci_settings import Mark, needed_words, read_mark, with_mark
+from grader.integrations.ci_settings import FAILING, read_settings
 from grader.rubric.load import load_rubric
 from tests.report.hostile import criterion
 

@@ -79,7 +79,7 @@ def pipeline(monkeypatch):
     fake = FakePipeline()
     monkeypatch.setitem(sys.modules, "grader.pipeline", fake)
     monkeypatch.setattr(grader, "pipeline", fake, raising=False)
-    monkeypatch.setattr("grader.cli.platform_support.why_unrun", lambda: "")  # whatever this machine has
+    monkeypatch.setattr("grader.cli.host_support.why_unrun", lambda: "")  # whatever this machine has
     _fresh(monkeypatch)
     yield fake
     for name in COMMANDS:

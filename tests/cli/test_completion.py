@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from grader.cli.completing.answer import completing_parser
-from grader.cli.completing.choosing import BY_VALUE, SPECIAL, completer_of
-from grader.cli.completing.labs import explained, lab_ids, mistakes, operators
-from grader.cli.completing.paths import paths
+from grader.cli.completion import completing_parser
+from grader.cli.completion import BY_VALUE, SPECIAL, completer_of
+from grader.cli.completion import explained, lab_ids, mistakes, operators
+from grader.cli.completion import paths
 from grader.cli.main import run
 from grader.cli.parsing.reports import FORMS
 from grader.cli.parsing.setting_up import SHELLS

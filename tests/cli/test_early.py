@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.live import Live
 
 from grader.cli.display import LiveSteps
-from grader.cli.early import print_early
+from grader.cli.display import print_early
 from grader.cli.main import run
 from grader.model.progress import Silence
 from grader.model.result import EarlyVerdict

@@ -11,8 +11,8 @@ import pytest
 
 from grader import __version__
 from grader.checks import CHECKS
-from grader.cli import diagnosis
-from grader.cli.diagnosis import Row
+from grader.cli import doctor
+from grader.cli.doctor import Row
 from grader.cli.main import run
 from grader.errors import EvidenceError
 from grader.judging.summary import criteria_bytes
@@ -182,7 +182,7 @@ def test_inspect_says_what_is_wrong_with_a_file(content, tmp_path, capsys):
 @pytest.mark.parametrize(("state", "code"), [("ok", 0), ("limited", 0), ("missing", 3)])
 def test_doctor_tells_by_its_exit_code(state, code, capsys, monkeypatch):
     row = Row(name="ROS 1", state=state, detail="x\x1b", mend="apt-get install ros")
-    monkeypatch.setattr("grader.cli.commands.doctor.diagnose", lambda: (row,))
+    monkeypatch.setattr("grader.cli.doctor.diagnose", lambda: (row,))
     assert run(["doctor"]) == code
     out = capsys.readouterr().out
     assert state in out
@@ -193,8 +193,8 @@ def test_doctor_tells_by_its_exit_code(state, code, capsys, monkeypatch):
 
 
 def test_diagnosis_without_ros_names_the_command_that_mends_it(monkeypatch):
-    monkeypatch.setattr(diagnosis, "find_ros", lambda: None)
-    rows = {row.name: row for row in diagnosis.diagnose()}
+    monkeypatch.setattr(doctor, "find_ros", lambda: None)
+    rows = {row.name: row for row in doctor.diagnose()}
     assert rows["ROS 1"].state == "missing"
     assert "apt-get install" in rows["ROS 1"].mend
     assert {"Python", "git", "sandbox", "memory", "disk", "host name", "encoding"} <= set(rows)

@@ -22,7 +22,7 @@ COMMANDS = {
     "batch": (["batch", "roster.csv", "--rubric", LAB, "--out", "o"], "grader.cli.commands.batch.run_batch"),
     "record": (["record", SOLUTION, "--rubric", LAB, "--out", "o"], "grader.pipeline.record"),
     "rubric new": (["rubric", "new", "--from", SOLUTION], "grader.cli.commands.rubric_new.propose_rubric"),
-    "rubric test": (["rubric", "test", LAB], "grader.cli.commands.rubric_test.run_test"),
+    "rubric test": (["rubric", "test", LAB], "grader.cli.mutants.run_test"),
 }
 
 
@@ -39,7 +39,7 @@ def _begins(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("GRADER_PATH", SOLUTION)
     monkeypatch.setenv("GRADER_LAB", LAB)
     (tmp_path / "roster.csv").write_text(f"id,source\nada,{SOLUTION}\n")
-    monkeypatch.setattr("grader.cli.sandbox_report.why_unrun", lambda: "")
+    monkeypatch.setattr("grader.cli.host_support.why_unrun", lambda: "")
 
 
 @pytest.mark.usefixtures("_begins")

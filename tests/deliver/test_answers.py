@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from grader.errors import HostError
-from grader.integrations.deliver import gradescope, prairielearn
-from grader.integrations.deliver.grading import REPORTS, Form, Place, deliver
-from grader.integrations.deliver.settings import FILE, Settings
+from grader.integrations import gradescope
+from grader.integrations import prairielearn
+from grader.integrations.autograde import REPORTS, Form, Place, deliver
+from grader.integrations.bundle import FILE, Settings
 from grader.model.result import ErrorInfo
 from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric

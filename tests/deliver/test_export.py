@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from grader.cli.main import run
-from grader.integrations.deliver.wheel import wheel
+from grader.integrations.bundle import wheel
 from tests.instructor.samples import GREETING, OWN, TESTS, write_rubric
 
 LAB = "york-ele00118m-lab7"
@@ -97,7 +97,7 @@ def test_the_wheel_is_installed_by_pip_and_exports_the_same_again(tmp_path) -> N
     pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-compile", "--target", str(target)]
     subprocess.run([*pip, str(tmp_path / name)], check=True)
     ask = (
-        "import sys; from grader.integrations.deliver.wheel import wheel; sys.stdout.buffer.write(wheel()[1])"
+        "import sys; from grader.integrations.bundle import wheel; sys.stdout.buffer.write(wheel()[1])"
     )
     again = subprocess.run(
         [sys.executable, "-c", ask],

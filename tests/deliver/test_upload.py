@@ -11,7 +11,7 @@ import pytest
 
 from grader.errors import SubmissionError
 from grader.intake import open_submission
-from grader.integrations.deliver.upload import upload
+from grader.integrations.autograde import upload
 from grader.model.submission import Submission
 
 MANIFEST = "<package format='2'><name>lab1</name></package>"

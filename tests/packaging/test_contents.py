@@ -13,7 +13,7 @@ from zipfile import ZipFile
 import pytest
 
 from grader import __version__
-from grader.cli.completing.script import script
+from grader.cli.completion import script
 from grader.cli.manual import man_page
 from grader.cli.parsing.setting_up import SHELLS
 from tests.packaging.making import ROOT, Built

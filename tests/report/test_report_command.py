@@ -11,7 +11,7 @@ import pytest
 from lxml import etree
 
 from grader.cli.main import run
-from grader.cli.prefix import package_prefix
+from grader.cli.find_packages import package_prefix
 from grader.model.result import RubricInfo
 from grader.model.verdict import FileCitation, Status
 from grader.report.files import write_reports

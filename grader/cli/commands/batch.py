@@ -15,7 +15,7 @@ from grader.classes.roster.times import parse_time
 from grader.cli.class_display import open_class_display
 from grader.cli.inherited_limits import make_room
 from grader.cli.output import say, say_beside, say_json
-from grader.cli.sandbox_report import say_unwalled
+from grader.cli.host_support import say_unwalled
 from grader.errors import ExitCode, UsageError
 from grader.model.batch import BatchRun
 from grader.portable import cores

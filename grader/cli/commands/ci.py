@@ -12,18 +12,18 @@ from grader.cli.display import open_progress
 from grader.cli.errors import report
 from grader.cli.outcome import exit_code, settled
 from grader.cli.output import say, say_beside
-from grader.cli.prefix import package_prefix
-from grader.cli.sandbox_report import say_unwalled
+from grader.cli.find_packages import package_prefix
+from grader.cli.host_support import say_unwalled
 from grader.cli.select_rubric import Chosen, choose_all, only
 from grader.errors import ExitCode, GraderError, RubricError, UsageError
 from grader.faults import fault_of
-from grader.integrations.ci.files import add_forms, clear, keep
-from grader.integrations.ci.github import GitHub
-from grader.integrations.ci.gitlab import GitLab
-from grader.integrations.ci.outcome import OF_CODE, Graded, Outcome
-from grader.integrations.ci.pass_mark import with_mark
-from grader.integrations.ci.settings import Settings, read_settings
-from grader.integrations.ci.status_lines import STUDENTS, said_of
+from grader.integrations.ci_results import add_forms, clear, keep
+from grader.integrations.github import GitHub
+from grader.integrations.gitlab import GitLab
+from grader.integrations.ci_results import OF_CODE, Graded, Outcome
+from grader.integrations.ci_settings import with_mark
+from grader.integrations.ci_settings import Settings, read_settings
+from grader.integrations.ci_results import STUDENTS, said_of
 from grader.judging.summary import overall_status, total_points
 from grader.model.result import GradingResult
 from grader.report.hidden import hidden_ids, without_hidden

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grader.cli.completing.script import script
+from grader.cli.completion import script
 from grader.cli.output import say_document
 from grader.errors import ExitCode
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from grader.cli.output import say
 from grader.errors import ExitCode
 from grader.files import atomic_write
-from grader.integrations.deliver.gradescope import autograder
-from grader.integrations.deliver.settings import Settings
+from grader.integrations.gradescope import autograder
+from grader.integrations.bundle import Settings
 from grader.rubric.load import load_rubric
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from grader.cli.output import say
 from grader.errors import ExitCode, UsageError
 from grader.files import atomic_write
-from grader.integrations.deliver.prairielearn import IMAGE, question
-from grader.integrations.deliver.settings import FILE, Settings
+from grader.integrations.prairielearn import IMAGE, question
+from grader.integrations.bundle import FILE, Settings
 from grader.rubric.load import load_rubric
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from grader import pipeline
 from grader.cli.display import open_progress
-from grader.cli.sandbox_report import say_unwalled
-from grader.cli.show import show
+from grader.cli.host_support import say_unwalled
+from grader.cli.outcome import show
 from grader.errors import ExitCode
 from grader.files import check_writable
 from grader.intake.recordings import is_recording

@@ -9,7 +9,7 @@ from grader import pipeline
 from grader.arena.sandbox import Mode
 from grader.cli.display import open_progress
 from grader.cli.output import say
-from grader.cli.sandbox_report import say_unwalled
+from grader.cli.host_support import say_unwalled
 from grader.cli.select_rubric import only_package
 from grader.errors import ExitCode, UsageError
 from grader.files import check_writable

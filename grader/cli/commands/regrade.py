@@ -13,7 +13,7 @@ from grader.classes.batch.regrade import CHANGES, Change, Regraded, regrade, run
 from grader.cli.class_display import open_class_display
 from grader.cli.commands.batch import JOBS_PER_CORE, exit_code, rubric_source
 from grader.cli.output import say, say_json
-from grader.cli.sandbox_report import say_unwalled
+from grader.cli.host_support import say_unwalled
 from grader.errors import ExitCode
 from grader.portable import cores
 from grader.report.text import number

@@ -14,7 +14,7 @@ from grader.classes.batch.settled import figures_in
 from grader.cli.errors import report
 from grader.cli.outcome import exit_code
 from grader.cli.output import say, say_beside
-from grader.cli.prefix import package_prefix
+from grader.cli.find_packages import package_prefix
 from grader.errors import EvidenceError, ExitCode, UsageError
 from grader.files import atomic_write
 from grader.model.figure import Figures

@@ -10,7 +10,7 @@ from grader.arena.sandbox import Mode
 from grader.authoring.new import propose_rubric
 from grader.cli.display import open_progress
 from grader.cli.output import say, say_document
-from grader.cli.sandbox_report import say_unwalled
+from grader.cli.host_support import say_unwalled
 from grader.cli.select_rubric import only_package
 from grader.errors import ExitCode, UsageError
 from grader.files import atomic_write

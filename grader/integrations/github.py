@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from grader.errors import GraderError, OutputError
-from grader.integrations.ci.outcome import TITLES, Graded, Outcome, of_error
+from grader.integrations.ci_results import TITLES, Graded, Outcome, of_error
 from grader.report.annotations import EACH_MAX, github_annotation, github_annotations
 from grader.report.classroom import classroom
 from grader.report.findings import Severity

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from grader.errors import GraderError
-from grader.integrations.deliver.grading import Form, Place
-from grader.integrations.deliver.lab import add_lab
-from grader.integrations.deliver.parcel import Parcel
-from grader.integrations.deliver.settings import FILE, Settings
-from grader.integrations.deliver.wheel import system_script, wheel
+from grader.integrations.autograde import Form, Place
+from grader.integrations.bundle import add_lab
+from grader.integrations.bundle import Parcel
+from grader.integrations.bundle import FILE, Settings
+from grader.integrations.bundle import system_script, wheel
 from grader.model.result import GradingResult
 from grader.report.gradescope import LIMIT, LOOK, gradescope
 from grader.report.text import line

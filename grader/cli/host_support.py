@@ -8,19 +8,22 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
-
 from grader.arena.control_groups import describe, find_cgroups, has_memory
 from grader.arena.host_programs import HOST_ENV, host_program
 from grader.arena.sandbox import NAMESPACES
 from grader.arena.sandbox_probe import ULIMIT_HINT, choose, refused_limits
 from grader.arena.static_recorder import why_unrun
 from grader.cli.output import say_beside
-from grader.cli.row import Row
 from grader.errors import GraderError, HostError
 from grader.portable import user_id
 from grader.report.unwalled import without_sandbox
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_ros
+from collections.abc import Iterator
+from grader.errors import RosMissing
+from grader.portable import system
+from typing import Literal
+from grader.model.record import Record
 
 if TYPE_CHECKING:
     from grader.arena.sandbox import Mode
@@ -145,3 +148,47 @@ def say_unwalled(mode: Mode, rubric: LoadedRubric | None = None) -> None:
         words = without_sandbox(choose(mode).label)
         if words:
             say_beside(words)
+
+
+# [cli.platform_support] What a machine that cannot run ROS 1's nodes can do all the same, and how to get the rest.
+
+PAGE = "docs/how-to/without-ros.md"
+WAYS = {
+    "Windows": "WSL 2 or the Docker image",
+    "macOS": "the Docker image",
+    "": "grader doctor, RoboStack or the Docker image",
+}
+WITHOUT = "check --static, judge, report, explain, labs, rubric validate"
+LACKS = "grade, record, and check beyond the files: ROS 1's nodes are run on Linux"
+
+
+def nothing_runs() -> str:
+    """Why `grader check` only looks at files on this machine; "" where it can run nodes."""
+    with suppress(RosMissing):  # where ROS is not where it was said to be, the grading says so
+        return why_unrun()
+    return ""
+
+
+def the_rest() -> tuple[str, str]:
+    """Two lines that say how what was not run can be run."""
+    here = f"Only your files were checked: {nothing_runs()}."
+    way = WAYS.get(system(), WAYS["macOS"])
+    return here, f"For the rest: {way}; see {PAGE}."
+
+
+def elsewhere() -> Iterator[Row]:
+    """What can and cannot be done on a system that is not Linux."""
+    yield Row(name=system(), state="ok", detail=f"can: {WITHOUT}")
+    way = WAYS.get(system(), WAYS["macOS"])
+    yield Row(name="ROS 1", state="missing", detail=f"cannot: {LACKS}", mend=f"{way}; see {PAGE}")
+
+
+# [cli.row] One line of `grader doctor`.
+
+class Row(Record):
+    """`missing`: grading is not fully possible. `limited`: it is, but less safely or more slowly."""
+
+    name: str
+    state: Literal["ok", "limited", "missing"]
+    detail: str
+    mend: str = ""

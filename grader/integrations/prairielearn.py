@@ -10,11 +10,11 @@ from typing import Any
 from uuid import NAMESPACE_URL, uuid5
 
 from grader.errors import GraderError
-from grader.integrations.deliver.grading import Form, Place
-from grader.integrations.deliver.lab import add_lab
-from grader.integrations.deliver.parcel import Parcel
-from grader.integrations.deliver.settings import FILE, Settings
-from grader.integrations.deliver.wheel import system_script, wheel
+from grader.integrations.autograde import Form, Place
+from grader.integrations.bundle import add_lab
+from grader.integrations.bundle import Parcel
+from grader.integrations.bundle import FILE, Settings
+from grader.integrations.bundle import system_script, wheel
 from grader.model.result import CriterionResult, GradingResult
 from grader.report.hidden import hidden_ids
 from grader.report.settled import late_words

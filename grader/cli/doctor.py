@@ -12,16 +12,23 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-
 from grader.arena.host_programs import HOST_ENV, host_program
 from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
 from grader.arena.standin_packages import missing_packages
-from grader.cli.platform_support import elsewhere
-from grader.cli.row import Row
-from grader.cli.sandbox_report import walls
+from grader.cli.host_support import elsewhere
+from grader.cli.host_support import Row
+from grader.cli.host_support import walls
 from grader.errors import RosMissing
 from grader.outside import LISTS
 from grader.portable import cores, system, user_id
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+from grader.cli.output import say_json
+from grader.errors import ExitCode
+from grader.report.terminal import emit, open_console
+from grader.report.text import visible
+
 
 PROGRAMS = {"git": "git", "cmake": "cmake", "make": "make", "c++": "g++"}
 ROS_PROGRAMS = ("catkin_make", "roslaunch", "rosrun", "rospack")
@@ -202,3 +209,32 @@ def _encoding() -> Row:
         detail=f"{name}: reports use plain signs",
         mend="export LC_ALL=C.UTF-8",
     )
+
+
+# [cli.commands.doctor] `grader doctor`: what this machine can and cannot do, and the command that mends it.
+
+STYLES = {"ok": "green", "limited": "yellow", "missing": "red"}
+
+
+def run(*, as_json: bool = False) -> ExitCode:
+    """Print a row for each thing that grading needs. NOT_GRADED where one is missing."""
+    rows = diagnose()
+    if as_json:
+        say_json([row.model_dump() for row in rows])
+    else:
+        _print(rows, open_console(sys.stdout))
+    return ExitCode.NOT_GRADED if any(row.state == "missing" for row in rows) else ExitCode.PASSED
+
+
+def _print(rows: tuple[Row, ...], console: Console) -> None:
+    grid = Table.grid(padding=(0, 2, 0, 0))
+    for _ in range(2):
+        grid.add_column(no_wrap=True)
+    grid.add_column(overflow="fold")
+    for row in rows:
+        grid.add_row(Text(row.state, STYLES[row.state]), Text(row.name), Text(visible(row.detail)))
+        if row.mend:
+            grid.add_row(Text(), Text("mend:", "bold"), Text(visible(row.mend), "bold"))
+    missing = sum(row.state == "missing" for row in rows)
+    verdict = f"{missing} missing: grading is not fully possible here." if missing else "Ready to grade."
+    emit(console, [grid, Text(f"\n{verdict}")])

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from grader.errors import GraderError
 from grader.files import atomic_write
-from grader.integrations.ci.outcome import Graded, Outcome, of_error
+from grader.integrations.ci_results import Graded, Outcome, of_error
 from grader.report.text import number
 
 VARIABLES = "grader.env"

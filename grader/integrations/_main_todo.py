@@ -8,8 +8,9 @@ import warnings
 from pathlib import Path
 from types import FrameType
 
-from grader.integrations.deliver import gradescope, prairielearn
-from grader.integrations.deliver.grading import deliver
+from grader.integrations import gradescope
+from grader.integrations import prairielearn
+from grader.integrations.autograde import deliver
 
 PLATFORMS = {
     "gradescope": (gradescope.place, gradescope.FORM),
