@@ -14,12 +14,13 @@ GRADER = Path(__file__).resolve().parent.parent / "grader"
 ROS_SIDE = GRADER / "arena" / "ros"
 
 # Who may import whom, beside itself. `rubric.model` holds records only: whoever may see records may see it.
-BASE = {"model", "errors", "portable", "shown"}
+BASE = {"model", "errors", "portable", "shown", "suggest"}
 ALLOWED = {
     "__init__": {"api", "errors", "model", "rubric"},
     "model": set[str](),
     "errors": set[str](),
     "shown": set[str](),
+    "suggest": set[str](),
     "portable": set[str](),
     "outside": set[str](),
     "files": {"errors", "portable"},

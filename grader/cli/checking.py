@@ -1,149 +1,103 @@
-"""`grader check [PATH]`: the student's own look before handing in."""
+"""What `grader check` does with the packages that were chosen: grade them, or watch one, without hidden criteria.
+
+The command line comes in, a report on stdout and an exit code go out. Below the report stands how the package differs
+from what is pushed; git is asked about that in a thread beside the grading, and never holds it up.
+"""
 
 from __future__ import annotations
 
 import os
 import sys
-from contextlib import ExitStack, nullcontext
-from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING
-from grader import pipeline
-from grader.cli.display import open_progress
-from grader.cli.outcome import exit_code, settled, staged_code, worst
-from grader.cli.output import say, say_beside
-from grader.cli.host_support import nothing_runs, the_rest
-from grader.cli.host_support import say_unwalled
-from grader.cli.select_rubric import Chosen, choose_all, only
-from grader.cli.outcome import show
-from grader.errors import ExitCode, UsageError
-from grader.files import check_writable
-from grader.intake import safe_name
-from grader.model.git_status import Standing
-from grader.model.progress import Silence
-from grader.model.result import GradingResult
-from grader.report.hidden import hidden_ids, without_hidden
-from grader.report.terminal import open_console
-from grader.rubric.load import LoadedRubric
-from grader.rubric.needs import needs_ros
-from grader.student.git_status import write_staged
-from grader.temporary import temporary_folder
 import threading
 from collections.abc import Iterator
+from contextlib import ExitStack, nullcontext
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 from rich.console import Console, RenderableType
 from rich.padding import Padding
 from rich.text import Text
-from grader.cli.output import say_beside
+
+from grader import pipeline
+from grader.cli.display import open_progress
+from grader.cli.host_support import how_to_run_nodes, why_nothing_runs
+from grader.cli.outcome import exit_code, settled, show, staged_code
+from grader.cli.output import say, say_beside
+from grader.cli.select_rubric import Chosen
+from grader.errors import ExitCode, UsageError
+from grader.intake import safe_name
 from grader.model.git_status import Point, Standing
-from grader.report.terminal import emit
+from grader.model.progress import Silence
+from grader.model.result import GradingResult
+from grader.report.hidden import hidden_ids, without_hidden
+from grader.report.terminal import emit, open_console
 from grader.report.text import line
-from grader.student.git_status import ask, standing, surroundings
+from grader.rubric.load import LoadedRubric
+from grader.rubric.needs import needs_ros
+from grader.student.git_status import ask, standing, surroundings, write_staged
+from grader.temporary import temporary_folder
 
 if TYPE_CHECKING:
-    from grader.arena.sandbox import Mode
     from grader.student.watching.loop import Shown
 
-
-def run(
-    *,
-    path: str = ".",
-    rubric: str | None = None,
-    static: bool = False,
-    staged: bool = False,
-    watch: bool = False,
-    out: Path | None = None,
-    sandbox: Mode = "auto",
-    as_json: bool = False,
-) -> ExitCode:
-    """Grade the package at `path` with hidden criteria left out; with `static`, from its files alone.
-
-    Where packages of several labs are there, one after the other. `staged` looks at git's index instead of the disk,
-    and gives the code of a hook: what fails, fails it, and nothing else. With `watch`, again whenever a file of it is
-    saved, until Ctrl-C.
-    """
-    if staged and (watch or not static):
-        raise UsageError("--staged goes with --static, and not with --watch", hint="add --static")
-    chosen = choose_all(Path(path), rubric)
-    if watch or as_json:
-        only(chosen)
-    if watch and not Path(chosen[0].source).is_dir():
-        raise UsageError(
-            f"{path} is no folder, so nothing is saved in it", hint="watch your package's folder"
-        )
-    if out is not None:
-        check_writable(out)
-    options = pipeline.GradeOptions(
-        sandbox=sandbox,
-        submission_id=None,
-        static_only=static,
-        keep_hidden=False,
-        files=watch or out is not None,
-    )
-    running = [one.rubric for one in chosen if not static and needs_ros(one.rubric)]
-    if running:
-        say_unwalled(sandbox)
-    if watch:
-        _tell(chosen[0])
-        source = str(Path(chosen[0].source).resolve())
-        return _watch(source, chosen[0].rubric, options, out=out, as_json=as_json)
-    several, told = len(chosen) > 1, set[str]()
-    return worst(
-        _check(one, options, out, as_json=as_json, staged=staged, several=several, told=told)
-        for one in chosen
-    )
+TITLE = "Your marks come from what you have pushed. It differs from what was checked:"
+REMARKS = "Before you submit"
+LINE_CHARS = 300
+GIT_TIMEOUT_S = 10.0
 
 
-def _tell(chosen: Chosen) -> None:
-    """What was chosen, before anything else is said."""
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """What all packages of one command line share. `out` is None if the results are only shown; `told` holds what was
+    said about git's state already, for another package."""
+
+    options: pipeline.GradeOptions
+    out: Path | None
+    as_json: bool
+    staged: bool
+    several: bool
+    told: set[str] = field(default_factory=set)
+
+
+def say_choice(chosen: Chosen) -> None:
+    """Say what was chosen, before anything else is said."""
     if chosen.words:
         say_beside(chosen.words)
 
 
-def _check(
-    chosen: Chosen,
-    options: pipeline.GradeOptions,
-    out: Path | None,
-    *,
-    as_json: bool,
-    staged: bool,
-    several: bool,
-    told: set[str],
-) -> ExitCode:
-    """One package. What git's state has `told` already, for another one, is not said again."""
-    _tell(chosen)
-    static, rubric = options.static_only, chosen.rubric.rubric
-    if several and chosen.package is not None:
+def check_package(chosen: Chosen, check: Check) -> ExitCode:
+    """Grade one package and print its report."""
+    say_choice(chosen)
+    options, rubric = check.options, chosen.rubric.rubric
+    static = options.static_only
+    if check.several and chosen.package is not None:
         options = replace(options, submission_id=safe_name(chosen.package.resolve().name))
         say("")
-    with ExitStack() as stack:
-        own = stack.enter_context(temporary_folder("check"))
+    with temporary_folder("check") as own:
         source = chosen.source
-        if staged:
-            source = str(
-                write_staged(_package(chosen), own / "index", index=os.environ.get("GIT_INDEX_FILE", ""))
-            )
-            options = replace(options, submission_id=safe_name(_package(chosen).resolve().name))
-        unrun = "--static" if static else nothing_runs() if needs_ros(chosen.rubric) else ""
-        inquiry = Inquiry(chosen.package, own / "git") if chosen.package is not None else None
-        folder = out or own
-        early = not (as_json or unrun)
-        with nullcontext(Silence()) if staged else open_progress(early=early) as progress:
+        if check.staged:
+            package = _package(chosen)
+            source = str(write_staged(package, own / "index", index=os.environ.get("GIT_INDEX_FILE", "")))
+            options = replace(options, submission_id=safe_name(package.resolve().name))
+        unrun = "--static" if static else why_nothing_runs() if needs_ros(chosen.rubric) else ""
+        inquiry = GitInquiry(chosen.package, own / "git") if chosen.package is not None else None
+        folder = check.out or own
+        early = not (check.as_json or unrun)
+        with nullcontext(Silence()) if check.staged else open_progress(early=early) as progress:
             result = pipeline.grade(source, chosen.rubric, folder, options, progress)
         shown = without_hidden(result, rubric)
-        kept = folder / result.submission.id if out is not None else None
-        standing = inquiry.result() if inquiry is not None else Standing()
-        if as_json:
-            shown = shown.model_copy(update={"standing": standing})
+        kept = folder / result.submission.id if check.out is not None else None
+        found = inquiry.result() if inquiry is not None else Standing()
+        if check.as_json:
+            shown = shown.model_copy(update={"standing": found})
         hidden = len(hidden_ids(rubric))
-        code = show(shown, rubric, kept, hidden=hidden, as_json=as_json, static=static, unrun=unrun)
-        for words in () if static or not unrun else the_rest():
-            (say_beside if as_json else say)(words)
-        if as_json:
-            print_beside(standing)
-        else:
-            print_standing(news(standing, told), open_console(sys.stdout))
+        code = show(shown, rubric, kept, hidden=hidden, as_json=check.as_json, static=static, unrun=unrun)
+        for words in () if static or not unrun else how_to_run_nodes():
+            (say_beside if check.as_json else say)(words)
+        _print_git_status(found, check)
         graded = shown.status != "error"
-        return staged_code(shown.criteria, rubric) if staged and graded else code
+        return staged_code(shown.criteria, rubric) if check.staged and graded else code
 
 
 def _package(chosen: Chosen) -> Path:
@@ -152,10 +106,11 @@ def _package(chosen: Chosen) -> Path:
     return chosen.package
 
 
-def _watch(
+def watch_package(
     source: str, rubric: LoadedRubric, options: pipeline.GradeOptions, *, out: Path | None, as_json: bool
 ) -> ExitCode:
-    from grader.student.watching.grading import Grading  # noqa: PLC0415 - nobody else needs what this loads
+    """Grade the package whenever one of its files is saved, until Ctrl-C."""
+    from grader.student.watching.grading import Grading  # noqa: PLC0415 - no other command needs what this loads
     from grader.student.watching.kept import Kept  # noqa: PLC0415
     from grader.student.watching.loop import Watched, watch  # noqa: PLC0415
     from grader.student.watching.saves import WatchedFolders  # noqa: PLC0415
@@ -199,15 +154,7 @@ def _shown(folder: Path, rubric: LoadedRubric, *, static: bool, as_json: bool) -
     return ScreenShown(folder.name, rubric.rubric, sys.stdout, hidden=hidden, static=static)
 
 
-# [cli.handing_in] Says how what was checked stands to what will be marked. Git is asked beside the grading, and holds nobody up.
-
-TITLE = "What is marked is what is pushed. It differs from what was checked:"
-REMARKS = "Handing in"
-LIMIT = 300
-PATIENCE_S = 10.0
-
-
-class Inquiry:
+class GitInquiry:
     """Asks git about the package in `package`, in a thread that ends with the program."""
 
     def __init__(self, package: Path, base: Path) -> None:
@@ -218,31 +165,29 @@ class Inquiry:
         self._thread.start()
 
     def result(self) -> Standing:
-        """What there is to say; nothing where git does not come back."""
-        self._thread.join(PATIENCE_S)
+        """Return what git said; nothing if it does not answer in time."""
+        self._thread.join(GIT_TIMEOUT_S)
         return self._found
 
     def _ask(self) -> None:
         self._found = standing(ask(self._package, self._base), self._around)
 
 
-def news(found: Standing, told: set[str]) -> Standing:
-    """What is not among the texts that were `told` already; it is from now on."""
-    points = tuple(point for point in found.points if point.text not in told)
-    summary = found.summary if found.summary not in told else ""
-    told |= {found.summary, *(point.text for point in points)}
-    return Standing(points=points, summary=summary)
+def _print_git_status(found: Standing, check: Check) -> None:
+    """Print what git said below the report; to stderr if stdout is for a program."""
+    if check.as_json:
+        for point in found.points:
+            say_beside(point.text)
+        return
+    points = tuple(point for point in found.points if point.text not in check.told)
+    summary = found.summary if found.summary not in check.told else ""
+    check.told.update({found.summary, *(point.text for point in points)})
+    print_standing(Standing(points=points, summary=summary), open_console(sys.stdout))
 
 
 def print_standing(found: Standing, console: Console) -> None:
-    """Print it below a report."""
+    """Print how the package differs from what is pushed."""
     emit(console, _parts(found, console.encoding))
-
-
-def print_beside(found: Standing) -> None:
-    """Print it to stderr, where stdout is for a program."""
-    for point in found.points:
-        say_beside(point.text)
 
 
 def _parts(found: Standing, encoding: str) -> Iterator[RenderableType]:
@@ -264,4 +209,4 @@ def _point(point: Point, encoding: str) -> Iterator[RenderableType]:
 
 
 def _fitted(text: str, encoding: str) -> str:
-    return line(text, LIMIT).encode(encoding, "backslashreplace").decode(encoding)
+    return line(text, LINE_CHARS).encode(encoding, "backslashreplace").decode(encoding)

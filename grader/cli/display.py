@@ -1,4 +1,7 @@
-"""Shows a run's course on stderr: alive on a terminal, one line at each change of state elsewhere."""
+"""Shows the progress of a grading on stderr: live on a terminal, else as a line at each change of state.
+
+What a package's files alone decide goes to stdout as soon as it is known, before anything is built or run.
+"""
 
 from __future__ import annotations
 
@@ -11,19 +14,25 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import partial
 from typing import IO
+
 from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 from rich.text import Text
+
+from grader.cli.output import say
 from grader.model.progress import Progress, StepState
 from grader.model.result import EarlyVerdict
-from grader.shown import line
-from grader.cli.output import say
 from grader.report.terminal import STYLES, mark
-from grader.report.text import line, visible
-from grader.shown import uncommanded
+from grader.report.text import visible
+from grader.shown import line, uncommanded
 
-
+EARLY_TITLE = "Your files, before anything is built or run:"
+SO_FAR = "So far: the build may still change this."
+MESSAGE_CHARS = 300
+INDENT = 2
+ESCAPE = 8
+"""A line may become this much longer when characters in it are escaped."""
 REFRESH_HZ = 8
 NAME_LIMIT = 120
 DETAIL_LIMIT = 160
@@ -195,16 +204,6 @@ def _shown(detail: str) -> str:
     return line(detail, DETAIL_LIMIT)
 
 
-# [cli.early] Shows what a package's files alone decide, while the build and the runs are still to come.
-
-TITLE = "Your files, before anything is built or run:"
-SO_FAR = "so far: the build may still settle it otherwise"
-MESSAGE_CHARS = 300
-INDENT = 2
-ESCAPE = 8
-"""So much longer may a line become that is written out."""
-
-
 def print_early(
     verdicts: tuple[EarlyVerdict, ...], above: Callable[[Text], None] | None = None, *, width: int = 80
 ) -> None:
@@ -224,7 +223,7 @@ def print_early(
 
 
 def _rows(verdicts: tuple[EarlyVerdict, ...], encoding: str) -> Iterator[Text]:
-    yield Text(TITLE, "bold")
+    yield Text(EARLY_TITLE, "bold")
     words = [_word(verdict) for verdict in verdicts]
     status_width = max(map(len, words))
     name_width = max(len(visible(verdict.criterion.id)) for verdict in verdicts)
@@ -237,7 +236,7 @@ def _rows(verdicts: tuple[EarlyVerdict, ...], encoding: str) -> Iterator[Text]:
         if criterion.points < criterion.max_points and criterion.hint:
             yield Text(f"{' ' * (INDENT + 2)}hint: {line(criterion.hint, MESSAGE_CHARS)}", "dim")
     if not all(verdict.final for verdict in verdicts):
-        yield Text(f"{' ' * INDENT}({SO_FAR})", "dim")
+        yield Text(f"{' ' * INDENT}{SO_FAR}", "dim")
     yield Text()
 
 

@@ -1,4 +1,4 @@
-"""Looks at this machine, one row for each thing that grading needs. Changes nothing."""
+"""What `grader doctor` finds out about this machine: a row for each thing that grading needs. Changes nothing."""
 
 from __future__ import annotations
 
@@ -10,26 +10,24 @@ import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import IO
+
+from rich.table import Table
+from rich.text import Text
+
 from grader.arena.host_programs import HOST_ENV, host_program
 from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
 from grader.arena.standin_packages import missing_packages
-from grader.cli.host_support import elsewhere
-from grader.cli.host_support import Row
-from grader.cli.host_support import walls
+from grader.cli.host_support import Row, platform_rows, sandbox_rows
 from grader.errors import RosMissing
 from grader.outside import LISTS
 from grader.portable import cores, system, user_id
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
-from grader.cli.output import say_json
-from grader.errors import ExitCode
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible
 
-
+STYLES = {"ok": "green", "limited": "yellow", "missing": "red"}
 PROGRAMS = {"git": "git", "cmake": "cmake", "make": "make", "c++": "g++"}
 ROS_PROGRAMS = ("catkin_make", "roslaunch", "rosrun", "rospack")
 ROS_MODULES = {
@@ -50,14 +48,14 @@ MIN_MEMORY_BYTES, MIN_DISK_BYTES = GIB, GIB
 
 
 def diagnose() -> tuple[Row, ...]:
-    """Every row, in the order in which things are needed. Where it is not Linux, what is there without it."""
+    """Return every row, in the order in which things are needed; on other systems than Linux, only what helps there."""
     if system():
-        return (_python(), _git(), *elsewhere(), *_resources(), _encoding())
+        return (_python(), _git(), *platform_rows(), *_resources(), _encoding())
     return (
         _python(),
         *_programs(),
         *_ros(),
-        *walls(),
+        *sandbox_rows(),
         _user(),
         _search_paths(),
         *_resources(),
@@ -104,7 +102,7 @@ def _ros() -> Iterator[Row]:
 
 
 def _modules(ros: RosInstallation) -> Iterator[Row]:
-    """ROS's Python packages, as its own interpreter finds them."""
+    """Look for ROS's Python packages with its own interpreter."""
     command = [ros.python, "-c", FIND_MODULES, *ROS_MODULES]
     try:
         done = subprocess.run(
@@ -137,12 +135,12 @@ def _standins(ros: RosInstallation) -> Row:
 
 
 def _search_paths() -> Row:
-    """An entry that is no absolute path stands for the folder that one is in, which may be a student's."""
+    """Look for entries that are not absolute paths: they mean the current folder, which may be a student's."""
     odd = [name for name in LISTS if not all(map(os.path.isabs, os.environ.get(name, "/").split(os.pathsep)))]
     if not odd:
         return Row(name="search paths", state="ok", detail="every entry is an absolute path")
-    detail = f"{', '.join(odd)}: an entry stands for the current folder, so programs load files from there"
-    fix = "write ${NAME:+$NAME:} in front of what is added, with no empty entry"
+    detail = f"{', '.join(odd)}: an entry means the current folder, so programs load files from there"
+    fix = "write ${NAME:+$NAME:} before what you add, without an empty entry"
     return Row(name="search paths", state="limited", detail=detail, mend=fix)
 
 
@@ -159,7 +157,7 @@ def _resources() -> Iterator[Row]:
     yield Row(
         name="cores",
         state="ok" if number >= 2 else "limited",
-        detail=f"{number}" if number >= 2 else "1: runs go one after another, rates may be inconclusive",
+        detail=f"{number}" if number >= 2 else "1: runs take turns, and rates may be inconclusive",
     )
     if sys.platform != "win32":
         memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
@@ -171,13 +169,13 @@ def _resources() -> Iterator[Row]:
 def _amount(name: str, size_bytes: int, least_bytes: int, unit: str) -> Row:
     enough = size_bytes >= least_bytes
     detail = f"{size_bytes / GIB:.1f} {unit}" + (
-        "" if enough else f", {least_bytes / GIB:.0f} would be better"
+        "" if enough else f"; {least_bytes / GIB:.0f} GiB is recommended"
     )
     return Row(name=name, state="ok" if enough else "limited", detail=detail)
 
 
 def _hostname() -> Row:
-    """ROS nodes look their own host up; getent has a time limit where the resolver has none."""
+    """Look up this host, as ROS nodes do; with getent, since the resolver has no time limit."""
     name = socket.gethostname()
     command = [host_program("getent") or "/usr/bin/getent", "hosts", name]
     try:
@@ -206,27 +204,13 @@ def _encoding() -> Row:
     return Row(
         name="encoding",
         state="limited",
-        detail=f"{name}: reports use plain signs",
+        detail=f"{name}: reports use plain characters",
         mend="export LC_ALL=C.UTF-8",
     )
 
 
-# [cli.commands.doctor] `grader doctor`: what this machine can and cannot do, and the command that mends it.
-
-STYLES = {"ok": "green", "limited": "yellow", "missing": "red"}
-
-
-def run(*, as_json: bool = False) -> ExitCode:
-    """Print a row for each thing that grading needs. NOT_GRADED where one is missing."""
-    rows = diagnose()
-    if as_json:
-        say_json([row.model_dump() for row in rows])
-    else:
-        _print(rows, open_console(sys.stdout))
-    return ExitCode.NOT_GRADED if any(row.state == "missing" for row in rows) else ExitCode.PASSED
-
-
-def _print(rows: tuple[Row, ...], console: Console) -> None:
+def print_rows(rows: Sequence[Row], stream: IO[str]) -> None:
+    """Print a row for each thing that grading needs, and what is missing."""
     grid = Table.grid(padding=(0, 2, 0, 0))
     for _ in range(2):
         grid.add_column(no_wrap=True)
@@ -234,7 +218,7 @@ def _print(rows: tuple[Row, ...], console: Console) -> None:
     for row in rows:
         grid.add_row(Text(row.state, STYLES[row.state]), Text(row.name), Text(visible(row.detail)))
         if row.mend:
-            grid.add_row(Text(), Text("mend:", "bold"), Text(visible(row.mend), "bold"))
+            grid.add_row(Text(), Text("fix:", "bold"), Text(visible(row.mend), "bold"))
     missing = sum(row.state == "missing" for row in rows)
     verdict = f"{missing} missing: grading is not fully possible here." if missing else "Ready to grade."
-    emit(console, [grid, Text(f"\n{verdict}")])
+    emit(open_console(stream), [grid, Text(f"\n{verdict}")])

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
 from grader.errors import UsageError
+from grader.intake import find_packages
 from grader.intake.find import BUILD_SPACES, Candidate, enclosing_package, find_nearest
 from grader.intake.gitdir import repository_around
 from grader.intake.manifest import manifest_name
 from grader.intake.names import printable
 from grader.intake.tree import is_file, is_there
-from collections.abc import Iterator
-from grader.intake import find_packages
 from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
-
 
 _MADE = BUILD_SPACES | {"logs"}
 _MARKS = (".catkin_workspace", ".catkin_tools", "src/CMakeLists.txt")
@@ -113,8 +113,6 @@ def shown(folder: Path) -> str:
     whole = str(folder.resolve())
     return printable(near if len(near) < len(whole) else whole)
 
-
-# [cli.prefix] Where the package lies in its repository, which results do not say: looked for around the current folder.
 
 def package_prefix(result: GradingResult, here: Path) -> str | None:
     """The package's folder relative to the repository around `here` (or to `here`), `.` for the root itself.

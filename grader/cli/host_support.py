@@ -1,4 +1,7 @@
-"""What this machine has of each part of the sandbox, and what mends it where it is missing."""
+"""What this machine can run, and how safely: each part of the sandbox, and what a machine without ROS 1 can do.
+
+Rows for `grader doctor` go out, and warnings before students' code is run. What else is looked at is in `doctor`.
+"""
 
 from __future__ import annotations
 
@@ -7,27 +10,20 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Literal
+
 from grader.arena.control_groups import describe, find_cgroups, has_memory
 from grader.arena.host_programs import HOST_ENV, host_program
-from grader.arena.sandbox import NAMESPACES
+from grader.arena.sandbox import NAMESPACES, Mode
 from grader.arena.sandbox_probe import ULIMIT_HINT, choose, refused_limits
 from grader.arena.static_recorder import why_unrun
 from grader.cli.output import say_beside
-from grader.errors import GraderError, HostError
-from grader.portable import user_id
+from grader.errors import GraderError, HostError, RosMissing
+from grader.model.record import Record
+from grader.portable import system, user_id
 from grader.report.unwalled import without_sandbox
 from grader.rubric.load import LoadedRubric
 from grader.rubric.needs import needs_ros
-from collections.abc import Iterator
-from grader.errors import RosMissing
-from grader.portable import system
-from typing import Literal
-from grader.model.record import Record
-
-if TYPE_CHECKING:
-    from grader.arena.sandbox import Mode
-
 
 PROGRAMS = {"bwrap": "bubblewrap", "setpriv": "util-linux", "prlimit": "util-linux"}
 PROBE_S = 20
@@ -44,10 +40,27 @@ CONTAINER = "in a container: start it with --privileged, or with --security-opt 
 DELEGATE = "loginctl enable-linger, or systemd-run --user --scope -p Delegate=yes grader …, or run it as root"
 OLD_GROUPS = "run it as root, or boot with cgroup v2 (systemd.unified_cgroup_hierarchy=1)"
 ROOTS_GROUPS = "in a container: start it with --privileged; in a service: Delegate=yes in its unit"
+PAGE = "docs/how-to/without-ros.md"
+WAYS = {
+    "Windows": "WSL 2 or the Docker image",
+    "macOS": "the Docker image",
+    "": "grader doctor, RoboStack or the Docker image",
+}
+WITHOUT = "check --static, judge, report, explain, labs, rubric validate"
+LACKS = "grade, record, and check beyond the files: ROS 1 nodes run on Linux"
 
 
-def walls() -> Iterator[Row]:
-    """A row for each part, then one for what `--sandbox auto` makes of them."""
+class Row(Record):
+    """A line of `grader doctor`. `missing`: not everything can be graded; `limited`: it can, but less well."""
+
+    name: str
+    state: Literal["ok", "limited", "missing"]
+    detail: str
+    mend: str = ""
+
+
+def sandbox_rows() -> Iterator[Row]:
+    """Return a row for each part, then one for the sandbox that `--sandbox auto` chooses."""
     yield from map(_program, PROGRAMS)
     unshare = host_program("unshare") or "unshare"
     yield _probe("user namespaces", [unshare, "--user", "--pid", "--fork", "/bin/true"], drop=user_id() == 0)
@@ -55,7 +68,7 @@ def walls() -> Iterator[Row]:
     yield _limits_of_trees()
     yield from _inherited()
     yield _limits_of_processes()
-    yield _mode()
+    yield _chosen_sandbox()
 
 
 def _program(name: str) -> Row:
@@ -66,7 +79,7 @@ def _program(name: str) -> Row:
 
 
 def _probe(name: str, command: Sequence[str], *, drop: bool) -> Row:
-    """Whether namespaces of that kind can be made, by the user who needs them."""
+    """Return whether namespaces of that kind can be made, by the user who needs them."""
     setpriv = host_program("setpriv") or "setpriv"
     nobody = [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if drop else []
     try:
@@ -89,7 +102,7 @@ def _probe(name: str, command: Sequence[str], *, drop: bool) -> Row:
 
 
 def _switch() -> str:
-    """The setting of the kernel that forbids it, where it is one."""
+    """Return the command that lifts the kernel's ban on it, if a setting forbids it."""
     for name, (forbidding, mend) in SWITCHES.items():
         path = SETTINGS / name
         if path.is_file() and path.read_text(errors="replace").strip() == forbidding:
@@ -123,7 +136,7 @@ def _limits_of_processes() -> Row:
     return Row(name="ulimit", state="missing", detail=refused, mend=ULIMIT_HINT)
 
 
-def _mode() -> Row:
+def _chosen_sandbox() -> Row:
     try:
         sandbox = choose("auto")
     except HostError as error:
@@ -131,64 +144,46 @@ def _mode() -> Row:
     if sandbox.bubblewrap:
         return Row(name="sandbox", state="ok", detail=f"--sandbox auto takes {sandbox.label}")
     detail = f"{without_sandbox(sandbox.label)} --sandbox require refuses."
-    return Row(name="sandbox", state="limited", detail=detail, mend="mend the rows above")
+    return Row(name="sandbox", state="limited", detail=detail, mend="fix the rows above")
 
 
-# Says before a command begins that students' code will run without a sandbox.
+def warn_without_sandbox(mode: Mode, rubric: LoadedRubric | None = None) -> None:
+    """Warn on stderr that students' code will run without a sandbox, if it will.
 
-
-def say_unwalled(mode: Mode, rubric: LoadedRubric | None = None) -> None:
-    """Say it on stderr, where it is so. Nothing of a rubric for which nothing is run; what keeps a sandbox from being
-    chosen is said by the grading itself."""
+    A rubric that runs nothing needs no warning; if no sandbox can be chosen, the grading itself says so.
+    """
     with suppress(GraderError):
         if (rubric is not None and not needs_ros(rubric)) or why_unrun():
             return
-        from grader.arena.sandbox_probe import choose  # noqa: PLC0415 - where nothing is run, nobody needs it
-
         words = without_sandbox(choose(mode).label)
         if words:
             say_beside(words)
 
 
-# [cli.platform_support] What a machine that cannot run ROS 1's nodes can do all the same, and how to get the rest.
-
-PAGE = "docs/how-to/without-ros.md"
-WAYS = {
-    "Windows": "WSL 2 or the Docker image",
-    "macOS": "the Docker image",
-    "": "grader doctor, RoboStack or the Docker image",
-}
-WITHOUT = "check --static, judge, report, explain, labs, rubric validate"
-LACKS = "grade, record, and check beyond the files: ROS 1's nodes are run on Linux"
-
-
-def nothing_runs() -> str:
-    """Why `grader check` only looks at files on this machine; "" where it can run nodes."""
-    with suppress(RosMissing):  # where ROS is not where it was said to be, the grading says so
+def why_nothing_runs() -> str:
+    """Return why `grader check` only looks at files on this machine, or "" if it can run nodes."""
+    with suppress(RosMissing):  # if ROS is not where GRADER_ROS_SETUP says, the grading reports it
         return why_unrun()
     return ""
 
 
-def the_rest() -> tuple[str, str]:
-    """Two lines that say how what was not run can be run."""
-    here = f"Only your files were checked: {nothing_runs()}."
+def how_to_run_nodes() -> tuple[str, str]:
+    """Return two lines: that only files were checked, and how to check the rest."""
+    here = f"Only your files were checked: {why_nothing_runs()}."
     way = WAYS.get(system(), WAYS["macOS"])
     return here, f"For the rest: {way}; see {PAGE}."
 
 
-def elsewhere() -> Iterator[Row]:
-    """What can and cannot be done on a system that is not Linux."""
+def platform_rows() -> Iterator[Row]:
+    """Return what can and cannot be done on a system other than Linux."""
     yield Row(name=system(), state="ok", detail=f"can: {WITHOUT}")
     way = WAYS.get(system(), WAYS["macOS"])
     yield Row(name="ROS 1", state="missing", detail=f"cannot: {LACKS}", mend=f"{way}; see {PAGE}")
 
 
-# [cli.row] One line of `grader doctor`.
+def require_room(*, gradings: int) -> None:
+    """Check that the limits inherited from the shell leave enough for so many gradings at a time. Raises HostError."""
+    if sys.platform == "linux":
+        from grader.arena.inherited import make_room  # noqa: PLC0415 - other systems lack what it imports
 
-class Row(Record):
-    """`missing`: grading is not fully possible. `limited`: it is, but less safely or more slowly."""
-
-    name: str
-    state: Literal["ok", "limited", "missing"]
-    detail: str
-    mend: str = ""
+        make_room(gradings=gradings)

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from grader.errors import ExitCode
-from grader.judging.summary import OPEN, overall_status, reached_pass_mark
-from grader.model.result import CriterionResult
-from grader.model.verdict import Status
-from grader.rubric.model import Rubric
 import sys
+from collections.abc import Iterable
 from pathlib import Path
+
 from grader.cli.errors import report
 from grader.cli.output import say, say_document
 from grader.errors import ExitCode, GraderError
-from grader.model.result import GradingResult
+from grader.judging.summary import OPEN, overall_status, reached_pass_mark
+from grader.model.result import CriterionResult, GradingResult
+from grader.model.verdict import Status
 from grader.report.result_json import result_text
 from grader.report.terminal import open_console, print_report
-
+from grader.rubric.model import Rubric
 
 EXACT_DIGITS = 6
 """More than points have, and fewer than show how floating point multiplies."""
@@ -61,8 +59,6 @@ def _in_proportion(rubric: Rubric, shown: tuple[CriterionResult, ...]) -> Rubric
     share = sum(c.max_points for c in shown) / (rubric.max_points or 1.0)
     return rubric.model_copy(update={"pass_mark": round(rubric.pass_mark * share, EXACT_DIGITS)})
 
-
-# [cli.show] How `grade` and `check` end: the report on stdout, where the files are, the exit code.
 
 REPORTS = ("report.html", "result.json", "report.md", "junit.xml", "console.log")
 

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
 from grader.cli.find_packages import Found, find, shown
 from grader.errors import UsageError
 from grader.intake import enclosing_package, find_packages
 from grader.intake.find import Candidate
-from grader.intake.names import is_archive_name
-from grader.intake.recordings import is_recording
-from grader.rubric.load import LoadedRubric, load_rubric
-import difflib
-import re
-from collections.abc import Iterable
-from grader.cli.find_packages import Found, shown
 from grader.intake.manifest import MANIFEST
-from grader.intake.names import listing, printable
-from grader.rubric.load import find_rubric_for_package, packages_of_labs
-
+from grader.intake.names import is_archive_name, listing, printable
+from grader.intake.recordings import is_recording
+from grader.rubric.load import LoadedRubric, find_rubric_for_package, load_rubric, packages_of_labs
+from grader.rubric.model import Criterion, Rubric, Scenario, Start, Until
+from grader.suggest import closest
 
 Package = tuple[str, Path]
+ALIKE = 0.75
+"""How alike a package's name and a lab's must be to suggest the lab."""
+MAX_SECONDS = 3600
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,11 +130,6 @@ def _source(path: Path, found: Found, package: Candidate) -> str:
     return str(path if inside and found.whole and not found.moved else package.folder)
 
 
-# [cli.labs] Which lab a package is for, and what to say where none is.
-
-_ALIKE = 0.75
-
-
 @dataclass(frozen=True, kw_only=True)
 class Lab:
     """A lab and the package that it is for; `why` says how the two were brought together."""
@@ -220,9 +216,9 @@ def _near(names: Iterable[str], known: dict[str, str]) -> str | None:
     words = {_plain(word): rubric for rubric, package in known.items() for word in (rubric, package)}
     for name in names:
         inside = [word for word in words if len(word) >= 4 and word in _plain(name)]
-        close = difflib.get_close_matches(_plain(name), words, n=1, cutoff=_ALIKE)
-        if close or inside:
-            return words[(close or sorted(inside, key=len, reverse=True))[0]]
+        near = closest(_plain(name), words, cutoff=ALIKE) or max(inside, key=len, default="")
+        if near:
+            return words[near]
     return None
 
 
@@ -232,3 +228,35 @@ def _plain(name: str) -> str:
 
 def _listed(known: dict[str, str]) -> str:
     return ", ".join(f"{rubric} (package {package})" for rubric, package in known.items())
+
+
+def rubric_to_record(
+    package: str, scripts: Sequence[str], launches: Sequence[str], seconds: float
+) -> LoadedRubric:
+    """Return a rubric that only says what to run and for how long; its criterion is never judged."""
+    if not 0 < seconds <= MAX_SECONDS:
+        raise UsageError(f"--seconds must be more than 0 and at most {MAX_SECONDS}, not {seconds:g}")
+    starts = [Start(name=_start_name(i, file), script=file) for i, file in enumerate(scripts, 1)]
+    starts += [
+        Start(name=_start_name(i, file), launch=file) for i, file in enumerate(launches, len(starts) + 1)
+    ]
+    until = Until(limit_s=seconds, first_message_s=seconds, silent_s=seconds, messages={})
+    scenario = Scenario(title="As asked on the command line", start=tuple(starts), until=until)
+    criterion = Criterion.model_validate(
+        {"id": "recorded", "title": "Recorded", "points": 0, "check": "none", "scenario": "record"}
+    )
+    made = {
+        "schema": "grader.rubric/1",
+        "id": "record",
+        "title": "Recording",
+        "version": "0",
+        "package": package,
+    }
+    rubric = Rubric.model_validate({**made, "scenarios": {"record": scenario}, "criteria": (criterion,)})
+    return LoadedRubric(rubric=rubric, path=Path(), digest="")
+
+
+def _start_name(number: int, file: str) -> str:
+    """Return a name with a number, so that it is unique: `p1-numeric-talker`."""
+    stem = re.sub(r"[^a-z0-9]+", "-", Path(file).stem.lower()).strip("-")
+    return f"p{number}-{stem}".rstrip("-")

@@ -1,64 +1,127 @@
-"""Files to hand over, as a zip or as a folder. The same files give the same bytes."""
+"""What an export packs: the grader itself as a wheel, the lab, and the settings that the packed grader reads back.
+
+The same grader and lab always give the same bytes. The files of one platform are added by `gradescope` and
+`prairielearn`; `autograde` is what runs in the platform's container.
+"""
 
 from __future__ import annotations
 
-import io
-import os
-import zipfile
-from collections.abc import Iterator
-from pathlib import Path
-from grader.files import atomic_write
 import base64
 import hashlib
+import io
+import os
 import sys
+import zipfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib import resources
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
-from grader.errors import UsageError
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import ValidationError
+
+from grader.errors import GraderError, InternalError, UsageError
+from grader.files import atomic_write
+from grader.model.record import Record
+from grader.model.result import GradingResult
 from grader.rubric.instructor import read_instructor
 from grader.rubric.load import LoadedRubric
 from grader.rubric.source import read_source
-from typing import Literal
-from pydantic import ValidationError
-from grader.errors import InternalError
-from grader.model.record import Record
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+NAME = "ros-lab-grader"
+PACKAGE = Path(__file__).resolve().parents[1]
+SYSTEM_SCRIPT = "setup.sh"
+WHEEL = "Wheel-Version: 1.0\nGenerator: grader export\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+METADATA_FILES = ("METADATA", "entry_points.txt")
+SETTINGS_FILE = "grader.json"
+"""Lies in the folder of the lab."""
+EARLIEST = (1980, 1, 1, 0, 0, 0)
+"""The first date that a zip can carry: the time of the export is not part of its bytes."""
+LostModes = Literal["lost", "granted"]
 
 
-LONG_AGO = (1980, 1, 1, 0, 0, 0)
-"""The first date that a zip can carry: nothing of when it was made is in it."""
+@dataclass(frozen=True, kw_only=True)
+class Platform:
+    """Where a platform's container keeps the `lab` and the `upload`, as folders below its root, and how results are
+    written for it: `graded` and `not_graded` return the JSON document `results/results.json`."""
+
+    lab: str
+    upload: str
+    graded: Callable[[GradingResult, LoadedRubric], dict[str, Any]]
+    not_graded: Callable[[GraderError], dict[str, Any]]
 
 
-class Parcel:
-    """Files by their path, posix and relative."""
+class Settings(Record):
+    """The file `grader.json` of an exported grader, beside the rubric's folder.
+
+    `rubric` is the path of the rubric from the folder of the settings, `minutes` the platform's time limit. `modes`
+    says how a script counts if its executable bit was lost in the upload.
+    """
+
+    rubric: str
+    minutes: int
+    sandbox: Literal["auto", "require", "none"] = "auto"
+    modes: LostModes = "lost"
+
+    @property
+    def grading_s(self) -> int:
+        """Return how long grading may take: half a minute is left to report that it took too long."""
+        return self.minutes * 60 - 30
+
+    def to_json(self) -> bytes:
+        """Return the content of its file."""
+        return f"{self.model_dump_json(indent=2)}\n".encode()
+
+
+def read_settings(folder: Path) -> Settings:
+    """Read the settings in `folder`. Raises InternalError: an export wrote them, not a student."""
+    try:
+        return Settings.model_validate_json((folder / SETTINGS_FILE).read_bytes())
+    except (OSError, ValidationError) as error:
+        raise InternalError(
+            f"{folder / SETTINGS_FILE} cannot be read: {type(error).__name__}", hint="export the grader again"
+        ) from error
+
+
+class Bundle:
+    """Files to hand over as a zip or a folder, by their relative POSIX path."""
 
     def __init__(self) -> None:
         self._files: dict[str, tuple[bytes, bool]] = {}
 
     def add(self, path: str, data: bytes, *, executable: bool = False) -> None:
-        """Add a file, or put it in the place of one of the same path."""
+        """Add a file, or replace the one of the same path."""
         self._files[path] = (data, executable)
 
     def add_file(self, path: str, file: Path) -> None:
-        """Add a file of the disk, with its executable bit."""
+        """Add a file from the disk with its executable bit."""
         self.add(path, file.read_bytes(), executable=os.access(file, os.X_OK))
 
     def entries(self) -> Iterator[tuple[str, bytes, bool]]:
-        """Path, content and executable bit of each file, in order of the paths."""
+        """Return the path, content and executable bit of each file, sorted by path."""
         for path, (data, executable) in sorted(self._files.items()):
             yield path, data, executable
 
     def zipped(self) -> bytes:
-        """A zip with the files' modes in it."""
+        """Return a zip that keeps the modes of the files."""
         out = io.BytesIO()
         with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
             for path, data, executable in self.entries():
-                about = zipfile.ZipInfo(path, LONG_AGO)
-                about.create_system = 3  # Unix, whatever this is: only then do modes count
+                about = zipfile.ZipInfo(path, EARLIEST)
+                about.create_system = 3  # Unix, on any machine: only then do modes count
                 about.compress_type = zipfile.ZIP_DEFLATED
                 about.external_attr = _mode(executable=executable) << 16
                 archive.writestr(about, data)
         return out.getvalue()
 
     def write(self, folder: Path) -> None:
-        """Write the files below `folder`, each whole or not at all. Raises OutputError."""
+        """Write the files below `folder`, each one atomically. Raises OutputError."""
         for path, data, executable in self.entries():
             target = folder / path
             atomic_write(target, data, public=True)
@@ -69,53 +132,40 @@ def _mode(*, executable: bool) -> int:
     return 0o100755 if executable else 0o100644
 
 
-# [integrations.deliver.wheel] A wheel of the grader that runs here, whether it was installed from a wheel or runs from a clone.
-#
-# The same grader gives the same bytes. What was installed beside the package (the man page) is not in it.
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib
-
-NAME = "ros-lab-grader"
-PACKAGE = Path(__file__).resolve().parents[2]
-DATA = "grader/_data"
-SYSTEM_SCRIPT = "setup.sh"
-WHEEL = "Wheel-Version: 1.0\nGenerator: grader export\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
-KEPT = ("METADATA", "entry_points.txt")
-
-
 def wheel() -> tuple[str, bytes]:
-    """Its file name and its bytes. Raises UsageError where the grader is not installed, only on Python's path."""
+    """Return the file name and the bytes of a wheel of the running grader, installed or in a clone.
+
+    What is installed beside the package (the man page) is left out. Raises UsageError if the grader is not installed
+    but only on Python's path.
+    """
     try:
         installed = distribution(NAME)
     except PackageNotFoundError as error:
         raise UsageError(
-            "the grader is not installed here, so there is nothing to pack",
-            hint="pip install -e . in its folder, or pipx install it",
+            "the grader is not installed here, so it cannot be packed",
+            hint="run pip install -e . in its folder, or install it with pipx",
         ) from error
-    parcel = Parcel()
+    bundle = Bundle()
     for path, file in _package_files():
-        parcel.add_file(path, file)
+        bundle.add_file(path, file)
     stem = f"{NAME.replace('-', '_')}-{installed.version}"
     info = f"{stem}.dist-info"
     for name, text in _metadata(installed):
-        parcel.add(f"{info}/{name}", text.encode())
-    parcel.add(f"{info}/WHEEL", WHEEL.encode())
-    parcel.add(f"{info}/RECORD", _record(parcel, f"{info}/RECORD"))
-    return f"{stem}-py3-none-any.whl", parcel.zipped()
+        bundle.add(f"{info}/{name}", text.encode())
+    bundle.add(f"{info}/WHEEL", WHEEL.encode())
+    bundle.add(f"{info}/RECORD", _record(bundle, f"{info}/RECORD"))
+    return f"{stem}-py3-none-any.whl", bundle.zipped()
 
 
 def system_script() -> bytes:
-    """The script that installs the packages of the system."""
+    """Return the script that installs the system's packages."""
     checkout = _checkout()
     file = checkout / "scripts" / SYSTEM_SCRIPT if checkout else PACKAGE / "_data" / SYSTEM_SCRIPT
     return file.read_bytes()
 
 
 def _checkout() -> Path | None:
-    """The clone that the grader runs from; None where it is installed."""
+    """Return the clone that the grader runs from, or None if it is installed."""
     root = PACKAGE.parent
     return root if (root / "pyproject.toml").is_file() and (root / "rubrics").is_dir() else None
 
@@ -141,14 +191,14 @@ def _files(source: Path, target: str) -> Iterator[tuple[str, Path]]:
 
 
 def _metadata(installed: Distribution) -> Iterator[tuple[str, str]]:
-    for name in KEPT:
+    for name in METADATA_FILES:
         text = installed.read_text(name)
         if text is not None:
             yield name, text
 
 
-def _record(parcel: Parcel, own: str) -> bytes:
-    lines = [f"{path},sha256={_digest(data)},{len(data)}" for path, data, _ in parcel.entries()]
+def _record(bundle: Bundle, own: str) -> bytes:
+    lines = [f"{path},sha256={_digest(data)},{len(data)}" for path, data, _ in bundle.entries()]
     return "".join(f"{line}\n" for line in [*lines, f"{own},,"]).encode()
 
 
@@ -156,50 +206,16 @@ def _digest(data: bytes) -> str:
     return base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
 
 
-# [integrations.deliver.lab] A rubric and the instructor's files that belong to it, to be taken along.
-
-def add_lab(parcel: Parcel, rubric: LoadedRubric, folder: str) -> str:
-    """Add the rubric's file and those it names below `folder`; gives the rubric's path in the parcel."""
+def add_lab(bundle: Bundle, rubric: LoadedRubric, folder: str) -> str:
+    """Add the rubric's file and the files it names below `folder`. Return the rubric's path in the bundle."""
     path = f"{folder}/{rubric.path.name}"
-    parcel.add(path, rubric.path.read_bytes())
+    bundle.add(path, rubric.path.read_bytes())
     source = read_source(rubric.path, rubric.path.name)
     for name, data in read_instructor(source.data, rubric.path.parent).files.items():
-        parcel.add(f"{folder}/{name}", data)
+        bundle.add(f"{folder}/{name}", data)
     return path
 
 
-# [integrations.deliver.settings] What an exported grader is told: `grader.json` beside the rubric's folder, written by the export.
-
-FILE = "grader.json"
-Modes = Literal["lost", "granted"]
-
-
-class Settings(Record):
-    """`rubric` is the rubric's path from the folder of the settings; `minutes` is the platform's time limit for all.
-
-    `modes` says what a script counts as whose executable bit the upload has lost.
-    """
-
-    rubric: str
-    minutes: int
-    sandbox: Literal["auto", "require", "none"] = "auto"
-    modes: Modes = "lost"
-
-    @property
-    def grading_s(self) -> int:
-        """How long grading may take, so that there is time left to say that it took too long."""
-        return self.minutes * 60 - 30
-
-    def to_json(self) -> bytes:
-        """Its file."""
-        return f"{self.model_dump_json(indent=2)}\n".encode()
-
-
-def read_settings(folder: Path) -> Settings:
-    """Those in `folder`. Raises InternalError: the export wrote them, no student."""
-    try:
-        return Settings.model_validate_json((folder / FILE).read_bytes())
-    except (OSError, ValidationError) as error:
-        raise InternalError(
-            f"{folder / FILE} cannot be read: {type(error).__name__}", hint="export the grader again"
-        ) from error
+def template(name: str) -> bytes:
+    """Return a file of `integrations/files`, which holds what the platforms run and show."""
+    return (resources.files("grader.integrations") / "files" / name).read_bytes()

@@ -1,28 +1,29 @@
-"""How a grading ended, in the words that a CI system's later steps compare."""
+"""How a grading in a CI job ended: its outcome, the line that says so, and the folder of reports that is kept.
+
+`github` and `gitlab` tell their system; what a job grades is for `ci_settings`.
+"""
 
 from __future__ import annotations
 
+import shutil
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from grader.errors import ExitCode, GraderError
-from grader.model.result import GradingResult
-from grader.rubric.model import Rubric
-from grader.errors import PackageNotFound, SubmissionError
-from grader.integrations.ci_settings import needed_words
-from grader.report.text import number
-from grader.report.view import arrange
-import shutil
-from contextlib import suppress
-from grader.errors import OutputError
+
+from grader.errors import ExitCode, GraderError, OutputError, PackageNotFound, SubmissionError
 from grader.files import atomic_write, make_folder
+from grader.model.result import GradingResult
 from grader.report.code_quality import code_quality
 from grader.report.junit import junit
 from grader.report.sarif import sarif
+from grader.report.text import number
+from grader.report.view import arrange
+from grader.rubric.model import Rubric
 
 
 class Outcome(str, Enum):
-    """The output `status`, and the words of `fail-on`."""
+    """The values of the output `status` and of the input `fail-on`, which later steps compare."""
 
     PASSED = "passed"
     BELOW = "below-pass-mark"
@@ -45,19 +46,29 @@ TITLES = {
     Outcome.NOT_GRADED: "Not graded",
     Outcome.WRONG_INPUT: "Wrong input",
 }
+STUDENTS = {SubmissionError.kind, PackageNotFound.kind}
+"""The kinds of error that are the student's fault."""
+NO_MARK_LOST = "this is not the submission's fault, and no mark is lost"
+REPORT_NAMES = frozenset(
+    {
+        "code-quality.json", "console.log", "evidence", "grader.env", "junit.xml", "report.html", "report.md",
+        "report.sarif", "result.json",
+    }
+)  # fmt: skip
+SECTION = "== "
 
 
 @dataclass(frozen=True, kw_only=True)
 class Graded:
-    """A result that there is, without its hidden criteria. `fails`: whether the job is to fail.
+    """A result without its hidden criteria. `fails` is whether the job fails.
 
-    `said` and `hint` are a line each about the outcome. `counted` is the result of what was asked for, which may be the
-    files alone. `folder` has the result's files, `prefix` is the package's folder in the repository.
+    `message` and `hint` are a line each about the outcome. `counted` holds the criteria that were asked for, which may
+    be only those of the files. `folder` has the reports, `prefix` is the package's folder in the repository.
     """
 
     outcome: Outcome
     fails: bool
-    said: str
+    message: str
     hint: str
     result: GradingResult
     counted: GradingResult
@@ -66,34 +77,38 @@ class Graded:
     prefix: str
 
 
-def of_error(error: GraderError) -> Outcome:
-    """Where there is no result at all."""
+def outcome_of_error(error: GraderError) -> Outcome:
+    """Return the outcome of a job without any result."""
     return OF_CODE[error.exit_code]
 
 
-# [integrations.ci.status_lines] What a CI system says of a result, in a line, and what to do about it in another.
-
-STUDENTS = {SubmissionError.kind, PackageNotFound.kind}
-NO_MARK_LOST = "this is not the submission's fault, and no mark is lost"
-
-
-def said_of(counted: GradingResult, rubric: Rubric, outcome: Outcome, *, static: bool) -> tuple[str, str]:
-    """The line, and a hint where there is one. What is behind an outcome that is nobody's fault is named."""
+def describe_outcome(
+    counted: GradingResult, rubric: Rubric, outcome: Outcome, *, static: bool
+) -> tuple[str, str]:
+    """Return a line about the outcome, with its cause where that is not the student's, and a hint or ""."""
     if outcome is Outcome.NOT_GRADED:
-        return _not_graded(counted)
-    files = " that the files alone decide (nothing was run)" if static else ""
-    told = f"{number(counted.points)} of {number(counted.max_points)} points{files}"
+        return _describe_error(counted)
+    files = " that can be judged from the files alone (nothing was run)" if static else ""
+    reached = f"{number(counted.points)} of {number(counted.max_points)} points{files}"
     if outcome is not Outcome.INCONCLUSIVE:
-        return f"{told}; {needed_words(rubric, counted.max_points)}", ""
+        return f"{reached}; {points_to_pass(rubric, counted.max_points)}", ""
     waiting = arrange(counted, rubric).open
     if not waiting:
-        return f"{told}, and something could not be judged; no mark is lost", ""
+        return f"{reached}; something could not be judged, and no mark is lost", ""
     points = number(sum(loss.points for loss in waiting))
     first = waiting[0].criterion
-    return f"{told}; {points} more are not settled, and no mark is lost: {first.message}", first.hint
+    return f"{reached}; {points} more are undecided, and no mark is lost: {first.message}", first.hint
 
 
-def _not_graded(result: GradingResult) -> tuple[str, str]:
+def points_to_pass(rubric: Rubric, points: float) -> str:
+    """Return what it takes to pass, out of the `points` that are counted."""
+    if rubric.pass_mark is None:
+        return "to pass, every visible criterion has to be met"
+    needed = rubric.pass_mark * points / (rubric.max_points or 1)
+    return f"to pass, it takes {number(needed)}"
+
+
+def _describe_error(result: GradingResult) -> tuple[str, str]:
     if result.error is None:
         return (
             f"a check of the grader failed; {NO_MARK_LOST}",
@@ -103,25 +118,14 @@ def _not_graded(result: GradingResult) -> tuple[str, str]:
     return result.error.message if own else f"{result.error.message}; {NO_MARK_LOST}", result.error.hint
 
 
-# [integrations.ci.files] The folder that a CI system keeps: every report, and the evidence of what is shown.
-
-OURS = frozenset(
-    {
-        "code-quality.json", "console.log", "evidence", "grader.env", "junit.xml", "report.html", "report.md",
-        "report.sarif", "result.json",
-    }
-)  # fmt: skip
-SECTION = "== "
-
-
 def clear(out: Path) -> None:
-    """Make the folder, empty. What an earlier run left goes first, so that nobody takes it for this one's.
+    """Make the folder and empty it, so that reports of an earlier run are not taken for this one's.
 
-    Raises OutputError where there is anything else in it, or where it is a link.
+    Raises OutputError if it is a link or holds anything that is not the grader's.
     """
     try:
         names = {entry.name for entry in out.iterdir()} if out.is_dir() else set()
-        if out.is_symlink() or (out.exists() and not out.is_dir()) or names - OURS:
+        if out.is_symlink() or (out.exists() and not out.is_dir()) or names - REPORT_NAMES:
             raise OutputError(f"{out} is in the way of the results", hint="remove it from the repository")
         for name in names:
             path = out / name
@@ -129,15 +133,15 @@ def clear(out: Path) -> None:
         make_folder(out)
     except OSError as error:
         raise OutputError(
-            f"{out} cannot be written: {error.strerror}", hint="say where else it may go"
+            f"{out} cannot be written: {error.strerror}", hint="choose another folder"
         ) from error
 
 
 def keep(made: Path, out: Path, rubric: Rubric) -> None:
-    """Move a submission's results to `out`, without what only hidden criteria look at. Raises OutputError."""
+    """Move a submission's reports to `out`, without the runs that only hidden criteria use. Raises OutputError."""
     unseen = _hidden_scenarios(rubric)
     try:
-        for name in sorted(OURS):
+        for name in sorted(REPORT_NAMES):
             if (made / name).exists():
                 shutil.move(made / name, out / name)
         for name in unseen:
@@ -146,11 +150,13 @@ def keep(made: Path, out: Path, rubric: Rubric) -> None:
             console = (out / "console.log").read_text(encoding="utf-8")
             atomic_write(out / "console.log", _without(console, unseen).encode())
     except OSError as error:
-        raise OutputError(f"{out} cannot be written: {error.strerror}", hint="make room there") from error
+        raise OutputError(
+            f"{out} cannot be written: {error.strerror}", hint="free some space there"
+        ) from error
 
 
 def add_forms(out: Path, result: GradingResult, prefix: str, docs: dict[str, dict[str, str]]) -> None:
-    """The reports that know files by their place in the repository. Raises OutputError."""
+    """Write the reports that name files by their path in the repository. Raises OutputError."""
     atomic_write(out / "junit.xml", junit(result, prefix))
     atomic_write(out / "code-quality.json", code_quality(result, prefix).encode())
     atomic_write(out / "report.sarif", sarif(result, prefix, docs=docs).encode("utf-8", "backslashreplace"))
@@ -165,7 +171,7 @@ def _hidden_scenarios(rubric: Rubric) -> frozenset[str]:
 
 
 def _without(console: str, unseen: frozenset[str]) -> str:
-    """A run's part begins with its name; all other lines begin with a time."""
+    """Return the console log without the sections of the runs `unseen`; every other line begins with a time."""
     kept, shown = [], True
     for row in console.splitlines(keepends=True):
         if row.startswith(SECTION):

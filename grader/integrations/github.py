@@ -1,7 +1,7 @@
 """GitHub Actions: annotations, the step's summary, outputs.
 
-Values go into files, each between lines that nobody can guess; while anything of a student's may be printed, the
-runner is told to obey nothing.
+Values go into files, each between lines that cannot be guessed; while anything of a student's may be printed, the
+runner is told to ignore commands.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from grader.errors import GraderError, OutputError
-from grader.integrations.ci_results import TITLES, Graded, Outcome, of_error
+from grader.integrations.ci_results import TITLES, Graded, Outcome, outcome_of_error
 from grader.report.annotations import EACH_MAX, github_annotation, github_annotations
 from grader.report.classroom import classroom
 from grader.report.findings import Severity
@@ -23,15 +23,15 @@ LINE_CHARS = 1000
 
 
 class GitHub:
-    """Tells GitHub's runner. `variables` are the step's: where it names no file, that part is left out."""
+    """Tells GitHub's runner. `variables` are those of the step; without the name of a file, that part is left out."""
 
     def __init__(self, variables: Mapping[str, str]) -> None:
         self._outputs = variables.get("GITHUB_OUTPUT", "")
         self._summary = variables.get("GITHUB_STEP_SUMMARY", "")
 
     @contextmanager
-    def unheard(self) -> Iterator[None]:
-        """Nothing that is printed meanwhile is a command."""
+    def commands_stopped(self) -> Iterator[None]:
+        """Keep the runner from taking anything printed in this block for a command."""
         token = secrets.token_hex(20)
         _print(f"::stop-commands::{token}\n")
         try:
@@ -40,21 +40,21 @@ class GitHub:
             _print(f"\n::{token}::\n")
 
     def tell(self, graded: Graded) -> None:
-        """Annotations, summary and outputs of a result. Raises OutputError."""
-        told = graded.result.model_copy(update={"error": None})  # it is said here, with whose fault it is
-        said = "\n".join(part for part in (graded.said, graded.hint) if part)
-        _print(github_annotation(_severity(graded), TITLES[graded.outcome], said))
-        _print(github_annotations(told, graded.prefix, each_max=EACH_MAX - 1))
+        """Write the annotations, summary and outputs of a result. Raises OutputError."""
+        result = graded.result.model_copy(update={"error": None})  # it is in `text`, with whose fault it is
+        text = "\n".join(part for part in (graded.message, graded.hint) if part)
+        _print(github_annotation(_severity(graded), TITLES[graded.outcome], text))
+        _print(github_annotations(result, graded.prefix, each_max=EACH_MAX - 1))
         report = graded.folder / "report.md"
-        text = report.read_text(encoding="utf-8") if report.is_file() else ""
-        self._add(self._summary, f"{_heading(graded.outcome, graded.said)}\n\n{text}\n")
+        summary = report.read_text(encoding="utf-8") if report.is_file() else ""
+        self._add(self._summary, f"{_heading(graded.outcome, graded.message)}\n\n{summary}\n")
         self._write_outputs(_values(graded))
 
-    def refuse(self, error: GraderError) -> None:
-        """The same where there is no result. Raises OutputError."""
-        outcome = of_error(error)
-        said = "\n".join(part for part in (error.message, error.hint) if part)
-        _print(github_annotation(Severity.ERROR, TITLES[outcome], said))
+    def tell_error(self, error: GraderError) -> None:
+        """Write the same where there is no result. Raises OutputError."""
+        outcome = outcome_of_error(error)
+        text = "\n".join(part for part in (error.message, error.hint) if part)
+        _print(github_annotation(Severity.ERROR, TITLES[outcome], text))
         self._add(
             self._summary, f"{_heading(outcome, error.message)}\n\n{markdown(line(error.hint, LINE_CHARS))}\n"
         )
@@ -76,7 +76,7 @@ class GitHub:
         except OSError as error:
             message = f"{file} cannot be written: {error.strerror}"
             raise OutputError(
-                message, hint="it is GitHub's own: is the container's user its owner?"
+                message, hint="GitHub made this file: does it belong to the container's user?"
             ) from error
 
 
@@ -101,12 +101,12 @@ def _severity(graded: Graded) -> Severity:
     return Severity.ERROR if graded.fails else Severity.WARNING
 
 
-def _heading(outcome: Outcome, said: str) -> str:
-    return f"**{TITLES[outcome]}:** {markdown(line(said, LINE_CHARS))}"
+def _heading(outcome: Outcome, text: str) -> str:
+    return f"**{TITLES[outcome]}:** {markdown(line(text, LINE_CHARS))}"
 
 
 def _print(text: str) -> None:
-    """At once, and in order with what the terminal's report prints."""
+    """Print at once, in order with the report on the terminal."""
     encoding = sys.stdout.encoding or "ascii"
     sys.stdout.write(text.encode(encoding, "backslashreplace").decode(encoding))
     sys.stdout.flush()

@@ -8,25 +8,25 @@ from pathlib import Path
 
 from grader.errors import GraderError
 from grader.files import atomic_write
-from grader.integrations.ci_results import Graded, Outcome, of_error
+from grader.integrations.ci_results import Graded, Outcome, outcome_of_error
 from grader.report.text import number
 
 VARIABLES = "grader.env"
 
 
 class GitLab:
-    """Tells GitLab's runner, by files in `out`."""
+    """Tells GitLab's runner through files in `out`."""
 
     def __init__(self, out: Path) -> None:
         self._out = out
 
     @contextmanager
-    def unheard(self) -> Iterator[None]:
-        """GitLab obeys nothing that is printed but escapes, and the reports have none."""
+    def commands_stopped(self) -> Iterator[None]:
+        """Do nothing: GitLab obeys only escape sequences, and the reports have none."""
         yield
 
     def tell(self, graded: Graded) -> None:
-        """The points as variables. Raises OutputError."""
+        """Write the points as variables. Raises OutputError."""
         counted = graded.outcome is not Outcome.NOT_GRADED
         self._write(
             {
@@ -36,10 +36,10 @@ class GitLab:
             }
         )
 
-    def refuse(self, error: GraderError) -> None:
-        """The same where there is no result. Raises OutputError."""
+    def tell_error(self, error: GraderError) -> None:
+        """Write the outcome where there is no result. Raises OutputError."""
         if not self._out.is_symlink() and (self._out.is_dir() or not self._out.exists()):
-            self._write({"GRADER_STATUS": of_error(error).value})
+            self._write({"GRADER_STATUS": outcome_of_error(error).value})
 
     def _write(self, values: dict[str, str]) -> None:
         atomic_write(

@@ -1,20 +1,25 @@
-"""PrairieLearn: a question with an external grader, the files of its image, and what it answers in the container."""
+"""PrairieLearn: the export of a question with an external grader and its image, and the results of a grading."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from importlib import resources
 from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
 
-from grader.errors import GraderError
-from grader.integrations.autograde import Form, Place
-from grader.integrations.bundle import add_lab
-from grader.integrations.bundle import Parcel
-from grader.integrations.bundle import FILE, Settings
-from grader.integrations.bundle import system_script, wheel
+from grader.errors import GraderError, UsageError
+from grader.files import atomic_write
+from grader.integrations.bundle import (
+    SETTINGS_FILE,
+    Bundle,
+    Platform,
+    Settings,
+    add_lab,
+    system_script,
+    template,
+    wheel,
+)
 from grader.model.result import CriterionResult, GradingResult
 from grader.report.hidden import hidden_ids
 from grader.report.settled import late_words
@@ -22,31 +27,44 @@ from grader.report.text import html, line, number, text_limit
 from grader.report.view import OPEN
 from grader.rubric.load import LoadedRubric
 
-DEFAULT_MINUTES, MOST_MINUTES = 10, 10
-"""PrairieLearn lets an external grader run for 600 seconds at most."""
 ENTRYPOINT = "/usr/local/bin/grade-question"
-IMAGE = "ros-lab-grader"
 LIMIT = 1000
 LOOK = "A PERSON MUST LOOK"
 
 
-def question(rubric: LoadedRubric, settings: Settings, image: str) -> Parcel:
-    """`question/` for a course, and `image/` to build the image from, which is the same for every lab."""
-    parcel = Parcel()
+def question(rubric: LoadedRubric, settings: Settings, image: str) -> Bundle:
+    """Return the folder `question/` for a course, and `image/`, the files of a Docker image that suits every lab."""
+    bundle = Bundle()
     name, data = wheel()
-    parcel.add(f"image/{name}", data)
-    parcel.add("image/system.sh", system_script(), executable=True)
-    parcel.add("image/grade-question", _file("grade-question"), executable=True)
-    parcel.add("image/Dockerfile", _file("prairielearn.Dockerfile"))
-    lab = add_lab(parcel, rubric, "question/tests/rubric").removeprefix("question/tests/")
-    parcel.add(f"question/tests/{FILE}", settings.model_copy(update={"rubric": lab}).to_json())
-    parcel.add("question/info.json", _info(rubric, settings, image))
-    parcel.add("question/question.html", _page(rubric))
-    return parcel
+    bundle.add(f"image/{name}", data)
+    bundle.add("image/system.sh", system_script(), executable=True)
+    bundle.add("image/grade-question", template("grade-question"), executable=True)
+    bundle.add("image/Dockerfile", template("prairielearn.Dockerfile"))
+    lab = add_lab(bundle, rubric, "question/tests/rubric").removeprefix("question/tests/")
+    bundle.add(f"question/tests/{SETTINGS_FILE}", settings.model_copy(update={"rubric": lab}).to_json())
+    bundle.add("question/info.json", _info(rubric, settings, image))
+    bundle.add("question/question.html", _page(rubric))
+    return bundle
+
+
+def write_question(bundle: Bundle, target: Path) -> None:
+    """Write a question to a folder, or to a zip if `target` ends in .zip.
+
+    Raises UsageError if the folder contains anything but an earlier export.
+    """
+    if target.suffix.lower() == ".zip":
+        atomic_write(target, bundle.zipped(), public=True)
+        return
+    if target.exists() and not target.is_dir():
+        raise UsageError(f"{target} is not a folder", hint="give --out a folder, or a name that ends in .zip")
+    exported = (target / "question" / "tests" / SETTINGS_FILE).is_file()
+    if target.is_dir() and any(target.iterdir()) and not exported:
+        raise UsageError(f"{target} contains other files", hint="choose a new folder with --out")
+    bundle.write(target)
 
 
 def _info(rubric: LoadedRubric, settings: Settings, image: str) -> bytes:
-    """The uuid is made of the rubric's id: exported again, it is the same question."""
+    """Return info.json. Its uuid comes from the rubric's id, so that a second export is the same question."""
     lab = rubric.rubric
     info = {
         "uuid": str(uuid5(NAMESPACE_URL, f"ros-lab-grader:{lab.id}")),
@@ -67,23 +85,18 @@ def _info(rubric: LoadedRubric, settings: Settings, image: str) -> bytes:
 
 
 def _page(rubric: LoadedRubric) -> bytes:
-    text = _file("question.html").decode()
+    text = template("question.html").decode()
     package = html(rubric.rubric.package)
     return text.replace("@TITLE@", html(rubric.rubric.title)).replace("@PACKAGE@", package).encode()
 
 
-def place(root: Path) -> Place:
-    """PrairieLearn's folders, below /grade."""
-    return Place(lab=root / "tests", handed_in=root / "student", results=root / "results")
-
-
 def graded(result: GradingResult, rubric: LoadedRubric) -> dict[str, Any]:
-    """Points, or that what was handed in cannot be graded: then no attempt is used up."""
+    """Return the points, or that the submission cannot be graded: then no attempt is used up."""
     if result.error is not None:
         return _invalid(result.error.message, result.error.hint)
     counting = [c for c in result.criteria if c.max_points > 0]
     if all(c.status in OPEN for c in counting):
-        return _invalid("no criterion could be judged", "hand it in again")
+        return _invalid("no criterion could be judged", "submit again")
     hidden = hidden_ids(rubric.rubric)
     shown = [c for c in result.criteria if c.id not in hidden]
     limit = text_limit(len(result.criteria), LIMIT)
@@ -99,11 +112,12 @@ def graded(result: GradingResult, rubric: LoadedRubric) -> dict[str, Any]:
 
 
 def not_graded(fault: GraderError) -> dict[str, Any]:
-    """PrairieLearn takes no points and no attempt for it."""
+    """Return a document that costs neither points nor an attempt."""
     return _invalid(fault.message, fault.hint)
 
 
-FORM = Form(graded=graded, not_graded=not_graded)
+PLATFORM = Platform(lab="tests", upload="student", graded=graded, not_graded=not_graded)
+"""Its folders lie below /grade."""
 
 
 def _invalid(message: str, hint: str) -> dict[str, Any]:
@@ -137,13 +151,9 @@ def _test(criterion: CriterionResult, limit: int) -> dict[str, Any]:
 
 
 def _unseen(criteria: list[CriterionResult]) -> dict[str, Any]:
-    """PrairieLearn has no criteria that are seen later, and the score counts them all."""
+    """Return one row for all hidden criteria: PrairieLearn cannot reveal them later, and the score counts them."""
     return {
         "name": f"{len(criteria)} criteria that are not shown",
         "points": round(sum(c.points for c in criteria), 6),
         "max_points": sum(c.max_points for c in criteria),
     }
-
-
-def _file(name: str) -> bytes:
-    return (resources.files("grader.integrations.deliver") / "files" / name).read_bytes()

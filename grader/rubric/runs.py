@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from grader.rubric.faults import did_you_mean
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
+from grader.suggest import did_you_mean
 
 KINDS_OF_START = ("script", "launch", "load", "program", "built")
 STRING = "std_msgs/String"

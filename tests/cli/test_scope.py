@@ -11,8 +11,7 @@ import pytest
 
 from grader.arena import control_groups, host_programs
 from grader.arena.control_groups import LEAF
-from grader.cli import main
-from grader.cli import systemd_scope
+from grader.cli import main, systemd_scope
 from tests.arena.fake_groups import FakeGroups
 
 SYSTEMD = """#!/bin/sh

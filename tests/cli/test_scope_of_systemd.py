@@ -34,8 +34,8 @@ echo 0 > $1/login/cgroup.procs
 PROGRAM = """
 import os, subprocess, sys, time
 from pathlib import Path
-from grader.arena import cgroups, delegated
-from grader.cli import scope
+from grader.arena import control_groups
+from grader.cli import systemd_scope as scope
 asks = ["busctl", "--user", "--timeout=1", "--acquired", "--no-pager", "list"]
 until = time.monotonic() + float(os.environ["READY_S"])
 while b"org.freedesktop.systemd1 " not in subprocess.run(asks, capture_output=True).stdout and time.monotonic() < until:
@@ -43,16 +43,16 @@ while b"org.freedesktop.systemd1 " not in subprocess.run(asks, capture_output=Tr
 # this machine's groups of version 2 hold no memory, and this process is root's in no login
 os.geteuid = lambda: 1000
 scope.LOGINS, scope.has_memory, scope._lingers = "/", lambda: True, lambda user: True
-cgroups.find_cgroups.cache_clear()
-scope.find_cgroups = lambda: cgroups.Cgroups()
+control_groups.find_cgroups.cache_clear()
+scope.find_cgroups = lambda: control_groups.Cgroups()
 scope.find_cgroups.cache_clear = lambda: None
 pid = os.getpid()
 scope.enter_scope()
-print(cgroups.own_group(), pid == os.getpid())
-(own,) = [folder for version, folder in cgroups.own_groups("none") if version == 2]
-print(delegated._belongs_to_the_grader(own))
-delegated._make_ready(own)
-print(cgroups.own_group(), delegated._processes(own))
+print(control_groups.own_group(), pid == os.getpid())
+(own,) = [folder for version, folder in control_groups.own_groups("none") if version == 2]
+print(control_groups._belongs_to_the_grader(own))
+control_groups._make_ready(own)
+print(control_groups.own_group(), control_groups._processes(own))
 """
 
 

@@ -17,7 +17,7 @@ from grader.errors import HostError, SandboxMissing
 
 
 def rows() -> dict[str, Row]:
-    return {row.name: row for row in host_support.walls()}
+    return {row.name: row for row in host_support.sandbox_rows()}
 
 
 def test_every_part_has_a_row_and_what_is_missing_a_command() -> None:

@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import get_args
 
 import jsonschema
 import pytest
@@ -17,7 +18,7 @@ from lxml import etree
 from lxml import html as parser
 from markdown_it import MarkdownIt
 
-from grader.cli.parsing.reports import FORMS
+from grader.cli.commands.classes import ReportForm
 from grader.errors import GraderError
 from grader.model.figure import Edge, Figures, GraphFigure
 from grader.model.result import ErrorInfo
@@ -361,5 +362,5 @@ def test_the_worst_result_has_what_it_is_named_for():
 
 def test_the_docs_name_every_form_and_no_other():
     docs = (Path(__file__).parents[2] / "docs" / "how-to" / "reports.md").read_text(encoding="utf-8")
-    assert tuple(re.findall(r"^\| `([a-z][\w-]*)` \|", docs, re.MULTILINE)) == FORMS
-    assert set(re.findall(r"--form (\S+)", docs)) <= set(FORMS)
+    assert tuple(re.findall(r"^\| `([a-z][\w-]*)` \|", docs, re.MULTILINE)) == get_args(ReportForm)
+    assert set(re.findall(r"--form (\S+)", docs)) <= set(get_args(ReportForm))

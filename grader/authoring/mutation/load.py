@@ -13,10 +13,11 @@ from grader.authoring.mutation.operators import OPERATORS
 from grader.errors import RubricError
 from grader.model.record import Record
 from grader.model.version import MUTANTS
-from grader.rubric.faults import did_you_mean, model_faults
+from grader.rubric.faults import model_faults
 from grader.rubric.load import refuse_newer
 from grader.rubric.model import Rubric
 from grader.rubric.source import Fault, KeyPath, Source, as_map, as_maps, read_source
+from grader.suggest import did_you_mean
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.solution import Site, Solution
 from grader.authoring.mutation.tree import Tree
 from grader.errors import RubricError, UsageError
-from grader.rubric.faults import did_you_mean
+from grader.suggest import did_you_mean
 
 SHOWN_PLACES = 6
 Place = Mapping[str, str | int]

@@ -1,8 +1,14 @@
-"""`grader example LAB [DIR]`: a lab's correct package to try things with, as it is or with a mistake of students'."""
+"""What `grader labs` and `grader example` show and write: the labs, correct packages, and packages with a mistake."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
+from typing import IO
+
+from rich.table import Table
+from rich.text import Text
 
 from grader.authoring.mutation.find import find_reference, load_solution, mutants_file
 from grader.authoring.mutation.load import load_mutants
@@ -11,22 +17,30 @@ from grader.authoring.mutation.plan import Planned, plan_all, plan_declared
 from grader.authoring.mutation.solution import Solution
 from grader.authoring.mutation.tree import Tree, write_tree
 from grader.cli.output import say
-from grader.errors import ExitCode, UsageError
+from grader.errors import UsageError
 from grader.files import check_writable
-from grader.rubric.faults import did_you_mean
+from grader.report.terminal import emit, open_console
+from grader.report.text import number, visible
 from grader.rubric.load import LoadedRubric, load_rubric
+from grader.rubric.model import NAME_PATTERN, Rubric
+from grader.suggest import did_you_mean
 
 
-def run(*, lab: str, folder: Path | None = None, mistake: str | None = None) -> ExitCode:
-    """Write the package into `folder`, or list the lab's mistakes. Raises UsageError for a folder that is in use."""
-    loaded = load_rubric(lab)
-    correct = load_solution(find_reference(loaded), loaded.rubric.package)
-    if folder is None:
-        if mistake is not None:
-            raise UsageError(
-                "--mistake needs a folder to write to", hint=f"grader example {lab} DIR --mistake {mistake}"
-            )
-        return _list(loaded, correct)
+def print_labs(rubrics: Sequence[Rubric], stream: IO[str]) -> None:
+    """Print a table of labs with the package that each is for."""
+    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="dim")
+    for heading in ("lab", "package", "criteria", "points", "title"):
+        table.add_column(heading, no_wrap=heading != "title")
+    for rubric in rubrics:
+        points = number(rubric.max_points)
+        cells = (rubric.id, rubric.package, str(len(rubric.criteria)), points, rubric.title)
+        table.add_row(*(Text(visible(cell)) for cell in cells))
+    emit(open_console(stream), [table])
+
+
+def write_example(lab: str, folder: Path, mistake: str | None) -> None:
+    """Write a lab's correct package into `folder`, or one with a mistake. Raises UsageError if the folder is in use."""
+    loaded, correct = _correct(lab)
     wanted = None if mistake is None else _chosen(_mistakes(loaded, correct), mistake)
     _write(correct.tree if wanted is None else wanted.tree, folder)
     package = folder / correct.folder
@@ -34,17 +48,30 @@ def run(*, lab: str, folder: Path | None = None, mistake: str | None = None) -> 
         say(f"{package}: a correct package for {loaded.rubric.id}")
     else:
         say(f"{package}: a package for {loaded.rubric.id} with a mistake: the student {_words(wanted)}")
-    return ExitCode.PASSED
 
 
-def _list(loaded: LoadedRubric, correct: Solution) -> ExitCode:
-    """Each mistake with the criteria that it costs."""
-    planned = _mistakes(loaded, correct)
+def list_mistakes(lab: str) -> None:
+    """Print each mistake with the criteria that it costs."""
+    planned = _mistakes(*_correct(lab))
     width = max((len(mutant.name) for mutant in planned), default=0)
     for mutant in planned:
         costs = ", ".join(mutant.costs or {})
         say(f"{mutant.name:{width}}  {costs}".rstrip())
-    return ExitCode.PASSED
+
+
+def rubric_id_from(text: str) -> str:
+    """Return `text` as an id of a rubric. Raises UsageError if it contains nothing that an id may have."""
+    found = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
+    if not re.fullmatch(NAME_PATTERN, found):
+        raise UsageError(
+            f"{text!r} cannot be made into an id", hint="give --id: lower-case letters, digits and hyphens"
+        )
+    return found
+
+
+def _correct(lab: str) -> tuple[LoadedRubric, Solution]:
+    loaded = load_rubric(lab)
+    return loaded, load_solution(find_reference(loaded), loaded.rubric.package)
 
 
 def _mistakes(loaded: LoadedRubric, correct: Solution) -> list[Planned]:
@@ -55,7 +82,7 @@ def _mistakes(loaded: LoadedRubric, correct: Solution) -> list[Planned]:
 
 
 def _chosen(planned: list[Planned], name: str) -> Planned:
-    """The mistake of that name; an operator's name will do where it makes one mistake only. Raises UsageError."""
+    """Return the mistake of that name, or that of an operator which makes only one. Raises UsageError."""
     found = [m for m in planned if m.name == name] or [m for m in planned if m.operators == (name,)]
     if len(found) == 1:
         return found[0]
@@ -74,8 +101,8 @@ def _words(mutant: Planned) -> str:
 
 
 def _write(tree: Tree, folder: Path) -> None:
-    """Raises UsageError where something is in the folder already."""
+    """Raises UsageError if the folder is not empty."""
     if folder.is_symlink() or (folder.exists() and (not folder.is_dir() or any(folder.iterdir()))):
-        raise UsageError(f"{folder} is in use", hint="give a folder that is empty or not there")
+        raise UsageError(f"{folder} is in use", hint="give a new or an empty folder")
     check_writable(folder.absolute())
     write_tree(tree, folder)

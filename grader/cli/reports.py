@@ -1,4 +1,4 @@
-"""`grader report DIR`: the reports of results that are there already, written again. Nothing is run, no ROS needed."""
+"""What `grader report` writes: the reports of results that exist already, of a submission or a class."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from grader.classes.batch.folder import RUN, BatchFolder, open_batch
 from grader.classes.batch.reports import Written, has_result, result_in, write_all, write_one
 from grader.classes.batch.settled import figures_in
 from grader.cli.errors import report
+from grader.cli.find_packages import package_prefix
 from grader.cli.outcome import exit_code
 from grader.cli.output import say, say_beside
-from grader.cli.find_packages import package_prefix
 from grader.errors import EvidenceError, ExitCode, UsageError
 from grader.files import atomic_write
 from grader.model.figure import Figures
@@ -42,41 +42,8 @@ OF_LINES = ("junit", "sarif", "code-quality", "annotations", "classroom")
 NAMES_SHOWN = 5
 
 
-def run(
-    *,
-    folder: Path,
-    rubric: str | None = None,
-    form: str = "",
-    out: str = "",
-    prefix: str | None = None,
-    student: bool = False,
-    anonymous: Path | None = None,
-) -> ExitCode:
-    """Write every report of a submission or of a class anew; with `form`, that one of one submission to `out`."""
-    batch = open_batch(folder) if (folder / RUN).is_file() else None
-    if batch is not None:
-        batch.refuse_newer()
-    single = batch is None and has_result(folder)
-    if form:
-        if not single or anonymous:
-            raise UsageError(f"{folder}: --form is for one submission", hint="give its own folder: DIR/<id>")
-        return _one(folder, _rubric(rubric, folder), form, out or STDOUT, prefix, student=student)
-    if out or prefix is not None or student:
-        raise UsageError("--out, --prefix and --student go with --form", hint="see grader report --help")
-    if anonymous and batch is None:
-        raise UsageError(
-            f"{folder}: only a class has a page: there is no {RUN}", hint="give the batch's --out"
-        )
-    folders = [folder] if single else _folders(folder, batch)
-    loaded = _rubric(rubric, folders[0], batch)
-    code = _written(folders, loaded)
-    if batch is not None:
-        _class_pages(batch, anonymous)
-    return code
-
-
-def _folders(folder: Path, batch: BatchFolder | None) -> list[Path]:
-    """The submissions in a batch's folder, or in any folder of results."""
+def folders_in(folder: Path, batch: BatchFolder | None) -> list[Path]:
+    """Return the submissions of a batch, or in any folder of results. Raises UsageError if there are none."""
     try:
         places = sorted(folder.iterdir()) if batch is None else map(batch.folder_of, batch.run.entries)
         found = [place for place in places if has_result(place)]
@@ -84,23 +51,24 @@ def _folders(folder: Path, batch: BatchFolder | None) -> list[Path]:
         raise UsageError(f"{folder}: {error.strerror}", hint="give a folder of results") from error
     if not found:
         hint = "give the --out of `grader batch`, or a submission's folder"
-        raise UsageError(f"{folder}: no results in it", hint=hint)
+        raise UsageError(f"{folder} contains no results", hint=hint)
     return found
 
 
-def _rubric(given: str | None, folder: Path, batch: BatchFolder | None = None) -> LoadedRubric:
-    """What the command line says, else what the batch was graded by, else the one of that id among the grader's own."""
+def rubric_of(given: str | None, folder: Path, batch: BatchFolder | None = None) -> LoadedRubric:
+    """Return the rubric that is given, else the one of the batch, else the grader's own one with the result's id."""
     if given is None and batch is None and (folder.absolute().parent / RUN).is_file():
         batch = open_batch(folder.absolute().parent)
     if given is None and batch is None:
         given = result_in(folder).rubric.id
         if given not in rubric_ids():
-            message = f'{folder}: its rubric "{given}" is none of those that come with the grader'
+            message = f'{folder}: its rubric "{given}" does not come with the grader'
             raise UsageError(message, hint="name its file with --rubric")
     return load_rubric(given or (batch.run.rubric_source if batch else ""))
 
 
-def _written(folders: Sequence[Path], rubric: LoadedRubric) -> ExitCode:
+def write_reports(folders: Sequence[Path], rubric: LoadedRubric) -> ExitCode:
+    """Write every report of these submissions. NOT_GRADED if a result cannot be read."""
     if len(folders) == 1:
         digest = write_one(folders[0], rubric).rubric.digest
         done = [Written(folder=folders[0], rubric_digest=digest)]
@@ -121,14 +89,15 @@ def _say_others(names: Sequence[str], rubric: LoadedRubric) -> None:
     if names:
         more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
         shown = ", ".join(names[:NAMES_SHOWN])
-        _remark(f"{shown}{more}: judged by another version of {rubric.path} than this one")
+        _remark(f"{shown}{more}: judged by another version of {rubric.path}")
 
 
 def _remark(text: str) -> None:
     say_beside(f"report: {text}")
 
 
-def _class_pages(batch: BatchFolder, anonymous: Path | None) -> None:
+def write_class_pages(batch: BatchFolder, anonymous: Path | None) -> None:
+    """Write the class's page, and one without names to `anonymous`."""
     targets = [(batch.path / INDEX, False), *([(anonymous, True)] if anonymous else [])]
     for target, nameless in targets:
         pairs = ((row.entry, row.result) for row in batch.rows())
@@ -137,14 +106,15 @@ def _class_pages(batch: BatchFolder, anonymous: Path | None) -> None:
         say(str(target))
 
 
-def _one(
+def write_form(
     folder: Path, rubric: LoadedRubric, form: str, out: str, prefix: str | None, *, student: bool
 ) -> ExitCode:
+    """Write one form of a submission's report to the file `out`, or to stdout for `-`."""
     result = result_in(folder, rubric)
     if result.rubric.digest != rubric.digest:
         _say_others([folder.absolute().name], rubric)
     if form == "gradescope" and student:
-        raise UsageError("Gradescope hides hidden criteria itself", hint="leave --student away")
+        raise UsageError("Gradescope hides hidden criteria itself", hint="leave out --student")
     shown = without_hidden(result, rubric.rubric) if student or form == "classroom" else result
     if form == "terminal" and out == STDOUT:
         hidden = missing_hidden(shown, rubric.rubric)
@@ -165,7 +135,7 @@ def _prefix(result: GradingResult, given: str | None) -> str:
     if found is None and cites:
         package = result.submission.package
         _remark(
-            f"no package {package} with these files is here: paths begin in it; --prefix says where it is"
+            f"no package {package} with these files is here, so paths begin in it; give its folder with --prefix"
         )
     return found or ""
 
@@ -177,7 +147,7 @@ def _made(
     prefix: str,
     figures: Callable[[], Figures | None],
 ) -> bytes:
-    """The report in that form. Only those that show figures have the evidence read."""
+    """Return the report in that form. The evidence is read only for forms that show figures."""
     lab = rubric.rubric
     hidden = missing_hidden(result, lab)
     makers: dict[str, Callable[[], str]] = {

@@ -1,10 +1,10 @@
-"""`grader similar DIR [--starter PATH]`: submissions that are nearly the same, for a person to look at."""
+"""What `grader similar` compares and prints: submissions that are nearly the same, for a person to look at."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import IO
 
 from rich.console import RenderableType
 from rich.padding import Padding
@@ -12,14 +12,10 @@ from rich.table import Table
 from rich.text import Text
 
 from grader.classes.batch.folder import RUN, open_batch
-from grader.classes.similarity import compare, write_similarity
-from grader.classes.similarity.comparing import require_library
 from grader.classes.similarity.files import percent, stretches
 from grader.classes.similarity.sources import PLACE
-from grader.cli.output import say_json
-from grader.errors import ExitCode, UsageError
+from grader.errors import UsageError
 from grader.model.similarity import NotCompared, Pair, Similarity
-from grader.portable import cores
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
 
@@ -28,31 +24,20 @@ PATH_CHARS = 40
 TEXT_CHARS = 300
 PAIRS_SHOWN = 50
 IDS_SHOWN = 20
-HARMLESS = "For a person to look at: no mark depends on it, and likeness alone proves nothing."
+HARMLESS = "For a person to look at: no mark depends on it, and similarity alone proves nothing."
 
 
-def run(*, folder: Path, starter: list[Path], threshold: float, as_json: bool = False) -> ExitCode:
-    """Compare all submissions in `folder`; `threshold` is in percent. What is alike is shown and written there."""
-    require_library()
-    folders, names, groups = _class(folder)
-    similarity = compare(
-        folders,
-        starter=starter,
-        groups=groups,
-        threshold=threshold / 100,
-        jobs=cores(),
-    )
-    written = write_similarity(similarity, folder, names)
-    if as_json:
-        say_json(similarity.model_dump(mode="json", by_alias=True))
-        return ExitCode.PASSED
-    emit(open_console(sys.stdout), _report(similarity, names))
-    emit(open_console(sys.stdout), [Text(f"Written: {line(str(path), TEXT_CHARS)}") for path in written])
-    return ExitCode.PASSED
+def print_similarity(
+    similarity: Similarity, names: Mapping[str, str], written: Sequence[Path], stream: IO[str]
+) -> None:
+    """Print the pairs that are alike, and the files that were `written`."""
+    console = open_console(stream)
+    emit(console, _report(similarity, names))
+    emit(console, [Text(f"Written: {line(str(path), TEXT_CHARS)}") for path in written])
 
 
-def _class(folder: Path) -> tuple[dict[str, Path], dict[str, str], dict[str, str]]:
-    """The submissions' folders, names and groups by id: the batch's, or every folder with evidence in it."""
+def submissions_in(folder: Path) -> tuple[dict[str, Path], dict[str, str], dict[str, str]]:
+    """Return the folders, names and groups of submissions by id: the batch's, or every folder with evidence in it."""
     if (folder / RUN).exists():
         batch = open_batch(folder)
         entries = batch.run.entries
@@ -64,7 +49,7 @@ def _class(folder: Path) -> tuple[dict[str, Path], dict[str, str], dict[str, str
         raise UsageError(f"{folder}: {error.strerror}", hint="give the --out of `grader batch`") from error
     if not below:
         raise UsageError(
-            f"{folder}: no submissions with evidence in it", hint="give the --out of `grader batch`"
+            f"{folder} contains no submissions with evidence", hint="give the --out of `grader batch`"
         )
     return {path.name: path for path in below}, {}, {}
 
@@ -107,19 +92,19 @@ def _tail(similarity: Similarity) -> Iterator[str]:
         yield f"{len(similarity.pairs) - PAIRS_SHOWN} more pairs are in the files below."
     for group in similarity.clusters:
         if len(group) > 2:
-            yield f"{len(group)} hang together: {_ids(group)}"
+            yield f"{len(group)} belong together: {_ids(group)}"
     if similarity.same_group:
         count = similarity.same_group
         yield (
-            "1 pair of one group is not named."
+            "1 pair within a group is not listed."
             if count == 1
-            else f"{count} pairs of one group are not named."
+            else f"{count} pairs within a group are not listed."
         )
     if similarity.too_little:
         count, total = len(similarity.too_little), similarity.compared
         yield (
-            f"{count} of {total} have fewer than {similarity.min_lines} lines of their own beside the starter code, "
-            f"the tutorials and what most have: nothing can be said of them."
+            f"{count} of {total} have fewer than {similarity.min_lines} lines of their own besides the starter code, "
+            f"the tutorials and what most share: too few to compare."
         )
     for one in similarity.not_compared[:IDS_SHOWN]:
         yield f"Not compared: {_not_compared(one)}"

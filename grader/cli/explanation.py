@@ -1,4 +1,4 @@
-"""`grader explain NAME`: a check, or a criterion with its check."""
+"""What `grader explain` prints: a check, or a criterion with its check."""
 
 from __future__ import annotations
 
@@ -10,20 +10,23 @@ from rich.padding import Padding
 from rich.text import Text
 
 from grader.checks import HEADINGS, Check
-from grader.errors import ExitCode, UsageError
+from grader.errors import UsageError
 from grader.report.terminal import emit, open_console
 from grader.report.text import number, visible
-from grader.rubric.faults import did_you_mean
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import LoadedRubric, all_rubrics, load_rubric
 from grader.rubric.model import Criterion
 from grader.rubric.own_checks.known import known_checks
+from grader.suggest import did_you_mean
+
+Line = tuple[str, int]
+"""A paragraph and how far it is indented."""
 
 
-def run(*, name: str, rubric: str | None = None) -> ExitCode:
-    """Print what, why, how measured and how to fix. Raises UsageError for a name that nobody has.
+def print_explanation(name: str, rubric: str | None) -> None:
+    """Print what, why, how it is measured and how to fix it. Raises UsageError for an unknown name.
 
-    `rubric` is where to look for the name, beside the grader's own checks; `LAB/criterion` says the same.
+    The name is looked up in `rubric` beside the grader's own checks; `LAB/criterion` says the same.
     """
     lab, slash, criterion = ("", "", name) if rubric is not None else name.rpartition("/")
     loaded = [load_rubric(rubric or lab)] if rubric is not None or slash else list(all_rubrics())
@@ -38,19 +41,15 @@ def run(*, name: str, rubric: str | None = None) -> ExitCode:
         _print(_criterion_lines(each, item))
     if not found and not is_check:
         raise _unknown(name, loaded, known)
-    return ExitCode.PASSED
 
 
 def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]) -> UsageError:
-    known = [*checks, *(c.id for r in rubrics for c in r.rubric.criteria), *(f"{i}/" for i in rubric_ids())]
-    near = did_you_mean(name.rpartition("/")[2], known)
+    criteria = (c.id for r in rubrics for c in r.rubric.criteria if c.visibility == "visible")
+    near = did_you_mean(name.rpartition("/")[2], [*checks, *criteria, *(f"{lab}/" for lab in rubric_ids())])
     return UsageError(
-        f'there is no check and no criterion "{name}"{near}',
-        hint="name a check, a criterion of a lab, or LAB/criterion; grader labs lists the labs",
+        f'there is no check or criterion "{name}"{near}',
+        hint="give a check, a criterion of a lab, or LAB/criterion; grader labs lists the labs",
     )
-
-
-Line = tuple[str, int]
 
 
 def _criterion_lines(loaded: LoadedRubric, criterion: Criterion) -> Iterator[Line]:

@@ -1,4 +1,7 @@
-"""`grader ci github|gitlab`: what `action.yml` and `ci/gitlab.yml` run. All that it is asked stands in variables."""
+"""What `grader ci` does in a job of GitHub or GitLab: grade as `grader check` does, keep the reports, tell the system.
+
+`action.yml` and `ci/gitlab.yml` run it; everything it is asked stands in variables.
+"""
 
 from __future__ import annotations
 
@@ -10,20 +13,26 @@ from grader import pipeline
 from grader.classes.batch.folder import read_result
 from grader.cli.display import open_progress
 from grader.cli.errors import report
+from grader.cli.find_packages import package_prefix
+from grader.cli.host_support import warn_without_sandbox
 from grader.cli.outcome import exit_code, settled
 from grader.cli.output import say, say_beside
-from grader.cli.find_packages import package_prefix
-from grader.cli.host_support import say_unwalled
 from grader.cli.select_rubric import Chosen, choose_all, only
 from grader.errors import ExitCode, GraderError, RubricError, UsageError
 from grader.faults import fault_of
-from grader.integrations.ci_results import add_forms, clear, keep
+from grader.integrations.ci_results import (
+    OF_CODE,
+    STUDENTS,
+    Graded,
+    Outcome,
+    add_forms,
+    clear,
+    describe_outcome,
+    keep,
+)
+from grader.integrations.ci_settings import Settings, read_settings, with_pass_mark
 from grader.integrations.github import GitHub
 from grader.integrations.gitlab import GitLab
-from grader.integrations.ci_results import OF_CODE, Graded, Outcome
-from grader.integrations.ci_settings import with_mark
-from grader.integrations.ci_settings import Settings, read_settings
-from grader.integrations.ci_results import STUDENTS, said_of
 from grader.judging.summary import overall_status, total_points
 from grader.model.result import GradingResult
 from grader.report.hidden import hidden_ids, without_hidden
@@ -33,12 +42,12 @@ from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 from grader.temporary import temporary_folder
 
-WHICH = "say where the package is by path (GRADER_PATH), and which lab it is by lab (GRADER_LAB)"
+WHICH = "give the package's folder as path (GRADER_PATH), and the lab as lab (GRADER_LAB)"
 RESULT = "result.json"
 
 
-def run(*, system: str) -> ExitCode:
-    """Grade as `grader check` does, keep the reports, tell the CI system. Its job fails as `GRADER_FAIL_ON` says."""
+def run_job(system: str) -> ExitCode:
+    """Run the job of `github` or `gitlab`; it fails as `GRADER_FAIL_ON` says."""
     variables = dict(os.environ)
     teller = (
         GitHub(variables)
@@ -47,16 +56,16 @@ def run(*, system: str) -> ExitCode:
     )
     try:
         settings = read_settings(variables)
-        with teller.unheard():
+        with teller.commands_stopped():
             graded = _graded(settings)
     except Exception as error:
-        teller.refuse(fault_of(error))
+        teller.tell_error(fault_of(error))
         raise
     teller.tell(graded)
-    say(f"{graded.outcome.value}: {graded.said}")
-    unwalled = without_sandbox(graded.result.environment.sandbox)
-    if unwalled:
-        say(unwalled)
+    say(f"{graded.outcome.value}: {graded.message}")
+    warning = without_sandbox(graded.result.environment.sandbox)
+    if warning:
+        say(warning)
     say(f"sandbox: {graded.result.environment.sandbox}")
     code = next(code for code, outcome in OF_CODE.items() if outcome is graded.outcome)
     return code if graded.fails else ExitCode.PASSED
@@ -64,11 +73,11 @@ def run(*, system: str) -> ExitCode:
 
 def _graded(settings: Settings) -> Graded:
     chosen = _chosen(settings)
-    source, rubric = chosen.source, with_mark(chosen.rubric, settings.mark)
+    source, rubric = chosen.source, with_pass_mark(chosen.rubric, settings.mark)
     if chosen.words:
         say_beside(chosen.words)
     if not settings.static:
-        say_unwalled(settings.sandbox, rubric)
+        warn_without_sandbox(settings.sandbox, rubric)
     clear(settings.out)
     options = pipeline.GradeOptions(
         sandbox=settings.sandbox, submission_id=None, static_only=settings.static, keep_hidden=False
@@ -93,12 +102,12 @@ def _chosen(settings: Settings) -> Chosen:
         return only(choose_all(settings.path, settings.lab))
     except RubricError:
         raise
-    except UsageError as error:  # its hint is for who sits at a terminal
+    except UsageError as error:  # its hint is for people at a terminal
         raise UsageError(error.message, hint=WHICH) from error
 
 
 def _left(folder: Path, error: GraderError) -> tuple[GradingResult, Path]:
-    """The result that says why nothing was graded. Raises the error where there is none."""
+    """Return the result that says why nothing was graded. Raises the error if there is none."""
     report(error)
     for place in sorted(path.parent for path in folder.glob(f"*/{RESULT}")):
         result = read_result(place)
@@ -108,7 +117,7 @@ def _left(folder: Path, error: GraderError) -> tuple[GradingResult, Path]:
 
 
 def _prefix(result: GradingResult, source: Path) -> str:
-    """The package's folder in the repository: the one around it, or where the job was started."""
+    """Return the package's folder in the repository: the one around it, or where the job was started."""
     source = source.resolve()
     cloned = any((folder / ".git").exists() for folder in (source, *source.parents))
     return package_prefix(result, source if cloned and source.is_dir() else Path.cwd()) or ""
@@ -120,12 +129,12 @@ def _judged(result: GradingResult, rubric: LoadedRubric, settings: Settings, pre
     lab = rubric.rubric
     code = ExitCode.NOT_GRADED if error or not counted.criteria else exit_code(counted.criteria, lab)
     outcome = OF_CODE[code]
-    said, hint = said_of(counted, lab, outcome, static=settings.static)
+    message, hint = describe_outcome(counted, lab, outcome, static=settings.static)
     students = error is not None and error.kind in STUDENTS
     return Graded(
         outcome=outcome,
         fails=outcome in settings.fail_on or (students and Outcome.BELOW in settings.fail_on),
-        said=said,
+        message=message,
         hint=hint,
         result=result,
         counted=counted,
@@ -136,7 +145,7 @@ def _judged(result: GradingResult, rubric: LoadedRubric, settings: Settings, pre
 
 
 def _counted(result: GradingResult, rubric: Rubric, *, static: bool) -> GradingResult:
-    """With `static`, the result of the criteria that the files alone decide."""
+    """Return, with `static`, the result of the criteria that can be judged from the files alone."""
     if not static or result.error is not None:
         return result
     criteria = settled(result.criteria)
