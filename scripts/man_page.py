@@ -23,8 +23,8 @@ ABOUT = (
 """Paragraphs; the first continues after the program's name."""
 
 ENVIRONMENT = {
-    "GRADER_ROS_SETUP": "the setup.bash of the ROS 1 to use, or none, to use no ROS. Without this variable the grader "
-    "looks in /opt/ros, then for Debian's packages, then in the active conda environment.",
+    "GRADER_ROS_SETUP": "the setup.bash of the ROS 1 to use, or none, to use no ROS. Without it, the grader looks in "
+    "/opt/ros, then for Debian's packages, then in the active conda environment.",
     "GITHUB_TOKEN, GITLAB_TOKEN": "credentials for submissions that are fetched from there. They are never stored.",
     "GRADER_GIT_HOST, GRADER_GIT_TOKEN, GRADER_GIT_USER": "the same for another host.",
     "WATCHFILES_FORCE_POLLING": "if 1, grader check --watch polls for saved files, as network folders need.",
@@ -33,10 +33,10 @@ ENVIRONMENT = {
 }
 
 FILES = {
-    "~/.cache/grader": "mirrors of fetched repositories, and what CMake found out about this machine. May be deleted at "
-    "any time.",
-    "DIR/SUBMISSION/result.json": "the result, for programs; report.html beside it is for people, and evidence/ contains "
-    "the recordings.",
+    "~/.cache/grader": "mirrors of fetched repositories, and what CMake found out about this machine. May be deleted "
+    "at any time.",
+    "DIR/SUBMISSION/result.json": "the result, for programs; report.html beside it is for people, and evidence/ "
+    "contains the recordings.",
 }
 
 EXAMPLES = {

@@ -31,7 +31,7 @@ RUNNING_SHOWN = 8
 NAMES_SHOWN = 10
 CHANGES_SHOWN = 200
 MANY = 500
-"""Of more submissions than that, a log has a line for each hundredth of them, and for each that is not graded."""
+"""For more submissions than that, a log has a line per hundredth of them, and for each that is not graded."""
 
 
 class PlainClass(Course):
@@ -42,7 +42,7 @@ class PlainClass(Course):
         self.stream = stream
 
     def ended(self, outcome: Outcome) -> None:
-        """Say what became of it, and what is left."""
+        """Print what became of it, and what is left."""
         super().ended(outcome)
         step = self.total // 100 if self.total > MANY else 1
         if outcome.status != "graded" or self.done % step == 0 or self.done == self.total:
@@ -51,14 +51,14 @@ class PlainClass(Course):
 
 
 class LiveClass(Course):
-    """A bar, the counts, and what runs; what is not graded stays above it as a line."""
+    """A progress bar, the counts, and what runs; a line above it stays for each submission that is not graded."""
 
     def __init__(self, console: Console) -> None:
         super().__init__()
         self.console = console
 
     def ended(self, outcome: Outcome) -> None:
-        """Leave a line of what a person has to look at."""
+        """Leave a line if a person has to look at it."""
         super().ended(outcome)
         if outcome.status != "graded" or outcome.message:
             self.console.print(Text(said(outcome), "red" if outcome.status == "error" else "yellow"))
@@ -112,7 +112,7 @@ def _span(seconds: float) -> str:
 
 @contextmanager
 def open_class_display() -> Iterator[Watcher]:
-    """Show a batch's course on stderr until the block is left."""
+    """Show a batch's progress on stderr until the block ends."""
     console = Console(file=sys.stderr, markup=False, emoji=False, highlight=False)
     if not console.is_terminal or console.is_dumb_terminal or console.encoding != "utf-8":
         yield PlainClass(sys.stderr)

@@ -1,4 +1,4 @@
-"""Which packages `grader check` is about, in whatever folder it is called: below it, around it, or beside it."""
+"""Finds the packages that `grader check` is about from any folder: below it, around it, or beside it."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ _MADE_MARKS = ("CMakeCache.txt", ".catkin", "setup.sh", ".catkin_tools.yaml", ".
 
 @dataclass(frozen=True, kw_only=True)
 class Found:
-    """`candidates` may be packages, nearest first. `root` is the folder that they were looked for in; where it is not
-    the one that was asked about, `moved` says why. `whole` is false where not everything was looked at."""
+    """`candidates` may be packages, nearest first. `root` is the folder that was searched; if that is not the one
+    that was given, `moved` says why. `whole` is false if some of it was not searched."""
 
     root: Path
     candidates: tuple[Candidate, ...]
@@ -34,14 +34,14 @@ class Found:
 
     @property
     def packages(self) -> tuple[Candidate, ...]:
-        """Those with a manifest, as catkin sees them."""
+        """Return those with a manifest, as catkin sees them."""
         return tuple(c for c in self.candidates if c.has_manifest and c.ignored_by is None)
 
 
 def find(path: Path) -> Found:
-    """The packages below the folder `path`; else the one around it; else those of its repository or workspace.
+    """Find the packages below the folder `path`; else the one around it; else those of its repository or workspace.
 
-    What git or a build keeps for itself is left first. Raises UsageError where `path` cannot be read.
+    From inside .git or a build's folder, the search starts outside of it. Raises UsageError if `path` cannot be read.
     """
     try:
         return _find(path)
@@ -65,24 +65,24 @@ def _find(path: Path) -> Found:
 
 
 def _outside(here: Path) -> tuple[Path, str]:
-    """The folder to look in instead of one in which there are copies of packages, or none at all."""
+    """Return the folder to search instead of one with copies of packages, or none, and why."""
     for folder in (*reversed(here.parents), here):
         if folder.name == ".git":
-            return folder.parent, "this folder is git's own"
+            return folder.parent, "this folder belongs to git"
         if folder.name in _MADE and _is_made(folder):
-            return folder.parent, f"what is in {folder.name}/ was made by a build"
+            return folder.parent, f"{folder.name}/ was made by a build"
     return here, ""
 
 
 def _is_made(folder: Path) -> bool:
-    """Whether catkin (or CMake) made it: of a package's own folders some are named alike."""
+    """Return whether catkin or CMake made it: a package may have a folder of the same name."""
     if any(is_there(folder / mark) for mark in _MADE_MARKS):
         return True
     return any(is_there(folder.parent / mark) for mark in _MARKS)
 
 
 def _beside(here: Path) -> Found | None:
-    """In the rest of the repository or the workspace that the folder is part of."""
+    """Search the rest of the repository or workspace that the folder is part of."""
     repository = repository_around(here)
     workspace = next((f for f in here.parents if any(is_there(f / mark) for mark in _MARKS)), None)
     for root, what in ((workspace, "workspace"), (repository, "repository")):
@@ -105,7 +105,7 @@ def _as_candidate(folder: Path) -> Candidate:
 
 
 def shown(folder: Path) -> str:
-    """A folder as somebody here would call it."""
+    """Return the shorter of the relative and the absolute path, as printable text."""
     try:
         near = os.path.relpath(folder.resolve(), Path.cwd())
     except (OSError, ValueError):
@@ -115,9 +115,9 @@ def shown(folder: Path) -> str:
 
 
 def package_prefix(result: GradingResult, here: Path) -> str | None:
-    """The package's folder relative to the repository around `here` (or to `here`), `.` for the root itself.
+    """Return the package's folder relative to the repository around `here` (or to `here`), `.` for the root itself.
 
-    It is the one of that name in which all files are that the result cites. None where there is none.
+    Results do not say it: it is the package of that name that has all files that the result cites. None if none has.
     """
     root = _root(here.resolve())
     cited = {

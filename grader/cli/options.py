@@ -57,7 +57,7 @@ def percent(text: str) -> float:
 
 
 def port(text: str) -> int:
-    """Parse a port; 0 is any that is free."""
+    """Parse a port; 0 means any free one."""
     return _whole(text, 0, 65535, f"{text!r} is not a port from 1 to 65535")
 
 

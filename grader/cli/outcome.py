@@ -1,4 +1,4 @@
-"""From criteria to exit codes."""
+"""How a command ends: the report on stdout, where its files are, and the exit code that the criteria come to."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from grader.report.terminal import open_console, print_report
 from grader.rubric.model import Rubric
 
 EXACT_DIGITS = 6
-"""More than points have, and fewer than show how floating point multiplies."""
+"""More digits than points have, and fewer than rounding errors show in."""
 
 
 def exit_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
-    """Of the criteria that are shown: not graded where the grader itself failed, passed, not settled, or below.
+    """Return the exit code of the criteria that are shown.
 
-    A pass mark in points that is reached stays reached, whatever is still open.
+    A pass mark in points that is reached stays reached, even if some criteria are open.
     """
     shown = tuple(criteria)
     status = overall_status(shown)
@@ -35,25 +35,25 @@ def exit_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
 
 
 def worst(codes: Iterable[ExitCode]) -> ExitCode:
-    """How several ended together. Not graded is worse than below the mark, that than not settled."""
+    """Return the worst code: not graded is worse than below the pass mark, and that is worse than inconclusive."""
     order = (ExitCode.PASSED, ExitCode.INCONCLUSIVE, ExitCode.BELOW_PASS_MARK, ExitCode.NOT_GRADED)
     return max(codes, key=order.index)
 
 
 def staged_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
-    """Of a hook before a commit: what fails, fails it, whatever the pass mark is. What is open does not."""
+    """Return the code of a pre-commit hook: any criterion that fails, fails it, whatever the pass mark is."""
     judged = settled(criteria)
     counted = [c for c in judged if c.max_points > 0 or c.status is Status.ERROR]
     return exit_code(judged, rubric.model_copy(update={"pass_mark": None})) if counted else ExitCode.PASSED
 
 
 def settled(criteria: Iterable[CriterionResult]) -> tuple[CriterionResult, ...]:
-    """Those that could be judged."""
+    """Return the criteria that could be judged."""
     return tuple(c for c in criteria if c.status not in OPEN)
 
 
 def _in_proportion(rubric: Rubric, shown: tuple[CriterionResult, ...]) -> Rubric:
-    """The rubric with its pass mark as large a part of the points that are shown as it is of all."""
+    """Return the rubric with its pass mark scaled from all points to those that are shown."""
     if rubric.pass_mark is None:
         return rubric
     share = sum(c.max_points for c in shown) / (rubric.max_points or 1.0)
@@ -73,10 +73,10 @@ def show(
     static: bool = False,
     unrun: str = "",
 ) -> ExitCode:
-    """Print the result (`hidden` criteria are left out of it already) and give its exit code.
+    """Print the result, from which `hidden` criteria are left out already, and return its exit code.
 
-    With `static` nothing was run on purpose: the exit code is that of the criteria that could be judged. `unrun` says
-    why nothing was run, on purpose or not: what is open is then only counted.
+    With `static`, only the criteria that could be judged count. `unrun` says why nothing was run, on purpose or not:
+    open criteria are then only counted in the report.
     """
     if as_json:
         say_document(lambda ascii_only: result_text(result, ascii_only=ascii_only))

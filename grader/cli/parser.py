@@ -6,7 +6,7 @@ import argparse
 import platform
 import sys
 from collections.abc import Iterator, Sequence
-from itertools import groupby
+from itertools import groupby, takewhile
 from typing import Any, NoReturn
 
 import grader.cli.commands  # noqa: F401 - fills COMMANDS
@@ -42,9 +42,10 @@ class Parser(argparse.ArgumentParser):
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
         """Parse as argparse does, but each command refuses what it does not know itself."""
-        if self._subparsers is None:
-            words = list(args or ())
-            self.given = tuple(words[: words.index("--")] if "--" in words else words)
+        before_command = self._subparsers is not None
+        self.given = tuple(
+            takewhile(lambda word: word != "--" and not (before_command and word[:1] != "-"), args or ())
+        )
         found, rest = super().parse_known_args(args, namespace)
         if rest:
             self.error(f"unrecognized arguments: {' '.join(rest)}")

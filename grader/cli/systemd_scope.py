@@ -1,9 +1,9 @@
-"""A control group of its own for this process, asked of systemd where the memory of students' code would be held less
-well: a scope that is delegated, as `systemd-run --scope -p Delegate=yes` makes one.
+"""Moves this process to a control group of its own, if students' memory could not be limited well otherwise: a
+delegated scope of systemd, as `systemd-run --scope -p Delegate=yes` makes one.
 
-The process stays what it is: its id, terminal, folder and variables. Only people's logins are left for a scope. What
-runs in a service (cron, a CI runner, a cluster's job) stays where its administrator put it; so does what would be
-ended when its user logs out, and is not yet.
+The process keeps its id, terminal, folder and variables. Only processes of a person's login move. What runs in a
+service (cron, a CI runner, a cluster's job) stays where its administrator put it; so does what would then be ended when
+its user logs out.
 
 Sources: man 5 org.freedesktop.systemd1 (StartTransientUnit), man 1 busctl, man 1 loginctl (enable-linger).
 """
@@ -34,7 +34,7 @@ DELEGATED = ("Delegate", "b", "true", "CollectMode", "s", "inactive-or-failed")
 
 
 def enter_scope() -> None:
-    """Move this process to a scope of its own where its groups cannot hold memory, and systemd gives one.
+    """Move this process to a scope of its own if its groups cannot limit memory and systemd grants one.
 
     Raises nothing.
     """
@@ -53,7 +53,7 @@ def _may_move() -> bool:
 
 
 def _lingers(user: int) -> bool:
-    """Its services go on when it logs out."""
+    """Return whether the user's services continue after logging out."""
     import pwd  # noqa: PLC0415 - not on Windows
 
     with suppress(KeyError, OSError):
@@ -66,7 +66,7 @@ def _environment() -> dict[str, str]:
 
 
 def _moved() -> bool:
-    """Ask, and wait until it is done: the answer says only that it will be."""
+    """Ask for the move and wait until it is done: the answer only says that it will be."""
     busctl, pid = host_program("busctl"), os.getpid()
     if busctl is None:
         return False

@@ -97,7 +97,7 @@ def describe_outcome(
         return f"{reached}; something could not be judged, and no mark is lost", ""
     points = number(sum(loss.points for loss in waiting))
     first = waiting[0].criterion
-    return f"{reached}; {points} more are undecided, and no mark is lost: {first.message}", first.hint
+    return f"{reached}; {points} more are not settled, and no mark is lost: {first.message}", first.hint
 
 
 def points_to_pass(rubric: Rubric, points: float) -> str:

@@ -51,6 +51,7 @@ def test_version(capsys):
             "argument --sandbox: invalid choice: 'maybe'",
         ),
         (["grade", "x", "--rub", "y"], 'unrecognized arguments: --rub (did you mean "--rubric"?)'),
+        (["--vresion"], 'unrecognized arguments: --vresion (did you mean "--version"?)'),
         (["grade", "--ouput=x"], 'unrecognized arguments: --ouput=x (did you mean "--out"?)'),
         (["chekc"], 'there is no command "chekc" (did you mean "check"?)'),
         (["rubric", "tset"], 'there is no command "rubric tset" (did you mean "test"?)'),
