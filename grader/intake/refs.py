@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from dataclasses import dataclass
 
 from grader.errors import SubmissionError
 from grader.intake.names import listing, printable
+from grader.suggest import closest
 
 _HASH = re.compile(r"[0-9a-fA-F]{4,64}")
 # Shorter ones may mean another commit than the one that a ref happens to point to.
@@ -50,10 +50,8 @@ def no_such_ref(refs: dict[str, str], ref: str, *, given: str) -> SubmissionErro
     """The error for a ref that is not there, with the nearest that is."""
     names = [re.sub(r"^refs/(heads|tags)/", "", name) for name in refs if name.startswith("refs/heads/")]
     names += [name[len("refs/tags/") :] for name in refs if re.fullmatch(r"refs/tags/.*(?<!\^\{\})", name)]
-    near = difflib.get_close_matches(ref, names, n=1)
-    hint = (
-        f"Did you mean @{printable(near[0])}?" if near else f"There are: {listing(names) or 'no branches'}."
-    )
+    near = closest(ref, names)
+    hint = f"Did you mean @{printable(near)}?" if near else f"There are: {listing(names) or 'no branches'}."
     return SubmissionError(f"{given}: there is no branch, tag or commit '{printable(ref)}'", hint=hint)
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from difflib import get_close_matches
 
 from grader.errors import UsageError
 from grader.intake import safe_name
 from grader.model.result import GradingResult
 from grader.model.roster import Entry
 from grader.shown import line
+from grader.suggest import closest
 
 FAILED, INCONCLUSIVE, CHANGED = "failed", "inconclusive", "changed"
 WORDS = (FAILED, INCONCLUSIVE, CHANGED)
@@ -47,8 +47,8 @@ def check(entries: Sequence[Entry], only: Sequence[str]) -> None:
     for name in only:
         if name in WORDS or safe_name(name).casefold() in known:
             continue
-        near = get_close_matches(name, list(known.values()), n=1)
-        hint = f"did you mean {line(near[0], NAME_CHARS)}?" if near else f"an id, or {', '.join(WORDS)}"
+        near = closest(name, known.values())
+        hint = f"did you mean {line(near, NAME_CHARS)}?" if near else f"an id, or {', '.join(WORDS)}"
         raise UsageError(
             f"--only {line(name, NAME_CHARS)}: no submission of that id in the roster", hint=hint
         )

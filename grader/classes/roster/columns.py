@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 from grader.classes.roster.table import Table
 from grader.errors import UsageError
 from grader.intake.names import brief
+from grader.suggest import closest
 
 REQUIRED = ("id", "source")
 OPTIONAL = ("ref", "name", "group", "submitted_at", "extension_days")
@@ -43,9 +43,9 @@ def near_misses(columns: tuple[str, ...]) -> Iterator[tuple[str, str]]:
     plain = {_plain(column) for column in columns}
     missing = [name for name in KNOWN if name not in plain]
     for column in columns:
-        near = difflib.get_close_matches(_plain(column)[:40], missing, n=1, cutoff=NEARLY)
-        if near and near[0][0] == _plain(column)[0] and _plain(column) not in KNOWN:
-            yield column, f"the column {brief(column)} means nothing here: did you mean {near[0]}?"
+        near = closest(_plain(column)[:40], missing, cutoff=NEARLY)
+        if near and near[0] == _plain(column)[0] and _plain(column) not in KNOWN:
+            yield column, f"the column {brief(column)} means nothing here: did you mean {near}?"
 
 
 def _plain(column: str) -> str:
