@@ -133,7 +133,7 @@ def export_bags(evidence: Path, out: Path | None, *, everything: bool) -> None:
     chosen = [r for r in runs.values() if everything or any(c.messages for c in r.channels)]
     if not chosen:
         raise EvidenceError(
-            f"{evidence}: there are no messages to export", hint="--all exports the grader's records"
+            f"{evidence}: holds no messages to export", hint="--all exports the grader's records"
         )
     for each in chosen:
         _export(each, _free(folder / _name(each), evidence, named=False), everything=everything)
