@@ -25,8 +25,8 @@ class CustomBuildHook(BuildHookInterface):
         """Write the files into a temporary folder, and name them to the builder."""
         del version  # of the kind of wheel, not of the grader
         sys.path.insert(0, self.root)
-        from grader.cli.completing.script import script  # noqa: PLC0415 - found only now
-        from grader.cli.manual import man_page  # noqa: PLC0415 - as above
+        from grader.cli.completion import script  # noqa: PLC0415 - found only now
+        from scripts.man_page import man_page  # noqa: PLC0415 - as above
 
         self.folder = tempfile.TemporaryDirectory()
         texts = {MAN_PAGE: man_page()} | {path: script(shell) for shell, path in COMPLETIONS.items()}

@@ -8,16 +8,18 @@ import sys
 
 
 def main() -> int:
-    # numpy's OpenBLAS takes memory for each core, which nothing here needs, and where it gets none it ends the process.
+    # numpy's OpenBLAS reserves memory per core, which nothing here needs, and ends the process if it gets none.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if "_ARGCOMPLETE" in os.environ:  # a shell asks what may be typed here
-        from grader.cli.completing.answer import answer  # noqa: PLC0415 - as below
+    if "_ARGCOMPLETE" in os.environ:  # a shell asks what may be typed next
+        from grader.cli.completion import answer  # noqa: PLC0415 - as below
 
         answer()
     from grader.cli.main import run  # noqa: PLC0415 - keeps `python -m grader --help` quick to import
 
     code = run(sys.argv[1:])
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is said: a late Ctrl-C does not change how it ended
+    signal.signal(
+        signal.SIGINT, signal.SIG_IGN
+    )  # everything is printed: a late Ctrl-C does not change the outcome
     return code
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from grader.arena.ros_env import RosInstallation
 from grader.classes.batch.job import Outcome
-from grader.cli.diagnosis import _modules
+from grader.cli.doctor import _modules
 from grader.host_programs import (
     find_user_program,
     module_command,

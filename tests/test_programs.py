@@ -38,12 +38,12 @@ STARTS = {
     ),
     "arena/ros_env.py:_from_setup": Start("base", "'/'", "nothing: ROS's own setup.bash"),
     "arena/arena_process.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
-    "cli/diagnosis.py:_hostname": Start("HOST_ENV", "'/'", "nothing"),
-    "cli/diagnosis.py:_modules": Start("ros.env", "'/'", "nothing"),
-    "cli/scope.py:_moved": Start(
+    "cli/doctor.py:_hostname": Start("HOST_ENV", "'/'", "nothing"),
+    "cli/doctor.py:_modules": Start("ros.env", "'/'", "nothing"),
+    "cli/systemd_scope.py:_moved": Start(
         "_environment()", "'/'", "nothing: systemd is asked for this process's number"
     ),
-    "cli/sandbox_report.py:_probe": Start("HOST_ENV", "'/'", "nothing"),
+    "cli/host_support.py:_probe": Start("HOST_ENV", "'/'", "nothing"),
     "rubric/pytest_check.py:_run": Start(
         "_environment()", "folder", "nothing: the instructor's tests, beside a copy of the evidence"
     ),

@@ -1,9 +1,9 @@
-"""Shows on stderr how a batch goes: alive on a terminal, a line for each submission elsewhere."""
+"""Shows the progress of a batch on stderr, as a live display or a line per submission, and its outcome on stdout."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime, timedelta
 from typing import IO
@@ -14,9 +14,12 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from grader.classes.batch.folder import BatchFolder
 from grader.classes.batch.job import Outcome
-from grader.classes.batch.progress import BatchProgress
-from grader.classes.batch.run import Watcher
+from grader.classes.batch.progress import BatchProgress, list_attention
+from grader.classes.batch.regrade import CHANGES, Change, Regraded
+from grader.classes.batch.run import GRADEBOOK, INDEX, RESULTS, Watcher
+from grader.cli.output import say, say_json
 from grader.report.text import number
 from grader.untrusted_text import line
 
@@ -24,8 +27,10 @@ REFRESH_HZ = 4
 NAME_CHARS = 40
 TEXT_CHARS = 300
 RUNNING_SHOWN = 8
+NAMES_SHOWN = 10
+CHANGES_SHOWN = 200
 MANY = 500
-"""Of more submissions than that, a log has a line for each hundredth of them, and for each that is not graded."""
+"""For more submissions than that, a log has a line per hundredth of them, and for each that is not graded."""
 
 
 class PlainClass(BatchProgress):
@@ -36,7 +41,7 @@ class PlainClass(BatchProgress):
         self.stream = stream
 
     def ended(self, outcome: Outcome) -> None:
-        """Say what became of it, and what is left."""
+        """Print what became of it, and what is left."""
         super().ended(outcome)
         step = self.total // 100 if self.total > MANY else 1
         if outcome.status != "graded" or self.done % step == 0 or self.done == self.total:
@@ -45,14 +50,14 @@ class PlainClass(BatchProgress):
 
 
 class LiveClass(BatchProgress):
-    """A bar, the counts, and what runs; what is not graded stays above it as a line."""
+    """A progress bar, the counts, and what runs; a line above it stays for each submission that is not graded."""
 
     def __init__(self, console: Console) -> None:
         super().__init__()
         self.console = console
 
     def ended(self, outcome: Outcome) -> None:
-        """Leave a line of what a person has to look at."""
+        """Leave a line if a person has to look at it."""
         super().ended(outcome)
         if outcome.status != "graded" or outcome.message:
             self.console.print(Text(said(outcome), "red" if outcome.status == "error" else "yellow"))
@@ -74,7 +79,7 @@ class LiveClass(BatchProgress):
 def said(outcome: Outcome) -> str:
     """`ada  85/100  graded  8.1 s`."""
     points = f"{number(outcome.points)}/{number(outcome.max_points)}" if outcome.status != "error" else "-"
-    status = f"{outcome.status}, complete before" if outcome.kept else outcome.status
+    status = f"{outcome.status}, complete already" if outcome.kept else outcome.status
     parts = [line(outcome.id, NAME_CHARS), points, status, f"{outcome.wall_s:.1f} s"]
     parts += [line(outcome.message, TEXT_CHARS)] if outcome.message else []
     return "  ".join(parts)
@@ -106,7 +111,7 @@ def _span(seconds: float) -> str:
 
 @contextmanager
 def open_class_display() -> Iterator[Watcher]:
-    """Show a batch's progress on stderr until the block is left."""
+    """Show a batch's progress on stderr until the block ends."""
     console = Console(file=sys.stderr, markup=False, emoji=False, highlight=False)
     if not console.is_terminal or console.is_dumb_terminal or console.encoding != "utf-8":
         yield PlainClass(sys.stderr)
@@ -114,3 +119,87 @@ def open_class_display() -> Iterator[Watcher]:
     progress = LiveClass(console)
     with Live(progress, console=console, refresh_per_second=REFRESH_HZ, transient=True):
         yield progress
+
+
+def print_batch(folder: BatchFolder, *, as_json: bool) -> None:
+    """Print what became of a batch, and what a person has to look at."""
+    if as_json:
+        say_json(folder.run.model_dump(mode="json", by_alias=True, exclude={"entries"}))
+        return
+    for text in list_attention(folder):
+        say(text)
+    counts = folder.run.counts
+    parts = [f"{counts.submissions} submissions", f"{counts.graded} graded ({counts.passed} passed)"]
+    parts += [f"{counts.inconclusive} inconclusive"] if counts.inconclusive else []
+    parts += [f"{counts.error} could not be graded"] if counts.error else []
+    parts += [f"{counts.missing} not graded yet"] if counts.missing else []
+    parts += [f"{counts.kept} complete already"] if counts.kept else []
+    say(", ".join(parts))
+    say(f"{folder.path / INDEX}  {folder.path / GRADEBOOK}  {folder.path / RESULTS}")
+
+
+def print_regraded(batch: BatchFolder, regraded: Sequence[Regraded], *, as_json: bool) -> None:
+    """Print what changed when a class was judged again."""
+    if as_json:
+        say_json([_regraded_json(one) for one in regraded])
+        return
+    for text in _regraded_lines(batch, regraded):
+        say(text)
+
+
+def _regraded_json(one: Regraded) -> dict[str, object]:
+    return {
+        "id": one.entry.id,
+        "points_before": one.before.points if one.before else None,
+        "points": one.after.points if one.after else None,
+        "missing": list(one.missing),
+        "error": one.error,
+        "changes": [
+            {
+                "criterion": change.criterion,
+                "before": _state(change, "before"),
+                "after": _state(change, "after"),
+                "why": change.why,
+            }
+            for change in one.changes
+        ],
+    }
+
+
+def _state(change: Change, which: str) -> dict[str, object] | None:
+    criterion = change.before if which == "before" else change.after
+    return {"status": criterion.status.value, "points": criterion.points} if criterion else None
+
+
+def _regraded_lines(batch: BatchFolder, regraded: Sequence[Regraded]) -> Iterator[str]:
+    shown = 0
+    for one in regraded:
+        if not one.changes or one.before is None or one.after is None:
+            continue
+        yield f"{one.entry.id}: {number(one.before.points)} -> {number(one.after.points)}"
+        for change in one.changes:
+            shown += 1
+            if shown <= CHANGES_SHOWN:
+                before, after = (_status_and_points(change, which) for which in ("before", "after"))
+                yield f"    {change.criterion}: {before} -> {after}: {change.why}"
+    if shown > CHANGES_SHOWN:
+        yield f"{shown - CHANGES_SHOWN} more changes: {batch.path / CHANGES}"
+    for one in regraded:
+        if one.error:
+            yield f"{one.entry.id}: unchanged: {one.error}"
+    missing = [one for one in regraded if one.missing]
+    if missing:
+        names = ", ".join(one.entry.id for one in missing[:NAMES_SHOWN])
+        more = f" and {len(missing) - NAMES_SHOWN} more" if len(missing) > NAMES_SHOWN else ""
+        scenarios = ", ".join(dict.fromkeys(name for one in missing for name in one.missing))
+        yield f"{len(missing)} must run again, since there is no recording of {scenarios}: {names}{more}"
+        yield "  hint: --run-missing runs them"
+    changed = sum(bool(one.changes) for one in regraded)
+    judged = sum(one.after is not None for one in regraded)
+    yield f"{judged} of {len(regraded)} judged again, {changed} changed"
+    yield f"{batch.path / GRADEBOOK}  {batch.path / CHANGES}"
+
+
+def _status_and_points(change: Change, which: str) -> str:
+    criterion = change.before if which == "before" else change.after
+    return f"{criterion.status.value} {number(criterion.points)}" if criterion else "-"

@@ -1,4 +1,7 @@
-"""Shows a run's course on stderr: alive on a terminal, one line at each change of state elsewhere."""
+"""Shows the progress of a grading on stderr: live on a terminal, else as a line at each change of state.
+
+What a package's files alone decide goes to stdout as soon as it is known, before anything is built or run.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +20,19 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from grader.cli.early import print_early
+from grader.cli.output import say
 from grader.model.progress import Progress, StepState
 from grader.model.result import EarlyVerdict
-from grader.untrusted_text import line
+from grader.report.terminal import STYLES, mark
+from grader.report.text import visible
+from grader.untrusted_text import line, uncommanded
 
+EARLY_TITLE = "Your files, before anything is built or run:"
+SO_FAR = "So far: the build may still change this."
+MESSAGE_CHARS = 300
+INDENT = 2
+ESCAPE = 8
+"""A line may become this much longer when characters in it are escaped."""
 REFRESH_HZ = 8
 NAME_LIMIT = 120
 DETAIL_LIMIT = 160
@@ -38,7 +49,7 @@ Tell = Callable[[tuple[EarlyVerdict, ...]], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """One step as last heard of. Times are monotonic seconds; a step has begun when it first runs."""
+    """The last known state of a step. Times are monotonic seconds; a step begins when it first runs."""
 
     name: str
     state: StepState
@@ -54,7 +65,7 @@ class Step:
 
 
 class Steps:
-    """The steps in order of appearance. Any thread may tell of one. `tell` shows what the files alone decide."""
+    """The steps in order of appearance; any thread may report one. `tell` shows what the files alone decide."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic, tell: Tell | None = None) -> None:
         self.clock = clock
@@ -64,7 +75,7 @@ class Steps:
         self.tell = tell
 
     def step(self, name: str, state: StepState, detail: str = "", expected_s: float | None = None) -> None:
-        """Take note (see `grader.model.progress.Progress`)."""
+        """Take note of a step's state (see `grader.model.progress.Progress`)."""
         now_s = self.clock()
         with self.lock:
             before = self.steps.get(name)
@@ -75,15 +86,15 @@ class Steps:
                 after = replace(after, begun_s=now_s)
             after = replace(after, ended_s=now_s if state in ENDED else None)
             self.steps[name] = after
-            self.told(before, after, now_s)
+            self.changed(before, after, now_s)
 
     def early(self, verdicts: Callable[[], tuple[EarlyVerdict, ...]]) -> None:
-        """Show what the files alone decide, where that is asked for."""
+        """Show what the files alone decide, if that is wanted."""
         if self.tell is not None:
             self.tell(verdicts())
 
-    def told(self, before: Step | None, after: Step, now_s: float) -> None:
-        """For those who show something at each call."""
+    def changed(self, before: Step | None, after: Step, now_s: float) -> None:
+        """Do nothing; a subclass may show the change."""
 
     def snapshot(self) -> tuple[Step, ...]:
         with self.lock:
@@ -99,7 +110,7 @@ class PlainSteps(Steps):
         super().__init__(clock, tell)
         self.stream = stream
 
-    def told(self, before: Step | None, after: Step, now_s: float) -> None:
+    def changed(self, before: Step | None, after: Step, now_s: float) -> None:
         """Print, unless only the detail is new."""
         if before is not None and before.state == after.state:
             return
@@ -109,9 +120,9 @@ class PlainSteps(Steps):
 
 
 class LiveSteps(Steps):
-    """The steps as a table that rich draws again and again; it asks, nobody is held up by it.
+    """The steps as a table that rich redraws; no step waits for it.
 
-    It has at most `rows` lines: of more steps, those that run are shown, and the last that came to an end.
+    It has at most `rows` lines: of more steps, it shows those that run and those that ended last.
     """
 
     def __init__(
@@ -141,7 +152,7 @@ class LiveSteps(Steps):
 
 @contextmanager
 def open_progress(*, early: bool = False) -> Iterator[Progress]:
-    """Show what is told, on stderr, until the block is left; then the display is cleared away.
+    """Show progress on stderr until the block ends; then a live display is cleared.
 
     With `early`, what the files alone decide is printed to stdout as soon as it is known, and stays there.
     """
@@ -164,7 +175,7 @@ def open_progress(*, early: bool = False) -> Iterator[Progress]:
 
 
 def _fitting(steps: tuple[Step, ...], rows: int) -> tuple[Step, ...]:
-    """As many of the steps as there are rows, in their order: what ended first is left out first."""
+    """Return as many steps as there are rows, in order, without those that ended first."""
     ended = sorted((s for s in steps if s.state in ENDED), key=lambda step: step.ended_s or 0.0)
     dropped = {step.name for step in ended[: max(len(steps) - rows, 0)]}
     return tuple(step for step in steps if step.name not in dropped)[:rows]
@@ -181,7 +192,7 @@ def _times(step: Step, now_s: float) -> str:
 
 
 def _left(steps: tuple[Step, ...], now_s: float) -> str:
-    """Runs go side by side, so the longest of what is left is what is left."""
+    """Return the time that is left: that of the longest step, since runs go side by side."""
     left_s = [
         (step.expected_s or 0.0) - (step.elapsed_s(now_s) or 0.0) for step in steps if step.state not in ENDED
     ]
@@ -191,3 +202,50 @@ def _left(steps: tuple[Step, ...], now_s: float) -> str:
 
 def _shown(detail: str) -> str:
     return line(detail, DETAIL_LIMIT)
+
+
+def print_early(
+    verdicts: tuple[EarlyVerdict, ...], above: Callable[[Text], None] | None = None, *, width: int = 80
+) -> None:
+    """Print each verdict at once, with how to fix a loss; with `above` if a live display is in the way, else to stdout.
+
+    Lines for a display are at most `width` columns wide.
+    """
+    if not verdicts:
+        return
+    for row in _rows(verdicts, sys.stdout.encoding or "ascii"):
+        if above is None:
+            say(row.plain)
+        else:
+            for part in _wrapped(row, width):
+                above(part)
+    sys.stdout.flush()
+
+
+def _rows(verdicts: tuple[EarlyVerdict, ...], encoding: str) -> Iterator[Text]:
+    yield Text(EARLY_TITLE, "bold")
+    words = [_word(verdict) for verdict in verdicts]
+    status_width = max(map(len, words))
+    name_width = max(len(visible(verdict.criterion.id)) for verdict in verdicts)
+    for verdict, word in zip(verdicts, words, strict=True):
+        criterion = verdict.criterion
+        row = Text(" " * INDENT)
+        row.append(f"{mark(criterion.status, encoding)} {word:{status_width}}", STYLES[criterion.status])
+        row.append(f"  {visible(criterion.id):{name_width}}  {line(criterion.message, MESSAGE_CHARS)}")
+        yield row
+        if criterion.points < criterion.max_points and criterion.hint:
+            yield Text(f"{' ' * (INDENT + 2)}hint: {line(criterion.hint, MESSAGE_CHARS)}", "dim")
+    if not all(verdict.final for verdict in verdicts):
+        yield Text(f"{' ' * INDENT}{SO_FAR}", "dim")
+    yield Text()
+
+
+def _wrapped(row: Text, width: int) -> Iterator[Text]:
+    """Return its lines as a terminal shows them, none of which a CI system takes for a command."""
+    for part in row.wrap(Console(width=width), width - ESCAPE, overflow="fold") or [row]:
+        harmless = uncommanded(part.plain)
+        yield part if harmless == part.plain else Text(harmless, part.style)
+
+
+def _word(verdict: EarlyVerdict) -> str:
+    return verdict.criterion.status.value + ("" if verdict.final else " so far")

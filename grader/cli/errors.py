@@ -16,7 +16,7 @@ SIGPIPE_CODE = 141  # what a shell reports for a program that a closed pipe ende
 
 
 def guarded(command: Callable[[], int], *, debug: bool) -> int:
-    """Run the command; whatever it raises becomes lines on stderr and an exit code."""
+    """Run the command and turn what it raises into lines on stderr and an exit code."""
     try:
         code = int(command())
         flush()
@@ -30,7 +30,7 @@ def guarded(command: Callable[[], int], *, debug: bool) -> int:
         _trace(debug)
         report(error)
         return error.exit_code
-    except Exception as error:  # noqa: BLE001 - the last place: nobody above could show it in one line
+    except Exception as error:  # noqa: BLE001 - the last place: no caller could show it in one line
         _trace(debug)
         _say(f"grader: internal error: {type(error).__name__}: {_line(error)}{'' if debug else DEBUG_HINT}")
         return ExitCode.NOT_GRADED
@@ -41,8 +41,8 @@ DEBUG_HINT = " (run with --debug for the traceback)"
 
 
 def report(error: GraderError) -> None:
-    """One line that says what is wrong, one that says what to do, one that says what became of the result. A rubric's
-    faults have a line each."""
+    """Print a line that says what is wrong, one that says what to do, and one that says what became of the result. Each
+    fault of a rubric has its own line."""
     faults = error.faults if isinstance(error, RubricError) else [error.message]
     for fault in faults:
         _say(f"grader: error: {_line(fault)}")
@@ -53,7 +53,7 @@ def report(error: GraderError) -> None:
 
 
 def flush() -> None:
-    """Send what was printed, so that a closed pipe is met here and not while the interpreter ends."""
+    """Send what was printed, so that a closed pipe is noticed here and not at the interpreter's exit."""
     if sys.stdout is not None:
         sys.stdout.flush()
 

@@ -1,16 +1,20 @@
-"""Which packages `grader check` is about, in whatever folder it is called: below it, around it, or beside it."""
+"""Finds the packages that `grader check` is about from any folder: below it, around it, or beside it."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from grader.errors import UsageError
+from grader.intake import find_packages
 from grader.intake.find import BUILD_SPACES, Candidate, enclosing_package, find_nearest, manifest_name
 from grader.intake.gitdir import repository_around
 from grader.intake.names import printable
 from grader.intake.tree import is_file, is_there
+from grader.model.result import GradingResult
+from grader.model.verdict import FileCitation
 
 _MADE = BUILD_SPACES | {"logs"}
 _MARKS = (".catkin_workspace", ".catkin_tools", "src/CMakeLists.txt")
@@ -19,8 +23,8 @@ _MADE_MARKS = ("CMakeCache.txt", ".catkin", "setup.sh", ".catkin_tools.yaml", ".
 
 @dataclass(frozen=True, kw_only=True)
 class Found:
-    """`candidates` may be packages, nearest first. `root` is the folder that they were looked for in; where it is not
-    the one that was asked about, `moved` says why. `whole` is false where not everything was looked at."""
+    """`candidates` may be packages, nearest first. `root` is the folder that was searched; if that is not the one
+    that was given, `moved` says why. `whole` is false if some of it was not searched."""
 
     root: Path
     candidates: tuple[Candidate, ...]
@@ -29,14 +33,14 @@ class Found:
 
     @property
     def packages(self) -> tuple[Candidate, ...]:
-        """Those with a manifest, as catkin sees them."""
+        """Return those with a manifest, as catkin sees them."""
         return tuple(c for c in self.candidates if c.has_manifest and c.ignored_by is None)
 
 
 def find(path: Path) -> Found:
-    """The packages below the folder `path`; else the one around it; else those of its repository or workspace.
+    """Find the packages below the folder `path`; else the one around it; else those of its repository or workspace.
 
-    What git or a build keeps for itself is left first. Raises UsageError where `path` cannot be read.
+    From inside .git or a build's folder, the search starts outside of it. Raises UsageError if `path` cannot be read.
     """
     try:
         return _find(path)
@@ -60,24 +64,24 @@ def _find(path: Path) -> Found:
 
 
 def _outside(here: Path) -> tuple[Path, str]:
-    """The folder to look in instead of one in which there are copies of packages, or none at all."""
+    """Return the folder to search instead of one with copies of packages, or none, and why."""
     for folder in (*reversed(here.parents), here):
         if folder.name == ".git":
-            return folder.parent, "this folder is git's own"
+            return folder.parent, "this folder belongs to git"
         if folder.name in _MADE and _is_made(folder):
-            return folder.parent, f"what is in {folder.name}/ was made by a build"
+            return folder.parent, f"{folder.name}/ was made by a build"
     return here, ""
 
 
 def _is_made(folder: Path) -> bool:
-    """Whether catkin (or CMake) made it: of a package's own folders some are named alike."""
+    """Return whether catkin or CMake made it: a package may have a folder of the same name."""
     if any(is_there(folder / mark) for mark in _MADE_MARKS):
         return True
     return any(is_there(folder.parent / mark) for mark in _MARKS)
 
 
 def _beside(here: Path) -> Found | None:
-    """In the rest of the repository or the workspace that the folder is part of."""
+    """Search the rest of the repository or workspace that the folder is part of."""
     repository = repository_around(here)
     workspace = next((f for f in here.parents if any(is_there(f / mark) for mark in _MARKS)), None)
     for root, what in ((workspace, "workspace"), (repository, "repository")):
@@ -100,10 +104,37 @@ def _as_candidate(folder: Path) -> Candidate:
 
 
 def shown(folder: Path) -> str:
-    """A folder as somebody here would call it."""
+    """Return the shorter of the relative and the absolute path, as printable text."""
     try:
         near = os.path.relpath(folder.resolve(), Path.cwd())
     except (OSError, ValueError):
         return printable(str(folder))
     whole = str(folder.resolve())
     return printable(near if len(near) < len(whole) else whole)
+
+
+def package_prefix(result: GradingResult, here: Path) -> str | None:
+    """Return the package's folder relative to the repository around `here` (or to `here`), `.` for the root itself.
+
+    Results do not say it: it is the package of that name that has all files that the result cites. None if none has.
+    """
+    root = _root(here.resolve())
+    cited = {
+        c.file for criterion in result.criteria for c in criterion.citations if isinstance(c, FileCitation)
+    }
+    for name, folder in _packages(root):
+        if name == result.submission.package and all((folder / file).exists() for file in cited):
+            return folder.relative_to(root).as_posix()
+    return None
+
+
+def _root(here: Path) -> Path:
+    return next((folder for folder in (here, *here.parents) if (folder / ".git").exists()), here)
+
+
+def _packages(root: Path) -> Iterator[tuple[str, Path]]:
+    try:
+        found = find_packages(root)
+    except OSError:
+        return
+    yield from ((name, folder) for name, folder in found if folder.is_relative_to(root))

@@ -7,60 +7,53 @@ import signal
 import sys
 import threading
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 from io import TextIOWrapper
 from types import FrameType
 
+from grader.cli.declare import Command, loading
 from grader.cli.errors import guarded
-from grader.cli.inherited_limits import make_room
-from grader.cli.parsing import build_parser
-
-RUNNING = {"batch", "check", "ci", "grade", "record", "regrade", "rubric_new", "rubric_test"}
-"""Commands that run what students wrote."""
+from grader.cli.parser import build_parser, overview
+from grader.errors import ExitCode
 
 
 def run(argv: Sequence[str]) -> int:
     """Run one command line and return its exit code. Prints its errors itself; raises nothing."""
     _prepare_streams()
     _prepare_signals()
-    if not sys.warnoptions:  # Python's remarks on a student's code quote it, and are for nobody here
+    if not sys.warnoptions:  # Python's warnings about a student's code quote it, and are of no use here
         warnings.simplefilter("ignore")
     return guarded(lambda: _dispatch(argv), debug="--debug" in argv)
 
 
 def _dispatch(argv: Sequence[str]) -> int:
+    if not argv:
+        print(f"usage: grader COMMAND ...\n\n{overview()}\nSee grader COMMAND --help.", file=sys.stderr)
+        return ExitCode.USAGE
     try:
         options = vars(build_parser().parse_args(argv))
     except SystemExit as done:  # --help and --version end this way
         return int(done.code or 0)
     options.pop("debug", None)
-    name = options.pop("module")
-    with _uninterrupted():
-        if name in RUNNING and not options.get("static"):
-            make_room(begin=True)  # before more is loaded: under short limits that would end without a word
-        module = import_module(f"grader.cli.commands.{name}")
-    if name in {*RUNNING, "doctor"} and not options.get("static"):  # doctor says what the others would find
-        import_module("grader.cli.scope").enter_scope()
-    return int(module.run(**options))
-
-
-@contextmanager
-def _uninterrupted() -> Iterator[None]:
-    """Hold Ctrl-C back for a moment: a compiled module that is interrupted while it loads panics."""
-    if sys.platform == "win32":
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    command: Command = options.pop("command")
+    runs_code = command.runs_code and not options.get("static")
+    with loading():
+        if runs_code and sys.platform == "linux":
+            inherited = import_module("grader.arena.inherited")
+            inherited.make_room(
+                begin=True
+            )  # before more is loaded: short limits would end that without a word
+        if runs_code or command.looks_at_host:
+            scope = import_module("grader.cli.systemd_scope")
+    if runs_code or command.looks_at_host:
+        scope.enter_scope()
+    return int(command.run(**options))
 
 
 def _prepare_streams() -> None:
-    """A character that the terminal's encoding lacks is written out; a closed stream swallows."""
+    """Escape characters that the terminal's encoding lacks; let a closed stream swallow everything."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             descriptor = os.open(os.devnull, os.O_WRONLY)
@@ -72,9 +65,9 @@ def _prepare_streams() -> None:
 
 
 def _prepare_signals() -> None:
-    """A terminated grader cleans up as an interrupted one does. A shell's `&` leaves SIGINT alive too.
+    """Make SIGTERM clean up as SIGINT does, and keep SIGINT alive under a shell's `&`.
 
-    It waits for what it starts, and hears every signal, whatever who started it ignores or holds back.
+    The grader waits for its children and gets every signal, even if its parent ignores or blocks some.
     """
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)

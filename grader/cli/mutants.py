@@ -1,17 +1,36 @@
-"""Shows a rubric's test: a table, then whatever did not go as declared with its diff and its evidence."""
+"""What `grader rubric test` runs and prints: a correct package, and mutants of it that must lose marks.
+
+A table comes first, then everything that did not go as declared, with its diff and its evidence.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import IO
 
 from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from grader.authoring.mutation.declared import load_mutants, mutants_file, mutants_text
+from grader.authoring.mutation.plan import Planned, plan_all, plan_declared, refuse_unfit, select_mutants
+from grader.authoring.mutation.rubric_test import Plan, run_test
+from grader.authoring.mutation.solution import (
+    Solution,
+    find_reference,
+    load_solution,
+    reference_at,
+)
+from grader.cli.display import open_progress
+from grader.files import atomic_write, check_writable
 from grader.model.mutants import LostCriterion, MutantResult, RubricTest
+from grader.model.submission import SandboxMode
 from grader.report.terminal import emit, open_console
 from grader.report.text import line, number, visible
+from grader.rubric.load import LoadedRubric, load_rubric
 
 MARKS = {
     "killed": ("✓", "green"),
@@ -24,8 +43,74 @@ TEXT_CHARS = 500
 DIFF_STYLES = {"+": "green", "-": "red", "@": "cyan"}
 
 
+def plan_test(
+    rubric: str,
+    solution: Path | None,
+    *,
+    only: Sequence[str],
+    jobs: int,
+    out: Path | None,
+    everything: Path | None,
+    sandbox: SandboxMode,
+) -> Plan:
+    """Return what is to be graded, and where. `everything` is the file that what every operator costs is written to,
+    None to try the declared mutants. Raises UsageError."""
+    loaded = load_rubric(rubric)
+    reference = reference_at(solution) if solution else find_reference(loaded)
+    correct = load_solution(reference, loaded.rubric.package)
+    mutants, unfit = _planned(loaded, correct, own=solution is not None, everything=everything is not None)
+    picked = select_mutants(mutants, only)
+    for place in filter(None, (out, everything and everything.absolute().parent)):
+        check_writable(place)
+    folder = out or Path(tempfile.mkdtemp(prefix="grader-mutants-"))
+    return Plan(
+        rubric=loaded,
+        solution=correct,
+        given=str(reference.folder),
+        mutants=picked,
+        unfit=unfit,
+        partial=bool(only),
+        jobs=jobs,
+        out=folder.absolute(),
+        keep_all=out is not None,
+        sandbox=sandbox,
+    )
+
+
+def _planned(
+    loaded: LoadedRubric, solution: Solution, *, own: bool, everything: bool
+) -> tuple[list[Planned], list[str]]:
+    """Return the mutants, and the declared ones that do not fit a solution of the user's `own`."""
+    file = None if everything else mutants_file(loaded)
+    if file is None:
+        return plan_all(solution), []
+    mutants, unfit = plan_declared(load_mutants(file, loaded.rubric), solution)
+    if not own:
+        refuse_unfit(unfit)
+    return mutants, unfit
+
+
+def run_plan(plan: Plan, *, temporary: bool) -> RubricTest:
+    """Grade everything. A temporary folder is kept only if it holds evidence for a person to look at."""
+    kept = False
+    try:
+        with open_progress() as progress:
+            test = run_test(plan, progress)
+        kept = any(mutant.evidence for mutant in test.mutants) or test.reference.evidence is not None
+        return test
+    finally:
+        if temporary and not kept:
+            shutil.rmtree(plan.out, ignore_errors=True)
+
+
+def write_mutants(plan: Plan, test: RubricTest, file: Path) -> None:
+    """Write a mutants file with what each mutant cost."""
+    text = mutants_text(plan.rubric.rubric.id, {m.name: m.mutant for m in plan.mutants}, test.mutants)
+    atomic_write(file, text.encode(), public=True)
+
+
 def print_test(test: RubricTest, stream: IO[str]) -> None:
-    """The whole test on a terminal or in a file."""
+    """Print the whole test on a terminal or to a file."""
     parts: list[RenderableType] = [_table(test)] if test.mutants else []
     parts += list(_reference(test))
     for mutant in test.mutants:
@@ -94,7 +179,7 @@ def _summary(test: RubricTest) -> Iterator[Text]:
         yield Text(f"not tried: {visible(fault)}", "yellow")
     if test.uncosted:
         names = ", ".join(test.uncosted)
-        yield Text(f"No mutant costs {names}: add mutants that do, to see that these criteria work", "red")
+        yield Text(f"No mutant costs {names}: add mutants that do, to show that these criteria work", "red")
     killed = sum(mutant.state == "killed" for mutant in test.mutants)
     text = f"{test.rubric.id}: {killed} of {len(test.mutants)} mutants killed, {test.wall_s:.0f} s"
     yield Text(text, "bold green" if test.passed else "bold red")

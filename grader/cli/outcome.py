@@ -1,23 +1,29 @@
-"""From criteria to exit codes."""
+"""How a command ends: the report on stdout, where its files are, and the exit code that the criteria come to."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
+from pathlib import Path
 
-from grader.errors import ExitCode
+from grader.cli.errors import report
+from grader.cli.output import say, say_document
+from grader.errors import ExitCode, GraderError
 from grader.judging.summary import overall_status, reached_pass_mark
-from grader.model.result import CriterionResult
+from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
+from grader.report.result_json import result_text
+from grader.report.terminal import open_console, print_report
 from grader.rubric.model import Rubric
 
 EXACT_DIGITS = 6
-"""More than points have, and fewer than show how floating point multiplies."""
+"""More digits than points have, and fewer than rounding errors show in."""
 
 
 def exit_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
-    """Of the criteria that are shown: not graded where the grader itself failed, passed, not settled, or below.
+    """Return the exit code of the criteria that are shown.
 
-    A pass mark in points that is reached stays reached, whatever is still open.
+    A pass mark in points that is reached stays reached, even if some criteria are open.
     """
     shown = tuple(criteria)
     status = overall_status(shown)
@@ -29,26 +35,68 @@ def exit_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
 
 
 def worst(codes: Iterable[ExitCode]) -> ExitCode:
-    """How several ended together. Not graded is worse than below the mark, that than not settled."""
+    """Return the worst code: not graded is worse than below the pass mark, and that is worse than inconclusive."""
     order = (ExitCode.PASSED, ExitCode.INCONCLUSIVE, ExitCode.BELOW_PASS_MARK, ExitCode.NOT_GRADED)
     return max(codes, key=order.index)
 
 
 def staged_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
-    """Of a hook before a commit: what fails, fails it, whatever the pass mark is. What is open does not."""
+    """Return the code of a pre-commit hook: any criterion that fails, fails it, whatever the pass mark is."""
     judged = settled(criteria)
     counted = [c for c in judged if c.max_points > 0 or c.status is Status.ERROR]
     return exit_code(judged, rubric.model_copy(update={"pass_mark": None})) if counted else ExitCode.PASSED
 
 
 def settled(criteria: Iterable[CriterionResult]) -> tuple[CriterionResult, ...]:
-    """Those that could be judged."""
+    """Return the criteria that could be judged."""
     return tuple(c for c in criteria if not c.status.is_open)
 
 
 def _in_proportion(rubric: Rubric, shown: tuple[CriterionResult, ...]) -> Rubric:
-    """The rubric with its pass mark as large a part of the points that are shown as it is of all."""
+    """Return the rubric with its pass mark scaled from all points to those that are shown."""
     if rubric.pass_mark is None:
         return rubric
     share = sum(c.max_points for c in shown) / (rubric.max_points or 1.0)
     return rubric.model_copy(update={"pass_mark": round(rubric.pass_mark * share, EXACT_DIGITS)})
+
+
+REPORTS = ("report.html", "result.json", "report.md", "junit.xml", "console.log")
+
+
+def show(
+    result: GradingResult,
+    rubric: Rubric,
+    folder: Path | None,
+    *,
+    hidden: int = 0,
+    as_json: bool = False,
+    static: bool = False,
+    unrun: str = "",
+) -> ExitCode:
+    """Print the result, from which `hidden` criteria are left out already, and return its exit code.
+
+    With `static`, only the criteria that could be judged count. `unrun` says why nothing was run, on purpose or not:
+    open criteria are then only counted in the report.
+    """
+    if as_json:
+        say_document(lambda ascii_only: result_text(result, ascii_only=ascii_only))
+    else:
+        print_report(result, rubric, open_console(sys.stdout), hidden=hidden, static=static, unrun=unrun)
+        _paths(folder)
+    if result.error is not None:
+        report(GraderError(result.error.message, hint=result.error.hint))
+    if result.status == "error":
+        return ExitCode.NOT_GRADED
+    return exit_code(settled(result.criteria) if static else result.criteria, rubric)
+
+
+def _paths(folder: Path | None) -> None:
+    if folder is None:
+        return
+    say("")
+    say("Reports:")
+    for name in REPORTS:
+        if (folder / name).is_file():
+            say(f"  {folder / name}")
+    if (folder / "evidence").is_dir():
+        say(f"  {folder / 'evidence'}/")

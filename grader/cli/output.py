@@ -1,4 +1,4 @@
-"""How commands print: whatever a student wrote is shown on a line of its own, and never obeyed."""
+"""How commands print: what a student wrote is shown on one line, and never obeyed by a terminal."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def say_json(data: object) -> None:
 
 
 def say_document(made: Callable[[bool], str]) -> None:
-    """Print a whole document that is harmless already. `made` is told whether stdout takes ASCII only: in an encoding
-    that lacks a letter, only an escape of the document's own can stand for it."""
+    """Print a document that is harmless already. `made` is told whether stdout takes only ASCII: a letter that the
+    encoding lacks needs an escape of the document's own format."""
     encoding = (sys.stdout.encoding or "ascii").lower().replace("-", "")
     sys.stdout.write(made(encoding != "utf8"))

@@ -1,26 +1,34 @@
-"""Which package and which rubric a folder is about, where the command line does not say."""
+"""Which package and which lab a command is about, where the command line does not say.
+
+A path comes in, and a rubric with the folder to grade goes out; or an error that says what is there.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from grader.cli.find_packages import Found, find, shown
-from grader.cli.labs import Lab, labs_of
 from grader.errors import UsageError
 from grader.intake import enclosing_package, find_packages
-from grader.intake.find import Candidate
-from grader.intake.names import is_archive_name
+from grader.intake.find import MANIFEST, Candidate
+from grader.intake.names import is_archive_name, listing, printable
 from grader.intake.open import is_recording
-from grader.rubric.load import LoadedRubric, load_rubric
+from grader.rubric.load import LoadedRubric, find_rubric_for_package, load_rubric, packages_of_labs
+from grader.rubric.model import Criterion, Rubric, Scenario, Start, Until
+from grader.suggest import closest
 
-Package = tuple[str, Path]
+ALIKE = 0.75
+"""How alike a package's name and a lab's must be to suggest the lab."""
+MAX_SECONDS = 3600
 
 
 @dataclass(frozen=True, kw_only=True)
 class Chosen:
-    """What is to be checked: `source` by `rubric`. `package` is the folder of the package where that is known already,
-    `words` say in one line what was chosen and why, "" where the command line says it all."""
+    """What to check: `source` by `rubric`. `package` is the folder of the package if that is known already. `words`
+    say what was chosen and why, or are "" if the command line says it all."""
 
     rubric: LoadedRubric
     source: str
@@ -28,36 +36,21 @@ class Chosen:
     words: str = ""
 
 
-def packages_at(path: Path) -> list[Package]:
-    """The packages in (or else around) a folder, as name and folder. Raises UsageError."""
-    try:
-        return find_packages(path)
-    except OSError as error:
-        reason = "does not exist" if not path.exists() else error.strerror or "cannot be read"
-        raise UsageError(f"{path} {reason}", hint="give your package's folder") from error
-
-
-def choose(path: Path, rubric: str | None) -> tuple[LoadedRubric, str]:
-    """The rubric, and what to grade: `path`, or the package around it. Raises UsageError."""
-    chosen = only(choose_all(path, rubric))
-    return chosen.rubric, chosen.source
-
-
 def only(chosen: tuple[Chosen, ...]) -> Chosen:
-    """The one that was chosen. Raises UsageError where there are several."""
+    """Return the one that was chosen. Raises UsageError if there are several."""
     if len(chosen) > 1:
         named = ", ".join(one.rubric.rubric.id for one in chosen)
         raise UsageError(
-            f"packages of {len(chosen)} labs are here: {named}",
-            hint="go into one of them, or name the lab with --rubric",
+            f"there are packages of {len(chosen)} labs here: {named}",
+            hint="go to the folder of one of them, or give the lab with --rubric",
         )
     return chosen[0]
 
 
 def choose_all(path: Path, rubric: str | None) -> tuple[Chosen, ...]:
-    """What to check where `path` is named: one package, or one for each lab of which a package is there.
+    """Return what to check at `path`: one package, or one for each lab that has a package there.
 
-    Raises UsageError where that cannot be told, RubricError for a rubric that is wrong.
+    Raises UsageError if that is unclear, RubricError for a faulty rubric.
     """
     if not path.is_dir():
         folder = _around_file(path, rubric)
@@ -71,20 +64,23 @@ def choose_all(path: Path, rubric: str | None) -> tuple[Chosen, ...]:
 
 
 def only_package(source: str) -> str:
-    """The name of the one package in a folder. Raises UsageError where there is none or more than one."""
+    """Return the name of the only package in a folder. Raises UsageError if there is none or more than one."""
     path = Path(source)
     if not path.is_dir():
-        raise UsageError("which package is to be recorded?", hint="name it with --package")
-    names = [name for name, _ in packages_at(path)]
+        raise UsageError("it is unclear which package to record", hint="give its name with --package")
+    try:
+        names = [name for name, _ in find_packages(path)]
+    except OSError as error:
+        raise UsageError(f"{path}: {error.strerror}", hint="give a package's folder") from error
     if len(names) != 1:
         found = ", ".join(names) or "no package.xml"
-        raise UsageError(f"{source} holds {found}", hint="name one package with --package")
+        raise UsageError(f"{source} contains {found}", hint="give one package with --package")
     return names[0]
 
 
 def _around_file(path: Path, rubric: str | None) -> Path | None:
-    """The package that a file is part of; None for an archive or a recording, whose lab has to be named, and for what
-    is no file and may be an address."""
+    """Return the package that a file is part of. None for an archive or a recording, whose lab has to be given, and for
+    what does not exist here and may be an address."""
     if not path.exists():
         if rubric is not None:
             return None
@@ -92,23 +88,23 @@ def _around_file(path: Path, rubric: str | None) -> Path | None:
     handed_in = is_archive_name(path.name) or is_recording(path)
     around = None if handed_in else enclosing_package(path.parent)
     if around is None and rubric is None:
-        what = "is no folder" if handed_in else "is a file, and no package is around it"
-        raise UsageError(f"{path} {what}", hint="give your package's folder, or name the lab with --rubric")
+        what = "is not a folder" if handed_in else "is a file outside any package"
+        raise UsageError(f"{path} {what}", hint="give your package's folder, or the lab with --rubric")
     return around
 
 
 def _named(path: Path, found: Found, rubric: LoadedRubric) -> Chosen:
-    """By the lab that was asked for. Of several packages the intake takes the lab's."""
+    """Choose by the lab that was given. Of several packages the intake takes the lab's."""
     fitting = [c for c in found.packages if c.name.lower() == rubric.rubric.package.lower()]
     package = next(iter([*fitting, *found.packages]), None)
     if package is None:
         return Chosen(rubric=rubric, source=str(path))
-    words = f"checking {package.name} in {shown(package.folder)} ({found.moved})" if found.moved else ""
+    words = f"Checking {package.name} in {shown(package.folder)} ({found.moved})" if found.moved else ""
     return Chosen(rubric=rubric, source=_source(path, found, package), package=package.folder, words=words)
 
 
 def _chosen(path: Path, found: Found, lab: Lab) -> Chosen:
-    words = f"checking {lab.package.name} in {shown(lab.package.folder)} by {lab.rubric}, {lab.why}"
+    words = f"Checking {lab.package.name} in {shown(lab.package.folder)} by {lab.rubric}, {lab.why}"
     return Chosen(
         rubric=load_rubric(lab.rubric),
         source=_source(path, found, lab.package),
@@ -118,6 +114,138 @@ def _chosen(path: Path, found: Found, lab: Lab) -> Chosen:
 
 
 def _source(path: Path, found: Found, package: Candidate) -> str:
-    """The folder that was named, with all that is in it, where the package is in there and nothing was left out."""
+    """Return the given folder if the package is in it and all of it was searched, else the package's folder."""
     inside = package.folder.resolve().is_relative_to(path.resolve())
     return str(path if inside and found.whole and not found.moved else package.folder)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lab:
+    """A lab and the package that it is for; `why` says how they were matched."""
+
+    rubric: str
+    package: Candidate
+    why: str
+
+
+def labs_of(found: Found) -> tuple[Lab, ...]:
+    """Return the labs of the packages that were found, one package each, nearest first.
+
+    Raises UsageError if there is none: it says what is there, which labs there are, and which is most alike.
+    """
+    labs: dict[str, Lab] = {}
+    for read in (_by_name, _by_folder):
+        for candidate in found.packages:
+            lab = read(candidate)
+            if lab is not None:
+                labs.setdefault(lab.rubric, lab)
+    if not labs:
+        bare = (c for c in found.candidates if not c.has_manifest and c.ignored_by is None)
+        labs = {lab.rubric: lab for candidate in bare if (lab := _by_folder(candidate)) is not None}
+    if not labs:
+        raise _none(found)
+    return tuple(labs.values())
+
+
+def _by_name(candidate: Candidate) -> Lab | None:
+    rubric = find_rubric_for_package(candidate.name)
+    if rubric is None:
+        return None
+    return Lab(rubric=rubric, package=candidate, why=f"the lab for a package named {candidate.name}")
+
+
+def _by_folder(candidate: Candidate) -> Lab | None:
+    folder = re.sub(
+        r"-(main|master)$", "", printable(candidate.folder.resolve().name)
+    )  # as GitHub's zip names it
+    rubric = find_rubric_for_package(folder)
+    if rubric is None or (candidate.name.lower() == folder.lower() and candidate.has_manifest):
+        return None
+    name = f"its {MANIFEST} says {candidate.name}" if candidate.has_manifest else f"it has no {MANIFEST}"
+    return Lab(rubric=rubric, package=candidate, why=f"the lab that its folder is named after ({name})")
+
+
+def _none(found: Found) -> UsageError:
+    names = list(dict.fromkeys(c.name for c in found.packages))
+    if not names:
+        return _no_package(found)
+    known = packages_of_labs()
+    near = _near(names, known)
+    if near is None:
+        hint = f"give the lab with --rubric: {_listed(known)}; or --rubric FILE for a lab of your own"
+    else:
+        hint = (
+            f"{near} is for a package named {known[near]}: fix <name> in {MANIFEST}, "
+            f"or add --rubric {near}; all labs: {', '.join(known)}"
+        )
+    return UsageError(f"no lab is for the package {listing(names)}", hint=hint)
+
+
+def _no_package(found: Found) -> UsageError:
+    folder = shown(found.root)
+    if not found.whole:
+        return UsageError(
+            f"{folder} has too many files to search it all for a package",
+            hint="go to your package's folder, or give it: grader check PATH",
+        )
+    ignored = next((c for c in found.candidates if c.has_manifest and c.ignored_by), None)
+    if ignored is not None:
+        return UsageError(
+            f"the package {ignored.name} is hidden from catkin by {printable(ignored.ignored_by or '')}",
+            hint="delete that file",
+        )
+    return UsageError(
+        f"there is no {MANIFEST} in {folder} or above it",
+        hint="go to your package's folder, or give it: grader check PATH",
+    )
+
+
+def _near(names: Iterable[str], known: dict[str, str]) -> str | None:
+    """Return the lab whose package or own name is most like one of these."""
+    words = {_plain(word): rubric for rubric, package in known.items() for word in (rubric, package)}
+    for name in names:
+        inside = [word for word in words if len(word) >= 4 and word in _plain(name)]
+        near = closest(_plain(name), words, cutoff=ALIKE) or max(inside, key=len, default="")
+        if near:
+            return words[near]
+    return None
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _listed(known: dict[str, str]) -> str:
+    return ", ".join(f"{rubric} (package {package})" for rubric, package in known.items())
+
+
+def rubric_to_record(
+    package: str, scripts: Sequence[str], launches: Sequence[str], seconds: float
+) -> LoadedRubric:
+    """Return a rubric that only says what to run and for how long; its criterion is never judged."""
+    if not 0 < seconds <= MAX_SECONDS:
+        raise UsageError(f"--seconds must be more than 0 and at most {MAX_SECONDS}, not {seconds:g}")
+    starts = [Start(name=_start_name(i, file), script=file) for i, file in enumerate(scripts, 1)]
+    starts += [
+        Start(name=_start_name(i, file), launch=file) for i, file in enumerate(launches, len(starts) + 1)
+    ]
+    until = Until(limit_s=seconds, first_message_s=seconds, silent_s=seconds, messages={})
+    scenario = Scenario(title="As asked on the command line", start=tuple(starts), until=until)
+    criterion = Criterion.model_validate(
+        {"id": "recorded", "title": "Recorded", "points": 0, "check": "none", "scenario": "record"}
+    )
+    made = {
+        "schema": "grader.rubric/1",
+        "id": "record",
+        "title": "Recording",
+        "version": "0",
+        "package": package,
+    }
+    rubric = Rubric.model_validate({**made, "scenarios": {"record": scenario}, "criteria": (criterion,)})
+    return LoadedRubric(rubric=rubric, path=Path(), digest="")
+
+
+def _start_name(number: int, file: str) -> str:
+    """Return a name with a number, so that it is unique: `p1-numeric-talker`."""
+    stem = re.sub(r"[^a-z0-9]+", "-", Path(file).stem.lower()).strip("-")
+    return f"p{number}-{stem}".rstrip("-")

@@ -1,1 +1,4 @@
-"""The platforms that the grader runs on: GitHub, GitLab, Gradescope, PrairieLearn."""
+"""The platforms that run the grader: CI jobs of GitHub and GitLab, exports for Gradescope and PrairieLearn.
+
+A result comes in, and the form that the platform reads goes out. Grading is for `pipeline`, the reports for `report`.
+"""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import re
 import types
@@ -14,6 +13,7 @@ from pydantic_core import ErrorDetails
 
 from grader.rubric.model import NAME_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
 from grader.rubric.source import Fault, KeyPath
+from grader.suggest import did_you_mean
 
 PATTERN_RULES = {
     NAME_PATTERN: "must be lower-case letters, digits and hyphens, beginning with a letter",
@@ -151,12 +151,6 @@ def shown(value: object) -> str:
         return "empty"
     text = json.dumps(value, ensure_ascii=False)
     return text if len(text) <= 60 else text[:57] + "…"
-
-
-def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """` (did you mean "x"?)`, or nothing."""
-    near = difflib.get_close_matches(word, list(known), n=1)
-    return f' (did you mean "{near[0]}"?)' if near else ""
 
 
 def _keys(model: type[BaseModel], path: KeyPath) -> list[str]:

@@ -6,9 +6,8 @@ import argparse
 import re
 from collections.abc import Iterator
 
-from grader.cli.parsing import build_parser
-from grader.cli.parsing.exit_codes import EXIT_CODES
-from grader.cli.parsing.walk import commands, options, value_of
+from grader.cli.declare import EXIT_CODES
+from grader.cli.parser import build_parser, commands, options, value_of
 from scripts.reference.table import MADE, code, table
 
 COMMANDS = f"""# Commands

@@ -69,7 +69,7 @@ def test_nothing_else_in_the_package_has_such_a_name() -> None:
 
 @pytest.mark.parametrize(
     "before",
-    ["import grader.judging.judge", "import grader.cli.commands.judge", "import grader.pipeline", "pass"],
+    ["import grader.judging.judge", "import grader.cli.commands.grading", "import grader.pipeline", "pass"],
 )
 def test_judge_is_the_function_whatever_was_imported_before(before: str) -> None:
     assert fresh(f"{before}\nfrom grader import judge, grade\nprint(judge.__module__, grade.__module__)") == (

@@ -111,7 +111,7 @@ def test_a_scenario_that_was_not_recorded(tmp_path, capsys) -> None:
     (out / "ada" / "evidence" / "listener.mcap").unlink()
     assert run(["regrade", str(out)]) == 4
     shown = capsys.readouterr().out
-    assert "1 must run again, there is no recording of listener: ada" in shown
+    assert "1 must run again, since there is no recording of listener: ada" in shown
     assert "--run-missing" in shown
     statuses = {line["submission"]["id"]: line["status"] for line in lines_of(out)}
     assert statuses == {"ada": "inconclusive", "bob": "graded"}
@@ -201,7 +201,7 @@ def test_what_could_not_be_graded_stays_as_it_was(tmp_path, capsys) -> None:
     capsys.readouterr()
     assert run(["regrade", str(out)]) == 3
     shown = capsys.readouterr().out
-    assert "bob: stays as it was: there is no package lab1" in shown
+    assert "bob: unchanged: there is no package lab1" in shown
     assert "1 of 2 judged again, 0 changed" in shown
     assert [line["status"] for line in lines_of(out)] == ["graded", "error"]
 

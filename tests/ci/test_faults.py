@@ -40,7 +40,7 @@ def test_no_fault_of_ours_ends_without_a_word(job, monkeypatch, capsys, error, s
     def fail(*_, **__):
         raise error
 
-    monkeypatch.setattr("grader.cli.commands.ci.pipeline.grade", fail)
+    monkeypatch.setattr("grader.pipeline.grade", fail)
     assert run(["ci", "github"]) == 3
     ((_, told, text),) = heard(capsys.readouterr().out)
     assert told["title"] == "Not graded"

@@ -6,9 +6,8 @@ import pytest
 
 from grader.cli.outcome import exit_code
 from grader.errors import ExitCode, UsageError
-from grader.integrations.ci.outcome import Outcome
-from grader.integrations.ci.pass_mark import Mark, needed_words, read_mark, with_mark
-from grader.integrations.ci.settings import FAILING, read_settings
+from grader.integrations.ci_results import Outcome, points_to_pass
+from grader.integrations.ci_settings import FAILING, PassMark, read_pass_mark, read_settings, with_pass_mark
 from grader.rubric.load import load_rubric
 from tests.support.a_class import criterion
 
@@ -18,7 +17,7 @@ from tests.support.a_class import criterion
     [("60%", 60, True), ("60 %", 60, True), ("12.5", 12.5, False), ("0", 0, False), ("100%", 100, True)],
 )
 def test_a_mark_is_points_or_a_percentage(text, value, percent):
-    assert read_mark(text) == Mark(value=value, percent=percent)
+    assert read_pass_mark(text) == PassMark(value=value, percent=percent)
 
 
 @pytest.mark.parametrize(
@@ -26,7 +25,7 @@ def test_a_mark_is_points_or_a_percentage(text, value, percent):
 )
 def test_what_is_no_mark_is_named(text):
     with pytest.raises(UsageError, match="pass-mark: "):
-        read_mark(text)
+        read_pass_mark(text)
 
 
 def test_a_mark_is_of_the_visible_points():
@@ -37,13 +36,13 @@ def test_a_mark_is_of_the_visible_points():
     )
     loaded = lab.model_copy(update={"rubric": hiding})
     with pytest.raises(UsageError, match="has 5 visible ones"):
-        with_mark(loaded, Mark(value=6, percent=False))
+        with_pass_mark(loaded, PassMark(value=6, percent=False))
     for points, code in ((3, ExitCode.PASSED), (2.9, ExitCode.BELOW_PASS_MARK)):
-        for mark in (Mark(value=60, percent=True), Mark(value=3, percent=False)):
-            marked = with_mark(loaded, mark).rubric
+        for mark in (PassMark(value=60, percent=True), PassMark(value=3, percent=False)):
+            marked = with_pass_mark(loaded, mark).rubric
             seen = (criterion(first.id, "partial", points, 5),)
             assert exit_code(seen, marked) is code
-            assert needed_words(marked, 5) == "to pass, it takes 3"
+            assert points_to_pass(marked, 5) == "to pass, it takes 3"
 
 
 @pytest.mark.parametrize("tenths", range(1, 1000, 37))
@@ -56,7 +55,7 @@ def test_just_the_mark_is_reached_whatever_floating_point_says(tenths):
         }
     )
     loaded = load_rubric("leeds-comp3631-lab1").model_copy(update={"rubric": third})
-    marked = with_mark(loaded, Mark(value=tenths / 10, percent=False)).rubric
+    marked = with_pass_mark(loaded, PassMark(value=tenths / 10, percent=False)).rubric
     assert exit_code((criterion("a", "partial", tenths / 10, 71.3),), marked) in {0, 1}
     whole = sum(c.points for c in third.criteria)
     assert exit_code((criterion("a", "partial", tenths / 10, whole),), marked) is ExitCode.PASSED

@@ -71,7 +71,7 @@ def test_no_input_is_pasted_into_a_script():
 
 
 def test_every_variable_of_the_grader_can_be_set_by_an_input():
-    from grader.cli.parsing.ci import CI_VARIABLES  # noqa: PLC0415 - the help's text
+    from grader.cli.commands.integrations import CI_VARIABLES  # noqa: PLC0415 - the help's text
 
     known = set(re.findall(r"GRADER_\w+", CI_VARIABLES))
     grade = next(step for step in ACTION["runs"]["steps"] if step.get("id") == "grade")

@@ -16,7 +16,8 @@ from tests.report.hostile import result
 from tests.rubric.samples import spoiled
 from tests.support.a_class import criterion
 
-COMMANDS = ("grade", "check", "record", "judge")
+LOADED = "grader.cli.checking"
+"""Has the pipeline as it was when it was loaded."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,22 +70,16 @@ def passing(status: str = "pass", *, graded: str = "graded") -> GradingResult:
     )
 
 
-def _fresh(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in COMMANDS:
-        monkeypatch.delitem(sys.modules, f"grader.cli.commands.{name}", raising=False)
-
-
 @pytest.fixture
 def pipeline(monkeypatch):
     """The fake in place of `grader.pipeline`, in freshly imported commands that no other test sees."""
     fake = FakePipeline()
     monkeypatch.setitem(sys.modules, "grader.pipeline", fake)
     monkeypatch.setattr(grader, "pipeline", fake, raising=False)
-    monkeypatch.setattr("grader.cli.platform_support.why_unrun", lambda: "")  # whatever this machine has
-    _fresh(monkeypatch)
+    monkeypatch.setattr("grader.cli.host_support.why_unrun", lambda: "")  # whatever this machine has
+    monkeypatch.delitem(sys.modules, LOADED, raising=False)
     yield fake
-    for name in COMMANDS:
-        sys.modules.pop(f"grader.cli.commands.{name}", None)
+    sys.modules.pop(LOADED, None)
 
 
 @pytest.fixture

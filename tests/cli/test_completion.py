@@ -5,22 +5,31 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
-from grader.cli.completing.answer import completing_parser
-from grader.cli.completing.choosing import BY_VALUE, SPECIAL, completer_of
-from grader.cli.completing.labs import explained, lab_ids, mistakes, mutants
-from grader.cli.completing.paths import paths
+from grader.cli.commands.integrations import Shell
+from grader.cli.completion import (
+    BY_VALUE,
+    SPECIAL,
+    completer_of,
+    completing_parser,
+    explained,
+    lab_ids,
+    mistakes,
+    mutants,
+    paths,
+)
 from grader.cli.main import run
-from grader.cli.parsing.reports import FORMS
-from grader.cli.parsing.setting_up import SHELLS
-from grader.cli.parsing.walk import commands, options, value_of
+from grader.cli.parser import commands, options, value_of
+from grader.report.forms import FORMS
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import all_rubrics
 from tests.cli.shells import Asked, Typed
 
 LAB = "leeds-comp3631-lab1"
+SHELLS = get_args(Shell)
 LINES = [
     ("grader exp", ("explain", "export")),
     ("grader rubric va", ("validate ",)),
@@ -171,4 +180,4 @@ def test_nobody_guesses_numbers_and_names():
 
 def test_forms_are_offered_by_the_parser_itself():
     report = next(command for command in commands(completing_parser()) if command.prog == "grader report")
-    assert next(action.choices for action in options(report) if action.dest == "form") == FORMS
+    assert next(action.choices for action in options(report) if action.dest == "form") == tuple(FORMS)

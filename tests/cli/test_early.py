@@ -11,8 +11,7 @@ from hypothesis import example, given, settings
 from rich.console import Console
 from rich.live import Live
 
-from grader.cli.display import LiveSteps
-from grader.cli.early import print_early
+from grader.cli.display import LiveSteps, print_early
 from grader.cli.main import run
 from grader.model.progress import Silence
 from grader.model.result import EarlyVerdict
@@ -34,7 +33,7 @@ Your files, before anything is built or run:
   ✓ pass         manifest  names lab1
   ✗ fail so far  talker    has no executable bit
     hint: chmod +x talker.py
-  (so far: the build may still settle it otherwise)
+  So far: the build may still change this.
 
 """
 
@@ -112,7 +111,7 @@ def test_a_live_display_goes_on_below_them() -> None:
         steps.step("package", "done")
         steps.early(lambda: (PASSED, FAILED))
     assert "names lab1" in out.getvalue()
-    assert "package" in out.getvalue()[out.getvalue().rindex("so far:") :]
+    assert "package" in out.getvalue()[out.getvalue().rindex("So far:") :]
 
 
 def test_without_a_verdict_there_is_no_title(capsys) -> None:

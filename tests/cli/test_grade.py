@@ -223,7 +223,7 @@ def test_record_makes_a_scenario_of_what_is_named(pipeline, tmp_path, capsys):
             ["--script", "y", "--seconds", "nan", "--package", "p"],
             "--seconds must be more than 0 and at most 3600, not nan",
         ),
-        (["--script", "y"], "which package is to be recorded?"),
+        (["--script", "y"], "it is unclear which package to record"),
     ],
 )
 def test_record_says_what_it_lacks(more, message, pipeline, tmp_path, capsys):

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 import grader
-from grader.cli.commands import inspect as inspect_command
+from grader.cli.commands.grading import inspect
 from grader.cli.display import LiveSteps, PlainSteps
 from grader.cli.errors import guarded, report
 from grader.cli.mutants import print_test
@@ -30,13 +30,13 @@ from tests.report.test_shown import TO_A_CI
 
 GRADER = Path(grader.__file__).parent
 MAY_PRINT = {
-    "cli/say.py",
+    "cli/output.py",
     "cli/errors.py",
     "cli/display.py",
     "cli/class_display.py",
-    "ci/github.py",  # annotations; tests/ci
-    "deliver/grading.py",  # a report as in a terminal; tests/deliver
-    "similarity/job.py",  # JSON for the process that started it
+    "cli/main.py",  # the list of commands, which is its own
+    "integrations/github.py",  # annotations; tests/ci
+    "integrations/autograde.py",  # a report as in a terminal; tests/deliver
 }
 NASTY = "\x1b[2J\u202e\n::error::owned\n##[error]x\x9b31m\ud800" + "y" * 10**6
 SOME = settings(max_examples=40)
@@ -111,8 +111,8 @@ def inspected(text: str) -> Run:
 @pytest.mark.parametrize("as_json", [False, True])
 def test_inspect_shows_names_that_somebody_else_chose(as_json, monkeypatch, capsys):
     text = NASTY[:100].replace("\ud800", "")
-    monkeypatch.setattr(inspect_command, "inspect_file", lambda _: inspect_run(inspected(text)))
-    assert inspect_command.run(file=None, as_json=as_json) == 0
+    monkeypatch.setattr("grader.evidence.inspect.inspect_file", lambda _: inspect_run(inspected(text)))
+    assert inspect(file=None, as_json=as_json) == 0
     shown = capsys.readouterr().out
     assert harmless(shown)
     assert as_json or "\nnoticed:" in shown
@@ -141,8 +141,8 @@ def test_inspect_of_a_thousand_channels_ends(monkeypatch, capsys):
         end_ns=1,
         channels=channels,
     )
-    monkeypatch.setattr(inspect_command, "inspect_file", lambda _: inspect_run(run))
-    assert inspect_command.run(file=None) == 0
+    monkeypatch.setattr("grader.evidence.inspect.inspect_file", lambda _: inspect_run(run))
+    assert inspect(file=None) == 0
     assert "and 500 more channels" in capsys.readouterr().out
 
 

@@ -11,8 +11,8 @@ import pytest
 
 from grader import __version__
 from grader.checks import CHECKS
-from grader.cli import diagnosis
-from grader.cli.diagnosis import Row
+from grader.cli import doctor
+from grader.cli.doctor import Row
 from grader.cli.main import run
 from grader.errors import EvidenceError
 from grader.judging.summary import criteria_bytes
@@ -45,13 +45,16 @@ def test_version(capsys):
 @pytest.mark.parametrize(
     ("argv", "message"),
     [
-        ([], "the following arguments are required: COMMAND"),
         (["grade"], "the following arguments are required: SOURCE, --rubric"),
         (
             ["grade", "x", "--rubric", "y", "--sandbox", "maybe"],
             "argument --sandbox: invalid choice: 'maybe'",
         ),
-        (["grade", "x", "--rub", "y"], "the following arguments are required: --rubric"),
+        (["grade", "x", "--rub", "y"], 'unrecognized arguments: --rub (did you mean "--rubric"?)'),
+        (["--vresion"], 'unrecognized arguments: --vresion (did you mean "--version"?)'),
+        (["grade", "--ouput=x"], 'unrecognized arguments: --ouput=x (did you mean "--out"?)'),
+        (["chekc"], 'there is no command "chekc" (did you mean "check"?)'),
+        (["rubric", "tset"], 'there is no command "rubric tset" (did you mean "test"?)'),
         (["rubric"], "the following arguments are required: COMMAND"),
         (["labs", "\x1b[2J"], "unrecognized arguments: \\x1b[2J"),
         (["judge", "--rubric", "x"], "the following arguments are required: EVIDENCE"),
@@ -62,6 +65,21 @@ def test_a_wrong_command_line_is_one_line_and_a_hint(argv, message, capsys):
     error, hint = capsys.readouterr().err.splitlines()
     assert error.startswith(f"grader: error: {message}")
     assert hint.startswith("  hint: see grader")
+
+
+def test_what_follows_two_hyphens_is_no_option(capsys):
+    assert run(["judge", "--rubric", "y", "--", "--ouput"]) == 2
+    assert capsys.readouterr().err.startswith('grader: error: there is no rubric "y"')
+
+
+def test_without_a_command_those_of_students_come_first(capsys):
+    assert run([]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    rows = [row.split()[0] for row in shown.err.splitlines() if row.startswith("  ")]
+    assert rows[:3] == ["check", "explain", "doctor"]
+    assert set(HELPED) <= set(rows)
+    assert max(map(len, shown.err.splitlines())) <= 100
 
 
 def test_help_imports_nothing_heavy():
@@ -145,7 +163,7 @@ def test_a_criterion_is_explained_with_its_check(capsys, tmp_path):
 
 def test_explain_has_a_suggestion(capsys):
     assert run(["explain", "raet"]) == 2
-    assert 'there is no check and no criterion "raet" (did you mean "rate"?)' in capsys.readouterr().err
+    assert 'there is no check or criterion "raet" (did you mean "rate"?)' in capsys.readouterr().err
 
 
 def test_validate_names_every_fault_of_every_file(tmp_path, capsys):
@@ -182,7 +200,7 @@ def test_inspect_says_what_is_wrong_with_a_file(content, tmp_path, capsys):
 @pytest.mark.parametrize(("state", "code"), [("ok", 0), ("limited", 0), ("missing", 3)])
 def test_doctor_tells_by_its_exit_code(state, code, capsys, monkeypatch):
     row = Row(name="ROS 1", state=state, detail="x\x1b", mend="apt-get install ros")
-    monkeypatch.setattr("grader.cli.commands.doctor.diagnose", lambda: (row,))
+    monkeypatch.setattr("grader.cli.doctor.diagnose", lambda: (row,))
     assert run(["doctor"]) == code
     out = capsys.readouterr().out
     assert state in out
@@ -193,8 +211,8 @@ def test_doctor_tells_by_its_exit_code(state, code, capsys, monkeypatch):
 
 
 def test_diagnosis_without_ros_names_the_command_that_mends_it(monkeypatch):
-    monkeypatch.setattr(diagnosis, "find_ros", lambda: None)
-    rows = {row.name: row for row in diagnosis.diagnose()}
+    monkeypatch.setattr(doctor, "find_ros", lambda: None)
+    rows = {row.name: row for row in doctor.diagnose()}
     assert rows["ROS 1"].state == "missing"
     assert "apt-get install" in rows["ROS 1"].mend
     assert {"Python", "git", "sandbox", "memory", "disk", "host name", "encoding"} <= set(rows)

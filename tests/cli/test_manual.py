@@ -8,10 +8,8 @@ import subprocess
 
 import pytest
 
-from grader.cli.manual import man_page
-from grader.cli.manual.roff import bold, text
-from grader.cli.parsing import build_parser
-from grader.cli.parsing.walk import commands, options, value_of
+from grader.cli.parser import build_parser, commands, options, value_of
+from scripts.man_page import bold, man_page, text
 
 GROFF, MAN, MANDOC = (shutil.which(name) for name in ("groff", "man", "mandoc"))
 HOSTILE = ["", ".so /etc/passwd", "'br", r"\fBa\n[x]", "a\\", "`x` 'y' \"z\" ^ ~ - é €", "..", "\\(aq"]
@@ -46,7 +44,7 @@ def test_every_command_and_option_is_described():
 def test_examples_are_commands(capsys):
     parser = build_parser()
     for command in re.findall(r"\.nf\n\\fBgrader (.*)\\fR\n", man_page()):
-        assert parser.parse_args(command.replace(r"\-", "-").split()).module, capsys.readouterr().err
+        assert parser.parse_args(command.replace(r"\-", "-").split()).command, capsys.readouterr().err
 
 
 @pytest.mark.skipif(GROFF is None, reason="no groff here: apt-get install groff-base")

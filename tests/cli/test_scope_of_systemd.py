@@ -36,6 +36,7 @@ import os, subprocess, sys, time
 from pathlib import Path
 from grader.arena import control_groups
 from grader.cli import scope
+from grader.cli import systemd_scope as scope
 asks = ["busctl", "--user", "--timeout=1", "--acquired", "--no-pager", "list"]
 until = time.monotonic() + float(os.environ["READY_S"])
 while b"org.freedesktop.systemd1 " not in subprocess.run(asks, capture_output=True).stdout and time.monotonic() < until:

@@ -19,10 +19,10 @@ COMMANDS = {
     "grade": (["grade", SOLUTION, "--rubric", LAB, "--out", "o"], GRADE),
     "check": (["check", SOLUTION, "--rubric", LAB], GRADE),
     "ci": (["ci", "gitlab"], GRADE),
-    "batch": (["batch", "roster.csv", "--rubric", LAB, "--out", "o"], "grader.cli.commands.batch.run_batch"),
+    "batch": (["batch", "roster.csv", "--rubric", LAB, "--out", "o"], "grader.classes.batch.flow.run_batch"),
     "record": (["record", SOLUTION, "--rubric", LAB, "--out", "o"], "grader.pipeline.record"),
-    "rubric new": (["rubric", "new", "--from", SOLUTION], "grader.cli.commands.rubric_new.propose_rubric"),
-    "rubric test": (["rubric", "test", LAB], "grader.cli.commands.rubric_test.run_test"),
+    "rubric new": (["rubric", "new", "--from", SOLUTION], "grader.authoring.propose.propose_rubric"),
+    "rubric test": (["rubric", "test", LAB], "grader.cli.mutants.run_test"),
 }
 
 
@@ -39,14 +39,14 @@ def _begins(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("GRADER_PATH", SOLUTION)
     monkeypatch.setenv("GRADER_LAB", LAB)
     (tmp_path / "roster.csv").write_text(f"id,source\nada,{SOLUTION}\n")
-    monkeypatch.setattr("grader.cli.sandbox_report.why_unrun", lambda: "")
+    monkeypatch.setattr("grader.cli.host_support.why_unrun", lambda: "")
 
 
 @pytest.mark.usefixtures("_begins")
 @pytest.mark.parametrize("command", COMMANDS)
 def test_it_is_said_before_anything_is_run(command: str, monkeypatch, capsys) -> None:
     none = Sandbox(bubblewrap=False, uid=None, reason="bwrap is not installed")
-    monkeypatch.setattr("grader.arena.sandbox_probe.choose", lambda _: none)
+    monkeypatch.setattr("grader.cli.host_support.choose", lambda _: none)
     assert run(COMMANDS[command][0]) == 3
     said = capsys.readouterr().err
     assert said.count(SAID) == 1, said
@@ -57,7 +57,7 @@ def test_it_is_said_before_anything_is_run(command: str, monkeypatch, capsys) ->
 @pytest.mark.parametrize("command", COMMANDS)
 def test_nothing_is_said_of_a_sandbox_that_is_there(command: str, monkeypatch, capsys) -> None:
     there = Sandbox(bubblewrap=True, uid=None)
-    monkeypatch.setattr("grader.arena.sandbox_probe.choose", lambda _: there)
+    monkeypatch.setattr("grader.cli.host_support.choose", lambda _: there)
     assert run(COMMANDS[command][0]) == 3
     assert "students' code" not in capsys.readouterr().err
 

@@ -10,14 +10,14 @@ import pytest
 from grader.arena import control_groups
 from grader.arena.control_groups import Cgroup, Cgroups
 from grader.arena.sandbox import Sandbox
-from grader.cli import sandbox_report
-from grader.cli.diagnosis import diagnose
-from grader.cli.row import Row
+from grader.cli import host_support
+from grader.cli.doctor import diagnose
+from grader.cli.host_support import Row
 from grader.errors import HostError, SandboxMissing
 
 
 def rows() -> dict[str, Row]:
-    return {row.name: row for row in sandbox_report.walls()}
+    return {row.name: row for row in host_support.sandbox_rows()}
 
 
 def test_every_part_has_a_row_and_what_is_missing_a_command() -> None:
@@ -32,10 +32,10 @@ def test_every_part_has_a_row_and_what_is_missing_a_command() -> None:
 @pytest.mark.parametrize(("program", "package"), [("bwrap", "bubblewrap"), ("setpriv", "util-linux")])
 def test_a_program_that_is_not_installed(monkeypatch, program: str, package: str) -> None:
     monkeypatch.setattr(
-        sandbox_report, "find_host_program", lambda name: None if name == program else f"/usr/bin/{name}"
+        host_support, "find_host_program", lambda name: None if name == program else f"/usr/bin/{name}"
     )
     none = Sandbox(bubblewrap=False, uid=None, reason=f"{program} is not installed")
-    monkeypatch.setattr(sandbox_report, "choose", lambda _: none)
+    monkeypatch.setattr(host_support, "choose", lambda _: none)
     found = rows()
     assert (found[program].state, found[program].mend) == ("limited", f"apt-get install {package}")
     assert found["sandbox"].state == "limited"
@@ -59,9 +59,9 @@ def test_namespaces_that_are_forbidden(monkeypatch, tmp_path: Path, name: str, v
     (tmp_path / name).parent.mkdir()
     (tmp_path / name).write_text(f"{value}\n")
     refused = subprocess.CompletedProcess([], 1, b"", b"unshare: unshare failed: Operation not permitted\n")
-    monkeypatch.setattr(sandbox_report, "SETTINGS", tmp_path)
-    monkeypatch.setattr(sandbox_report.subprocess, "run", lambda *_args, **_more: refused)
-    row = sandbox_report._probe("user namespaces", ["unshare"], drop=False)
+    monkeypatch.setattr(host_support, "SETTINGS", tmp_path)
+    monkeypatch.setattr(host_support.subprocess, "run", lambda *_args, **_more: refused)
+    row = host_support._probe("user namespaces", ["unshare"], drop=False)
     assert (row.state, row.detail) == ("limited", "unshare: unshare failed: Operation not permitted")
     assert mend in row.mend
 
@@ -70,7 +70,7 @@ def test_a_probe_that_does_not_answer_is_not_taken_for_a_machine_without(monkeyp
     def no_answer(_mode: str) -> None:
         raise SandboxMissing("no answer within 20 s", hint="look at each part")
 
-    monkeypatch.setattr(sandbox_report, "choose", no_answer)
+    monkeypatch.setattr(host_support, "choose", no_answer)
     row = rows()["sandbox"]
     assert (row.state, row.detail, row.mend) == ("missing", "no answer within 20 s", "look at each part")
 
@@ -78,17 +78,17 @@ def test_a_probe_that_does_not_answer_is_not_taken_for_a_machine_without(monkeyp
 @pytest.mark.parametrize(
     ("user", "could", "mend"),
     [
-        (1000, True, sandbox_report.DELEGATE),
-        (1000, False, sandbox_report.OLD_GROUPS),
-        (0, True, sandbox_report.ROOTS_GROUPS),
+        (1000, True, host_support.DELEGATE),
+        (1000, False, host_support.OLD_GROUPS),
+        (0, True, host_support.ROOTS_GROUPS),
     ],
 )
 def test_what_holds_memory_where_no_group_can_be_made(monkeypatch, user: int, could: bool, mend: str) -> None:
-    for module in (sandbox_report, control_groups):
+    for module in (host_support, control_groups):
         monkeypatch.setattr(module, "find_cgroups", Cgroups)
-    monkeypatch.setattr(sandbox_report, "user_id", lambda: user)
-    monkeypatch.setattr(sandbox_report, "has_memory", lambda: could)
-    row = sandbox_report._limits_of_trees()
+    monkeypatch.setattr(host_support, "user_id", lambda: user)
+    monkeypatch.setattr(host_support, "has_memory", lambda: could)
+    row = host_support._limits_of_trees()
     assert (row.state, row.mend) == ("limited", mend)
     assert "looked at twice a second" in row.detail
     assert "children that nobody waited for is not counted" in row.detail
@@ -96,9 +96,9 @@ def test_what_holds_memory_where_no_group_can_be_made(monkeypatch, user: int, co
 
 def test_what_holds_memory_where_groups_can_be_made(monkeypatch) -> None:
     held = Cgroups(memory=Cgroup(version=2, folder="/sys/fs/cgroup"))
-    for module in (sandbox_report, control_groups):
+    for module in (host_support, control_groups):
         monkeypatch.setattr(module, "find_cgroups", lambda: held)
-    row = sandbox_report._limits_of_trees()
+    row = host_support._limits_of_trees()
     assert (row.state, row.mend) == ("ok", "")
     assert "memory by cgroup v2, tasks by rlimits and a watchdog; below its own group" in row.detail
 
@@ -107,8 +107,8 @@ def test_limits_that_cannot_be_set_keep_everything_from_being_graded(monkeypatch
     def refuses(_mode: str) -> None:
         raise HostError("the limits cannot be set", hint="raise them")
 
-    monkeypatch.setattr(sandbox_report, "refused_limits", lambda: "prlimit: Operation not permitted")
-    monkeypatch.setattr(sandbox_report, "choose", refuses)
+    monkeypatch.setattr(host_support, "refused_limits", lambda: "prlimit: Operation not permitted")
+    monkeypatch.setattr(host_support, "choose", refuses)
     found = rows()
     assert (found["ulimit"].state, found["ulimit"].detail) == ("missing", "prlimit: Operation not permitted")
     assert (found["sandbox"].state, found["sandbox"].mend) == ("missing", "raise them")

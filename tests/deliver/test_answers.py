@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from grader.errors import HostError
-from grader.integrations.deliver import gradescope, prairielearn
-from grader.integrations.deliver.grading import REPORTS, Form, Place, deliver
-from grader.integrations.deliver.settings import FILE, Settings
+from grader.integrations import gradescope, prairielearn
+from grader.integrations.autograde import PLATFORMS, REPORTS, grade_upload
+from grader.integrations.bundle import SETTINGS_FILE, Platform, Settings
 from grader.model.result import ErrorInfo
 from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric
@@ -20,10 +20,6 @@ from tests.report.nasty import STEERING
 from tests.report.worst import LONG, MERMAID, rubric, worst
 from tests.support.a_class import criterion
 
-FORMS = {
-    "gradescope": (gradescope.place, gradescope.FORM),
-    "prairielearn": (prairielearn.place, prairielearn.FORM),
-}
 REFERENCE = Path(__file__).parents[2] / "reference_solutions" / "leeds-comp3631-lab1" / "lab1"
 RUBRIC = LoadedRubric.model_construct(rubric=rubric(), path=Path("lab.yaml"), digest="0" * 64)
 SOUND = (
@@ -65,56 +61,56 @@ def test_prairielearn_takes_no_attempt_for_what_was_not_graded(kind) -> None:
     assert STEERING.search(json.dumps(document, ensure_ascii=False)) is None
 
 
-def laid_out(root: Path, platform: str, settings: str | None) -> tuple[Place, Form]:
-    make, form = FORMS[platform]
-    place = make(root)
-    place.lab.mkdir(parents=True)
-    place.handed_in.mkdir()
+def laid_out(root: Path, name: str, settings: str | None) -> Platform:
+    platform = PLATFORMS[name]
+    (root / platform.lab).mkdir()
+    (root / platform.upload).mkdir()
     if settings is not None:
-        (place.lab / FILE).write_text(settings)
-    return place, form
+        (root / platform.lab / SETTINGS_FILE).write_text(settings)
+    return platform
 
 
-@pytest.mark.parametrize("platform", FORMS)
+@pytest.mark.parametrize("name", PLATFORMS)
 @pytest.mark.parametrize(
     "settings", [None, "{", Settings(rubric="rubric/none.yaml", minutes=10).to_json().decode()]
 )
-def test_a_grader_that_cannot_grade_says_so_and_gives_no_score(platform, settings, tmp_path, capsys) -> None:
-    place, form = laid_out(tmp_path, platform, settings)
-    assert deliver(place, form) is False
-    document = json.loads((place.results / "results.json").read_bytes())
+def test_a_grader_that_cannot_grade_says_so_and_gives_no_score(name, settings, tmp_path, capsys) -> None:
+    platform = laid_out(tmp_path, name, settings)
+    assert grade_upload(platform, tmp_path) is False
+    document = json.loads((tmp_path / "results" / "results.json").read_bytes())
     assert not document.get("gradable", False)
     assert document.get("score", 0) == 0
-    assert ("score" in document) == (platform == "prairielearn")  # there, it says that nothing was gradable
+    assert ("score" in document) == (name == "prairielearn")  # there, it says that nothing was gradable
     assert "NOT GRADED" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("platform", FORMS)
-def test_a_platform_can_read_what_it_is_told_and_the_reports_stay_closed(platform, tmp_path) -> None:
+@pytest.mark.parametrize("name", PLATFORMS)
+def test_a_platform_can_read_what_it_is_told_and_the_reports_stay_closed(name, tmp_path) -> None:
     lab = Path(__file__).parents[2] / "benchmarks" / "data" / "static.yaml"
-    place, form = laid_out(tmp_path, platform, Settings(rubric=str(lab), minutes=10).to_json().decode())
-    shutil.copytree(REFERENCE, place.handed_in / "lab1")
+    platform = laid_out(tmp_path, name, Settings(rubric=str(lab), minutes=10).to_json().decode())
+    shutil.copytree(REFERENCE, tmp_path / platform.upload / "lab1")
     before = os.umask(0o022)
     try:
-        assert deliver(place, form)
+        assert grade_upload(platform, tmp_path)
     finally:
         os.umask(before)
-    places = (place.results, place.results / "results.json", place.results / REPORTS)
+    results = tmp_path / "results"
+    places = (results, results / "results.json", results / REPORTS)
     assert [path.stat().st_mode & 0o777 for path in places] == [0o755, 0o644, 0o700]
 
 
-@pytest.mark.parametrize("platform", FORMS)
-def test_an_interrupted_grading_says_that_it_took_too_long(platform, tmp_path, monkeypatch) -> None:
+@pytest.mark.parametrize("name", PLATFORMS)
+def test_an_interrupted_grading_says_that_it_took_too_long(name, tmp_path, monkeypatch) -> None:
     lab = Path(__file__).parents[2] / "rubrics" / "mcr2-basic-comms.yaml"
-    place, form = laid_out(tmp_path, platform, Settings(rubric=str(lab), minutes=10).to_json().decode())
-    (place.handed_in / "package.xml").touch()
+    platform = laid_out(tmp_path, name, Settings(rubric=str(lab), minutes=10).to_json().decode())
+    (tmp_path / platform.upload / "package.xml").touch()
 
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("grader.pipeline.grade", interrupted)
-    assert deliver(place, form) is False
-    assert "took longer than the 10 minutes" in (place.results / "results.json").read_text()
+    assert grade_upload(platform, tmp_path) is False
+    assert "took longer than the 10 minutes" in (tmp_path / "results" / "results.json").read_text()
 
 
 def test_gradescope_hears_of_a_fault_in_plain_text_and_without_a_score() -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from grader.cli.main import run
-from grader.integrations.deliver.wheel import wheel
+from grader.integrations.bundle import wheel
 from tests.instructor.samples import GREETING, OWN, TESTS, write_rubric
 
 LAB = "york-ele00118m-lab7"
@@ -46,7 +46,7 @@ def test_gradescope_finds_its_two_scripts_at_the_top_and_may_run_them(tmp_path) 
 
 @pytest.mark.parametrize("script", ["gradescope-setup.sh", "run_autograder", "grade-question"])
 def test_the_scripts_are_sound_bash(script) -> None:
-    file = Path(__file__).parents[2] / "grader" / "deliver" / "files" / script
+    file = Path(__file__).parents[2] / "grader" / "integrations" / "files" / script
     assert subprocess.run(["/bin/bash", "-n", file], check=False).returncode == 0
 
 
@@ -96,9 +96,7 @@ def test_the_wheel_is_installed_by_pip_and_exports_the_same_again(tmp_path) -> N
     target = tmp_path / "site"
     pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-compile", "--target", str(target)]
     subprocess.run([*pip, str(tmp_path / name)], check=True)
-    ask = (
-        "import sys; from grader.integrations.deliver.wheel import wheel; sys.stdout.buffer.write(wheel()[1])"
-    )
+    ask = "import sys; from grader.integrations.bundle import wheel; sys.stdout.buffer.write(wheel()[1])"
     again = subprocess.run(
         [sys.executable, "-c", ask],
         env={"PYTHONPATH": str(target)},
@@ -165,7 +163,7 @@ def test_prairielearn_again_is_the_same_question_and_nobody_elses_folder_is_writ
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").touch()
     assert run(["export", "prairielearn", LAB, "--out", str(tmp_path / "mine")]) == 2
-    assert "holds other files" in capsys.readouterr().err
+    assert "contains other files" in capsys.readouterr().err
     assert [path.name for path in (tmp_path / "mine").iterdir()] == ["thesis.tex"]
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 REPO = Path(__file__).resolve().parents[2]
-FILES = REPO / "grader" / "deliver" / "files"
+FILES = REPO / "grader" / "integrations" / "files"
 MAKERS = [REPO / "Dockerfile", FILES / "prairielearn.Dockerfile", FILES / "gradescope-setup.sh"]
 KNOWN = {
     "name", "build", "image", "remoteUser", "containerUser", "postCreateCommand", "containerEnv", "customizations",

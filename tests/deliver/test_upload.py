@@ -11,7 +11,7 @@ import pytest
 
 from grader.errors import SubmissionError
 from grader.intake import open_submission
-from grader.integrations.deliver.upload import upload
+from grader.integrations.autograde import find_upload
 from grader.model.submission import Submission
 
 MANIFEST = "<package format='2'><name>lab1</name></package>"
@@ -29,7 +29,7 @@ def put(folder: Path, modes: Mapping[str, int]) -> Path:
 
 
 def opened(folder: Path, tmp_path: Path, modes: str = "lost") -> Submission:
-    return open_submission(upload(folder, modes), package="lab1", workdir=tmp_path / "work")
+    return open_submission(find_upload(folder, modes), package="lab1", workdir=tmp_path / "work")
 
 
 def bits(submission: Submission) -> tuple[bool | None, bool | None]:
@@ -95,7 +95,7 @@ def test_an_archive_beside_a_package_is_the_students_own_business(handed_in, tmp
 def test_a_link_to_an_archive_is_not_followed(handed_in, tmp_path) -> None:
     (tmp_path / "solution.zip").write_bytes(b"PK")
     (handed_in / "lab1.zip").symlink_to(tmp_path / "solution.zip")
-    assert upload(handed_in, "lost").kind == "folder"
+    assert find_upload(handed_in, "lost").kind == "folder"
 
 
 def test_files_of_a_package_without_its_folder_are_the_package(handed_in, tmp_path) -> None:
@@ -105,7 +105,7 @@ def test_files_of_a_package_without_its_folder_are_the_package(handed_in, tmp_pa
 
 def test_nothing_handed_in_is_said(handed_in) -> None:
     (handed_in / "__MACOSX").mkdir()
-    with pytest.raises(SubmissionError, match="nothing was handed in"):
-        upload(handed_in, "lost")
+    with pytest.raises(SubmissionError, match="nothing was submitted"):
+        find_upload(handed_in, "lost")
     with pytest.raises(SubmissionError, match="cannot be read"):
-        upload(handed_in / "none", "lost")
+        find_upload(handed_in / "none", "lost")

@@ -117,7 +117,7 @@ def test_the_command_overwrites_only_what_was_named(tmp_path, monkeypatch, capsy
     source = str(RECORDINGS / "correct" / "talker.mcap")
     assert grader(["export", "bag", source]) == 0
     assert grader(["export", "bag", source]) == 2
-    assert "talker.bag is there already" in capsys.readouterr().err
+    assert "talker.bag already exists" in capsys.readouterr().err
     assert grader(["export", "bag", source, "--out", "talker.bag"]) == 0
     assert grader(["export", "bag", "talker.bag", "--out", "talker.bag"]) == 2
     assert grader(["export", "bag", str(RECORDINGS / "correct" / "package.mcap")]) == 3

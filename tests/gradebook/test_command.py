@@ -13,7 +13,7 @@ from grader.classes.batch.folder import write_run
 from grader.classes.gradebook import FORMS, Row
 from grader.classes.gradebook.table import header
 from grader.cli.main import run
-from grader.cli.parsing import build_parser
+from grader.cli.parser import build_parser
 from grader.model.batch import BatchRun, RosterFault
 from grader.report.result_json import result_bytes
 from tests.gradebook.made import BOOK, row

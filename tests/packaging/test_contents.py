@@ -8,14 +8,15 @@ import re
 import subprocess
 import tarfile
 from pathlib import PurePosixPath
+from typing import get_args
 from zipfile import ZipFile
 
 import pytest
 
 from grader import __version__
-from grader.cli.completing.script import script
-from grader.cli.manual import man_page
-from grader.cli.parsing.setting_up import SHELLS
+from grader.cli.commands.integrations import Shell
+from grader.cli.completion import script
+from scripts.man_page import man_page
 from tests.packaging.making import ROOT, Built
 
 FOLDERS = {
@@ -27,7 +28,9 @@ FOLDERS = {
 """Of the repository, and where they lie in the wheel."""
 SETUP = {"scripts/setup.sh": "grader/_data/setup.sh"}
 """What an autograder's image is made with."""
-ROOT_FILES = {"CHANGELOG.md", "LICENSE", "README.md", "hatch_build.py", "pyproject.toml"}
+ROOT_FILES = {
+    "CHANGELOG.md", "LICENSE", "README.md", "hatch_build.py", "pyproject.toml", "scripts/man_page.py"
+}  # fmt: skip
 MADE = {"PKG-INFO", ".gitignore"}
 SHARED = {
     "share/man/man1/grader.1",
@@ -113,7 +116,7 @@ def test_the_wheel_holds_the_man_page_and_completion_of_this_parser(wheel: ZipFi
     assert texts.keys() == SHARED
     assert texts["share/man/man1/grader.1"] == man_page()
     scripts = {text for name, text in texts.items() if "man1" not in name}
-    assert scripts == {script(shell) for shell in SHELLS}
+    assert scripts == {script(shell) for shell in get_args(Shell)}
 
 
 def test_the_archive_holds_what_a_wheel_is_made_of_and_nothing_else(packages: Built):

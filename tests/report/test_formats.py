@@ -17,13 +17,13 @@ from lxml import etree
 from lxml import html as parser
 from markdown_it import MarkdownIt
 
-from grader.cli.parsing.reports import FORMS
 from grader.errors import GraderError
 from grader.model.figure import Edge, Figures, GraphFigure
 from grader.model.result import ErrorInfo
 from grader.model.verdict import FileCitation, Status
 from grader.report.annotations import render_annotations
 from grader.report.findings import findings, repository_path
+from grader.report.forms import FORMS
 from grader.report.gradescope import render_gradescope
 from grader.report.junit import render_junit
 from grader.report.markdown import BYTES_MAX, EDGES_MAX, PARTS_MAX, mermaid, render_markdown

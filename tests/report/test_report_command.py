@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
+from grader.cli.find_packages import package_prefix
 from grader.cli.main import run
-from grader.cli.prefix import package_prefix
 from grader.model.result import RubricInfo
 from grader.model.verdict import FileCitation, Status
 from grader.report.files import write_reports
@@ -102,7 +102,7 @@ def test_the_rubric_is_the_batchs_or_the_one_of_that_id(lab, tmp_path, capsys):
     assert run(["report", str(alone)]) == 0
     changed(alone, rubric={"id": "somebodys-own", "version": "0", "digest": "f" * 64})
     assert run(["report", str(alone)]) == 2
-    assert 'its rubric "somebodys-own" is none of those' in capsys.readouterr().err
+    assert 'its rubric "somebodys-own" does not come with the grader' in capsys.readouterr().err
     assert run(["report", str(alone), "--rubric", str(LAB)]) == 2
     assert "a result of somebodys-own, not of leeds-comp3631-lab1" in capsys.readouterr().err
     own = tmp_path / "own.yaml"
@@ -125,7 +125,7 @@ def test_a_folder_of_results_without_a_batch_has_no_page(lab, tmp_path, capsys):
     assert run(["report", str(tmp_path / "nowhere")]) == 2
     (tmp_path / "empty").mkdir()
     assert run(["report", str(tmp_path / "empty")]) == 2
-    assert "no results in it" in capsys.readouterr().err
+    assert "contains no results" in capsys.readouterr().err
 
 
 FORMS = {
@@ -287,4 +287,4 @@ def test_lines_of_files_begin_at_the_repositorys_root(tmp_path, capsys, monkeypa
     assert run([*command, "sarif"]) == 0
     out, err = capsys.readouterr()
     assert '"uri": "src/talker.py"' in out
-    assert "no package lab1 with these files is here: paths begin in it" in err
+    assert "no package lab1 with these files is here, so paths begin in it" in err

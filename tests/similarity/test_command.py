@@ -84,7 +84,7 @@ def test_names_and_groups_come_from_the_batch(tmp_path, capsys) -> None:
     shown = capsys.readouterr().out
     assert "2 pairs are nearly the same" in shown
     assert "Ann Ax" in shown
-    assert "1 pair of one group is not named." in shown
+    assert "1 pair within a group is not listed." in shown
 
 
 def test_a_submission_of_the_roster_without_evidence_is_named(tmp_path, capsys) -> None:

@@ -16,7 +16,7 @@ from grader.arena.sandbox_files import (
     missing_packages,
     with_standins,
 )
-from grader.cli.diagnosis import _standins
+from grader.cli.doctor import _standins
 from grader.rubric.model import Scenario, Start, Until
 from tests.arena.support import make_place, printed, require_ros, run
 

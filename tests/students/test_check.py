@@ -46,7 +46,7 @@ def test_it_says_what_it_took_and_that_all_is_pushed(lab: Clone) -> None:
     done = check(cwd=lab.package / "launch")
     assert done.returncode == 0, done.stderr
     assert done.stderr.startswith(
-        "grader: checking lab1 in .. by leeds-comp3631-lab1, the lab for a package named lab1\n"
+        "grader: Checking lab1 in .. by leeds-comp3631-lab1, the lab for a package named lab1\n"
     )
     assert "All of it is committed and pushed: origin/main has it" in done.stdout
 
@@ -58,7 +58,7 @@ def test_what_is_not_handed_in_stands_below_the_report_in_80_columns(lab: Clone)
     done = check(cwd=lab.package)
     assert done.returncode == 0, done.stderr
     report, _, below = done.stdout.partition(
-        "What is marked is what is pushed. It differs from what was checked:"
+        "Your marks come from what you have pushed. It differs from what was checked:"
     )
     assert "All criteria" in report
     assert "1 change is not committed: src/listener.py" in below
@@ -88,8 +88,8 @@ def test_in_ci_a_checkout_is_not_nagged(lab: Clone) -> None:
     lab.git("remote", "remove", "origin")
     done = check(cwd=lab.package, GITHUB_ACTIONS="true", CI="true")
     assert done.returncode == 0, done.stderr
-    assert "What is marked" not in done.stdout
-    assert "Handing in" not in done.stdout
+    assert "Your marks" not in done.stdout
+    assert "Before you submit" not in done.stdout
 
 
 def test_packages_of_two_labs_one_after_the_other(lab: Clone, tmp_path: Path) -> None:

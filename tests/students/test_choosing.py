@@ -65,9 +65,9 @@ def test_what_a_build_or_git_keeps_is_left_and_that_is_said(tmp_path: Path, monk
     workspace, _ = _workspace("leeds-comp3631-lab1", tmp_path)
     monkeypatch.chdir(workspace)
     (chosen,) = choose_all(Path("install/share/lab1"), None)
-    assert chosen.words.endswith("(what is in install/ was made by a build)")
+    assert chosen.words.endswith("(install/ was made by a build)")
     (chosen,) = choose_all(Path("src/.git"), None)
-    assert chosen.words.endswith("(this folder is git's own)")
+    assert chosen.words.endswith("(this folder belongs to git)")
 
 
 def test_a_package_may_have_a_folder_named_build(tmp_path: Path) -> None:
@@ -94,12 +94,12 @@ def test_another_case_is_the_same_lab(name: str, tmp_path: Path) -> None:
 def test_a_folder_tells_where_the_manifest_does_not(folder: str, tmp_path: Path) -> None:
     (chosen,) = choose_all(write_package(tmp_path / folder, "beginner_tutorials"), None)
     assert chosen.words.endswith(
-        "the lab that its folder is named for (its package.xml says beginner_tutorials)"
+        "the lab that its folder is named after (its package.xml says beginner_tutorials)"
     )
     shutil.rmtree(tmp_path / folder)
     (write_package(tmp_path / folder) / "package.xml").unlink()
     (chosen,) = choose_all(tmp_path / folder, None)
-    assert chosen.words.endswith("the lab that its folder is named for (it has no package.xml)")
+    assert chosen.words.endswith("the lab that its folder is named after (it has no package.xml)")
 
 
 @pytest.mark.parametrize("name", ["lab_1", "lab-1", "lab1_ada", "my_lab1", "comp3631_lab1"])
@@ -107,7 +107,7 @@ def test_a_near_miss_names_the_lab(name: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError) as caught:
         choose_all(write_package(tmp_path / "work", name), None)
     assert caught.value.message == f"no lab is for the package {name}"
-    assert caught.value.hint.startswith("leeds-comp3631-lab1 is for a package named lab1: mend <name>")
+    assert caught.value.hint.startswith("leeds-comp3631-lab1 is for a package named lab1: fix <name>")
     assert "--rubric leeds-comp3631-lab1" in caught.value.hint
 
 
@@ -161,7 +161,7 @@ def test_thousands_of_folders_end_and_that_is_said(tmp_path: Path, monkeypatch) 
     monkeypatch.setattr("grader.intake.find.FOLDERS_LOOKED_AT", 20)
     for number in range(50):
         (tmp_path / "many" / str(number)).mkdir(parents=True)
-    with pytest.raises(UsageError, match="too much in"):
+    with pytest.raises(UsageError, match="too many files"):
         choose_all(tmp_path / "many", None)
     package = write_package(tmp_path / "many" / "0" / "lab1")
     (chosen,) = choose_all(tmp_path / "many", "leeds-comp3631-lab1")

@@ -15,11 +15,12 @@ from grader.errors import RubricError
 from grader.model.mutants import Mutant, MutantResult, MutantsFile
 from grader.model.record import Record
 from grader.model.version import MUTANTS
-from grader.rubric.faults import did_you_mean, model_faults
+from grader.rubric.faults import model_faults
 from grader.rubric.find import rubrics_folder
 from grader.rubric.load import LoadedRubric, refuse_newer
 from grader.rubric.model import Rubric
 from grader.rubric.source import Fault, KeyPath, Source, as_map, as_maps, read_source
+from grader.suggest import did_you_mean
 from grader.untrusted_text import visible
 
 HEADER = """\

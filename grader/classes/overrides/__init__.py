@@ -15,10 +15,11 @@ from grader.errors import RubricError
 from grader.intake.names import safe_name
 from grader.model.result import Override
 from grader.model.version import OVERRIDES
-from grader.rubric.faults import did_you_mean, model_faults, shown
+from grader.rubric.faults import model_faults, shown
 from grader.rubric.load import refuse_newer
 from grader.rubric.model import Rubric
 from grader.rubric.source import Fault, Form, Source, as_map, read_source
+from grader.suggest import did_you_mean
 
 FILE = "overrides.yaml"
 SCHEMA_KEY, SCHEMA = "schema", str(OVERRIDES)

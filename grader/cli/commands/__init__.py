@@ -1,1 +1,8 @@
-"""One plain function a command: keyword arguments as parsed, the exit code as its result."""
+"""Every command, as a typed function: see `grader.cli.declare`. The order of these imports is that of the help.
+
+A module here has no `from __future__ import annotations`, since the parser is made from the annotations.
+"""
+
+from grader.cli.commands import students, grading, classes, labs, integrations  # noqa: I001 - their order
+
+__all__ = ["classes", "grading", "integrations", "labs", "students"]

@@ -1,42 +1,221 @@
-"""`grader labs`: the rubrics that come with the grader."""
-
-from __future__ import annotations
+"""The commands for labs and their rubrics."""
 
 import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
 
-from rich.table import Table
-from rich.text import Text
+from grader.cli.commands.grading import PACKAGE
+from grader.cli.declare import INSTRUCTORS, Argument, Flag, Option, command, loading
+from grader.cli.options import MUTANTS_EXIT_CODES, RUBRIC, JsonFlag, SandboxOption, count
+from grader.errors import ExitCode, RubricError, UsageError
 
-from grader.cli.output import say_json
-from grader.errors import ExitCode
-from grader.report.terminal import emit, open_console
-from grader.report.text import number, visible
-from grader.rubric.load import all_rubrics
-from grader.rubric.model import Rubric
+STDOUT = "-"
+OUT = Option("--out", "FILE", "where to write it (default: -, stdout)")
+FORCE = Flag("--force", "overwrite an existing file")
+LAB = Argument("LAB", "see grader labs")
 
 
-def run(*, as_json: bool = False) -> ExitCode:
-    """List them, with the package that each is for."""
+@command("labs", group=INSTRUCTORS)
+def labs(*, as_json: JsonFlag = False) -> ExitCode:
+    """List the labs that come with the grader."""
+    with loading():
+        from grader.cli.examples import print_labs
+        from grader.cli.output import say_json
+        from grader.rubric.load import all_rubrics
     rubrics = [loaded.rubric for loaded in all_rubrics()]
-    if as_json:
-        say_json([_row(r) for r in rubrics])
+    if not as_json:
+        print_labs(rubrics, sys.stdout)
         return ExitCode.PASSED
-    table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="dim")
-    for heading in ("lab", "package", "criteria", "points", "title"):
-        table.add_column(heading, no_wrap=heading != "title")
-    for r in rubrics:
-        cells = (r.id, r.package, str(len(r.criteria)), number(r.max_points), r.title)
-        table.add_row(*(Text(visible(cell)) for cell in cells))
-    emit(open_console(sys.stdout), [table])
+    say_json(
+        [
+            {
+                "id": rubric.id,
+                "title": rubric.title,
+                "version": rubric.version,
+                "package": rubric.package,
+                "criteria": len(rubric.criteria),
+                "max_points": rubric.max_points,
+            }
+            for rubric in rubrics
+        ]
+    )
     return ExitCode.PASSED
 
 
-def _row(rubric: Rubric) -> dict[str, object]:
-    return {
-        "id": rubric.id,
-        "title": rubric.title,
-        "version": rubric.version,
-        "package": rubric.package,
-        "criteria": len(rubric.criteria),
-        "max_points": rubric.max_points,
-    }
+@command("example", group=INSTRUCTORS)
+def example(
+    *,
+    lab: Annotated[str, LAB],
+    folder: Annotated[
+        Path | None,
+        Argument("DIR", "a new or empty folder (default: list the names for --mistake, and what each costs)"),
+    ] = None,
+    mistake: Annotated[str | None, Option("--mistake", "NAME", "with this mistake of students in it")] = None,
+) -> ExitCode:
+    """Write a lab's correct package to try things with, or one with a mistake."""
+    with loading():
+        from grader.cli.examples import list_mistakes, write_example
+    if folder is not None:
+        write_example(lab, folder, mistake)
+    elif mistake is None:
+        list_mistakes(lab)
+    else:
+        raise UsageError(
+            "--mistake needs a folder to write to", hint=f"grader example {lab} DIR --mistake {mistake}"
+        )
+    return ExitCode.PASSED
+
+
+@command("rubric validate", group=INSTRUCTORS)
+def validate_rubrics(*, files: Annotated[Sequence[str], Argument("FILE", "rubric files")]) -> ExitCode:
+    """Check rubric files, and name every fault."""
+    with loading():
+        from grader.cli.output import say
+        from grader.report.text import number
+        from grader.rubric.load import load_rubric
+    faults, hint = [], ""
+    for file in files:
+        try:
+            rubric = load_rubric(file).rubric
+        except RubricError as error:  # noqa: PERF203 - each file has its own
+            faults += error.faults
+            hint = hint or error.hint
+        else:
+            points = number(rubric.max_points)
+            say(f"{file}: ok, {rubric.id}, {len(rubric.criteria)} criteria, {points} points")
+    if faults:
+        raise RubricError(faults, hint=hint)
+    return ExitCode.PASSED
+
+
+@command("rubric schema", group=INSTRUCTORS)
+def print_rubric_schema(*, rubric: Annotated[str | None, RUBRIC] = None) -> ExitCode:
+    """Print the JSON Schema of rubrics, for editors.
+
+    With a rubric, its own checks are part of it.
+    """
+    with loading():
+        from grader.cli.output import say_json
+        from grader.rubric.load import load_rubric
+        from grader.rubric.schema import rubric_schema
+    checks = load_rubric(rubric).checks if rubric is not None else None
+    say_json(rubric_schema(checks))
+    return ExitCode.PASSED
+
+
+@command("rubric copy", group=INSTRUCTORS)
+def copy_rubric(
+    *,
+    lab: Annotated[str, LAB],
+    out: Annotated[str, OUT] = STDOUT,
+    force: Annotated[bool, FORCE] = False,
+) -> ExitCode:
+    """Write the rubric of a lab that comes with the grader, to change it."""
+    with loading():
+        from grader.rubric.load import load_rubric
+    path = load_rubric(lab).path
+    _refuse_existing(out, force=force)
+    _write(
+        out, path.read_bytes().decode("utf-8"), f"{out}: change it, then run `grader rubric validate {out}`"
+    )
+    return ExitCode.PASSED
+
+
+@command("rubric new", group=INSTRUCTORS, runs_code=True)
+def new_rubric(
+    *,
+    solution: Annotated[str, Option("--from", "SOLUTION", "a folder, an archive or a git URL")],
+    package: Annotated[str | None, PACKAGE] = None,
+    rubric_id: Annotated[
+        str | None, Option("--id", "NAME", "the rubric's id (default: from FILE or the package)")
+    ] = None,
+    out: Annotated[str, OUT] = STDOUT,
+    force: Annotated[bool, FORCE] = False,
+    sandbox: SandboxOption = "auto",
+) -> ExitCode:
+    """Write a first rubric from a run of a correct package."""
+    with loading():
+        from grader import pipeline
+        from grader.authoring.propose import propose_rubric
+        from grader.cli.display import open_progress
+        from grader.cli.examples import rubric_id_from
+        from grader.cli.host_support import warn_without_sandbox
+        from grader.cli.select_rubric import only_package
+    name = package or only_package(solution)
+    chosen = rubric_id or rubric_id_from(Path(out).stem if out != STDOUT else name)
+    _refuse_existing(out, force=force)
+    options = pipeline.GradeOptions(sandbox=sandbox)
+    warn_without_sandbox(sandbox)
+    with open_progress() as progress:
+        text = propose_rubric(solution, name, chosen, options, progress)
+    _write(
+        out,
+        text,
+        f"{out}: look through it, then run `grader rubric validate {out}`",
+        f"and `grader rubric test {out} --solution {solution}`",
+    )
+    return ExitCode.PASSED
+
+
+@command("rubric test", group=INSTRUCTORS, exit_codes=MUTANTS_EXIT_CODES, runs_code=True)
+def run_rubric_test(
+    *,
+    rubric: Annotated[str, Argument("LAB|FILE", "a lab's id or a rubric's file")],
+    solution: Annotated[
+        Path | None, Option("--solution", "DIR", "a correct package (default: the lab's own)")
+    ] = None,
+    only: Annotated[
+        Sequence[str], Option("--only", "MUTANT", "only these mutants or operators; * is a wildcard")
+    ] = (),
+    jobs: Annotated[int, Option("--jobs", "N", "how many at a time (default: 4)", count)] = 4,
+    out: Annotated[
+        Path | None,
+        Option(
+            "--out",
+            "DIR",
+            "keep everything in DIR/<mutant>/ (default: only what survived, in a temporary folder)",
+        ),
+    ] = None,
+    write: Annotated[
+        Path | None,
+        Option("--write", "FILE", "try every operator, and write a mutants file with what each costs"),
+    ] = None,
+    sandbox: SandboxOption = "auto",
+    as_json: JsonFlag = False,
+) -> ExitCode:
+    """Grade a correct package, then mutants of it that must lose marks."""
+    with loading():
+        from grader.cli import mutants
+        from grader.cli.host_support import require_room, warn_without_sandbox
+        from grader.cli.output import say_json
+    require_room(gradings=jobs)
+    plan = mutants.plan_test(
+        rubric, solution, only=only, jobs=jobs, out=out, everything=write, sandbox=sandbox
+    )
+    warn_without_sandbox(sandbox, plan.rubric)
+    tested = mutants.run_plan(plan, temporary=out is None)
+    if write is not None and not tested.reference.lost:
+        mutants.write_mutants(plan, tested, write)
+    if as_json:
+        say_json(tested.model_dump(mode="json", by_alias=True))
+    else:
+        mutants.print_test(tested, sys.stdout)
+    return ExitCode.PASSED if tested.passed else ExitCode.BELOW_PASS_MARK
+
+
+def _refuse_existing(out: str, *, force: bool) -> None:
+    if out != STDOUT and Path(out).exists() and not force:
+        raise UsageError(f"{out} exists", hint="choose another --out, or add --force")
+
+
+def _write(out: str, text: str, *next_steps: str) -> None:
+    from grader.cli.output import say, say_document
+    from grader.files import atomic_write
+
+    if out == STDOUT:
+        say_document(lambda _: text)
+        return
+    atomic_write(Path(out), text.encode("utf-8"), public=True)
+    for step in next_steps:
+        say(step)

@@ -1,0 +1,82 @@
+"""What the options of `grader batch` come to: folders, times, jobs and an executor; and the exit code of a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+
+from grader.classes.batch.job import Executor, LocalExecutor
+from grader.classes.batch.run import BatchOptions
+from grader.classes.roster import Local
+from grader.classes.roster.entries import parse_time
+from grader.cli.output import say_beside
+from grader.errors import ExitCode, UsageError
+from grader.model.batch import BatchRun
+from grader.portable import cores
+from grader.rubric.load import LoadedRubric
+from grader.untrusted_text import line
+
+JOBS_PER_CORE = 4
+"""Most of a grading's time is spent waiting for what the student's nodes send."""
+
+
+def rubric_source(rubric: str) -> str:
+    """Return the value of `--rubric` so that it is found again from any folder."""
+    path = Path(rubric)
+    return str(path.absolute()) if path.is_file() else rubric
+
+
+def exit_code(run: BatchRun) -> ExitCode:
+    """Return the exit code of the worst submission."""
+    counts = run.counts
+    if counts.error or counts.missing:
+        return ExitCode.NOT_GRADED
+    if counts.inconclusive:
+        return ExitCode.INCONCLUSIVE
+    return ExitCode.PASSED if counts.passed == counts.submissions else ExitCode.BELOW_PASS_MARK
+
+
+def default_jobs(rubric: LoadedRubric, *, static: bool) -> int:
+    """Return how many submissions are graded at a time."""
+    return cores() if static or not rubric.rubric.scenarios else cores() * JOBS_PER_CORE
+
+
+def parse_before(text: str | None) -> datetime | None:
+    """Parse the value of `--before`. Raises UsageError."""
+    if text is None:
+        return None
+    found = parse_time(text)
+    if found is None:
+        raise UsageError(
+            f"--before {line(text, 80)} is not a time", hint="write it like 2026-11-20T23:59:00+01:00"
+        )
+    return found
+
+
+def allowed_folders(folders: Sequence[Path], *, remote_only: bool) -> Local:
+    """Return which paths of this machine a roster may name. Raises UsageError."""
+    if folders and remote_only:
+        raise UsageError("--remote-only forbids what --allow-local allows", hint="leave out one of them")
+    for folder in folders:
+        if not folder.is_dir():
+            raise UsageError(f"--allow-local {folder}: there is no such folder", hint="give a folder")
+    return Local(folders=tuple(folder.absolute() for folder in folders), remote_only=remote_only)
+
+
+def executor(options: BatchOptions, exchange: str | None) -> Executor:
+    """Return the processes of this machine, or the cluster. Raises UsageError."""
+    if not options.cluster:
+        given = {"--exchange": exchange is not None, "--cluster-insecure": options.cluster_insecure}
+        for flag in (name for name, there in given.items() if there):
+            raise UsageError(f"{flag} goes with --cluster", hint="leave it out")
+        return LocalExecutor(options.jobs)
+    from grader.classes.cluster import ClusterExecutor  # noqa: PLC0415 - an extra
+
+    return ClusterExecutor(
+        options.cluster,
+        options.out,
+        exchange,
+        insecure=options.cluster_insecure,
+        say=lambda text: say_beside(f"cluster: {text}"),
+    )

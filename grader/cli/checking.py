@@ -1,0 +1,189 @@
+"""What `grader check` does with the packages that were chosen: grade them, or watch one, without hidden criteria.
+
+The command line comes in, a report on stdout and an exit code go out. Below the report stands how the package differs
+from what is pushed; git is asked about that in a thread beside the grading, and never holds it up.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, ExitStack, nullcontext
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from rich.console import Console, RenderableType
+from rich.padding import Padding
+from rich.text import Text
+
+from grader import pipeline
+from grader.cli.display import open_progress
+from grader.cli.host_support import how_to_run_nodes, why_nothing_runs
+from grader.cli.outcome import exit_code, settled, show, staged_code
+from grader.cli.output import say, say_beside
+from grader.cli.select_rubric import Chosen
+from grader.errors import ExitCode, UsageError
+from grader.files import temporary_folder
+from grader.intake import safe_name
+from grader.model.progress import Progress, Silence
+from grader.model.result import GradingResult, Point, Standing
+from grader.report.terminal import emit, open_console
+from grader.report.text import line
+from grader.report.view import hidden_ids, without_hidden
+from grader.rubric.load import LoadedRubric, needs_ros
+from grader.student.git_status import advise, read_environment
+from grader.student.git_view import write_staged
+
+TITLE = "Your marks come from what you have pushed. It differs from what was checked:"
+REMARKS = "Before you submit"
+LINE_CHARS = 300
+GIT_TIMEOUT_S = 10.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """What all packages of one command line share. `out` is None if the results are only shown; `told` holds what was
+    said about git's state already, for another package."""
+
+    options: pipeline.GradeOptions
+    out: Path | None
+    as_json: bool
+    staged: bool
+    several: bool
+    told: set[str] = field(default_factory=set)
+
+
+def say_choice(chosen: Chosen) -> None:
+    """Say what was chosen, before anything else is said."""
+    if chosen.words:
+        say_beside(chosen.words)
+
+
+def check_package(chosen: Chosen, check: Check) -> ExitCode:
+    """Grade one package and print its report."""
+    say_choice(chosen)
+    options, rubric = check.options, chosen.rubric.rubric
+    static = options.static_only
+    if check.several and chosen.package is not None:
+        options = replace(options, submission_id=safe_name(chosen.package.resolve().name))
+        say("")
+    with temporary_folder("check") as own:
+        source = chosen.source
+        if check.staged:
+            package = _package(chosen)
+            source = str(write_staged(package, own / "index", index=os.environ.get("GIT_INDEX_FILE", "")))
+            options = replace(options, submission_id=safe_name(package.resolve().name))
+        unrun = "--static" if static else why_nothing_runs() if needs_ros(chosen.rubric) else ""
+        inquiry = GitInquiry(chosen.package, own / "git") if chosen.package is not None else None
+        folder = check.out or own
+        early = not (check.as_json or unrun)
+        with nullcontext(Silence()) if check.staged else open_progress(early=early) as progress:
+            result = pipeline.grade(source, chosen.rubric, folder, options, progress)
+        shown = without_hidden(result, rubric)
+        kept = folder / result.submission.id if check.out is not None else None
+        found = inquiry.result() if inquiry is not None else Standing()
+        if check.as_json:
+            shown = shown.model_copy(update={"standing": found})
+        hidden = len(hidden_ids(rubric))
+        code = show(shown, rubric, kept, hidden=hidden, as_json=check.as_json, static=static, unrun=unrun)
+        for words in () if static or not unrun else how_to_run_nodes():
+            (say_beside if check.as_json else say)(words)
+        _print_git_status(found, check)
+        graded = shown.status != "error"
+        return staged_code(shown.criteria, rubric) if check.staged and graded else code
+
+
+def _package(chosen: Chosen) -> Path:
+    if chosen.package is None:
+        raise UsageError(f"there is no package in {chosen.source}", hint="leave out --staged")
+    return chosen.package
+
+
+def watch_package(
+    source: str, rubric: LoadedRubric, options: pipeline.GradeOptions, *, out: Path | None, as_json: bool
+) -> ExitCode:
+    """Grade the package whenever one of its files is saved, until Ctrl-C."""
+    from grader.student.watch_screen import JsonLines, TerminalScreen  # noqa: PLC0415 - slow to load
+    from grader.student.watching import Grading, watch  # noqa: PLC0415
+
+    static, hidden = options.static_only, len(hidden_ids(rubric.rubric))
+
+    def code(result: GradingResult) -> ExitCode:
+        return exit_code(settled(result.criteria) if static else result.criteria, rubric.rubric)
+
+    def progress(first: bool) -> AbstractContextManager[Progress]:
+        return nullcontext(Silence()) if static else open_progress(early=first and not as_json)
+
+    without = out.resolve() if out is not None else None
+    name = Path(source).name
+    screen = (
+        JsonLines(sys.stdout)
+        if as_json
+        else TerminalScreen(name, rubric.rubric, sys.stdout, hidden=hidden, static=static)
+    )
+    with ExitStack() as stack:
+        folder = without or stack.enter_context(temporary_folder("check"))
+        grading = Grading(
+            source=source, rubric=rubric, out=folder, options=options, progress=progress, code=code
+        )
+        return watch(grading, screen, without=without)
+
+
+class GitInquiry:
+    """Asks git about the package in `package`, in a thread that ends with the program."""
+
+    def __init__(self, package: Path, base: Path) -> None:
+        self._package, self._base = package, base
+        self._environment = read_environment(os.environ, Path.cwd())
+        self._found = Standing()
+        self._thread = threading.Thread(target=self._ask, daemon=True)
+        self._thread.start()
+
+    def result(self) -> Standing:
+        """Return what git said; nothing if it does not answer in time."""
+        self._thread.join(GIT_TIMEOUT_S)
+        return self._found
+
+    def _ask(self) -> None:
+        self._found = advise(self._package, self._base, self._environment)
+
+
+def _print_git_status(found: Standing, check: Check) -> None:
+    """Print what git said below the report; to stderr if stdout is for a program."""
+    if check.as_json:
+        for point in found.points:
+            say_beside(point.text)
+        return
+    points = tuple(point for point in found.points if point.text not in check.told)
+    summary = found.summary if found.summary not in check.told else ""
+    check.told.update({found.summary, *(point.text for point in points)})
+    print_standing(Standing(points=points, summary=summary), open_console(sys.stdout))
+
+
+def print_standing(found: Standing, console: Console) -> None:
+    """Print how the package differs from what is pushed."""
+    emit(console, _parts(found, console.encoding))
+
+
+def _parts(found: Standing, encoding: str) -> Iterator[RenderableType]:
+    if found.summary:
+        yield Text(f"\n{_fitted(found.summary, encoding)}", "dim")
+    differing = [point for point in found.points if not point.remark]
+    remarks = [point for point in found.points if point.remark]
+    for title, points in ((TITLE, differing), (REMARKS, remarks)):
+        if points:
+            yield Text(f"\n{title}", "bold")
+        for point in points:
+            yield from _point(point, encoding)
+
+
+def _point(point: Point, encoding: str) -> Iterator[RenderableType]:
+    yield Padding(Text(_fitted(point.text, encoding)), (0, 0, 0, 2))
+    for command in filter(None, point.mend.split(" && ")):
+        yield Padding(Text(_fitted(command, encoding), "bold"), (0, 0, 0, 6))
+
+
+def _fitted(text: str, encoding: str) -> str:
+    return line(text, LINE_CHARS).encode(encoding, "backslashreplace").decode(encoding)

@@ -1,0 +1,158 @@
+"""What `grader ci` does in a job of GitHub or GitLab: grade as `grader check` does, keep the reports, tell the system.
+
+`action.yml` and `ci/gitlab.yml` run it; everything it is asked stands in variables.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from grader import pipeline
+from grader.cli.display import open_progress
+from grader.cli.errors import report
+from grader.cli.find_packages import package_prefix
+from grader.cli.host_support import warn_without_sandbox
+from grader.cli.outcome import exit_code, settled
+from grader.cli.output import say, say_beside
+from grader.cli.select_rubric import Chosen, choose_all, only
+from grader.errors import ExitCode, GraderError, RubricError, UsageError
+from grader.faults import fault_of
+from grader.files import temporary_folder
+from grader.integrations.ci_results import (
+    OF_CODE,
+    STUDENTS,
+    Graded,
+    Outcome,
+    add_forms,
+    clear,
+    describe_outcome,
+    keep,
+)
+from grader.integrations.ci_settings import Settings, read_settings, with_pass_mark
+from grader.integrations.github import GitHub
+from grader.integrations.gitlab import GitLab
+from grader.judging.summary import overall_status, total_points
+from grader.model.result import GradingResult
+from grader.report.sentences import without_sandbox
+from grader.report.terminal import open_console, print_report
+from grader.report.view import hidden_ids, without_hidden
+from grader.results import read_result
+from grader.rubric.load import LoadedRubric
+from grader.rubric.model import Rubric
+
+WHICH = "give the package's folder as path (GRADER_PATH), and the lab as lab (GRADER_LAB)"
+RESULT = "result.json"
+
+
+def run_job(system: str) -> ExitCode:
+    """Run the job of `github` or `gitlab`; it fails as `GRADER_FAIL_ON` says."""
+    variables = dict(os.environ)
+    teller = (
+        GitHub(variables)
+        if system == "github"
+        else GitLab(Path(variables.get("GRADER_OUT") or "grader-results"))
+    )
+    try:
+        settings = read_settings(variables)
+        with teller.commands_stopped():
+            graded = _graded(settings)
+    except Exception as error:
+        teller.tell_error(fault_of(error))
+        raise
+    teller.tell(graded)
+    say(f"{graded.outcome.value}: {graded.message}")
+    warning = without_sandbox(graded.result.environment.sandbox)
+    if warning:
+        say(warning)
+    say(f"sandbox: {graded.result.environment.sandbox}")
+    code = next(code for code, outcome in OF_CODE.items() if outcome is graded.outcome)
+    return code if graded.fails else ExitCode.PASSED
+
+
+def _graded(settings: Settings) -> Graded:
+    chosen = _chosen(settings)
+    source, rubric = chosen.source, with_pass_mark(chosen.rubric, settings.mark)
+    if chosen.words:
+        say_beside(chosen.words)
+    if not settings.static:
+        warn_without_sandbox(settings.sandbox, rubric)
+    clear(settings.out)
+    options = pipeline.GradeOptions(
+        sandbox=settings.sandbox, submission_id=None, static_only=settings.static, keep_hidden=False
+    )
+    with temporary_folder("check") as folder:
+        try:
+            with open_progress(early=False) as progress:
+                made = pipeline.grade(source, rubric, folder, options, progress)
+            result, place = without_hidden(made, rubric.rubric), folder / made.submission.id
+        except GraderError as error:
+            result, place = _left(folder, error)
+        keep(place, settings.out, rubric.rubric)
+    prefix = _prefix(result, Path(source))
+    add_forms(settings.out, result, rubric.rubric, prefix, rubric.docs)
+    hidden = len(hidden_ids(rubric.rubric))
+    print_report(result, rubric.rubric, open_console(sys.stdout), hidden=hidden, static=settings.static)
+    return _judged(result, rubric, settings, prefix)
+
+
+def _chosen(settings: Settings) -> Chosen:
+    try:
+        return only(choose_all(settings.path, settings.lab))
+    except RubricError:
+        raise
+    except UsageError as error:  # its hint is for people at a terminal
+        raise UsageError(error.message, hint=WHICH) from error
+
+
+def _left(folder: Path, error: GraderError) -> tuple[GradingResult, Path]:
+    """Return the result that says why nothing was graded. Raises the error if there is none."""
+    report(error)
+    for place in sorted(path.parent for path in folder.glob(f"*/{RESULT}")):
+        result = read_result(place)
+        if result is not None:
+            return result, place
+    raise error
+
+
+def _prefix(result: GradingResult, source: Path) -> str:
+    """Return the package's folder in the repository: the one around it, or where the job was started."""
+    source = source.resolve()
+    cloned = any((folder / ".git").exists() for folder in (source, *source.parents))
+    return package_prefix(result, source if cloned and source.is_dir() else Path.cwd()) or ""
+
+
+def _judged(result: GradingResult, rubric: LoadedRubric, settings: Settings, prefix: str) -> Graded:
+    counted = _counted(result, rubric.rubric, static=settings.static)
+    error = result.error if result.status == "error" else None
+    lab = rubric.rubric
+    code = ExitCode.NOT_GRADED if error or not counted.criteria else exit_code(counted.criteria, lab)
+    outcome = OF_CODE[code]
+    message, hint = describe_outcome(counted, lab, outcome, static=settings.static)
+    students = error is not None and error.kind in STUDENTS
+    return Graded(
+        outcome=outcome,
+        fails=outcome in settings.fail_on or (students and Outcome.BELOW in settings.fail_on),
+        message=message,
+        hint=hint,
+        result=result,
+        counted=counted,
+        rubric=lab,
+        folder=settings.out.absolute(),
+        prefix=prefix,
+    )
+
+
+def _counted(result: GradingResult, rubric: Rubric, *, static: bool) -> GradingResult:
+    """Return, with `static`, the result of the criteria that can be judged from the files alone."""
+    if not static or result.error is not None:
+        return result
+    criteria = settled(result.criteria)
+    update = {
+        "criteria": criteria,
+        "points": total_points(rubric, criteria),
+        "max_points": sum(c.max_points for c in criteria),
+        "status": overall_status(criteria),
+    }
+    return result.model_copy(update=update)

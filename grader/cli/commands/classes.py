@@ -1,0 +1,366 @@
+"""The commands for a whole class: grade it, and work on the results."""
+
+import shutil
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated, Literal
+
+from grader.cli.declare import INSTRUCTORS, Argument, Flag, Option, command, loading
+from grader.cli.options import (
+    BATCH_FOLDER,
+    CLASS_EXIT_CODES,
+    REPORT_EXIT_CODES,
+    RUBRIC,
+    STATIC,
+    JsonFlag,
+    SandboxOption,
+    count,
+    percent,
+    port,
+)
+from grader.errors import ExitCode, UsageError
+from grader.report.forms import FORMS
+
+DEFAULT_OUT = Path("grader-results")
+STDOUT = "-"
+CLASS = Argument("DIR", BATCH_FOLDER)
+GRADEBOOKS = {
+    "csv": "gradebook.csv",
+    "jsonl": "results.jsonl",
+    "xlsx": "gradebook.xlsx",
+    "canvas": "gradebook-canvas.csv",
+    "moodle": "gradebook-moodle.csv",
+    "blackboard": "gradebook-blackboard.csv",
+}
+
+
+@command("batch", group=INSTRUCTORS, exit_codes=CLASS_EXIT_CODES, runs_code=True)
+def batch(
+    *,
+    roster: Annotated[
+        Path,
+        Argument(
+            "ROSTER|FOLDER",
+            "a CSV file (id,source,...), a folder of submissions, or an export of GitHub Classroom or GitLab",
+        ),
+    ],
+    rubric: Annotated[str, RUBRIC],
+    out: Annotated[
+        Path | None,
+        Option(
+            "--out",
+            "DIR",
+            "write results to DIR/<id>/, with gradebook.csv and results.jsonl (default: ./grader-results)",
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        Option("--jobs", "N", "how many at a time (default: four per core, with --static one)", count),
+    ] = None,
+    only: Annotated[
+        Sequence[str],
+        Option(
+            "--only", "WHICH", "failed, inconclusive, changed, or ids: grade these again, keep all others"
+        ),
+    ] = (),
+    before: Annotated[
+        str | None,
+        Option("--before", "TIME", "grade the last commit before TIME (default: the rubric's deadline)"),
+    ] = None,
+    allow_local: Annotated[
+        Sequence[Path],
+        Option(
+            "--allow-local",
+            "DIR",
+            "let the roster name paths below DIR too, not only below its own folder; may be repeated",
+            repeated=True,
+        ),
+    ] = (),
+    remote_only: Annotated[
+        bool, Flag("--remote-only", "do not let the roster name any path of this machine")
+    ] = False,
+    static: Annotated[bool, STATIC] = False,
+    cluster: Annotated[
+        str | None,
+        Option("--cluster", "ADDRESS", "grade on a Dask cluster: tls://HOST:8786, or local"),
+    ] = None,
+    cluster_insecure: Annotated[
+        bool,
+        Flag(
+            "--cluster-insecure",
+            "accept a cluster without certificates (tcp://): anyone who reaches it can run programs there",
+        ),
+    ] = False,
+    exchange: Annotated[
+        str | None,
+        Option("--exchange", "URL", "where a cluster's workers leave results (default: the folder of --out)"),
+    ] = None,
+    sandbox: SandboxOption = "auto",
+    as_json: JsonFlag = False,
+) -> ExitCode:
+    """Grade a class, or continue a batch that was stopped."""
+    with loading():
+        from grader.classes.batch.run import BatchOptions, run_batch
+        from grader.classes.roster import read_roster
+        from grader.cli import batches
+        from grader.cli.class_display import open_class_display, print_batch
+        from grader.cli.host_support import require_room, warn_without_sandbox
+        from grader.cli.output import say_beside
+        from grader.rubric.load import load_rubric, needs_ros
+    loaded = load_rubric(rubric)
+    local = batches.allowed_folders(allow_local, remote_only=remote_only)
+    named = read_roster(roster, local)
+    options = BatchOptions(
+        out=out or DEFAULT_OUT,
+        jobs=jobs or batches.default_jobs(loaded, static=static),
+        sandbox=sandbox,
+        static_only=static,
+        before=batches.parse_before(before),
+        only=only,
+        cluster=cluster or "",
+        cluster_insecure=cluster_insecure,
+        allow_local=tuple(str(folder) for folder in local.folders),
+        remote_only=remote_only,
+    )
+    if needs_ros(loaded) and not (static or cluster):
+        require_room(gradings=options.jobs)
+        warn_without_sandbox(sandbox, loaded)
+    for fault in named.faults:
+        say_beside(f"roster: {fault}")
+    with open_class_display() as watcher:
+        executor = batches.executor(options, exchange)
+        folder = run_batch(
+            named, batches.rubric_source(rubric), loaded, options, executor=executor, watcher=watcher
+        )
+    print_batch(folder, as_json=as_json)
+    return batches.exit_code(folder.run)
+
+
+@command("regrade", group=INSTRUCTORS, exit_codes=CLASS_EXIT_CODES, runs_code=True)
+def regrade(
+    *,
+    folder: Annotated[Path, CLASS],
+    rubric: Annotated[str | None, RUBRIC] = None,
+    run_missing_too: Annotated[
+        bool, Flag("--run-missing", "run the submissions that lack a recording of a scenario")
+    ] = False,
+    jobs: Annotated[int | None, Option("--jobs", "N", "how many at a time", count)] = None,
+    sandbox: SandboxOption = "auto",
+    as_json: JsonFlag = False,
+) -> ExitCode:
+    """Judge a class again from its evidence, without ROS."""
+    with loading():
+        from grader.classes.batch.folder import open_batch
+        from grader.classes.batch.job import LocalExecutor
+        from grader.classes.batch.regrade import regrade as judge_again
+        from grader.classes.batch.regrade import run_missing
+        from grader.cli import batches
+        from grader.cli.class_display import open_class_display, print_regraded
+        from grader.cli.host_support import warn_without_sandbox
+        from grader.portable import cores
+        from grader.rubric.load import load_rubric
+    batch = open_batch(folder)
+    source = rubric or batch.run.rubric_source
+    loaded = load_rubric(source)
+    own = cores()
+    batch, regraded = judge_again(batch, loaded, batches.rubric_source(source), jobs or own)
+    if run_missing_too and any(one.missing for one in regraded):
+        warn_without_sandbox(sandbox, loaded)
+        with open_class_display() as watcher:
+            executor = LocalExecutor(jobs or own * batches.JOBS_PER_CORE)
+            batch, regraded = run_missing(
+                batch, loaded, regraded, executor=executor, watcher=watcher, sandbox=sandbox
+            )
+    print_regraded(batch, regraded, as_json=as_json)
+    return batches.exit_code(batch.run)
+
+
+@command("review", group=INSTRUCTORS)
+def review(
+    *,
+    folder: Annotated[Path, CLASS],
+    port: Annotated[int, Option("--port", "N", "the page's port (default: any that is free)", port)] = 0,
+    no_browser: Annotated[bool, Flag("--no-browser", "only print the address")] = False,
+    author: Annotated[
+        str | None,
+        Option("--author", "NAME", "who reviews (default: git config user.name); the page can change it"),
+    ] = None,
+) -> ExitCode:
+    """Review a class in the browser: award points, override marks, comment.
+
+    The page is served to this machine alone until Ctrl-C.
+    """
+    with loading():
+        from grader.classes.review import require_library
+        from grader.cli.output import say
+    require_library()
+    with loading():
+        from grader.classes.review.cards import Wrong, author_of
+        from grader.classes.review.serve import browser, git_user, serve
+        from grader.classes.review.session import open_session
+    try:
+        name = author_of(git_user() if author is None else author)
+    except Wrong as error:
+        raise UsageError(f"--author: {error}") from error
+    review = open_session(folder)
+    with ExitStack() as stack:
+
+        def opened(address: str) -> None:
+            tried = stack.enter_context(browser(address, wanted=not no_browser))
+            say(f"{'Opening' if tried else 'Open'} {address}")
+            say("Only this machine can reach it, and only at this address. Press Ctrl-C to end it.")
+            sys.stdout.flush()  # a program that reads it from a pipe needs the address now
+
+        done = serve(review, port=port, author=name, opened=opened)
+    if done:
+        say("Ended. Everything is saved and written.")
+        return ExitCode.PASSED
+    say(
+        f"Ended. Your decisions are in overrides.yaml, but the gradebook is not written: {review.background.trouble}"
+    )
+    say(f"  hint: once that is fixed, grader regrade {folder} writes it")
+    return ExitCode.NOT_GRADED
+
+
+@command("gradebook", group=INSTRUCTORS)
+def gradebook(
+    *,
+    folder: Annotated[Path, CLASS],
+    form: Annotated[
+        Literal["csv", "jsonl", "xlsx", "canvas", "moodle", "blackboard"],
+        Option("--form", "", "its format; canvas, moodle and blackboard import theirs"),
+    ],
+    out: Annotated[str, Option("--out", "FILE", "where to write it; - is stdout (default: in DIR)")] = "",
+    template: Annotated[
+        Path | None,
+        Option("--template", "FILE", "the platform's own export, to be filled in with the points"),
+    ] = None,
+    column: Annotated[str, Option("--column", "NAME", "the platform's name for the column of points")] = "",
+    per_criterion: Annotated[bool, Flag("--per-criterion", "add a column for each criterion")] = False,
+) -> ExitCode:
+    """Write a class's gradebook for people, programs or a learning platform.
+
+    What a person has to know about it goes to stderr. Raises UsageError if the template would be overwritten.
+    """
+    with loading():
+        from grader.classes.batch.folder import open_batch
+        from grader.classes.gradebook import write_gradebook
+        from grader.cli.output import say, say_beside
+    batch = open_batch(folder)
+    name = Path(GRADEBOOKS[form])
+    if template:  # Blackboard's tab-separated tables end in .xls
+        name = name.with_suffix(template.suffix)
+    target = Path(out) if out else folder / name
+    if template and out != STDOUT and target.exists() and target.samefile(template):
+        raise UsageError(f"{target} is the template itself", hint="give another name with --out")
+    with TemporaryDirectory(prefix="gradebook-") as temporary:
+        place = Path(temporary, GRADEBOOKS[form]) if out == STDOUT else target
+        remarks = write_gradebook(
+            batch.book(),
+            batch.rows(),
+            place,
+            form,
+            per_criterion=per_criterion,
+            template=template,
+            column=column,
+        )
+        for remark in remarks:
+            say_beside(f"{form}: {remark}")
+        if out == STDOUT:
+            with place.open("rb") as written:
+                shutil.copyfileobj(written, sys.stdout.buffer)
+        else:
+            say(str(target))
+    return ExitCode.PASSED
+
+
+@command("report", group=INSTRUCTORS, exit_codes=REPORT_EXIT_CODES)
+def report(
+    *,
+    folder: Annotated[Path, Argument("DIR", f"a submission's folder of results, or {BATCH_FOLDER}")],
+    rubric: Annotated[str | None, RUBRIC] = None,
+    form: Annotated[
+        str | None,
+        Option("--form", "", "write only this form (default: all files of DIR)", choices=tuple(FORMS)),
+    ] = None,
+    out: Annotated[str, Option("--out", "FILE", "where to write that form (default: -, stdout)")] = "",
+    prefix: Annotated[
+        str | None,
+        Option("--prefix", "PATH", "the package's folder in the repository, for paths (default: found here)"),
+    ] = None,
+    student: Annotated[bool, Flag("--student", "leave hidden criteria out of that form")] = False,
+    anonymous: Annotated[
+        Path | None, Option("--anonymous", "FILE", "also write the class's page without names to FILE")
+    ] = None,
+) -> ExitCode:
+    """Write the reports of a result or a class again, without ROS."""
+    with loading():
+        from grader.classes.batch.folder import RUN, open_batch
+        from grader.classes.batch.reports import has_result
+        from grader.cli import reports
+    batch = open_batch(folder) if (folder / RUN).is_file() else None
+    if batch is not None:
+        batch.refuse_newer()
+    single = batch is None and has_result(folder)
+    if form:
+        if not single or anonymous:
+            raise UsageError(f"{folder}: --form is for one submission", hint="give its own folder: DIR/<id>")
+        loaded = reports.rubric_of(rubric, folder)
+        return reports.write_form(folder, loaded, form, out or STDOUT, prefix, student=student)
+    if out or prefix is not None or student:
+        raise UsageError("--out, --prefix and --student go with --form", hint="see grader report --help")
+    if anonymous and batch is None:
+        raise UsageError(
+            f"{folder}: only a class has a page, and there is no {RUN}", hint="give the batch's --out"
+        )
+    folders = [folder] if single else reports.folders_in(folder, batch)
+    code = reports.write_reports(folders, reports.rubric_of(rubric, folders[0], batch))
+    if batch is not None:
+        reports.write_class_pages(batch, anonymous)
+    return code
+
+
+@command("similar", group=INSTRUCTORS)
+def similar(
+    *,
+    folder: Annotated[Path, CLASS],
+    starter: Annotated[
+        Sequence[Path],
+        Option(
+            "--starter",
+            "PATH",
+            "code that everyone was given: a folder, an archive or a program; may be repeated",
+            repeated=True,
+        ),
+    ] = (),
+    threshold: Annotated[
+        float,
+        Option(
+            "--threshold",
+            "PERCENT",
+            "how much of a submission's code the other must share (default: 80)",
+            percent,
+        ),
+    ] = 80.0,
+    as_json: JsonFlag = False,
+) -> ExitCode:
+    """Find nearly identical submissions, for a person to look at; marks do not change."""
+    with loading():
+        from grader.classes.similarity.comparison import require_library
+    require_library()
+    with loading():
+        from grader.classes.similarity import compare, write_similarity
+        from grader.cli.output import say_json
+        from grader.cli.similarity import print_similarity, submissions_in
+        from grader.portable import cores
+    folders, names, groups = submissions_in(folder)
+    found = compare(folders, starter=list(starter), groups=groups, threshold=threshold / 100, jobs=cores())
+    written = write_similarity(found, folder, names)
+    if as_json:
+        say_json(found.model_dump(mode="json", by_alias=True))
+    else:
+        print_similarity(found, names, written, sys.stdout)
+    return ExitCode.PASSED

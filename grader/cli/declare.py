@@ -1,0 +1,162 @@
+"""Commands as typed functions. Parser, help, man page, completion and reference pages are made from their signatures:
+
+    @command("labs", group=INSTRUCTORS)
+    def labs(*, as_json: JsonFlag = False) -> ExitCode:
+        \"""List the labs that come with the grader.\"""
+
+The first line of the docstring is the help. Each argument is keyword-only and annotated with its type and an Argument,
+Option or Flag; its default is that of the signature. Nothing heavy is imported at the top of a module with commands,
+since help and completion load all of them: a command imports what it runs inside `with loading():`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin
+
+from grader.errors import ExitCode
+
+STUDENTS, INSTRUCTORS, REST = "For students", "For instructors", "More"
+EXIT_CODES = """exit codes:
+  0    passed: the pass mark is reached (by default every visible criterion)
+  1    graded, below the pass mark
+  2    the command line or a rubric is wrong
+  3    could not be graded
+  4    inconclusive: a criterion could not be judged
+  130  interrupted
+"""
+Function = TypeVar("Function", bound=Callable[..., ExitCode])
+
+
+class Argument(NamedTuple):
+    """A positional argument. `value` is its name in the help; empty to show the choices."""
+
+    value: str
+    help: str = ""
+    choices: tuple[str, ...] = ()
+
+
+class Option(NamedTuple):
+    """An option with a value, required if the signature has no default. With `repeated`, each use adds to a list."""
+
+    flag: str
+    value: str
+    help: str
+    parse: Callable[[str], object] | None = None
+    repeated: bool = False
+    choices: tuple[str, ...] = ()
+
+
+class Flag(NamedTuple):
+    """An option without a value."""
+
+    flag: str
+    help: str
+
+
+Spec = Argument | Option | Flag
+REQUIRED = object()
+"""In place of a default where the signature has none."""
+
+
+class Command(NamedTuple):
+    """A command and the function that runs it. `name` has two words for a command of a group such as `rubric`.
+
+    `notes` stand before the exit codes in the help. `runs_code` is set for commands that run what students wrote,
+    `looks_at_host` for those that say whether these would work.
+    """
+
+    name: str
+    run: Callable[..., ExitCode]
+    group: str
+    notes: str
+    exit_codes: str
+    runs_code: bool
+    looks_at_host: bool
+
+    @property
+    def summary(self) -> str:
+        """The first sentence of the function's docstring, with its full stop."""
+        return (self.run.__doc__ or "").partition("\n\n")[0].replace("\n    ", " ")
+
+
+COMMANDS: dict[str, Command] = {}
+"""By name, in the order of the help."""
+
+
+def command(
+    name: str,
+    *,
+    group: str = REST,
+    notes: str = "",
+    exit_codes: str = EXIT_CODES,
+    runs_code: bool = False,
+    looks_at_host: bool = False,
+) -> Callable[[Function], Function]:
+    """Register a function as the command `name`."""
+
+    def register(function: Function) -> Function:
+        COMMANDS[name] = Command(name, function, group, notes, exit_codes, runs_code, looks_at_host)
+        return function
+
+    return register
+
+
+def add_arguments(parser: argparse.ArgumentParser, function: Callable[..., ExitCode]) -> None:
+    """Add every argument of a command's function to its parser."""
+    defaults = function.__kwdefaults__ or {}
+    for name, annotation in function.__annotations__.items():
+        origin: object = get_origin(annotation)
+        if origin is Annotated:
+            kind, spec = get_args(annotation)
+            _add(parser, name, kind, spec, defaults.get(name, REQUIRED))
+
+
+def _add(parser: argparse.ArgumentParser, name: str, kind: object, spec: Spec, default: object) -> None:
+    if isinstance(spec, Flag):
+        parser.add_argument(spec.flag, action="store_true", dest=name, help=spec.help)
+        return
+    several = get_origin(kind) is Sequence
+    parts = get_args(kind) if several or get_origin(kind) in {Union, UnionType} else (kind,)
+    (plain,) = (part for part in parts if part is not NoneType)
+    choices = spec.choices or (get_args(plain) if get_origin(plain) is Literal else ())
+    how: dict[str, Any] = {
+        "help": spec.help or None,
+        "metavar": spec.value or None,
+        "choices": choices or None,
+    }
+    if plain is not str and not choices:
+        how["type"] = plain
+    if isinstance(spec, Argument):
+        nargs = "+" if several else None if default is REQUIRED else "?"
+        parser.add_argument(name, nargs=nargs, default=None if default is REQUIRED else default, **how)
+        return
+    if spec.parse:
+        how["type"] = spec.parse
+    if default is REQUIRED:
+        how["required"] = True
+    elif several and spec.repeated:
+        how |= {"action": "append", "default": []}
+    else:
+        how["default"] = default
+    if several and not spec.repeated:
+        how["nargs"] = "+"
+    parser.add_argument(spec.flag, dest=name, **how)
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """Hold Ctrl-C back for a moment: a compiled module that is interrupted while it loads panics."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

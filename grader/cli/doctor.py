@@ -1,0 +1,223 @@
+"""What `grader doctor` finds out about this machine: a row for each thing that grading needs. Changes nothing."""
+
+from __future__ import annotations
+
+import locale
+import os
+import platform
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import IO
+
+from rich.table import Table
+from rich.text import Text
+
+from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
+from grader.arena.sandbox_files import missing_packages
+from grader.cli.host_support import Row, platform_rows, sandbox_rows
+from grader.errors import RosMissing
+from grader.host_programs import HOST_ENV, LISTS, find_host_program
+from grader.portable import cores, system, user_id
+from grader.report.terminal import emit, open_console
+from grader.report.text import visible
+
+STYLES = {"ok": "green", "limited": "yellow", "missing": "red"}
+PROGRAMS = {"git": "git", "cmake": "cmake", "make": "make", "c++": "g++"}
+ROS_PROGRAMS = ("catkin_make", "roslaunch", "rosrun", "rospack")
+ROS_MODULES = {
+    "rospy": "python3-rospy",
+    "rosgraph": "python3-rosgraph",
+    "rosmaster": "python3-rosmaster",
+    "roslaunch": "python3-roslaunch",
+    "std_msgs": "python3-std-msgs",
+    "rosgraph_msgs": "python3-rosgraph-msgs",
+    "geometry_msgs": "python3-geometry-msgs",
+    "sensor_msgs": "python3-sensor-msgs",
+}
+FIND_MODULES = (
+    "import importlib.util, sys; print(*[m for m in sys.argv[1:] if not importlib.util.find_spec(m)])"
+)
+GIB = 1 << 30
+MIN_MEMORY_BYTES, MIN_DISK_BYTES = GIB, GIB
+
+
+def diagnose() -> tuple[Row, ...]:
+    """Return every row, in the order in which things are needed; on other systems than Linux, only what helps there."""
+    if system():
+        return (_python(), _git(), *platform_rows(), *_resources(), _encoding())
+    return (
+        _python(),
+        *_programs(),
+        *_ros(),
+        *sandbox_rows(),
+        _user(),
+        _search_paths(),
+        *_resources(),
+        _hostname(),
+        _encoding(),
+    )
+
+
+def _python() -> Row:
+    return Row(name="Python", state="ok", detail=f"{platform.python_version()} ({sys.executable})")
+
+
+def _programs() -> Iterator[Row]:
+    for name, package in PROGRAMS.items():
+        path = shutil.which(name)
+        if path:
+            yield Row(name=name, state="ok", detail=path)
+        else:
+            yield Row(name=name, state="missing", detail="not found", mend=f"apt-get install {package}")
+
+
+def _git() -> Row:
+    path = shutil.which("git")
+    mend = "" if path else "https://git-scm.com/downloads"
+    return Row(name="git", state="ok" if path else "limited", detail=path or "not found", mend=mend)
+
+
+def _ros() -> Iterator[Row]:
+    try:
+        ros = find_ros()
+    except RosMissing as error:
+        yield Row(name="ROS 1", state="missing", detail=error.message, mend=error.hint)
+        return
+    if ros is None:
+        yield Row(name="ROS 1", state="missing", detail="not found", mend=INSTALL_HINT)
+        return
+    yield Row(name="ROS 1", state="ok", detail=ros.label)
+    for program in ROS_PROGRAMS:
+        path = ros.program(program)
+        mend = "" if path else INSTALL_HINT
+        yield Row(name=program, state="ok" if path else "missing", detail=path or "not found", mend=mend)
+    yield from _modules(ros)
+    yield _standins(ros)
+
+
+def _modules(ros: RosInstallation) -> Iterator[Row]:
+    """Look for ROS's Python packages with its own interpreter."""
+    command = [ros.python, "-c", FIND_MODULES, *ROS_MODULES]
+    try:
+        done = subprocess.run(
+            command,
+            env=ros.env,
+            cwd="/",
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=20,
+        )
+    except (OSError, subprocess.SubprocessError) as error:
+        yield Row(name="ROS's Python", state="missing", detail=f"{ros.python}: {error}", mend=INSTALL_HINT)
+        return
+    missing = done.stdout.split()
+    yield Row(name="ROS's Python", state="ok", detail=ros.python)
+    for module, package in ROS_MODULES.items():
+        if module in missing:
+            mend = f"apt-get install {package}" if ros.kind == "debian" else INSTALL_HINT
+            yield Row(name=module, state="missing", detail=f"{ros.python} cannot import it", mend=mend)
+        else:
+            yield Row(name=module, state="ok", detail="found")
+
+
+def _standins(ros: RosInstallation) -> Row:
+    missing = missing_packages(ros)
+    detail = f"for {', '.join(missing)}, which this ROS lacks" if missing else "not needed for any package"
+    return Row(name="stand-ins", state="ok", detail=detail)
+
+
+def _search_paths() -> Row:
+    """Look for entries that are not absolute paths: they mean the current folder, which may be a student's."""
+    odd = [name for name in LISTS if not all(map(os.path.isabs, os.environ.get(name, "/").split(os.pathsep)))]
+    if not odd:
+        return Row(name="search paths", state="ok", detail="every entry is an absolute path")
+    detail = f"{', '.join(odd)}: an entry means the current folder, so programs load files from there"
+    fix = "write ${NAME:+$NAME:} before what you add, without an empty entry"
+    return Row(name="search paths", state="limited", detail=detail, mend=fix)
+
+
+def _user() -> Row:
+    if user_id() == 0:
+        return Row(
+            name="user", state="ok", detail="root; students' code runs as an unprivileged user in the sandbox"
+        )
+    return Row(name="user", state="ok", detail=f"uid {user_id()}")
+
+
+def _resources() -> Iterator[Row]:
+    number = cores()
+    yield Row(
+        name="cores",
+        state="ok" if number >= 2 else "limited",
+        detail=f"{number}" if number >= 2 else "1: runs take turns, and rates may be inconclusive",
+    )
+    if sys.platform != "win32":
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        yield _amount("memory", memory, MIN_MEMORY_BYTES, "GiB")
+    folder = Path(tempfile.gettempdir())
+    yield _amount("disk", shutil.disk_usage(folder).free, MIN_DISK_BYTES, f"GiB free in {folder}")
+
+
+def _amount(name: str, size_bytes: int, least_bytes: int, unit: str) -> Row:
+    enough = size_bytes >= least_bytes
+    detail = f"{size_bytes / GIB:.1f} {unit}" + (
+        "" if enough else f"; {least_bytes / GIB:.0f} GiB is recommended"
+    )
+    return Row(name=name, state="ok" if enough else "limited", detail=detail)
+
+
+def _hostname() -> Row:
+    """Look up this host, as ROS nodes do; with getent, since the resolver has no time limit."""
+    name = socket.gethostname()
+    command = [find_host_program("getent") or "/usr/bin/getent", "hosts", name]
+    try:
+        done = subprocess.run(
+            command,
+            env=HOST_ENV,
+            cwd="/",
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            timeout=5,
+        )
+        found = done.returncode == 0
+    except (OSError, subprocess.TimeoutExpired):
+        found = False
+    if found:
+        return Row(name="host name", state="ok", detail=f"{name} resolves")
+    mend = f"echo '127.0.1.1 {name}' >> /etc/hosts"
+    return Row(name="host name", state="limited", detail=f"{name} does not resolve", mend=mend)
+
+
+def _encoding() -> Row:
+    name = locale.getpreferredencoding(do_setlocale=False)
+    if name.lower().replace("-", "") == "utf8":
+        return Row(name="encoding", state="ok", detail=name)
+    return Row(
+        name="encoding",
+        state="limited",
+        detail=f"{name}: reports use plain characters",
+        mend="export LC_ALL=C.UTF-8",
+    )
+
+
+def print_rows(rows: Sequence[Row], stream: IO[str]) -> None:
+    """Print a row for each thing that grading needs, and what is missing."""
+    grid = Table.grid(padding=(0, 2, 0, 0))
+    for _ in range(2):
+        grid.add_column(no_wrap=True)
+    grid.add_column(overflow="fold")
+    for row in rows:
+        grid.add_row(Text(row.state, STYLES[row.state]), Text(row.name), Text(visible(row.detail)))
+        if row.mend:
+            grid.add_row(Text(), Text("fix:", "bold"), Text(visible(row.mend), "bold"))
+    missing = sum(row.state == "missing" for row in rows)
+    verdict = f"{missing} missing: grading is not fully possible here." if missing else "Ready to grade."
+    emit(open_console(stream), [grid, Text(f"\n{verdict}")])

@@ -1,0 +1,189 @@
+"""What this machine can run, and how safely: each part of the sandbox, and what a machine without ROS 1 can do.
+
+Rows for `grader doctor` go out, and warnings before students' code is run. What else is looked at is in `doctor`.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Literal
+
+from grader.arena.control_groups import describe, find_cgroups, has_memory
+from grader.arena.sandbox import NAMESPACES
+from grader.arena.sandbox_probe import ULIMIT_HINT, choose, refused_limits
+from grader.arena.static_recorder import why_unrun
+from grader.cli.output import say_beside
+from grader.errors import GraderError, HostError, RosMissing
+from grader.host_programs import HOST_ENV, find_host_program
+from grader.model.record import Record
+from grader.model.submission import SandboxMode
+from grader.portable import system, user_id
+from grader.report.sentences import without_sandbox
+from grader.rubric.load import LoadedRubric, needs_ros
+
+PROGRAMS = {"bwrap": "bubblewrap", "setpriv": "util-linux", "prlimit": "util-linux"}
+PROBE_S = 20
+SETTINGS = Path("/proc/sys")
+SWITCHES = {
+    "kernel/unprivileged_userns_clone": ("0", "sysctl -w kernel.unprivileged_userns_clone=1"),
+    "user/max_user_namespaces": ("0", "sysctl -w user.max_user_namespaces=10000"),
+    "kernel/apparmor_restrict_unprivileged_userns": (
+        "1",
+        "sysctl -w kernel.apparmor_restrict_unprivileged_userns=0",
+    ),
+}
+CONTAINER = "in a container: start it with --privileged, or with --security-opt seccomp=unconfined apparmor=unconfined"
+DELEGATE = "loginctl enable-linger, or systemd-run --user --scope -p Delegate=yes grader …, or run it as root"
+OLD_GROUPS = "run it as root, or boot with cgroup v2 (systemd.unified_cgroup_hierarchy=1)"
+ROOTS_GROUPS = "in a container: start it with --privileged; in a service: Delegate=yes in its unit"
+PAGE = "docs/how-to/without-ros.md"
+WAYS = {
+    "Windows": "WSL 2 or the Docker image",
+    "macOS": "the Docker image",
+    "": "grader doctor, RoboStack or the Docker image",
+}
+WITHOUT = "check --static, judge, report, explain, labs, rubric validate"
+LACKS = "grade, record, and check beyond the files: ROS 1 nodes run on Linux"
+
+
+class Row(Record):
+    """A line of `grader doctor`. `missing`: not everything can be graded; `limited`: it can, but less well."""
+
+    name: str
+    state: Literal["ok", "limited", "missing"]
+    detail: str
+    mend: str = ""
+
+
+def sandbox_rows() -> Iterator[Row]:
+    """Return a row for each part, then one for the sandbox that `--sandbox auto` chooses."""
+    yield from map(_program, PROGRAMS)
+    unshare = find_host_program("unshare") or "unshare"
+    yield _probe("user namespaces", [unshare, "--user", "--pid", "--fork", "/bin/true"], drop=user_id() == 0)
+    yield _probe("network", [sys.executable, "-I", str(NAMESPACES), "/bin/true"], drop=False)
+    yield _limits_of_trees()
+    yield from _inherited()
+    yield _limits_of_processes()
+    yield _chosen_sandbox()
+
+
+def _program(name: str) -> Row:
+    path, package = find_host_program(name), PROGRAMS[name]
+    if path is None:
+        return Row(name=name, state="limited", detail="not found", mend=f"apt-get install {package}")
+    return Row(name=name, state="ok", detail=path)
+
+
+def _probe(name: str, command: Sequence[str], *, drop: bool) -> Row:
+    """Return whether namespaces of that kind can be made, by the user who needs them."""
+    setpriv = find_host_program("setpriv") or "setpriv"
+    nobody = [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if drop else []
+    try:
+        done = subprocess.run(
+            [*nobody, *command],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            timeout=PROBE_S,
+            env=HOST_ENV,
+            cwd="/",
+        )
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        reason = "" if done.returncode == 0 else (said or [f"exit code {done.returncode}"])[-1]
+    except (OSError, subprocess.TimeoutExpired) as error:
+        reason = str(error)
+    if not reason:
+        return Row(name=name, state="ok", detail="namespaces can be made")
+    return Row(name=name, state="limited", detail=reason[:200], mend=_switch())
+
+
+def _switch() -> str:
+    """Return the command that lifts the kernel's ban on it, if a setting forbids it."""
+    for name, (forbidding, mend) in SWITCHES.items():
+        path = SETTINGS / name
+        if path.is_file() and path.read_text(errors="replace").strip() == forbidding:
+            return mend
+    return CONTAINER
+
+
+def _inherited() -> Iterator[Row]:
+    from grader.arena.inherited import group, limits  # noqa: PLC0415 - other systems lack what it imports
+
+    for limit in (*limits(), *group()):
+        detail = f"{limit.what}: {limit.found}; a run needs {limit.needed}"
+        yield Row(
+            name=limit.name, state="missing" if limit.command else "ok", detail=detail, mend=limit.command
+        )
+
+
+def _limits_of_trees() -> Row:
+    if find_cgroups().memory is not None:
+        return Row(name="limits", state="ok", detail=describe())
+    others = DELEGATE if has_memory() else OLD_GROUPS
+    return Row(
+        name="limits", state="limited", detail=describe(), mend=ROOTS_GROUPS if user_id() == 0 else others
+    )
+
+
+def _limits_of_processes() -> Row:
+    refused = refused_limits()
+    if not refused:
+        return Row(name="ulimit", state="ok", detail="limits of students' processes can be set")
+    return Row(name="ulimit", state="missing", detail=refused, mend=ULIMIT_HINT)
+
+
+def _chosen_sandbox() -> Row:
+    try:
+        sandbox = choose("auto")
+    except HostError as error:
+        return Row(name="sandbox", state="missing", detail=error.message, mend=error.hint)
+    if sandbox.bubblewrap:
+        return Row(name="sandbox", state="ok", detail=f"--sandbox auto takes {sandbox.label}")
+    detail = f"{without_sandbox(sandbox.label)} --sandbox require refuses."
+    return Row(name="sandbox", state="limited", detail=detail, mend="fix the rows above")
+
+
+def warn_without_sandbox(mode: SandboxMode, rubric: LoadedRubric | None = None) -> None:
+    """Warn on stderr that students' code will run without a sandbox, if it will.
+
+    A rubric that runs nothing needs no warning; if no sandbox can be chosen, the grading itself says so.
+    """
+    with suppress(GraderError):
+        if (rubric is not None and not needs_ros(rubric)) or why_unrun():
+            return
+        words = without_sandbox(choose(mode).label)
+        if words:
+            say_beside(words)
+
+
+def why_nothing_runs() -> str:
+    """Return why `grader check` only looks at files on this machine, or "" if it can run nodes."""
+    with suppress(RosMissing):  # if ROS is not where GRADER_ROS_SETUP says, the grading reports it
+        return why_unrun()
+    return ""
+
+
+def how_to_run_nodes() -> tuple[str, str]:
+    """Return two lines: that only files were checked, and how to check the rest."""
+    here = f"Only your files were checked: {why_nothing_runs()}."
+    way = WAYS.get(system(), WAYS["macOS"])
+    return here, f"For the rest: {way}; see {PAGE}."
+
+
+def platform_rows() -> Iterator[Row]:
+    """Return what can and cannot be done on a system other than Linux."""
+    yield Row(name=system(), state="ok", detail=f"can: {WITHOUT}")
+    way = WAYS.get(system(), WAYS["macOS"])
+    yield Row(name="ROS 1", state="missing", detail=f"cannot: {LACKS}", mend=f"{way}; see {PAGE}")
+
+
+def require_room(*, gradings: int) -> None:
+    """Check that the limits inherited from the shell leave enough for so many gradings at a time. Raises HostError."""
+    if sys.platform == "linux":
+        from grader.arena.inherited import make_room  # noqa: PLC0415 - other systems lack what it imports
+
+        make_room(gradings=gradings)

@@ -1,0 +1,78 @@
+"""What several commands share: options, the kinds of values that options take, and the meanings of exit codes."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import Annotated
+
+from grader.cli.declare import Flag, Option
+from grader.model.submission import SandboxMode
+
+RUBRIC = Option("--rubric", "ID|FILE", "a lab's id or a rubric's file; see grader labs")
+SandboxOption = Annotated[
+    SandboxMode, Option("--sandbox", "", "run students' code in a sandbox: if possible, always, or never")
+]
+JsonFlag = Annotated[bool, Flag("--json", "print JSON")]
+STATIC = Flag("--static", "check the files only and run nothing")
+BATCH_FOLDER = "the --out of `grader batch`"
+
+CLASS_EXIT_CODES = """exit codes, that of the worst submission:
+  0    all passed
+  1    all graded, not all passed
+  2    the command line, the roster, the rubric or overrides.yaml is wrong
+  3    some could not be graded
+  4    some are inconclusive, or wait for a person
+  130  interrupted: run the same command to continue
+"""
+MUTANTS_EXIT_CODES = """exit codes:
+  0    the correct package gets full marks, and every mutant loses what it must and no more
+  1    it does not, or a mutant survives, or a criterion is worth points that no mutant loses
+  2    the command line, the rubric or the mutants file is wrong
+  3    nothing could be graded here
+  130  interrupted
+"""
+REPORT_EXIT_CODES = """exit codes:
+  0    written, whatever the result is
+  2    the command line or a rubric is wrong
+  3    a result cannot be read, or cannot be shown in this form
+  130  interrupted
+"""
+EXPORT_EXIT_CODES = """exit codes:
+  0    written
+  2    the command line or the rubric is wrong, or the grader is not installed
+  130  interrupted
+"""
+
+
+def percent(text: str) -> float:
+    """Parse 1 to 100, with or without a percent sign."""
+    try:
+        number = float(text.removesuffix("%"))
+    except ValueError:
+        number = 0.0
+    if not 1 <= number <= 100:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a percentage from 1 to 100")
+    return number
+
+
+def port(text: str) -> int:
+    """Parse a port; 0 means any free one."""
+    return _whole(text, 0, 65535, f"{text!r} is not a port from 1 to 65535")
+
+
+def count(text: str) -> int:
+    """Parse 1 to 64."""
+    return _whole(text, 1, 64, f"{text!r} is not a number from 1 to 64")
+
+
+def minutes(most: int) -> Callable[[str], int]:
+    """Return a parser of 2 to `most` minutes: half a minute of a time limit is not for grading."""
+    return lambda text: _whole(text, 2, most, f"{text!r} is not a number from 2 to {most}")
+
+
+def _whole(text: str, least: int, most: int, otherwise: str) -> int:
+    number = int(text) if text.isascii() and text.isdecimal() else -1
+    if not least <= number <= most:
+        raise argparse.ArgumentTypeError(otherwise)
+    return number

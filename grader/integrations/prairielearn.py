@@ -1,0 +1,158 @@
+"""PrairieLearn: the export of a question with an external grader and its image, and the results of a grading."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from uuid import NAMESPACE_URL, uuid5
+
+from grader.errors import GraderError, UsageError
+from grader.files import atomic_write
+from grader.integrations.bundle import (
+    SETTINGS_FILE,
+    Bundle,
+    Platform,
+    Settings,
+    add_lab,
+    system_script,
+    template,
+    wheel,
+)
+from grader.model.result import CriterionResult, GradingResult
+from grader.report.sentences import late_words
+from grader.report.text import html, line, number, text_limit
+from grader.report.view import hidden_ids
+from grader.rubric.load import LoadedRubric
+
+ENTRYPOINT = "/usr/local/bin/grade-question"
+LIMIT = 1000
+LOOK = "A PERSON MUST LOOK"
+
+
+def question(rubric: LoadedRubric, settings: Settings, image: str) -> Bundle:
+    """Return the folder `question/` for a course, and `image/`, the files of a Docker image that suits every lab."""
+    bundle = Bundle()
+    name, data = wheel()
+    bundle.add(f"image/{name}", data)
+    bundle.add("image/system.sh", system_script(), executable=True)
+    bundle.add("image/grade-question", template("grade-question"), executable=True)
+    bundle.add("image/Dockerfile", template("prairielearn.Dockerfile"))
+    lab = add_lab(bundle, rubric, "question/tests/rubric").removeprefix("question/tests/")
+    bundle.add(f"question/tests/{SETTINGS_FILE}", settings.model_copy(update={"rubric": lab}).to_json())
+    bundle.add("question/info.json", _info(rubric, settings, image))
+    bundle.add("question/question.html", _page(rubric))
+    return bundle
+
+
+def write_question(bundle: Bundle, target: Path) -> None:
+    """Write a question to a folder, or to a zip if `target` ends in .zip.
+
+    Raises UsageError if the folder contains anything but an earlier export.
+    """
+    if target.suffix.lower() == ".zip":
+        atomic_write(target, bundle.zipped(), public=True)
+        return
+    if target.exists() and not target.is_dir():
+        raise UsageError(f"{target} is not a folder", hint="give --out a folder, or a name that ends in .zip")
+    exported = (target / "question" / "tests" / SETTINGS_FILE).is_file()
+    if target.is_dir() and any(target.iterdir()) and not exported:
+        raise UsageError(f"{target} contains other files", hint="choose a new folder with --out")
+    bundle.write(target)
+
+
+def _info(rubric: LoadedRubric, settings: Settings, image: str) -> bytes:
+    """Return info.json. Its uuid comes from the rubric's id, so that a second export is the same question."""
+    lab = rubric.rubric
+    info = {
+        "uuid": str(uuid5(NAMESPACE_URL, f"ros-lab-grader:{lab.id}")),
+        "title": lab.title,
+        "topic": "ROS",
+        "tags": ["code", "v3"],
+        "type": "v3",
+        "singleVariant": True,
+        "gradingMethod": "External",
+        "externalGradingOptions": {
+            "enabled": True,
+            "image": image,
+            "entrypoint": ENTRYPOINT,
+            "timeout": settings.minutes * 60,
+        },
+    }
+    return f"{json.dumps(info, indent=4, ensure_ascii=False)}\n".encode()
+
+
+def _page(rubric: LoadedRubric) -> bytes:
+    text = template("question.html").decode()
+    package = html(rubric.rubric.package)
+    return text.replace("@TITLE@", html(rubric.rubric.title)).replace("@PACKAGE@", package).encode()
+
+
+def graded(result: GradingResult, rubric: LoadedRubric) -> dict[str, Any]:
+    """Return the points, or that the submission cannot be graded: then no attempt is used up."""
+    if result.error is not None:
+        return _invalid(result.error.message, result.error.hint)
+    counting = [c for c in result.criteria if c.max_points > 0]
+    if all(c.status.is_open for c in counting):
+        return _invalid("no criterion could be judged", "submit again")
+    hidden = hidden_ids(rubric.rubric)
+    shown = [c for c in result.criteria if c.id not in hidden]
+    limit = text_limit(len(result.criteria), LIMIT)
+    tests = [_test(c, limit) for c in shown]
+    if unseen := [c for c in result.criteria if c.id in hidden]:
+        tests.append(_unseen(unseen))
+    return {
+        "gradable": True,
+        "score": round(min(1.0, max(0.0, result.points / (result.max_points or 1.0))), 6),
+        "message": "\n".join(_message(result, shown)),
+        "tests": tests,
+    }
+
+
+def not_graded(fault: GraderError) -> dict[str, Any]:
+    """Return a document that costs neither points nor an attempt."""
+    return _invalid(fault.message, fault.hint)
+
+
+PLATFORM = Platform(lab="tests", upload="student", graded=graded, not_graded=not_graded)
+"""Its folders lie below /grade."""
+
+
+def _invalid(message: str, hint: str) -> dict[str, Any]:
+    errors = [line(f"not graded: {message}", LIMIT), line(hint, LIMIT)]
+    return {"gradable": False, "score": 0.0, "format_errors": [e for e in errors if e]}
+
+
+def _message(result: GradingResult, shown: list[CriterionResult]) -> Iterator[str]:
+    waiting = sum(c.max_points for c in shown if c.status.is_open)
+    if waiting:
+        yield f"{LOOK}: {number(waiting)} points are not settled yet; no points are lost for good."
+    yield f"{number(result.points)} of {number(result.max_points)} points"
+    yield from (line(words, LIMIT) for words in late_words(result))
+
+
+def _test(criterion: CriterionResult, limit: int) -> dict[str, Any]:
+    name = f"{criterion.id}: {criterion.title}"
+    rows = {
+        "measured: ": criterion.measured,
+        "expected: ": criterion.expected,
+        "hint: ": criterion.hint,
+        "see it yourself: ": criterion.reproduce,
+    }
+    return {
+        "name": line(f"{LOOK}: {name}" if criterion.status.is_open else name, limit),
+        "points": criterion.points,
+        "max_points": criterion.max_points,
+        "message": line(f"{criterion.status.value}: {criterion.message}", limit),
+        "output": "\n".join(f"{label}{line(text, limit)}" for label, text in rows.items() if text),
+    }
+
+
+def _unseen(criteria: list[CriterionResult]) -> dict[str, Any]:
+    """Return one row for all hidden criteria: PrairieLearn cannot reveal them later, and the score counts them."""
+    return {
+        "name": f"{len(criteria)} criteria that are not shown",
+        "points": round(sum(c.points for c in criteria), 6),
+        "max_points": sum(c.max_points for c in criteria),
+    }
