@@ -11,12 +11,13 @@ from grader.checks.registry import NoParams, check
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.processes import Life, lives
 from grader.checks.support.scripts import cmake_calls, path_in_package, paths_by_name
-from grader.checks.support.text import bare, listed, near_names, seconds, shown
+from grader.checks.support.text import bare, near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import CMakeCall, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, seconds
 
 CATKIN_MAKE = "catkin_make"
 NO_PROGRAM = {"IMPORTED", "ALIAS", "EXCLUDE_FROM_ALL"}
@@ -92,7 +93,7 @@ def build(package: PackageFacts, build: Run, params: BuildParams) -> Verdict:
         Clone your repository into a new workspace, run `catkin_make`, and fix the first error: the later
         ones often follow from it.
     """
-    scripts = f", and {listed(params.scripts)} there to run" if params.scripts else ""
+    scripts = f", and {join_words(params.scripts)} there to run" if params.scripts else ""
     verdict = judge_build(package, build)
     if verdict.status is Status.PASS:
         verdict = _lost_scripts(package, params.scripts) or verdict
@@ -151,12 +152,12 @@ def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | No
     if not lost:
         return None
     near = [there[n] for s in lost for n in near_names(PurePosixPath(s).name, there)]
-    seen = f"; there is {listed(dict.fromkeys(near))}" if near else ""
+    seen = f"; there is {join_words(dict.fromkeys(near))}" if near else ""
     return unjudged(
-        f"catkin_make succeeded, but there is no {listed(lost, 'or')} to run{seen}",
+        f"catkin_make succeeded, but there is no {join_words(lost, 'or')} to run{seen}",
         expected=EXPECTED,
-        measured=f"rosrun finds no {listed((PurePosixPath(s).name for s in lost), 'or')}",
-        hint=f"add {listed(lost)} to the package, then git add, commit and push",
+        measured=f"rosrun finds no {join_words((PurePosixPath(s).name for s in lost), 'or')}",
+        hint=f"add {join_words(lost)} to the package, then git add, commit and push",
     )
 
 
@@ -230,7 +231,7 @@ def build_and_run(package: PackageFacts, build: Run, run: Run) -> Verdict:
     if made and not programs:
         return _not_started(package, made).about(expected=expected)
     broken = list(_broken(package, run, programs))
-    measured = f"{verdict.measured}; programs: {listed(_name(p) for p in programs) or 'none'}"
+    measured = f"{verdict.measured}; programs: {join_words(_name(p) for p in programs) or 'none'}"
     if not broken:
         message = f"{verdict.message}{_how_they_went(programs)}"
         return passed(message, expected=expected, measured=measured)
@@ -259,10 +260,10 @@ def _not_started(package: PackageFacts, made: dict[str, CMakeCall]) -> Verdict:
     set_at = next(iter(cmake_calls(package, "catkin_package")), None)
     early = [c for c in made.values() if set_at and c.file == set_at.file and c.line < set_at.line]
     if not early:
-        message = f"catkin_make succeeded, but no program was started ({listed(made)})"
+        message = f"catkin_make succeeded, but no program was started ({join_words(made)})"
         return inconclusive(message, measured="built, not started", hint="grade again")
     message = (
-        f"catkin_make succeeded, but rosrun finds no {listed((c.args[0] for c in early), 'or')}: "
+        f"catkin_make succeeded, but rosrun finds no {join_words((c.args[0] for c in early), 'or')}: "
         "add_executable(…) stands above catkin_package(…)"
     )
     cited = tuple(FileCitation(file=c.file, line=c.line) for c in early)
@@ -303,7 +304,7 @@ def _how_they_went(programs: list[Life]) -> str:
     codes = {_name(p): p.end.exit_code for p in programs if p.ended_early and p.end is not None}
     why = "perhaps because it needs arguments"
     ended = [f"{name} ends with exit code {code}, {why}" for name, code in codes.items() if code]
-    return "; ".join([f", and {listed(_name(p) for p in programs)} can be started", *ended])
+    return "; ".join([f", and {join_words(_name(p) for p in programs)} can be started", *ended])
 
 
 def _name(one: Life) -> str:

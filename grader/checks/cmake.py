@@ -10,10 +10,11 @@ from pydantic import Field
 
 from grader.checks.registry import check
 from grader.checks.support.scripts import PYTHON, Installed, copies_of, installed, is_bin, names_script
-from grader.checks.support.text import listed, near_names, shown
+from grader.checks.support.text import near_names, shown
 from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words
 
 BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 
@@ -145,7 +146,7 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
         scripts: `catkin_install_python(PROGRAMS scripts/talker.py scripts/listener.py DESTINATION
         ${CATKIN_PACKAGE_BIN_DESTINATION})`. Then run `catkin_make`.
     """
-    names = listed(params.scripts)
+    names = join_words(params.scripts)
     expected = f"catkin_install_python(PROGRAMS … DESTINATION {BIN}) with {names}"
     facts = package.cmake
     if facts is None:
@@ -153,7 +154,7 @@ def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
         return unjudged(message, expected=expected, measured="no file", hint="first add CMakeLists.txt")
     all_named = list(installed(package))
     of_python = [one for one in all_named if one.call.name == PYTHON]
-    measured = f"named: {listed(dict.fromkeys(shown(one.path) for one in of_python)) or 'none'}"
+    measured = f"named: {join_words(dict.fromkeys(shown(one.path) for one in of_python)) or 'none'}"
     calls = tuple(FileCitation(file=o.call.file, line=o.call.line) for o in of_python)
     lacks = {s: lack for s in params.scripts if (lack := _lack(package, all_named, s))}
     if not lacks:
@@ -176,7 +177,7 @@ def _reasons(lacks: dict[str, Lack]) -> Iterator[str]:
     """Yield each reason once, with the scripts that it is true of."""
     for why in dict.fromkeys(lack.why for lack in lacks.values()):
         scripts = [name for name, lack in lacks.items() if lack.why == why]
-        yield why.replace("{}", listed(scripts))
+        yield why.replace("{}", join_words(scripts))
 
 
 def _fixes(lacks: dict[str, Lack]) -> Iterator[str]:

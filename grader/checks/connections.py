@@ -6,12 +6,13 @@ from collections.abc import Iterator
 
 from grader.checks.registry import check
 from grader.checks.support.nodes import GlobalName, is_called
-from grader.checks.support.text import listed, near_names
+from grader.checks.support.text import near_names
 from grader.checks.support.topics import End, cite, no_node, nodes_on, topics_with
 from grader.evidence.run import Run, is_grader_node
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, passed
+from grader.wording import join_words
 
 ENDS: tuple[End, End] = ("publishers", "subscribers")
 
@@ -56,7 +57,7 @@ def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdi
     over = {c.topic: None for _, e in run.graph for c in e.connections if run.is_student_node(c.publisher)}
     return verdict.about(
         expected=f"{ends[0]} connected to {ends[1]} over {params.topic}",
-        measured=verdict.measured or (f"connections over {listed(over)}" if over else "no connection"),
+        measured=verdict.measured or (f"connections over {join_words(over)}" if over else "no connection"),
         citations=(*verdict.citations, cite(run, "/grader/graph")),
     )
 
@@ -102,7 +103,7 @@ def _misnamed(run: Run, end: End, params: ConnectedParams) -> Verdict | None:
     if not wanted or not there or any(is_called(n, wanted) for n in there):
         return None
     near = near_names(f"/{wanted.lstrip('/')}", there)
-    seen = listed(near or run.student_nodes() or there)
+    seen = join_words(near or run.student_nodes() or there)
     hint = f"the node's name is what rospy.init_node(…) or the launch file gives it: {wanted.lstrip('/')}"
     return failed(f"there is no node /{wanted.lstrip('/')}; there is {seen}", hint=hint)
 
@@ -115,7 +116,7 @@ def _not_on_topic(run: Run, end: End, params: ConnectedParams) -> Verdict:
     message = f"{who} never {does} {params.topic}" if wanted else f"{who} {does} {params.topic}"
     kind = "Publisher" if end == "publishers" else "Subscriber"
     hint = f"rospy.{kind}('{params.topic}', …); look for a <remap> or a namespace"
-    return failed(f"{message}; it {does} {listed(near)}" if near and wanted else message, hint=hint)
+    return failed(f"{message}; it {does} {join_words(near)}" if near and wanted else message, hint=hint)
 
 
 def _on(run: Run, topic: str, end: End, params: ConnectedParams) -> tuple[str, ...]:

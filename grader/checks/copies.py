@@ -18,12 +18,13 @@ from grader.checks.support.console_output import (
 from grader.checks.support.exit_causes import ended_after, explain_end
 from grader.checks.support.nodes import are_noted, nodes_of
 from grader.checks.support.processes import NO_SCRIPT_HINT, Life, life, lives
-from grader.checks.support.text import VALUE, in_words, listed, plural
+from grader.checks.support.text import VALUE, in_words
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, partial, passed, unjudged
+from grader.wording import join_words, plural
 
 SAME_NAME = "new node registered with same name"
 FEW = 2
@@ -87,7 +88,7 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
     )
     names = dict.fromkeys((*trio.first_nodes, *trio.second_nodes))
     graph = cite(run, "/grader/graph")
-    measured = verdict.measured or f"names of the copies: {listed(names) or 'none'}"
+    measured = verdict.measured or f"names of the copies: {join_words(names) or 'none'}"
     citations = verdict.citations or (graph,)
     return verdict.about(expected=expected, measured=measured, citations=citations)
 
@@ -95,7 +96,7 @@ def copies(package: PackageFacts, run: Run, params: CopiesParams) -> Verdict:
 def _trio(package: PackageFacts, run: Run, params: CopiesParams) -> Trio | Verdict:
     first, second, listener = (life(run, name) for name in (params.first, params.second, params.listener))
     if first is None or second is None:
-        started = listed(one.name for one in lives(run)) or "nothing"
+        started = join_words(one.name for one in lives(run)) or "nothing"
         return _not_started(package, run, params).about(measured=f"started: {started}")
     if listener is None:
         message = f"{params.listener} was not started, so nobody can tell whose messages arrive"
@@ -182,7 +183,7 @@ def _heard(package: PackageFacts, run: Run, trio: Trio, params: CopiesParams) ->
     from_ns = both_from_ns(run, params.topic, *copies)
     if from_ns is None:
         silent = next(nodes for nodes in copies if not sent_by(run, params.topic, nodes))
-        message = f"both copies live, but {listed(silent)} sends no text on {params.topic}"
+        message = f"both copies live, but {join_words(silent)} sends no text on {params.topic}"
         return unjudged(message, hint=f"publish on {params.topic} in the loop, as a copy alone does")
     first, second = (sent_by(run, params.topic, nodes, from_ns) for nodes in copies)
     if first.total() + second.total() > LOOKED_AT:  # the listener lags behind a flood

@@ -20,12 +20,12 @@ from grader.checks.support.counters import (
     wrong_steps,
 )
 from grader.checks.support.exit_causes import explain_early_end
-from grader.checks.support.text import listed, number, plural, seconds
 from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, plural, seconds, significant
 
 CONNECT_NS = 1_000_000_000
 LARGEST = 2.0**64
@@ -87,7 +87,7 @@ def _start(first: Count, run: Run, params: StartParams) -> Verdict:
         return inconclusive(message, hint="grade again")
     hint = f"set the counter to {params.start} before the loop, and add one after publish(…), not before"
     return failed(
-        f"the first value on {params.topic} is {number(first.values[0])}, not {params.start}", hint=hint
+        f"the first value on {params.topic} is {significant(first.values[0])}, not {params.start}", hint=hint
     )
 
 
@@ -158,8 +158,8 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
     if count is None:
         return _nothing(package, run, params.topic).about(expected=expected)
     verdict, seen = judge_wraps(count, run, package, params)
-    turn = f"{number(seen.before)}→{number(seen.after)}" if seen else "no reset"
-    lowest, highest = number(min(count.values)), number(max(count.values))
+    turn = f"{significant(seen.before)}→{significant(seen.after)}" if seen else "no reset"
+    lowest, highest = significant(min(count.values)), significant(max(count.values))
     measured = f"{plural(len(count.values), 'value')}, {lowest} to {highest}, {turn}"
     at = (seen.from_ns, seen.to_ns) if seen else (count.times_ns[0], count.times_ns[-1])
     return verdict.about(expected=expected, measured=measured, citations=(cite(run, params.topic, *at),))
@@ -204,13 +204,13 @@ def _wrong(count: Count, found: Wrong, params: StepParams) -> Verdict | None:
         return inconclusive(message, hint="grade again while the machine has less to do")
     first, usual = found.own[0], count.usual_step()
     after = seconds(first.to_ns - count.times_ns[0])
-    comes = f"after {number(first.before)} comes {number(first.after)}"
+    comes = f"after {significant(first.before)} comes {significant(first.after)}"
     place = f"{comes} (value {first.number + 1}, {after} after the first)"
     if usual not in {None, 1}:
         message = _usual_fault(usual or 0.0)
     else:
         kinds: dict[float, str] = {0: "repeats a value", -1: "goes back"}
-        message = listed(dict.fromkeys(kinds.get(s.change, "skips values") for s in found.own))
+        message = join_words(dict.fromkeys(kinds.get(s.change, "skips values") for s in found.own))
     hint = "add one to the counter in one place only, once in each turn of the loop"
     return failed(f"the counter {message}: {place}", hint=hint)
 
@@ -223,7 +223,7 @@ def _flooded(skips: int, params: StepParams) -> Verdict:
 def _usual_fault(usual: float) -> str:
     if usual == 0:
         return "stays at one value"
-    return f"counts in steps of {number(usual)}" if usual > 0 else "counts down"
+    return f"counts in steps of {significant(usual)}" if usual > 0 else "counts down"
 
 
 def _too_few(steps: int, run: Run, package: PackageFacts, params: StepParams) -> Verdict | None:

@@ -18,11 +18,12 @@ from grader.checks.support.scripts import (
     names_script,
     paths_by_name,
 )
-from grader.checks.support.text import listed, near_names, shown
+from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed
+from grader.wording import join_words
 
 RIGHT_SHEBANG = "#!/usr/bin/env python3"
 # a script without its first line is run by the shell, which knows no `import`
@@ -107,10 +108,10 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     near += [p for n, p in names.items() if n == wanted.stem and p not in near]
     movable = [p for p in near if PurePosixPath(p).suffix not in C_SOURCES]
     scripts = [p for n, p in names.items() if n.endswith(".py")]
-    seen = f"; there is {listed(near)}" if near else ""
+    seen = f"; there is {join_words(near)}" if near else ""
     return failed(
         f"{path} is not in the package{seen}",
-        measured=f"scripts: {listed(sorted(scripts))}" if scripts else "no Python script in the package",
+        measured=f"scripts: {join_words(sorted(scripts))}" if scripts else "no Python script in the package",
         hint=f"git mv {movable[0]} {path}" if movable else add_hint(path),
         citations=tuple(FileCitation(file=p) for p in near[:3]),
     )

@@ -17,12 +17,13 @@ from grader.checks.support.console_output import (
 )
 from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.processes import lives, not_started
-from grader.checks.support.text import VALUE, in_words, listed, near_names, number, plural, shown
+from grader.checks.support.text import VALUE, in_words, near_names, shown
 from grader.checks.support.topics import cite, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, plural, significant
 
 HAND_IN = "add the script to the package, and push it"
 CALLBACK_HINT = (
@@ -129,14 +130,14 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
         message = f"the node ended before it subscribed to {topic}: {end.cause}"
         return end.verdict(unjudged, message, measured="ended")
     subscribed = topics_with(run, "subscribers")
-    measured = f"subscribed to {listed(subscribed)}" if subscribed else "no subscription"
+    measured = f"subscribed to {join_words(subscribed)}" if subscribed else "no subscription"
     verdict = _types_differ(run, topic)
     if verdict is None and topic in subscribed:
         message = f"the node subscribed to {topic}, but the grader sent nothing"
         verdict = inconclusive(message, hint="grade again")
     elif verdict is None:
         near = near_names(topic, subscribed)
-        other = f"; it subscribes to {listed(near or subscribed)}" if subscribed else ""
+        other = f"; it subscribes to {join_words(near or subscribed)}" if subscribed else ""
         hint = f"add rospy.Subscriber('{topic}', …, callback)"
         verdict = failed(f"the node never subscribes to {topic}{other}", hint=hint)
     return verdict.about(measured=measured, citations=(cite(run, "/grader/graph"),))
@@ -210,6 +211,6 @@ def _by_number(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequenc
         hint = "subscribe with a callback and rospy.spin(); wait_for_message(…) waits for one message only"
         return failed("only the first message is printed", hint=hint)
     value = missing[0].value
-    first = number(value) if isinstance(value, int) else repr(value)
+    first = significant(value) if isinstance(value, int) else repr(value)
     message = f"{len(missing)} of {plural(len(probes), 'message')} not printed, the first of them {first}"
     return failed(message, hint=CALLBACK_HINT)

@@ -23,12 +23,13 @@ from grader.checks.support.launch import (
     why_not_up,
 )
 from grader.checks.support.scripts import find_script
-from grader.checks.support.text import bare, listed, shown
+from grader.checks.support.text import bare, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Status, Verdict, failed, passed
+from grader.wording import join_words
 
 SHELL = "#!/bin/bash"
 
@@ -73,7 +74,7 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
     expected = f"a shell script in {params.launch} opens {params.urls[0]} in {params.program}, beside a node"
     file = read_launch(package, params.launch)
     pages = _pages(run)
-    measured = f"opened: {listed(_shown(p) for p in pages)}" if pages else "nothing was opened"
+    measured = f"opened: {join_words(_shown(p) for p in pages)}" if pages else "nothing was opened"
     if isinstance(file, Verdict):
         return file.about(expected=expected)
     verdict = (
@@ -83,7 +84,8 @@ def opens(package: PackageFacts, build: Run, run: Run, params: OpensParams) -> V
         or missing_node(package, file, params.script)
         or _beside(package, file, run, params)
         or passed(
-            f"{listed(n.type or '' for n in _shells(package, file))} opens {_url(pages, params)} in {params.program}"
+            f"{join_words(n.type or '' for n in _shells(package, file))} opens "
+            f"{_url(pages, params)} in {params.program}"
         )
     )
     citations = verdict.citations or (FileCitation(file=file.path, line=1), cite(run, "/grader/actor"))
@@ -134,7 +136,7 @@ def _no_shell(package: PackageFacts, file: LaunchFile, params: OpensParams) -> V
     if slips:
         return slips[0].verdict()
     lying = [f.path for f in package.files if f.path.endswith(".sh")]
-    seen = f"; there is {listed(lying)} in the package" if lying else ""
+    seen = f"; there is {join_words(lying)} in the package" if lying else ""
     name = PurePosixPath(lying[0]).name if lying else "<script>.sh"
     hint = f'add <node pkg="{package.name}" type="{name}" name="…" output="screen"/>'
     return failed(f"{file.path} has no <node> that is a shell script{seen}", hint=hint)
@@ -149,10 +151,12 @@ def _page(package: PackageFacts, file: LaunchFile, run: Run, params: OpensParams
     cited = tuple(cite(run, "/grader/actor", p.at_ns) for p in pages[:1])
     hint = f"write {params.program} {params.urls[0]} in the script"
     if not mine and _url(pages, params):
-        message = f"the page is opened in {listed(p.program for p in pages)}, not in {params.program}"
+        message = f"the page is opened in {join_words(p.program for p in pages)}, not in {params.program}"
         return failed(message, hint=hint, citations=cited)
     if mine:
-        message = f"{params.program} is asked to open {listed(map(_arguments, mine))}, not {params.urls[0]}"
+        message = (
+            f"{params.program} is asked to open {join_words(map(_arguments, mine))}, not {params.urls[0]}"
+        )
         return failed(message, hint=hint, citations=cited)
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))

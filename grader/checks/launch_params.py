@@ -32,12 +32,13 @@ from grader.checks.support.parameters import (
     without_system_params,
 )
 from grader.checks.support.scripts import add_hint, find_script
-from grader.checks.support.text import listed, number, shown
+from grader.checks.support.text import shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchLoad, LaunchNode, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
+from grader.wording import join_words, significant
 
 SUMMARY = re.compile(r"\s*\*\s+/")  # roslaunch's list of parameters
 OUTSIDE = 'write <rosparam file="$(find <package>)/{}"/> outside the <node>, without ns'
@@ -88,7 +89,7 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
     place = FileCitation(file=file.path, line=_line(file, params))
     return verdict.about(
         expected=expected,
-        measured=f"on the server: {listed(found) or 'nothing'}",
+        measured=f"on the server: {join_words(found) or 'nothing'}",
         citations=verdict.citations or (place, cite(run, "/grader/param")),
     )
 
@@ -220,7 +221,9 @@ def _of_node(run: Run, file: LaunchFile, node: str, wanted: Wanted) -> Verdict |
     if _is_there(before, places, wanted):
         return None
     if _is_there(params_on_server(run, by=lambda caller: caller != node), places, wanted):
-        message = f"{listed(wanted)} are set only after {node} has started, and it reads them as it starts"
+        message = (
+            f"{join_words(wanted)} are set only after {node} has started, and it reads them as it starts"
+        )
         verdict = failed(message, hint="set them with <param> inside the <node>: roslaunch does that first")
     else:
         verdict = _wrong_value(before, places, wanted) or _elsewhere(before, node, wanted)
@@ -241,7 +244,7 @@ def _wrong_value(before: Mapping[str, Any], places: tuple[str, str], wanted: Wan
     if missing:
         known = [place + name for name in wanted if place + name in before]
         verb = "is" if len(missing) == 1 else "are"
-        message = f"{listed(place + name for name in missing)} {verb} not set, only {listed(known)}"
+        message = f"{join_words(place + name for name in missing)} {verb} not set, only {join_words(known)}"
         hint = "write one <param> for each inside the <node>, the names letter by letter"
         return failed(message, hint=hint)
     name = next(name for name, value in wanted.items() if not _fits(before[place + name], value))
@@ -251,8 +254,8 @@ def _wrong_value(before: Mapping[str, Any], places: tuple[str, str], wanted: Wan
         return failed(message, hint=f'write <param name="{name}" type="int" value="{value}"/>')
     seen = ", ".join(_shown(before[place + n]) for n in wanted)
     right = ", ".join(map(_shown, wanted.values()))
-    message = f"{place}{name} is {_shown(found)}, not {_shown(value)}: {listed(wanted)} are {seen}"
-    return failed(message, hint=f"{listed(wanted)} have to be {right}")
+    message = f"{place}{name} is {_shown(found)}, not {_shown(value)}: {join_words(wanted)} are {seen}"
+    return failed(message, hint=f"{join_words(wanted)} have to be {right}")
 
 
 def _elsewhere(before: Mapping[str, Any], node: str, wanted: Wanted) -> Verdict:
@@ -264,8 +267,8 @@ def _elsewhere(before: Mapping[str, Any], node: str, wanted: Wanted) -> Verdict:
         message = f"{found} is on the parameter server, but {node} reads {node}/{found.rpartition('/')[2]}"
         return failed(message, hint=hint)
     near = [name for name in before if name.startswith(f"{node}/")]
-    seen = f"; under {node}/ there is {listed(near)}" if near else ""
-    message = f"{listed(wanted)} are not on the parameter server{seen}: {node} reads {node}/{first}"
+    seen = f"; under {node}/ there is {join_words(near)}" if near else ""
+    message = f"{join_words(wanted)} are not on the parameter server{seen}: {node} reads {node}/{first}"
     return failed(message, hint=hint)
 
 
@@ -277,7 +280,9 @@ def _fits(found: object, wanted: float | str) -> bool:
 
 
 def _shown(value: object) -> str:
-    return number(value) if isinstance(value, int | float) and not isinstance(value, bool) else f'"{value}"'
+    return (
+        significant(value) if isinstance(value, int | float) and not isinstance(value, bool) else f'"{value}"'
+    )
 
 
 def _lines(file: LaunchFile, wanted: Wanted) -> tuple[FileCitation, ...]:

@@ -27,12 +27,13 @@ from grader.checks.support.launch import (
     why_not_up,
 )
 from grader.checks.support.nodes import GlobalName
-from grader.checks.support.text import listed, near_names, plural
+from grader.checks.support.text import near_names
 from grader.checks.support.topics import cite, nodes_on, topics_with
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
+from grader.wording import join_words, plural
 
 
 class LaunchConnectsParams(Record):
@@ -85,7 +86,7 @@ def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParam
 
 def _listed_nodes(run: Run) -> str:
     nodes = run.student_nodes()
-    return f"{plural(len(nodes), 'node')}: {listed(nodes)}" if nodes else "no node came up"
+    return f"{plural(len(nodes), 'node')}: {join_words(nodes)}" if nodes else "no node came up"
 
 
 def connections(run: Run, topic: str) -> Iterator[tuple[str, str]]:
@@ -103,7 +104,9 @@ def _names_missing(nodes: tuple[str, ...], file: LaunchFile, params: LaunchConne
         return None
     cited = (FileCitation(file=file.path, line=1),)
     hint = "the `name` in the launch file is the node's name"
-    return failed(f"{listed(missing)} did not come up; there is {listed(nodes)}", hint=hint, citations=cited)
+    return failed(
+        f"{join_words(missing)} did not come up; there is {join_words(nodes)}", hint=hint, citations=cited
+    )
 
 
 def _unconnected(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchConnectsParams) -> Verdict:
@@ -130,16 +133,18 @@ def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
         if c.topic not in {topic, "/rosout"} and run.is_student_node(c.subscriber)
     }
     if others:
-        message = f"the nodes are connected over {listed(sorted(others))}, not over {topic}"
+        message = f"the nodes are connected over {join_words(sorted(others))}, not over {topic}"
         return failed(message + said, hint=f"both have to use {topic}; look for a <remap> or a namespace")
     publishers, subscribers = nodes_on(run, topic, "publishers"), nodes_on(run, topic, "subscribers")
     if publishers and subscribers:
-        message = f"{listed(publishers)} and {listed(subscribers)} are both on {topic}, but not connected"
+        message = (
+            f"{join_words(publishers)} and {join_words(subscribers)} are both on {topic}, but not connected"
+        )
         return failed(message + said, hint="do both use the same message type?")
     lacking = "publishes on" if not publishers else "subscribes to"
     seen = topics_with(run, "subscribers" if publishers else "publishers")
-    there = f"; one {lacking} {listed(seen)}" if seen else ""
-    message = f"{listed(run.student_nodes())} are not connected: none {lacking} {topic}{there}{said}"
+    there = f"; one {lacking} {join_words(seen)}" if seen else ""
+    message = f"{join_words(run.student_nodes())} are not connected: none {lacking} {topic}{there}{said}"
     hint = f"launch a talker and a listener that use {topic}; look for a <remap> or a namespace"
     return failed(message, hint=hint)
 
@@ -194,7 +199,7 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
         *params.programs,
     ]
     over = f", connected over {params.topic}" if params.topic else ""
-    expected = f"{params.launch} brings up {listed(what) or 'its nodes'} under the file's names{over}"
+    expected = f"{params.launch} brings up {join_words(what) or 'its nodes'} under the file's names{over}"
     file = read_launch(package, params.launch)
     if isinstance(file, Verdict):
         unjudged_too = {"unjudged": bool(params.scripts)}
@@ -221,7 +226,7 @@ def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRun
         if misplaced is not None:
             return misplaced
     over = f", connected over {params.topic}" if params.topic else ""
-    return passed(f"roslaunch brings up {listed(dict.fromkeys(names))}{over}")
+    return passed(f"roslaunch brings up {join_words(dict.fromkeys(names))}{over}")
 
 
 def _wanted(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchRunsParams) -> Iterator[Wanted]:
@@ -253,7 +258,7 @@ def _unnamed(package: PackageFacts, file: LaunchFile, params: LaunchRunsParams) 
         if not nodes_of_program(file, program):
             pkg, _, name = program.partition("/")
             hint = f'add <node pkg="{pkg}" type="{name}" name="…"/>'
-            seen = f"; it has {listed(f'{n.pkg}/{n.type}' for n in file.brings)}" if file.brings else ""
+            seen = f"; it has {join_words(f'{n.pkg}/{n.type}' for n in file.brings)}" if file.brings else ""
             return failed(f"{file.path} has no <node> for {program}{seen}", hint=hint)
     return None
 
@@ -267,7 +272,7 @@ def _wrong_name(file: LaunchFile, name: str, pkg: str) -> Verdict | None:
         return Slip(found[0].file, found[0].line, why, f'write pkg="{pkg}"').verdict()
     others = [n.full_name for n in file.brings]
     near = near_names(f"/{name.lstrip('/')}", others) or tuple(others)
-    seen = f"; it has {listed(near)}" if near else ""
+    seen = f"; it has {join_words(near)}" if near else ""
     hint = f'write <node pkg="{pkg}" name="{name.lstrip("/")}" …/>'
     return failed(f"{file.path} has no node /{name.lstrip('/')}{seen}", hint=hint)
 

@@ -16,10 +16,11 @@ from grader.checks.support.launch import (
     refusals,
 )
 from grader.checks.support.scripts import add_hint, find_script
-from grader.checks.support.text import listed, near_names, plural
+from grader.checks.support.text import near_names
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
+from grader.wording import join_words, plural
 
 
 class LaunchXmlParams(Record):
@@ -53,7 +54,7 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
         them between `<launch>` and `</launch>`. `roslaunch --nodes <package> <file>` lists what it finds.
     """
     wanted = [PurePosixPath(s).name for s in params.scripts] + list(params.programs)
-    nodes = f"a <node> with pkg, type and name for {listed(wanted)}"
+    nodes = f"a <node> with pkg, type and name for {join_words(wanted)}"
     expected = f"{params.launch}: <launch> at its root, and {nodes}"
     file = read_launch(package, params.launch)
     if isinstance(file, Verdict):
@@ -63,9 +64,9 @@ def launch_xml(package: PackageFacts, params: LaunchXmlParams) -> Verdict:
         (refused.verdict() if refused else None)
         or next(filter(None, (missing_node(package, file, script) for script in params.scripts)), None)
         or next(filter(None, (_program(file, program) for program in params.programs)), None)
-        or passed(f"{file.path} has a <node> for {listed(wanted)}", hint=_advice(package, file))
+        or passed(f"{file.path} has a <node> for {join_words(wanted)}", hint=_advice(package, file))
     )
-    seen = f"{plural(len(file.brings), 'node')}: {listed(map(_shown, file.brings))}"
+    seen = f"{plural(len(file.brings), 'node')}: {join_words(map(_shown, file.brings))}"
     citations = verdict.citations or (FileCitation(file=file.path, line=1),)
     measured = seen if file.brings else "no <node>"
     return verdict.about(expected=expected, measured=measured, citations=citations)

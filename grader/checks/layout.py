@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 from grader.checks.registry import check
 from grader.checks.support.scripts import find_script
-from grader.checks.support.text import listed, near_names, plural
+from grader.checks.support.text import near_names
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
+from grader.wording import join_words, plural
 
 OTHERS = {
     "launch": ("launcher", "launchers", "launchfile", "launchfiles", "launch_files"),
@@ -59,9 +60,9 @@ def layout(package: PackageFacts, params: LayoutParams) -> Verdict:
         `Launch` is not `launch`.
     """
     wanted = [*(f"{name}/" for name in params.folders), *params.files, *params.scripts]
-    expected = f"{listed(wanted)} under one package folder"
+    expected = f"{join_words(wanted)} under one package folder"
     top = sorted({PurePosixPath(f.path).parts[0] + "/" * ("/" in f.path) for f in package.files})
-    measured = f"in the package: {listed(top) or 'nothing'}"
+    measured = f"in the package: {join_words(top) or 'nothing'}"
     slips = list(_slips(package, params))
     if not slips:
         message = (

@@ -13,13 +13,14 @@ from grader.checks.support.console_output import CALLS, Level, Logged, console_l
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.nodes import nodes_of
 from grader.checks.support.processes import early_end, life, lives, not_started
-from grader.checks.support.text import listed, plural, shown
+from grader.checks.support.text import shown
 from grader.checks.support.topics import cite
 from grader.evidence.events import ConsoleLine
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, plural
 
 ALIKE = 0.7
 
@@ -63,7 +64,7 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
         or _near(run, lines, params)
         or _nothing(package, run, nodes, lines, params)
     )
-    seen = listed(f"{shown(t)!r}" for t in dict.fromkeys(one.text for one in lines[:3]))
+    seen = join_words(f"{shown(t)!r}" for t in dict.fromkeys(one.text for one in lines[:3]))
     more = ", …" if len(lines) > 3 else ""
     at_ns = right.at_ns if right else None
     return verdict.about(
@@ -155,10 +156,10 @@ def _nothing(
         hint = "call rospy.init_node(…) before logging"
         return unjudged("no node was registered that could log", hint=hint)
     if lines:
-        message = f"{listed(nodes)} logs {shown(lines[0].text)!r}, not {params.text!r}"
+        message = f"{join_words(nodes)} logs {shown(lines[0].text)!r}, not {params.text!r}"
         return failed(message, hint=_call(params))
     hint = f"{_call(params)} below rospy.init_node(…): above it, nothing is sent"
-    return failed(f"{listed(nodes)} logs nothing", hint=hint)
+    return failed(f"{join_words(nodes)} logs nothing", hint=hint)
 
 
 def _call(params: LogsParams) -> str:

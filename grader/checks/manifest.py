@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from grader.checks.registry import NoParams, check
-from grader.checks.support.text import listed, near_names, shown
+from grader.checks.support.text import near_names, shown
 from grader.model.package import Fault, Manifest, PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, passed, unjudged
+from grader.wording import join_words
 
 RUNTIME_KINDS = ("depend", "exec_depend", "run_depend")
 BUILD_TOOL_KINDS = ("buildtool_depend", "build_depend", "depend")
@@ -48,7 +49,7 @@ def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
         handout, `<buildtool_depend>catkin</buildtool_depend>` names the build tool, and one `<exec_depend>`
         line (`<run_depend>` in format 1) each package that a node imports.
     """
-    needs = f", {listed(params.dependencies)} at run time" if params.dependencies else ""
+    needs = f", {join_words(params.dependencies)} at run time" if params.dependencies else ""
     verdict = _judged(package, params)
     return verdict.about(expected=f"package.xml, readable, name {params.name}, build tool catkin{needs}")
 
@@ -70,7 +71,7 @@ def _judged(package: PackageFacts, params: ManifestParams) -> Verdict:
         return failed(message, measured=measured, hint=hint, citations=place)
     if lacking := _lacking(found, params.dependencies):
         return lacking
-    declares = f", declares {listed(params.dependencies)}" if params.dependencies else ""
+    declares = f", declares {join_words(params.dependencies)}" if params.dependencies else ""
     message = f"{found.file} names {found.name}, built with catkin{declares}"
     measured, hint = f"name {found.name}, format {found.format}", "; ".join(package.general_hints())
     return passed(message, measured=measured, hint=hint, citations=place)
@@ -95,11 +96,11 @@ def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
         Add one `<exec_depend>` line for each package named (`<run_depend>` in a manifest of format 1).
     """
     found = package.manifest
-    expected = f"{listed(params.names)} at run time"
+    expected = f"{join_words(params.names)} at run time"
     if found is None:
         message = "package.xml cannot be read, so its dependencies are not known"
         return unjudged(message, expected=expected, hint="first fix package.xml")
-    declared = passed(f"{found.file} declares {listed(params.names)}", measured=_declared(found))
+    declared = passed(f"{found.file} declares {join_words(params.names)}", measured=_declared(found))
     return (_lacking(found, params.names) or declared).about(expected=expected)
 
 
@@ -127,7 +128,7 @@ def maintainer(package: PackageFacts) -> Verdict:
         message = "package.xml cannot be read, so its maintainer is not known"
         return unjudged(message, expected=expected, measured="not known", hint="first fix package.xml")
     people = found.maintainers
-    measured = listed(shown(p.email) for p in people) or "no maintainer"
+    measured = join_words(shown(p.email) for p in people) or "no maintainer"
     left = [p for p in people if p.email.strip().casefold().endswith(LEFT_AS_MADE)]
     cited = tuple(FileCitation(file=found.file, line=p.line) for p in left or people)
     cited = cited or (FileCitation(file=found.file, line=found.name_line),)
@@ -144,7 +145,7 @@ def maintainer(package: PackageFacts) -> Verdict:
 
 def _declared(found: Manifest) -> str:
     names = dict.fromkeys(d.name for d in found.dependencies if d.kind in RUNTIME_KINDS)
-    return f"at run time: {listed(names) or 'none'}"
+    return f"at run time: {join_words(names) or 'none'}"
 
 
 def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
@@ -155,12 +156,12 @@ def _lacking(found: Manifest, names: tuple[str, ...]) -> Verdict | None:
         return None
     tag = "run_depend" if found.format == 1 else "exec_depend"
     at_build = [d for d in found.dependencies if d.name in missing]
-    only = f"; {listed(dict.fromkeys(d.name for d in at_build))} only for building" if at_build else ""
+    only = f"; {join_words(dict.fromkeys(d.name for d in at_build))} only for building" if at_build else ""
     near = [n for name in missing for n in near_names(name, declared) if n not in names]
-    slip = f"; it declares {listed(near)}" if near else ""
+    slip = f"; it declares {join_words(near)}" if near else ""
     lines = tuple(FileCitation(file=found.file, line=d.line) for d in at_build)
     return failed(
-        f"{found.file} does not declare {listed(missing)} for run time{only or slip}",
+        f"{found.file} does not declare {join_words(missing)} for run time{only or slip}",
         measured=_declared(found),
         hint="add " + " ".join(f"<{tag}>{n}</{tag}>" for n in missing),
         citations=lines or (FileCitation(file=found.file, line=found.name_line),),

@@ -13,21 +13,13 @@ from grader.checks.support.clocks import GET_TIME, WATCHED_S, clocks_at, wrong_g
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.nodes import GlobalName, plain_type
 from grader.checks.support.processes import early_end, is_flood, observed_until_ns
-from grader.checks.support.text import (
-    NUMBER,
-    SECONDS,
-    in_one_line,
-    in_words,
-    message_pattern,
-    number,
-    plural,
-    seconds,
-)
+from grader.checks.support.text import NUMBER, SECONDS, in_one_line, in_words, message_pattern
 from grader.checks.support.topics import FieldPath, NoField, cite, losses, no_message, values_at
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import plural, seconds, significant
 
 ENOUGH = 3
 UNFILLED = ("%s", "%d", "%f", "{}", "{0}")
@@ -187,11 +179,11 @@ class FieldBoundsParams(Record):
     @property
     def words(self) -> str:
         if self.min is None:
-            return f"at most {number(self.max or 0)}"
+            return f"at most {significant(self.max or 0)}"
         return (
-            f"at least {number(self.min)}"
+            f"at least {significant(self.min)}"
             if self.max is None
-            else f"{number(self.min)} to {number(self.max)}"
+            else f"{significant(self.min)} to {significant(self.max)}"
         )
 
     def holds(self, value: float) -> bool:
@@ -290,7 +282,7 @@ def _outside(outside: Sequence[Reading], readings: Sequence[Reading], params: Fi
     first = outside[0]
     after = seconds(first.time_ns - readings[0].time_ns)
     wrong = [value for value in first.values if not params.holds(value)]
-    seen = f"is {number(wrong[0])}" if wrong else f"is not there ({first.fault})"
+    seen = f"is {significant(wrong[0])}" if wrong else f"is not there ({first.fault})"
     count = f"in {len(outside)} of {plural(len(readings), 'message')}"
     message = (
         f"{params.field} of {params.topic} is not {params.words} {count}: it {seen}, {after} after the first"
@@ -310,5 +302,5 @@ def _range(readings: Sequence[Reading]) -> str:
         return "no value"
     nan = sum(value != value for value in values)  # noqa: PLR0124 - NaN is not itself
     real = [value for value in values if value == value]  # noqa: PLR0124 - as above
-    span = f"{number(min(real))} to {number(max(real))}" if real else "no number"
+    span = f"{significant(min(real))} to {significant(max(real))}" if real else "no number"
     return f"{span}, and {plural(nan, 'NaN')}" if nan else span

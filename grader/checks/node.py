@@ -24,12 +24,12 @@ from grader.checks.support.nodes import (
     wrong_name,
 )
 from grader.checks.support.processes import Life, fell_silent, is_flood, life, lives, not_started, was_talking
-from grader.checks.support.text import listed, plural, seconds
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, plural, seconds
 
 LOOP = "loop with `while not rospy.is_shutdown():` and catch rospy.ROSInterruptException as talker.py does"
 
@@ -85,7 +85,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
         return not_started(params.process).about(expected=expected)
     nodes = nodes_of(run, one.name)
     up_ns = _up_ns(one, run, nodes)
-    message = f"{_script(one)} is the node {listed(nodes)}, stayed alive and ended on Ctrl-C"
+    message = f"{_script(one)} is the node {join_words(nodes)}, stayed alive and ended on Ctrl-C"
     verdict = (
         _early_end(one, run, package)
         or _registration(one, run, nodes)
@@ -94,7 +94,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
         or _bad_end(one, run, package)
         or passed(message)
     )
-    measured = f"{plural(len(nodes), 'node')} ({listed(nodes) or 'none'}), alive for {seconds(up_ns)}"
+    measured = f"{plural(len(nodes), 'node')} ({join_words(nodes) or 'none'}), alive for {seconds(up_ns)}"
     citations = verdict.citations or (cite(run, "/grader/process", one.start_ns, one.end_ns),)
     return verdict.about(expected=expected, measured=measured, citations=citations)
 
@@ -123,7 +123,7 @@ def node_name(package: PackageFacts, run: Run, params: NodeNameParams) -> Verdic
     if not nodes:
         return _nameless(package, run, params).about(expected=expected)
     cited = (cite(run, "/grader/graph"),)
-    measured = listed(nodes)
+    measured = join_words(nodes)
     wrong = _misnamed(nodes, params)
     verdict = wrong or passed(f"the node is {_fitting(nodes, params)[0]}")
     return verdict.about(expected=expected, measured=measured, citations=cited)
@@ -172,7 +172,7 @@ def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None
         return failed(f"{_script(one)} runs, but never registers as a node", hint=hint)
     if len(nodes) > (1 if are_noted(run) else max(1, len(lives(run)))):
         hint = "one script is one node: call rospy.init_node(…) once, start no other process"
-        return failed(f"{_script(one)} registers as {len(nodes)} nodes: {listed(nodes)}", hint=hint)
+        return failed(f"{_script(one)} registers as {len(nodes)} nodes: {join_words(nodes)}", hint=hint)
     return None
 
 

@@ -22,13 +22,14 @@ from grader.checks.support.parameters import (
 )
 from grader.checks.support.processes import Life, first_interrupt_ns, life, lives, not_started
 from grader.checks.support.scripts import add_hint, find_script, paths_by_name
-from grader.checks.support.text import listed, near_names, plural, shown
+from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite, no_node
 from grader.checks.support.values import differences, value_text
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Citation, FileCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, plural
 
 EXACT = 1e-9
 MISSING = object()
@@ -62,7 +63,7 @@ def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -
         `rosparam load <file>`, then `rosparam list` shows the names.
     """
     wanted = [absolute_name(name) for name in params.names]
-    expected = f"rosparam load {params.file} sets {listed(wanted)}"
+    expected = f"rosparam load {params.file} sets {join_words(wanted)}"
     source = find_script(package, params.file)
     found = without_system_params(params_on_server(run))
     one = life(run, params.process)
@@ -76,9 +77,9 @@ def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -
         verdict = (
             _error(run, one, source.path)
             or (_missing(found, missing, source.path) if missing else None)
-            or passed(f"{source.path} loads and sets {listed(wanted)}", hint=moved)
+            or passed(f"{source.path} loads and sets {join_words(wanted)}", hint=moved)
         )
-    measured = f"on the server: {listed(found)}" if found else "nothing on the server"
+    measured = f"on the server: {join_words(found)}" if found else "nothing on the server"
     cited: tuple[Citation, ...] = (cite(run, "/grader/param"),)
     place = (FileCitation(file=source.path),) if source and not verdict.citations else ()
     return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, *place, *cited))
@@ -89,7 +90,7 @@ def _no_file(package: PackageFacts, path: str) -> Verdict:
     names = paths_by_name(package)
     yaml = [p for n, p in names.items() if n.endswith((".yaml", ".yml"))]
     near = [names[n] for n in near_names(name, names)] or yaml
-    seen = f"; there is {listed(near)}" if near else ""
+    seen = f"; there is {join_words(near)}" if near else ""
     hint = f"git mv {near[0]} {path}" if near else add_hint(path)
     return failed(f"{path} is not in the package{seen}", hint=hint)
 
@@ -172,11 +173,11 @@ def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadP
     known = params_given(run)
     lines = printed_lines(run)
     missing = [n for n in params.names if n not in known or not is_printed(known[n].value, lines)]
-    expected = f"the values of {listed(params.names)} on the server are printed"
+    expected = f"the values of {join_words(params.names)} on the server are printed"
     verdict = (
         _not_printed(package, build, run, params, missing)
         if missing
-        else passed(f"prints the values of {listed(params.names)} that are on the server")
+        else passed(f"prints the values of {join_words(params.names)} that are on the server")
     )
     cited = cite(run, "/grader/console")
     measured = f"{len(params.names) - len(missing)} of {plural(len(params.names), 'value')} printed"
@@ -187,7 +188,7 @@ def _not_printed(
     package: PackageFacts, build: Run, run: Run, params: ParamsReadParams, missing: Sequence[str]
 ) -> Verdict:
     known = params_given(run)
-    names = listed(missing)
+    names = join_words(missing)
     if not lives(run):
         return not_started("the node")
     if end := explain_failure(package, run):
@@ -195,7 +196,9 @@ def _not_printed(
     strange = [n for n in missing if n not in known or not known[n].in_file]
     if strange:
         file = params.file or "the student's file"
-        message = f"{names} {_are(missing)} not printed, and {listed(strange)} {_are(strange)} not in {file}"
+        message = (
+            f"{names} {_are(missing)} not printed, and {join_words(strange)} {_are(strange)} not in {file}"
+        )
         return unjudged(message, hint=f"fix the names in {file} first")
     lines = printed_lines(run)
     copied = (n for n in missing if any(is_printed(v, lines) for v in _in_file(build, params.file, n)))
@@ -254,7 +257,7 @@ def params_set(package: PackageFacts, run: Run, params: ParamsSetParams) -> Verd
     until_ns = _until_ns(run)
     after = params_on_server(run, until_ns=until_ns)
     got = after.get(params.name)
-    others = f", {listed(params.unchanged)} as before" if params.unchanged else ""
+    others = f", {join_words(params.unchanged)} as before" if params.unchanged else ""
     expected = f"{params.name} is {params.value}{others}" + (", and it is logged" if params.logged else "")
     verdict = (
         (None if _is_value(got, params.value) else _not_set(package, run, after, params, until_ns))
@@ -294,7 +297,7 @@ def _not_set(
         message = f"{params.name} is set to {params.value} only after Ctrl-C: the node waits too long"
         return failed(message, hint="set it as soon as the values are read, without a long sleep before it")
     others = dict.fromkeys(absolute_name(e.name) for e in mine)
-    instead = f"; the node sets {listed(others)}" if others else ""
+    instead = f"; the node sets {join_words(others)}" if others else ""
     return failed(f"{params.name} is never set to {params.value}{instead}", hint=hint)
 
 
@@ -391,14 +394,14 @@ def _judged(got: object, params: ParamValueParams) -> Verdict:
     if not wrong:
         return passed(f"{params.name} is {shown(value_text(got))}")
     hint = "write numbers without quotes, and text in quotes" if "(text, not" in wrong[0] else ""
-    message = shown(f"{params.name} is {listed(wrong)}")
+    message = shown(f"{params.name} is {join_words(wrong)}")
     return failed(message, hint=hint or f"rosparam get {params.name} shows it; set it to the lab's value")
 
 
 def _not_there(package: PackageFacts, run: Run, names: Iterable[str], params: ParamValueParams) -> Verdict:
     near = near_names(params.name, names)
     if near:
-        message = f"there is no parameter {params.name}; there is {listed(near)}"
+        message = f"there is no parameter {params.name}; there is {join_words(near)}"
         hint = "with ~, or within <node>, a parameter's name is below the node's own; without, it is not"
         return failed(message, hint=hint)
     if absent := no_node(package, run, f"there is no parameter {params.name}"):

@@ -24,12 +24,12 @@ from grader.checks.support.geometry import (
 )
 from grader.checks.support.lateness import Lateness, excused
 from grader.checks.support.nodes import GlobalName
-from grader.checks.support.text import listed, number
 from grader.checks.support.topics import cite, no_message
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, significant
 
 LATE_MS = 25.0
 LATE_P95_MS = 5.0
@@ -104,7 +104,7 @@ def path(package: PackageFacts, run: Run, params: PathParams) -> Verdict:
         verdict = _judged(found, run, params)
     span = cite(run, params.topic)
     return verdict.about(
-        expected=f"a way through {listed(map(spot, params.points))}, within {metres(params.tolerance_m)}",
+        expected=f"a way through {join_words(map(spot, params.points))}, within {metres(params.tolerance_m)}",
         measured=verdict.measured or "no path",
         citations=(*verdict.citations, span),
     )
@@ -122,7 +122,7 @@ def _judged(found: Track, run: Run, params: PathParams) -> Verdict:
     figures = measured(taken, course, params.way)
     if course.done:
         count = f"{len(params.points)} points" if len(params.points) > 1 else "its point"
-        return passed(f"the path passes {count} within {number(params.tolerance_m)} m", measured=figures)
+        return passed(f"the path passes {count} within {significant(params.tolerance_m)} m", measured=figures)
     if stands(taken):
         hint = "publish a velocity that is not 0, again and again while it has to drive"
         return unjudged("it never moves", measured=figures, hint=hint)
@@ -162,7 +162,7 @@ class Way(NamedTuple):
 
 
 def spot(point: Point) -> str:
-    return f"({number(round(point[0], 2))}, {number(round(point[1], 2))})"
+    return f"({significant(round(point[0], 2))}, {significant(round(point[1], 2))})"
 
 
 def metres(distance_m: float) -> str:
@@ -211,7 +211,7 @@ def _wrong_start(path: Sequence[Pose], way: Way, course: Course) -> Words | None
 def _strays(path: Sequence[Pose], way: Way, course: Course) -> Words:
     peak, far_m = _peak(path, way, course)
     where = f"at {spot(peak.point)}, {_after(path, peak)}"
-    allowed = f"{number(way.tolerance_m)} m are allowed"
+    allowed = f"{significant(way.tolerance_m)} m are allowed"
     if course.reached == len(way.points):
         apart = metres(math.dist(peak.point, way.points[-1]))
         message = f"it passes every point, and goes on: it is {apart} from the last {where}"
@@ -241,7 +241,7 @@ def _too_far(path: Sequence[Pose], way: Way, course: Course) -> Words | None:
         return None
     message = f"it drives {metres(beyond_m)} past {way.name(corner)}, {_after(path, path[first])}"
     return Words(
-        message, f"turn sooner: {number(way.tolerance_m)} m are allowed; distance is speed times time"
+        message, f"turn sooner: {significant(way.tolerance_m)} m are allowed; distance is speed times time"
     )
 
 

@@ -13,13 +13,13 @@ from grader.checks.registry import check
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.lateness import Lateness, excused, lateness
 from grader.checks.support.processes import observed_until_ns
-from grader.checks.support.text import hertz, number, plural, seconds
 from grader.checks.support.topics import cite, no_message, whole_until_ns
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import hertz, plural, seconds, significant
 
 FLOOD_FACTOR = 5
 LATE_P95_SHARE = 0.2
@@ -142,7 +142,7 @@ def _flood(found: Rhythm, package: PackageFacts, params: RateParams) -> Verdict 
     where = f" ({slips[0].file}, line {slips[0].line}: {slips[0].message})" if slips else ""
     return failed(
         f"{params.topic} is flooded with {hertz(found.mean_hz)}: the loop does not sleep{where}",
-        hint=f"call rate.sleep(), with brackets, in each turn; rate = rospy.Rate({number(params.rate_hz)})",
+        hint=f"call rate.sleep(), with brackets, in each turn; rate = rospy.Rate({significant(params.rate_hz)})",
         citations=tuple(FileCitation(file=s.file, line=s.line) for s in slips[:3]),
     )
 
@@ -192,7 +192,7 @@ def _bursts(found: Rhythm, outside: list[int], even: bool, params: RateParams) -
 
 
 def _wrong_mean(found: Rhythm, params: RateParams) -> Verdict:
-    direction, nominal = "slow" if found.mean_hz < params.rate_hz else "fast", number(params.rate_hz)
+    direction, nominal = "slow" if found.mean_hz < params.rate_hz else "fast", significant(params.rate_hz)
     message = f"{params.topic} is too {direction}: {hertz(found.mean_hz)} instead of {nominal} Hz"
     return failed(message, hint=_rate_hint(found.mean_hz / params.rate_hz, nominal))
 

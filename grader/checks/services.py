@@ -12,13 +12,14 @@ from grader.checks.registry import check
 from grader.checks.support.exit_causes import HEADING, Traceback, explain_end, explain_traceback, tracebacks
 from grader.checks.support.nodes import GlobalName, TypeName, plain_type
 from grader.checks.support.processes import life_of
-from grader.checks.support.text import listed, near_names, plural, shown
+from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite, no_node
 from grader.checks.support.values import differences, fields_text
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, plural
 
 LOGGERS = ("/get_loggers", "/set_logger_level")
 
@@ -103,7 +104,7 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
     )
     shown = wrong[0] if wrong else next(reversed(made), None)
     return verdict.about(
-        expected=listed(f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1)),
+        expected=join_words(f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1)),
         measured=verdict.measured or _measured(shown),
         citations=(*verdict.citations, _citation(shown, run)),
     )
@@ -138,7 +139,9 @@ def _fault(
     found = list(differences(one.response, wanted, params.tolerance))
     if not found:
         return None
-    message = f"{params.service}, called with {fields_text(one.request)}, answers {listed(map(str, found))}"
+    message = (
+        f"{params.service}, called with {fields_text(one.request)}, answers {join_words(map(str, found))}"
+    )
     return failed(message, hint=f"try it by hand: rosservice call {params.service} …")
 
 
@@ -207,7 +210,10 @@ def offers(run: Run) -> dict[str, Offer]:
 
 def described(found: Mapping[str, Offer]) -> str:
     """Return all services in one line."""
-    return listed(f"{name} ({offer.type or 'type unknown'})" for name, offer in found.items()) or "no service"
+    return (
+        join_words(f"{name} ({offer.type or 'type unknown'})" for name, offer in found.items())
+        or "no service"
+    )
 
 
 def exchanges(run: Run, service: str) -> tuple[Exchange, ...]:
@@ -232,11 +238,11 @@ def not_offered(package: PackageFacts, run: Run, service: str) -> Verdict:
         message = f"{service} is offered by {owner}, which is not a node of the package"
         return failed(message, hint=f"offer it with rospy.Service('{service}', …) in a node of your own")
     if near:
-        message = f"there is no service {service}; {found[near[0]].node} offers {listed(near)}"
+        message = f"there is no service {service}; {found[near[0]].node} offers {join_words(near)}"
         return failed(message, hint=_rename_hint(service, near[0], found[near[0]].node))
     if absent := no_node(package, run, f"there is no service {service}"):
         return absent
-    others = f"; it offers {listed(found)}" if found else ""
+    others = f"; it offers {join_words(found)}" if found else ""
     hint = f"add rospy.Service('{service}', …, callback) before the loop or rospy.spin()"
     return failed(f"no node offers {service}{others}", hint=hint)
 

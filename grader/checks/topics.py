@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from grader.checks.registry import check
 from grader.checks.support.nodes import GlobalName, plain_type
-from grader.checks.support.text import listed, near_names, plural
+from grader.checks.support.text import near_names
 from grader.checks.support.topics import cite, no_message, no_node, nodes_on, published_topics
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Citation, Verdict, failed, inconclusive, passed
+from grader.wording import join_words, plural
 
 
 class TopicTypeParams(Record):
@@ -48,16 +49,20 @@ def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verd
         verdict = no_message(package, run, params.topic, of_node=failed)
     else:
         count = plural(sum(len(c.messages) for c in heard), "message")
-        publishers = listed(dict.fromkeys(c.publisher for c in heard))
+        publishers = join_words(dict.fromkeys(c.publisher for c in heard))
         verdict = passed(f"{publishers} publishes {params.type} on {params.topic} ({count})")
-    measured = listed(f"{plain_type(c.type)} by {c.publisher}" for c in channels) or _listed_topics(run)
+    measured = join_words(f"{plain_type(c.type)} by {c.publisher}" for c in channels) or _listed_topics(run)
     expected = f"{params.type} on {params.topic}"
     return verdict.about(expected=expected, measured=measured, citations=_cited(run, channels))
 
 
 def _listed_topics(run: Run) -> str:
     topics = published_topics(run).items()
-    return f"topics: {listed(f'{t} ({kind})' if kind else t for t, kind in topics)}" if topics else "no topic"
+    return (
+        f"topics: {join_words(f'{t} ({kind})' if kind else t for t, kind in topics)}"
+        if topics
+        else "no topic"
+    )
 
 
 def _wrong_type(channel: Channel, params: TopicTypeParams) -> Verdict:
@@ -112,8 +117,8 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
         missing = None if published else no_node(package, run, "no topic was published")
         verdict = missing or passed("no topic beside those of the lab is published")
     return verdict.about(
-        expected=f"no topic beside {listed(params.topics)}" if params.topics else "no topic at all",
-        measured=verdict.measured or listed(published) or "no topic",
+        expected=f"no topic beside {join_words(params.topics)}" if params.topics else "no topic at all",
+        measured=verdict.measured or join_words(published) or "no topic",
         citations=(*verdict.citations, cite(run, "/grader/graph")),
     )
 
@@ -124,7 +129,7 @@ def _unexpected(
     first = unexpected[0]
     missing = [t for t in params.topics if t not in published and not t.endswith("*")]
     meant = near_names(first, missing)
-    named = listed(f"{t} ({published[t]})" if published[t] else t for t in unexpected)
+    named = join_words(f"{t} ({published[t]})" if published[t] else t for t in unexpected)
     message = f"{_publisher(run, first)} publishes on {named}, which the lab does not ask for"
     hint = f"did you mean {meant[0]}?" if meant else f"remove the rospy.Publisher('{first}', …)"
     return failed(message, hint=hint)
@@ -168,10 +173,10 @@ def latched(package: PackageFacts, run: Run, params: LatchedParams) -> Verdict:
         verdict = inconclusive(message, hint="let the grader run the package itself")
     elif plain:
         hint = f"rospy.Publisher('{params.topic}', …, latch=True, queue_size=1)"
-        verdict = failed(f"{listed(plain)} publishes on {params.topic} without latching", hint=hint)
+        verdict = failed(f"{join_words(plain)} publishes on {params.topic} without latching", hint=hint)
     else:
-        verdict = passed(f"{listed(c.callerid for c in channels)} latches {params.topic}")
-    kinds = listed(f"{'latched' if c.latching else 'not latched'} by {c.callerid}" for c in channels)
+        verdict = passed(f"{join_words(c.callerid for c in channels)} latches {params.topic}")
+    kinds = join_words(f"{'latched' if c.latching else 'not latched'} by {c.callerid}" for c in channels)
     topic = params.topic if channels else "/grader/graph"
     return verdict.about(
         expected=f"a latched publisher on {params.topic}",

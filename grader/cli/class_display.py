@@ -20,8 +20,8 @@ from grader.classes.batch.progress import BatchProgress, list_attention
 from grader.classes.batch.regrade import CHANGES, Change, Regraded
 from grader.classes.batch.run import GRADEBOOK, INDEX, RESULTS, Watcher
 from grader.cli.output import say, say_json
-from grader.report.text import number
 from grader.untrusted_text import line
+from grader.wording import first_few, number
 
 REFRESH_HZ = 4
 NAME_CHARS = 40
@@ -189,10 +189,9 @@ def _regraded_lines(batch: BatchFolder, regraded: Sequence[Regraded]) -> Iterato
             yield f"{one.entry.id}: unchanged: {one.error}"
     missing = [one for one in regraded if one.missing]
     if missing:
-        names = ", ".join(one.entry.id for one in missing[:NAMES_SHOWN])
-        more = f" and {len(missing) - NAMES_SHOWN} more" if len(missing) > NAMES_SHOWN else ""
+        names = first_few([one.entry.id for one in missing], NAMES_SHOWN)
         scenarios = ", ".join(dict.fromkeys(name for one in missing for name in one.missing))
-        yield f"{len(missing)} must run again, since there is no recording of {scenarios}: {names}{more}"
+        yield f"{len(missing)} must run again, since there is no recording of {scenarios}: {names}"
         yield "  hint: --run-missing runs them"
     changed = sum(bool(one.changes) for one in regraded)
     judged = sum(one.after is not None for one in regraded)

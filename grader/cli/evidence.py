@@ -24,8 +24,9 @@ from grader.judging import judge
 from grader.judging.summary import criteria_text, judged_text
 from grader.model.result import CriterionResult
 from grader.report.terminal import emit, open_console
-from grader.report.text import line, number
+from grader.report.text import line
 from grader.rubric.load import LoadedRubric
+from grader.wording import number
 
 WORST_FIRST = (ExitCode.NOT_GRADED, ExitCode.BELOW_PASS_MARK, ExitCode.INCONCLUSIVE)
 CHANNELS_MAX = 500

@@ -18,10 +18,11 @@ from grader.cli.output import say
 from grader.errors import UsageError
 from grader.files import check_writable
 from grader.report.terminal import emit, open_console
-from grader.report.text import number, visible
+from grader.report.text import visible
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.model import NAME_PATTERN, Rubric
 from grader.suggest import did_you_mean
+from grader.wording import number
 
 
 def print_labs(rubrics: Sequence[Rubric], stream: IO[str]) -> None:

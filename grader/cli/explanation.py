@@ -12,12 +12,13 @@ from rich.text import Text
 from grader.checks import HEADINGS, Check
 from grader.errors import UsageError
 from grader.report.terminal import emit, open_console
-from grader.report.text import number, visible
+from grader.report.text import visible
 from grader.rubric.find import rubric_ids
 from grader.rubric.instructor import known_checks
 from grader.rubric.load import LoadedRubric, all_rubrics, load_rubric
 from grader.rubric.model import Criterion
 from grader.suggest import did_you_mean
+from grader.wording import number
 
 Line = tuple[str, int]
 """A paragraph and how far it is indented."""

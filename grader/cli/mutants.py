@@ -29,8 +29,9 @@ from grader.files import atomic_write, check_writable
 from grader.model.mutants import LostCriterion, MutantResult, RubricTest
 from grader.model.submission import SandboxMode
 from grader.report.terminal import emit, open_console
-from grader.report.text import line, number, visible
+from grader.report.text import line, visible
 from grader.rubric.load import LoadedRubric, load_rubric
+from grader.wording import number
 
 MARKS = {
     "killed": ("✓", "green"),

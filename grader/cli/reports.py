@@ -27,6 +27,7 @@ from grader.report.view import without_hidden
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.model import Rubric
+from grader.wording import first_few
 
 STDOUT = "-"
 NAMES_SHOWN = 5
@@ -77,9 +78,8 @@ def write_reports(folders: Sequence[Path], rubric: LoadedRubric) -> ExitCode:
 
 def _say_others(names: Sequence[str], rubric: LoadedRubric) -> None:
     if names:
-        more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
-        shown = ", ".join(names[:NAMES_SHOWN])
-        _remark(f"{shown}{more}: judged by another version of {rubric.path}")
+        shown = first_few(names, NAMES_SHOWN)
+        _remark(f"{shown}: judged by another version of {rubric.path}")
 
 
 def _remark(text: str) -> None:

@@ -18,6 +18,7 @@ from grader.errors import UsageError
 from grader.model.similarity import NotCompared, Pair, Similarity
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
+from grader.wording import first_few
 
 NAME_CHARS = 22
 PATH_CHARS = 40
@@ -119,5 +120,4 @@ def _not_compared(one: NotCompared) -> str:
 
 
 def _ids(group: tuple[str, ...]) -> str:
-    more = f" and {len(group) - IDS_SHOWN} more" if len(group) > IDS_SHOWN else ""
-    return ", ".join(line(name, NAME_CHARS) for name in group[:IDS_SHOWN]) + more
+    return first_few([line(name, NAME_CHARS) for name in group], IDS_SHOWN)

@@ -6,6 +6,8 @@ import hashlib
 import re
 import unicodedata
 
+from grader.wording import first_few
+
 MAX_NAME = 100
 _LETTERS = str.maketrans(
     {"ß": "ss", "æ": "ae", "Æ": "AE", "ø": "o", "Ø": "O", "œ": "oe", "Œ": "OE", "ł": "l", "Ł": "L"}
@@ -65,6 +67,4 @@ def is_archive_name(name: str) -> bool:
 
 def listing(names: list[str]) -> str:
     """Return the first few of `names` for a message, and how many more there are."""
-    shown = ", ".join(brief(name) for name in names[:_SHOWN_AT_MOST])
-    more = len(names) - _SHOWN_AT_MOST
-    return f"{shown} and {more} more" if more > 0 else shown
+    return first_few([brief(name) for name in names], _SHOWN_AT_MOST)

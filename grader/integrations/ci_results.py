@@ -15,9 +15,9 @@ from grader.errors import ExitCode, GraderError, OutputError, PackageNotFound, S
 from grader.files import atomic_write, make_folder
 from grader.model.result import GradingResult
 from grader.report.forms import FORMS, Shown
-from grader.report.text import number
 from grader.report.view import arrange
 from grader.rubric.model import Rubric
+from grader.wording import number
 
 
 class Outcome(str, Enum):

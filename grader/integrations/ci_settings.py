@@ -14,10 +14,10 @@ from typing import cast
 from grader.errors import UsageError
 from grader.integrations.ci_results import Outcome
 from grader.model.submission import SandboxMode
-from grader.report.text import number
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 from grader.untrusted_text import line
+from grader.wording import number
 
 MODES = ("auto", "require", "none")
 YES, NO = {"true", "yes", "on", "1"}, {"", "false", "no", "off", "0"}

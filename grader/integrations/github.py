@@ -17,7 +17,8 @@ from grader.integrations.ci_results import TITLES, Graded, Outcome, outcome_of_e
 from grader.report.annotations import EACH_MAX, github_annotation, render_annotations
 from grader.report.classroom import render_classroom
 from grader.report.findings import Severity
-from grader.report.text import line, markdown, number
+from grader.report.text import line, markdown
+from grader.wording import number
 
 LINE_CHARS = 1000
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from grader.errors import GraderError
 from grader.files import atomic_write
 from grader.integrations.ci_results import Graded, Outcome, outcome_of_error
-from grader.report.text import number
+from grader.wording import number
 
 VARIABLES = "grader.env"
 

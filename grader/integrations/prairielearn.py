@@ -22,9 +22,10 @@ from grader.integrations.bundle import (
 )
 from grader.model.result import CriterionResult, GradingResult
 from grader.report.sentences import late_words
-from grader.report.text import html, line, number, text_limit
+from grader.report.text import html, line, text_limit
 from grader.report.view import hidden_ids
 from grader.rubric.load import LoadedRubric
+from grader.wording import number
 
 ENTRYPOINT = "/usr/local/bin/grade-question"
 LIMIT = 1000

@@ -22,6 +22,7 @@ from grader.model.result import (
 )
 from grader.model.verdict import Status
 from grader.rubric.model import Late, Rubric
+from grader.wording import plural
 
 UNITS = {"day": timedelta(days=1), "hour": timedelta(hours=1)}
 SPANS = {"day": 86_400, "hour": 3600, "minute": 60, "second": 1}
@@ -186,7 +187,7 @@ def _cost(points: float, rubric: Rubric, late: timedelta) -> tuple[float, str]:
     left = max(Decimal(0), Decimal(repr(points)) - Decimal(repr(whole)) * percent / 100)
     of = f"{points:g} points reached" if policy.of == "reached" else f"the rubric's {whole:g} points"
     share = f"{float(percent):g} %{' (no more can be lost)' if cap < summed else ''}"
-    text = f"{_count(begun, policy.per)} late (begun {policy.per}s count): {share} of {of} are lost"
+    text = f"{plural(begun, policy.per)} late (begun {policy.per}s count): {share} of {of} are lost"
     return round_half_up(float(left), rubric.digits), text
 
 
@@ -197,7 +198,7 @@ def _in_time(given: HandedIn, deadline: datetime) -> str:
     if over > timedelta():
         return f"in time: {_span(over)} after the deadline, which is within the grace"
     if over > -timedelta(days=given.extension_days):
-        return f"in time thanks to {_count(given.extension_days, 'day')} of extension"
+        return f"in time thanks to {plural(given.extension_days, 'day')} of extension"
     return "in time"
 
 
@@ -207,9 +208,5 @@ def _span(time: timedelta) -> str:
     parts = []
     for unit, seconds in SPANS.items():
         number, left = divmod(left, seconds)
-        parts += [_count(number, unit)] if number else []
+        parts += [plural(number, unit)] if number else []
     return " ".join(parts[:2])
-
-
-def _count(number: float, unit: str) -> str:
-    return f"{number:g} {unit}" if number == 1 else f"{number:g} {unit}s"

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from grader.model.result import GradingResult
 from grader.report.findings import Finding, Severity, findings
-from grader.report.text import line, number
+from grader.report.text import line
+from grader.wording import number
 
 EACH_MAX = 10
 """So many of each kind GitHub shows of one step."""

@@ -18,9 +18,10 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation, Status
 from grader.report.findings import repository_path
 from grader.report.sentences import late_words
-from grader.report.text import line, number
+from grader.report.text import line
 from grader.report.view import is_students_fault, not_graded
 from grader.rubric.model import Rubric
+from grader.wording import number
 
 VERSION = 1
 JSON_BYTES_MAX = 60_000

@@ -14,9 +14,10 @@ from grader.errors import GraderError
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.sentences import decided, decision, late_words, look_again, missing_hidden, visible_words
-from grader.report.text import json_text, line, number, text_limit
+from grader.report.text import json_text, line, text_limit
 from grader.report.view import hidden_ids, is_students_fault, places, points_of
 from grader.rubric.model import Rubric
+from grader.wording import number
 
 LIMIT = 1000
 HIDDEN = "after_published"

@@ -20,8 +20,9 @@ from grader.report.sentences import (
     note_place,
     note_text,
 )
-from grader.report.text import line, number, text_limit, visible
+from grader.report.text import line, text_limit, visible
 from grader.report.view import places, points_of
+from grader.wording import number
 
 OUTCOME = {
     Status.PASS: None,

@@ -23,9 +23,10 @@ from grader.report.sentences import (
     visible_words,
     without_sandbox,
 )
-from grader.report.text import line, markdown, markdown_code, number
+from grader.report.text import line, markdown, markdown_code
 from grader.report.view import Loss, arrange, not_graded, places, points_of
 from grader.rubric.model import Rubric
+from grader.wording import number
 
 BYTES_MAX = 60_000
 """A comment on GitHub has 65,536 characters, a step's summary 1 MiB."""

@@ -10,9 +10,9 @@ from grader.errors import GraderError
 from grader.judging.summary import passed
 from grader.model.result import AppliedOverride, Automatic, CriterionResult, GradingResult, HandedIn, Note
 from grader.model.verdict import Status
-from grader.report.text import number
 from grader.report.view import ReportView, hidden_ids, not_graded
 from grader.rubric.model import Rubric
+from grader.wording import number, plural
 
 DECIDED_TITLE = "Decided by a person"
 BY = {"roster": "as the roster says", "commit": "the commit's date", "nobody": "not known"}
@@ -34,7 +34,7 @@ def _times(known: HandedIn) -> str:
     zone = (known.deadline or known.at).tzinfo if known.at else None
     at = f"submitted {_time(known.at.astimezone(zone))} ({BY[known.by]})" if known.at else ""
     days = known.extension_days
-    extension = f" with {number(days)} {'day' if days == 1 else 'days'} of extension" if days else ""
+    extension = f" with {plural(days, 'day')} of extension" if days else ""
     deadline = f"deadline {_time(known.deadline)}{extension}" if known.deadline else ""
     return ", ".join(words for words in (at, deadline) if words)
 
@@ -180,12 +180,7 @@ def _kinds(error: type[GraderError]) -> Iterator[type[GraderError]]:
 
 def count_points(value: float) -> str:
     """`1 point`, `2.5 points`."""
-    return f"{number(value)} {'point' if value == 1 else 'points'}"
-
-
-def count(many: int, one: str, more: str = "") -> str:
-    """`1 thing`, `3 things`."""
-    return f"{many} {one if many == 1 else more or one + 's'}"
+    return plural(value, "point")
 
 
 def verdict(result: GradingResult, rubric: Rubric, hidden: int) -> tuple[str, str]:
@@ -230,7 +225,7 @@ def in_short(result: GradingResult, view: ReportView) -> str:
     said = [] if late > 0 else ["Nothing was lost."]
     if lost > 0:
         costs = "costs" if len(view.lost) == 1 else "cost"
-        said = [f"{count(len(view.lost), 'thing')} {costs} you {count_points(lost)}."]
+        said = [f"{plural(len(view.lost), 'thing')} {costs} you {count_points(lost)}."]
     if len(view.lost) > 1:
         said.append(f"The first one alone is worth {count_points(view.lost[0].points)}.")
     if late > 0:

@@ -24,9 +24,10 @@ from grader.report.sentences import (
     visible_words,
     without_sandbox,
 )
-from grader.report.text import line, number, uncommanded
+from grader.report.text import line, uncommanded
 from grader.report.view import Loss, arrange, not_graded, places, points_of
 from grader.rubric.model import Rubric
+from grader.wording import number
 
 LIMIT = 500
 NAME_LIMIT = 30

@@ -31,16 +31,10 @@ __all__ = [
     "line",
     "markdown",
     "markdown_code",
-    "number",
     "text_limit",
     "uncommanded",
     "visible",
 ]
-
-
-def number(value: float, digits: int = 3) -> str:
-    """`10`, `87.5`: no zeros that say nothing."""
-    return f"{value:.{digits}f}".rstrip("0").rstrip(".") or "0"
 
 
 _ADDRESS = re.compile(r"https?://[!-~]+", re.IGNORECASE)

@@ -8,9 +8,9 @@ from grader.errors import PackageNotFound, SubmissionError
 from grader.judging.settle import lateness
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
-from grader.report.text import number
 from grader.rubric.model import Rubric
 from grader.untrusted_text import CITATIONS_MAX, clip
+from grader.wording import number
 
 PLACE_CHARS = 300
 

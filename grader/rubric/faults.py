@@ -14,6 +14,7 @@ from pydantic_core import ErrorDetails
 from grader.rubric.model import NAME_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
 from grader.rubric.source import Fault, KeyPath
 from grader.suggest import did_you_mean
+from grader.wording import shorten
 
 PATTERN_RULES = {
     NAME_PATTERN: "must be lower-case letters, digits and hyphens, beginning with a letter",
@@ -150,7 +151,7 @@ def shown(value: object) -> str:
     if value is None:
         return "empty"
     text = json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= 60 else text[:57] + "…"
+    return shorten(text, 60)
 
 
 def _keys(model: type[BaseModel], path: KeyPath) -> list[str]:

@@ -14,6 +14,7 @@ from grader.checks import Evidence, PackageFacts, Run
 from grader.checks.evidence import NoSuchScenario, NotRecorded
 from grader.model.verdict import Status
 from grader.rubric.pytest_check import Outcome, SessionOutcome, TestOutcome
+from grader.wording import shorten
 
 MESSAGE_CHARS = 200
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]{6,}\b")
@@ -133,4 +134,4 @@ class _Notes:
         text = text.encode("utf-8", "backslashreplace").decode()
         text = text.replace(self._folder, "…").replace(f"{self._rootdir}/", "")
         text = _ADDRESS.sub("0x…", text)
-        return text if len(text) <= MESSAGE_CHARS else text[: MESSAGE_CHARS - 1] + "…"
+        return shorten(text, MESSAGE_CHARS)

@@ -14,10 +14,11 @@ from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.result_json import result_text
 from grader.report.terminal import STYLES, emit, mark, open_console, print_report
-from grader.report.text import line, number
+from grader.report.text import line
 from grader.report.view import Loss, arrange, places, points_of
 from grader.rubric.model import Rubric
 from grader.student.watching import Outcome, Screen
+from grader.wording import first_few, number
 
 NAME_CHARS, TEXT_CHARS = 60, 300
 NAMES_SHOWN = 3
@@ -132,9 +133,8 @@ class TerminalScreen(Screen):
 
     def _saved(self, saved: tuple[str, ...]) -> str:
         """`saved src/talker.py at 12:03:04`."""
-        names = ", ".join(self._show(name, NAME_CHARS) for name in saved[:NAMES_SHOWN])
-        more = f" and {len(saved) - NAMES_SHOWN} more" if len(saved) > NAMES_SHOWN else ""
-        return f"saved {names}{more} at {self._at:%H:%M:%S}"
+        names = first_few([self._show(name, NAME_CHARS) for name in saved], NAMES_SHOWN)
+        return f"saved {names} at {self._at:%H:%M:%S}"
 
     def _say(self, words: str) -> None:
         text = self._show(f"Watching {self._package} {DASH} {words}", 3 * TEXT_CHARS)

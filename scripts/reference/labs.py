@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from grader.report.text import number
 from grader.rubric.load import all_rubrics
 from grader.rubric.model import Criterion, Rubric
+from grader.wording import number
 from scripts.reference.table import MADE, code, table
 
 INTRODUCTION = f"""# Labs

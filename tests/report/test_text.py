@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from lxml import html as parser
 from markdown_it import MarkdownIt
 
-from grader.report.text import csv_text, html, html_address, markdown, markdown_code, number, visible
+from grader.report.text import csv_text, html, html_address, markdown, markdown_code, visible
+from grader.wording import number
 from tests.report.nasty import STEERING, TEXTS
 
 MARKDOWN = MarkdownIt("gfm-like", {"linkify": True})

@@ -6,9 +6,9 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 
-from grader.checks.support.text import plural
 from grader.evidence.run import Run
 from grader.model.verdict import Verdict, failed, inconclusive
+from grader.wording import plural
 
 Seconds = tuple[float, ...]
 ToSeconds = Callable[[int], float]

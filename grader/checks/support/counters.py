@@ -13,12 +13,12 @@ from pydantic import Field
 
 from grader.checks.support.exit_causes import explain_early_end, explain_traceback, process_tracebacks
 from grader.checks.support.processes import lives, observed_until_ns
-from grader.checks.support.text import number, plural
 from grader.checks.support.topics import losses, whole_until_ns
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import plural, significant
 
 FLOOD_FACTOR = 3
 SYSTEMATIC_SHARE = 0.05
@@ -207,7 +207,7 @@ def judge_wraps(
         return _bad_turn(bad, turns, count, run, params), bad
     last = good[-1] if good else None
     if len(good) >= params.wraps:
-        message = f"after {number(good[0].before)} comes {params.minimum}, {plural(len(good), 'time')}"
+        message = f"after {significant(good[0].before)} comes {params.minimum}, {plural(len(good), 'time')}"
         return passed(message), last
     if losses(run, params.topic) and not count.is_flood(run, params.rate_hz):
         message = f"only {plural(len(good), 'reset')} of {params.wraps} is recorded"
@@ -273,13 +273,13 @@ def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Litera
 def bad_turn_message(step: Step, turns: list[Step], params: WrapParams) -> str:
     """Return what is wrong with a turn, in a student's words."""
     low, high = params.minimum, params.maximum
-    before, after = number(step.before), number(step.after)
+    before, after = significant(step.before), significant(step.after)
     comes = f"after {before} comes {after}"
     if step.after > high:
         late = next((s for s in turns if s.before > high), None)
         if late is None:
             return f"the counter never resets: {comes}, and it counts on"
-        return f"the counter resets too late, from {number(late.before)} to {number(late.after)}: {comes}"
+        return f"the counter resets too late, from {significant(late.before)} to {significant(late.after)}: {comes}"
     if step.after == -(high + 1):
         return f"the counter runs over to {after}, as a signed number of this width does: {comes}"
     if step.before >= high - 1:
@@ -295,16 +295,16 @@ def _died(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> 
         return None
     last = count.values[-1]
     if last >= params.maximum - 1:
-        message = f"the node dies at {number(last + 1)}, where the counter should reset: {end.cause}"
+        message = f"the node dies at {significant(last + 1)}, where the counter should reset: {end.cause}"
         return failed(message, hint=params.reset_hint)
-    message = f"the node ended at {number(last)}, before the counter could reset twice: {end.cause}"
+    message = f"the node ended at {significant(last)}, before the counter could reset twice: {end.cause}"
     return unjudged(message, hint=end.hint)
 
 
 def _stuck(count: Count, params: WrapParams) -> Verdict | None:
     if count.stuck < STUCK_COUNT:
         return None
-    last = number(count.values[-1])
+    last = significant(count.values[-1])
     message = f"the counter stays at {last} ({plural(count.stuck, 'time')} at the end)"
     at_top = count.values[-1] >= params.maximum - 1
     return (failed if at_top else unjudged)(message, hint=params.reset_hint)
@@ -319,7 +319,7 @@ def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -
         return None
     found = [t for one in lives(run) for t in process_tracebacks(run, one.name)]
     cause = f": {explain_traceback(found[-1], package).cause}" if found else ""
-    message = f"the node stops publishing after {number(count.values[-1])}, while it lives on{cause}"
+    message = f"the node stops publishing after {significant(count.values[-1])}, while it lives on{cause}"
     return failed(message, hint=params.reset_hint)
 
 
@@ -329,13 +329,15 @@ def _too_few(count: Count, good: list[Step], run: Run, params: WrapParams) -> Ve
     wrong = any(s.change in {0, -1} or s.change > 1 for s in count.steps)
     outcome = run.outcome.outcome if run.outcome else None
     if good and outcome == "complete" and all(s.change in {0, 1} or s in good for s in count.steps):
-        return passed(f"after {number(good[0].before)} comes {params.minimum}; values repeat, so only {seen}")
+        return passed(
+            f"after {significant(good[0].before)} comes {params.minimum}; values repeat, so only {seen}"
+        )
     if count.is_flood(run, params.rate_hz) or wrong:
         message = f"{params.wraps} resets were not seen: {seen}, which do not count up one by one"
         return unjudged(message, hint="first make the counter go up by one at its rate")
     if len(count.steps) < params.rate_hz * span_s / 2:
         message = f"{params.topic} is too slow to see {params.wraps} resets: {seen}"
-        return unjudged(message, hint=f"use rospy.Rate({number(params.rate_hz)})")
+        return unjudged(message, hint=f"use rospy.Rate({significant(params.rate_hz)})")
     end = {"timeout": "the run's time was over", "host": "the grading machine failed"}.get(
         outcome or "", "the run ended"
     )

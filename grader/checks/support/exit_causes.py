@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 from grader.checks.support.processes import Life, early_end, lives
 from grader.checks.support.scripts import path_in_package
-from grader.checks.support.text import seconds, shown
+from grader.checks.support.text import shown
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.verdict import FileCitation, Verdict
+from grader.wording import seconds
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
 RUN_IT = "run it by itself with rosrun, and read what it prints last"

@@ -10,10 +10,11 @@ from typing import NamedTuple
 from grader.checks.support.exit_causes import CAUSES, explain_traceback, process_tracebacks
 from grader.checks.support.processes import lives, observed_until_ns
 from grader.checks.support.scripts import chmod_hint, cmake_calls, find_script, paths_by_name
-from grader.checks.support.text import bare, listed, near_names, shown
+from grader.checks.support.text import bare, near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, unjudged
+from grader.wording import join_words
 
 UNRESOLVED = "$("
 ATTRIBUTES = ("pkg", "type", "name")
@@ -93,7 +94,7 @@ def _unreadable(package: PackageFacts, file: LaunchFile | None, launch: str) -> 
         others = [f.path for f in package.launch_files]
         names = paths_by_name(package)
         near = [names[n] for n in near_names(launch, names)]
-        seen = f"; there is {listed(dict.fromkeys([*near, *others]))}" if near or others else ""
+        seen = f"; there is {join_words(dict.fromkeys([*near, *others]))}" if near or others else ""
         message = f"{launch} is not in the package{seen}"
         hint = f"put it at launch/{launch}, then git add, commit and push it"
         cited = tuple(FileCitation(file=p) for p in (near or others)[:3])
@@ -127,7 +128,7 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
     """
     missing = [a for a in ATTRIBUTES if not (getattr(node, a) or "").strip()]
     if missing:
-        return _slip(node, f"<node> has no {listed(missing)}", "a <node> needs pkg, type and name")
+        return _slip(node, f"<node> has no {join_words(missing)}", "a <node> needs pkg, type and name")
     pkg, name = str(node.pkg), str(node.type)
     if path := next((a for a in ("pkg", "type") if "$(find" in str(getattr(node, a))), None):
         return _slip(
@@ -203,7 +204,7 @@ def _no_program(package: PackageFacts, node: LaunchNode) -> Slip:
     names = [n for n in _program_names(package) if n != name]
     near = near_names(plain, names) or [n for n in names if suffix and suffix != ".py" and n.endswith(suffix)]
     if near:
-        return _slip(node, f"{why}; there is {listed(near)}", f'write type="{near[0]}"')
+        return _slip(node, f"{why}; there is {join_words(near)}", f'write type="{near[0]}"')
     return _slip(node, why, "type is the script's whole file name, with its ending")
 
 
@@ -370,7 +371,9 @@ def _silent(run: Run, node: LaunchNode) -> Absence | None:
     if not started:
         return None
     if others:
-        why = f"{listed(others)} came up instead: the script does not take the name that roslaunch gives it"
+        why = (
+            f"{join_words(others)} came up instead: the script does not take the name that roslaunch gives it"
+        )
         return Absence(why, "start the script itself, and leave sys.argv as it is", of_script=True)
     return Absence("its script runs, but never registers as a node", hint, of_script=True)
 

@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from grader.checks.support.text import listed
 from grader.evidence.run import Run
+from grader.wording import join_words
 
 Anonymous = Literal["allowed", "required", "forbidden"]
 _KINDS = {"allowed": "plain or anonymous", "required": "anonymous", "forbidden": "plain"}
@@ -42,16 +42,16 @@ def base_name(node: str) -> str:
 
 def wanted_names(names: Iterable[str], anonymous: Anonymous) -> str:
     """`/talker or /numeric_talker, plain or anonymous`."""
-    return f"{listed(_bases(names), 'or')}, {_KINDS[anonymous]}"
+    return f"{join_words(_bases(names), 'or')}, {_KINDS[anonymous]}"
 
 
 def wrong_name(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous) -> str:
     """How the names of the nodes differ from those that are wanted: in themselves, or in their ending alone."""
     there = tuple(nodes)
     if {base_name(n) for n in there}.isdisjoint(_bases(names)):
-        return f"the node is named {listed(there)}, not {listed(_bases(names), 'or')}"
+        return f"the node is named {join_words(there)}, not {join_words(_bases(names), 'or')}"
     how = "without" if anonymous == "required" else "with"
-    return f"the node is named {listed(there)}, {how} the numbers that anonymous=True adds to the name"
+    return f"the node is named {join_words(there)}, {how} the numbers that anonymous=True adds to the name"
 
 
 def name_hint(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous) -> str:

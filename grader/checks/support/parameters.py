@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 from grader.checks.support.console_output import Line
 from grader.checks.support.exit_causes import Ending, explain_end, explain_error
 from grader.checks.support.processes import early_end
-from grader.checks.support.text import listed, near_names
+from grader.checks.support.text import near_names
 from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
+from grader.wording import join_words
 
 SYSTEM = (
     "/rosdistro",
@@ -101,7 +102,7 @@ def describe_missing(found: Mapping[str, Any], name: str) -> str:
     others = without_system_params(found)
     same = [n for n in others if n.rpartition("/")[2] == last]
     near = same or near_names(name, others) or list(others)
-    return f"there is no {name}" + (f"; there is {listed(near)}" if near else "")
+    return f"there is no {name}" + (f"; there is {join_words(near)}" if near else "")
 
 
 class Given(NamedTuple):
@@ -146,7 +147,7 @@ def explain_failure(package: PackageFacts, run: Run) -> Ending | None:
     }
     last = PurePosixPath(key[1]).name
     near = near_names(last, parts - {last})
-    seen = f"; there is {listed(near)}" if near else ""
+    seen = f"; there is {join_words(near)}" if near else ""
     hint = "write the name as rosparam list shows it, one key for each level: get_param('details')['name']['first']"
     return end._replace(cause=f"{end.cause}: nothing is named {key[1]} there{seen}", hint=hint)
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from itertools import islice
 
 from grader.untrusted_text import visible
+from grader.wording import shorten
 
 SIMILARITY = 0.8
 NAMES_MAX, NAME_CHARS_MAX = 1_000, 60
@@ -58,14 +59,6 @@ def _squeezed(name: str) -> str:
     return "".join(_words(name))
 
 
-def listed(names: Iterable[str], last: str = "and") -> str:
-    """`a, b and c`; at most six of them."""
-    items = list(names)
-    if len(items) > 6:
-        items = [*items[:6], f"{len(items) - 6} more"]
-    return " ".join([", ".join(items[:-1]), last, items[-1]]) if len(items) > 1 else "".join(items)
-
-
 def bare(text: str) -> str:
     """Without the terminal's colours."""
     return _ANSI.sub("", text)
@@ -79,24 +72,7 @@ def shown(text: str) -> str:
 def in_one_line(text: str) -> str:
     """Return the same of a message: its colours are part of it."""
     line = visible(" ".join(text[:SHOWN_BEFORE_CHARS].split()))
-    return line if len(line) <= SHOWN_CHARS else line[: SHOWN_CHARS - 1] + "…"
-
-
-def number(value: float) -> str:
-    """A number without a tail of zeros: `9.98`, `128`."""
-    return f"{value:.10g}" if float(value).is_integer() else f"{value:.4g}"
-
-
-def hertz(rate_hz: float) -> str:
-    return f"{rate_hz:.2f} Hz" if rate_hz < 1000 else f"{rate_hz:.0f} Hz"
-
-
-def seconds(duration_ns: float) -> str:
-    return f"{duration_ns / 1e9:.1f} s"
-
-
-def plural(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+    return shorten(line, SHOWN_CHARS)
 
 
 def words_pattern(words: str) -> str:

@@ -12,11 +12,12 @@ from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.nodes import plain_type
 from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives
-from grader.checks.support.text import listed, near_names, plural
+from grader.checks.support.text import near_names
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import EvidenceCitation, Status, Verdict, inconclusive, unjudged
+from grader.wording import join_words, plural
 
 SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
 End = Literal["publishers", "subscribers"]
@@ -79,22 +80,22 @@ def no_message(
         return lost
     published = published_topics(run)
     near = () if topic in published else near_names(topic, published)
-    measured, what = listed(published) or "no topic", f"no message came on {topic}"
+    measured, what = join_words(published) or "no topic", f"no message came on {topic}"
     if run.foreign:
-        seen = f"; {listed(near)} is" if near else ""
+        seen = f"; {join_words(near)} is" if near else ""
         hint = (
             f"publish on {topic} while you record, and record it: rosbag record {topic}, or -a for all topics"
         )
         return unjudged(f"{topic} is not in {run.evidence}{seen}", measured=measured, hint=hint)
     if near:
         hint = f"name the topic {topic} in rospy.Publisher(…)"
-        return of_node(f"{what}; the node publishes on {listed(near)}", measured=measured, hint=hint)
+        return of_node(f"{what}; the node publishes on {join_words(near)}", measured=measured, hint=hint)
     if absent := no_node(package, run, what) or _refused(run, topic):
         return absent
     if topic in published:
         hint = "call publish(…) inside the loop `while not rospy.is_shutdown():`"
         return of_node(f"{what}, although it is advertised", measured="no message", hint=hint)
-    only = f"it publishes on {listed(published)}; " if published else ""
+    only = f"it publishes on {join_words(published)}; " if published else ""
     hint = f"{only}add rospy.Publisher('{topic}', …) and publish in the loop"
     return of_node(f"{what}: no node publishes on it", measured=measured, hint=hint)
 

@@ -14,6 +14,7 @@ from grader.classes.overrides import FILE as OVERRIDES
 from grader.model.batch import MISSING, ROSTER
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status
+from grader.wording import first_few
 
 LATELY = 40
 """The pace is that of so many of the last gradings."""
@@ -138,5 +139,4 @@ def _waiting(row: Row) -> tuple[CriterionResult, ...]:
 
 def _open(row: Row) -> str:
     names = [f"{c.id} ({OPEN[c.status]})" for c in _waiting(row)]
-    more = f" and {len(names) - NAMES_SHOWN} more" if len(names) > NAMES_SHOWN else ""
-    return ", ".join(names[:NAMES_SHOWN]) + more
+    return first_few(names, NAMES_SHOWN)

@@ -12,6 +12,7 @@ from grader.errors import SubmissionError
 from grader.intake.names import printable
 from grader.model.batch import Entry
 from grader.model.result import HandedIn
+from grader.wording import plural
 
 _RECORD = re.compile(r"(?P<hash>[0-9a-f]{40,64}) (?P<seconds>-?\d+)?(?: (?P<zone>[+-]\d{4}))?")
 _EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)
@@ -96,7 +97,7 @@ def _zone(text: str | None) -> timezone:
 def limit_of(rule: Rule, entry: Entry) -> Limit | None:
     """The time after which nothing of this entry counts; None where there is no such time."""
     days = entry.extension_days
-    more = f" (with {days:g} {'day' if days == 1 else 'days'} of extension)" if days else ""
+    more = f" (with {plural(days, 'day')} of extension)" if days else ""
     if rule.before is not None:
         return Limit(later(rule.before, days), "the time asked for", more)
     if rule.deadline is None:

@@ -21,6 +21,7 @@ from grader.classes.gradebook.matching import (
 from grader.classes.gradebook.platforms import Mark, Wanted
 from grader.classes.gradebook.table import harmless, number_text
 from grader.errors import UsageError
+from grader.wording import first_few
 
 KEPT = {"EX", "N/A"}
 """What Canvas writes for who is excused, and for who has not got the assignment."""
@@ -236,8 +237,7 @@ def _titles(name: str, platform: Platform) -> set[str]:
 
 def _others(header: Sequence[str], known: dict[str, Kind]) -> str:
     names = [name for name in header if name.strip() and name not in known]
-    more = f" and {len(names) - SHOWN_MAX} more" if len(names) > SHOWN_MAX else ""
-    return f"there are: {', '.join(names[:SHOWN_MAX])}{more}"
+    return f"there are: {first_few(names, SHOWN_MAX)}"
 
 
 BYTES_MAX = 64 << 20

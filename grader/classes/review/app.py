@@ -41,7 +41,7 @@ from grader.errors import GraderError, RubricError
 from grader.model.result import Override
 from grader.report.html.shell import environment, style
 from grader.report.sentences import SIGNS
-from grader.report.text import number
+from grader.wording import number
 
 
 class _Pages(Flask):

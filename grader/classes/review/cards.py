@@ -13,8 +13,8 @@ from grader.classes.review.session import mark
 from grader.model.result import AUTHOR_CHARS, COMMENT_CHARS, AppliedOverride, CriterionResult, Override
 from grader.model.verdict import Status
 from grader.report.sentences import SIGNS
-from grader.report.text import number
 from grader.rubric.model import Rubric
+from grader.wording import number
 
 MANUAL = "manual"
 

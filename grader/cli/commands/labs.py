@@ -72,8 +72,8 @@ def validate_rubrics(*, files: Annotated[Sequence[str], Argument("FILE", "rubric
     """Check rubric files, and name every fault."""
     with loading():
         from grader.cli.output import say
-        from grader.report.text import number
         from grader.rubric.load import load_rubric
+        from grader.wording import number
     faults, hint = [], ""
     for file in files:
         try:

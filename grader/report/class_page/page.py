@@ -23,8 +23,9 @@ from grader.report.class_page.lines import CHARS, LETTERS, REPORT, Line, link_to
 from grader.report.class_page.statistics import costs, heat_map, histogram, most_first, span, spread, timing
 from grader.report.class_page.todo import todos
 from grader.report.html.shell import environment, policy, script, style
-from grader.report.sentences import SIGNS, count
+from grader.report.sentences import SIGNS
 from grader.untrusted_text import line
+from grader.wording import plural
 
 UNWALLED_MAX = 3
 SHARED_MAX, SHARED_FIRST, ALONE_MAX, WORDINGS_MAX = 100, 12, 100, 12
@@ -142,7 +143,7 @@ def _template() -> Template:
         "scripts": (copying, own),
         "policy": Markup(policy(copying, own)),  # noqa: S704 - ours
         "signs": {LETTERS[status]: (sign, status.value) for status, sign in SIGNS.items()},
-        "count": count,
+        "count": plural,
         "span": span,
         "link_to": link_to,
         "shared_first": SHARED_FIRST,

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from grader.model.batch import BatchRun, CriterionInfo
 from grader.report.class_page.lines import LETTERS, Line
 from grader.report.html import svg
-from grader.report.text import number
+from grader.wording import number
 
 
 @dataclass(kw_only=True)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from grader.evidence.run import Run
+from grader.wording import shorten
 
 NAME_LETTERS = 200
 LINE_LETTERS = 300
@@ -16,7 +17,7 @@ SPREAD = (math.sqrt(5) - 1) / 2
 def short(text: object, letters: int = LINE_LETTERS) -> str:
     """Its beginning, with a mark where it goes on."""
     whole = text if isinstance(text, str) else str(text)
-    cut = whole if len(whole) <= letters else f"{whole[: letters - 1]}…"
+    cut = shorten(whole, letters)
     return cut if cut.isascii() else cut.encode(errors="replace").decode()
 
 

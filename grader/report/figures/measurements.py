@@ -33,13 +33,13 @@ from grader.checks.support.counters import (
 )
 from grader.checks.support.geometry import Pose, followed, relative, track
 from grader.checks.support.lateness import lateness
-from grader.checks.support.text import listed, number
 from grader.evidence.run import Channel, Run
 from grader.model.figure import POINTS_MAX, CounterFigure, Heard, HeardFigure, PathFigure, RateFigure
 from grader.model.message_rate import Rhythm
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status
 from grader.report.figures.bounds import finite, named, second, short, spread
+from grader.wording import join_words, significant
 
 FIRST_VALUES = 40
 MARKS_MAX = 40
@@ -56,7 +56,9 @@ def start_figures(run: Run, params: StartParams) -> Iterator[CounterFigure]:
     for count in counts(run, params.topic)[:1]:
         right = begins_with(count, params.start) or run.foreign
         known = right or missed_the_first(run, params.topic, count)
-        marks = [] if known else [(0, f"the first value is {number(count.values[0])}, not {params.start}")]
+        marks = (
+            [] if known else [(0, f"the first value is {significant(count.values[0])}, not {params.start}")]
+        )
         steps = [s for s in count.steps[:FIRST_VALUES] if s.change < -1]
         first = range(len(count.values))[:FIRST_VALUES]
         yield _counter_figure(count, steps, marks, run=run, topic=params.topic, kept=first)
@@ -89,7 +91,7 @@ def wrap_figures(run: Run, package: PackageFacts, params: WrapParams) -> Iterato
 
 
 def _step_text(step: Step, *, flood: bool, lost: bool) -> str:
-    comes = f"after {number(step.before)} comes {number(step.after)}"
+    comes = f"after {significant(step.before)} comes {significant(step.after)}"
     if flood or lost:
         why = "a flood: its publisher drops values" if flood else "lost on the way, with a gap in time"
         return f"{comes} ({why})"
@@ -186,7 +188,7 @@ def _rate_figure(run: Run, params: RateParams, found: Rhythm, channels: Sequence
     low_ns, high_ns = params.bounds_ns
     return RateFigure(
         topic=named(params.topic),
-        publisher=named(listed(c.publisher for c in channels)),
+        publisher=named(join_words(c.publisher for c in channels)),
         scenario=named(run.scenario),
         times_s=tuple(second(run, arrivals[i]) for i in kept),
         gaps_s=tuple(round(found.gaps_ns[i] / 1e9, 6) for i in kept),

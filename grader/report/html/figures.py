@@ -29,8 +29,8 @@ from grader.report.html.plots import (
     rate_words,
     wrong_steps,
 )
-from grader.report.sentences import count
 from grader.report.text import clip
+from grader.wording import plural
 
 CONSOLE_FIRST, CONSOLE_LAST = 35, 25
 LINE_CHARS = 500
@@ -89,7 +89,7 @@ class Drawer:
         shown = [*figure.lines[:first], *figure.lines[len(figure.lines) - last :]]
         errors = sum(printed.stream == "stderr" for printed in figure.lines)
         left = figure.left_out + len(figure.lines) - len(shown)
-        lines = count(len(figure.lines) + figure.left_out, "line")
+        lines = plural(len(figure.lines) + figure.left_out, "line")
         return Drawn(
             name=name,
             kind="console",
@@ -97,7 +97,7 @@ class Drawer:
             points=len(shown),
             rows=shown,
             gap_at=first if left else len(shown),
-            left_out=f"{count(left, 'line is', 'lines are')} left out here; console.log has them."
+            left_out=f"{plural(left, 'line is', 'lines are')} left out here; console.log has them."
             if left
             else "",
         )
@@ -147,7 +147,7 @@ def _heard(figure: HeardFigure, name: str) -> Drawn:
     missed = [row for row in figure.rows if row.heard is None]
     rows = _first(figure.rows, missed)
     many = len(figure.rows)
-    said = f"{many - len(missed)} of {count(many, 'message')} {'was' if many == 1 else 'were'} printed."
+    said = f"{many - len(missed)} of {plural(many, 'message')} {'was' if many == 1 else 'were'} printed."
     if figure.out_of_order:
         said += " All of them came, but not in the order in which they were sent."
     return Drawn(
@@ -173,7 +173,7 @@ def _graph(figure: GraphFigure, name: str) -> Drawn:
     rows = list(graph_rows(figure))
     plot = graph_plot(figure, name)
     alone = [node for node in figure.nodes if node not in {edge.node for edge in figure.edges}]
-    words = f"{count(len(figure.nodes), 'node')}, {count(len(figure.topics), 'topic')}."
+    words = f"{plural(len(figure.nodes), 'node')}, {plural(len(figure.topics), 'topic')}."
     words += f" Connected to no topic: {', '.join(alone[:10])}." if alone else ""
     return Drawn(
         name=name,

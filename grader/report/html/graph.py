@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from grader.model.figure import GraphFigure
 from grader.report.html.svg import drawing, element, text
+from grader.wording import shorten
 
 MOST = 40
 HEIGHT, ROW, COLUMN_GAP, EDGE = 44.0, 66.0, 56.0, 14.0
@@ -59,7 +60,7 @@ def _arrow(edge: tuple[str, str, bool]) -> Arrow:
 
 
 def _clipped(name: str) -> str:
-    return name if len(name) <= NAME_CHARS else f"{name[: NAME_CHARS - 1]}…"
+    return shorten(name, NAME_CHARS)
 
 
 def _width(vertex: str, figure: GraphFigure) -> float:

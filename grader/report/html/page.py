@@ -28,9 +28,10 @@ from grader.report.sentences import (
     visible_words,
     without_sandbox,
 )
-from grader.report.text import line, number
+from grader.report.text import line
 from grader.report.view import Loss, ReportView, arrange, hidden_ids, not_graded, places, points_of
 from grader.rubric.model import Rubric
+from grader.wording import number
 
 
 @dataclass(frozen=True, kw_only=True)

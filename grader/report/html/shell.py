@@ -12,7 +12,8 @@ from jinja2 import DictLoader, Environment, StrictUndefined, pass_context
 from jinja2.runtime import Context
 from markupsafe import Markup
 
-from grader.report.text import line, number
+from grader.report.text import line
+from grader.wording import number
 
 LIMIT = 1000
 SUFFIX = ".html"

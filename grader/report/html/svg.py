@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from grader.report.text import html, line, number
+from grader.report.text import html, line
+from grader.wording import number
 
 TEXT_CHARS = 80
 
