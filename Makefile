@@ -40,12 +40,13 @@ links: setup ## whether the pages' links to other sites still work; needs the ne
 	@$(BIN)/python -m scripts.links
 
 test-pure: setup ## the tests that need no ROS
-	@$(BIN)/python -m pytest -m "not ros" -n 2
+	@$(BIN)/python -m pytest -m "not ros and not full" -n 2
 
 test-ros: setup ## the tests that run real nodes
 	@$(BIN)/python -m pytest -m "ros and not full" -n 3 --dist loadfile
 
-test-all: lint docs test-pure setup ## everything, and every fixture
+test-all: lint docs setup ## everything: slow tests, every fixture, every attack
+	@$(BIN)/python -m pytest -m "not ros" -n 2
 	@$(BIN)/python -m pytest -m ros -n 3 --dist loadfile
 
 stress: setup ## the reference solution and every fixture, TIMES times each

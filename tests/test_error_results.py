@@ -144,6 +144,7 @@ def test_what_is_no_grading_leaves_no_result(tmp_path, monkeypatch, error) -> No
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("error", "kind", "blame"), ERRORS, ids=NAMES)
 def test_only_the_submission_itself_replaces_a_complete_result(
     tmp_path, monkeypatch, error, kind, blame

@@ -144,6 +144,7 @@ def test_a_roscore_that_does_not_start(out: Path, open_path: Path) -> None:
     assert "rosmaster is broken here" in next(c.message for c in result.criteria if c.id == "rate")
 
 
+@pytest.mark.full
 def test_a_rosout_that_dies(out: Path) -> None:
     with grading(out, setup="mount --bind /bin/false /usr/lib/rosout/rosout") as one:
         assert one.end() == 0, one.err
@@ -175,6 +176,7 @@ exec {open_path}/real "$@"
     assert "could not be started" in next(c.message for c in result.criteria if c.id == "rate")
 
 
+@pytest.mark.full
 def test_what_is_killed_once_is_done_once_more(out: Path) -> None:
     with grading(out) as hit:
         hit.await_line("build", "running")
@@ -213,6 +215,7 @@ def test_a_recorder_that_is_killed_each_time(out: Path) -> None:
     assert "failed on the grading machine" in next(c.message for c in result.criteria if c.id == "rate")
 
 
+@pytest.mark.full
 def test_a_clock_that_is_set_back(out: Path) -> None:
     with grading(out, program=(sys.executable, "-c", CLOCK)) as turned:
         code = turned.end()
@@ -230,6 +233,7 @@ def test_an_output_folder_that_goes_away(out: Path) -> None:
     assert (result.status, result.error.kind, marked_down(result)) == ("error", "output", [])
 
 
+@pytest.mark.full
 def test_a_grader_that_is_held_up_and_a_second_one(out: Path) -> None:
     with grading(out) as held:
         held.await_line("talker", "running")

@@ -144,6 +144,7 @@ def test_all_reports_and_evidence_are_there(graded: tuple[Path, Grader]) -> None
     assert list(grader.files.iterdir()) == []
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("seen", ["catkin_make", "talker", "wraps  done", "launch"])
 def test_stopping_leaves_nothing(grader: Grader, tmp_path: Path, seen: str, number: int) -> None:
@@ -164,6 +165,7 @@ def test_stopping_leaves_nothing(grader: Grader, tmp_path: Path, seen: str, numb
     assert list(grader.files.iterdir()) == []
 
 
+@pytest.mark.full
 def test_killing_leaves_no_process_and_no_half_result(grader: Grader, tmp_path: Path) -> None:
     out = tmp_path / "out"
     process = grader.start("grade", SOLUTION, "--rubric", LAB, "--out", out)
@@ -214,6 +216,7 @@ def test_without_ros_the_static_criteria_are_still_judged(grader: Grader, tmp_pa
     assert "apt-get install python3-rospy" in out.replace("\n", " ").replace("          ", "")
 
 
+@pytest.mark.full
 def test_without_a_sandbox_the_lab_is_graded_all_the_same(grader: Grader, tmp_path: Path) -> None:
     code, out, err = grader.run(
         "grade", SOLUTION, "--rubric", LAB, "--out", tmp_path / "out", "--sandbox", "none"
@@ -224,6 +227,7 @@ def test_without_a_sandbox_the_lab_is_graded_all_the_same(grader: Grader, tmp_pa
     assert grader.await_none(2) == []
 
 
+@pytest.mark.full
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root becomes another user")
 def test_root_with_a_closed_temporary_folder(grader: Grader, tmp_path: Path) -> None:
     closed = tmp_path / "closed"

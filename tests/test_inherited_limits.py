@@ -45,6 +45,7 @@ def result_in(out: Path) -> GradingResult | None:
     return GradingResult.model_validate_json(found[0].read_bytes()) if found else None
 
 
+@pytest.mark.full
 @by_an_ordinary_user
 @pytest.mark.parametrize("short", SHORT)
 def test_a_limit_that_is_too_short_is_named_and_nothing_runs(open_path: Path, short: str) -> None:
@@ -91,6 +92,7 @@ def test_the_doctor_shows_the_same(open_path: Path) -> None:
     assert rows["ulimit -f"]["state"] == "ok"
 
 
+@pytest.mark.full
 @pytest.mark.ros
 @pytest.mark.slow
 @by_an_ordinary_user

@@ -22,6 +22,7 @@ pytestmark = [
 KILLS, SIDE_BY_SIDE = 12, 4
 
 
+@pytest.mark.full
 def test_killed_at_random_moments(open_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     seed = random.SystemRandom().randrange(1 << 30)
     begun = time.monotonic()

@@ -83,6 +83,7 @@ def test_every_station_is_in_the_rule() -> None:
     assert {_station(path) for path in _sources(GRADER)} <= ALLOWED.keys()
 
 
+@pytest.mark.full
 def test_imports_go_one_way() -> None:
     wrong = [
         f"{path.relative_to(GRADER)}: {module}"

@@ -52,6 +52,7 @@ def marker(tmp_path, monkeypatch) -> Path:
     return marker
 
 
+@pytest.mark.full
 def test_a_process_of_the_grader_imports_nothing_from_the_folder_that_it_is_started_in(marker) -> None:
     module = "grader.workers"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

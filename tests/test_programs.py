@@ -157,6 +157,7 @@ def test_what_counts_as_a_start(
     assert bool(starts(tmp_path / "new.py")) is found
 
 
+@pytest.mark.full
 def test_modules_that_start_programs_are_imported_as_modules() -> None:
     """`from subprocess import Popen as p` would pass unseen."""
     for path in GRADER.rglob("*.py"):

@@ -132,7 +132,7 @@ BOUNDS = {
         scenario_inputs.FILE_BYTES_MAX // KB, scenario_inputs.EVENTS_MAX, scenario_inputs.VALUES_MAX,
         scenario_inputs.DEPTH_MAX, scenario_inputs.ALIASES_MAX,
     ),
-    "texts of decode": (scenario_inputs.TEXT_BYTES_MAX // KB, decode._PARTS_MAX),
+    "texts of services": (scenario_inputs.TEXT_BYTES_MAX // KB, decode._PARTS_MAX),
     "what git says": (git._ANSWER_BYTES // MB, git._FILE_BYTES // MB, git._MEMORY_BYTES >> 30, gitdir._MAX_FILES),
 }  # fmt: skip
 """By how a reading begins: the numbers in its bound, each a constant of the code, of ROS's side as `file:NAME`."""

@@ -89,6 +89,7 @@ def checked(place: Path, program: str) -> list[str]:
     return done.stdout.splitlines()
 
 
+@pytest.mark.full
 def test_a_users_program_is_sound(place: Path) -> None:
     assert checked(place, PROGRAM) == []
 

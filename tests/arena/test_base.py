@@ -121,6 +121,7 @@ def _calls(trace: bytes) -> list[dict[str, object]]:
     ]
 
 
+@pytest.mark.full
 @pytest.mark.ros
 @pytest.mark.parametrize("cmake", [CMAKE, BROKEN_CMAKE])
 def test_a_build_on_the_base_is_the_one_without_it(
@@ -226,6 +227,7 @@ def test_the_base_is_of_this_machine_as_it_is(
         assert not has_base(place)
 
 
+@pytest.mark.full
 @pytest.mark.ros
 @pytest.mark.parametrize("arguments", [["--help"], [], ["no_such_package", "lab.launch"]])
 def test_roslaunch_is_the_real_one(arguments: list[str], tmp_path: Path) -> None:

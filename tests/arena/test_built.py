@@ -46,6 +46,7 @@ FILE = header("devel/lib/lab/a", 0, tarfile.REGTYPE)
 NAMES, SIZES, HEADERS = "far too long, or too many", "a size that they do not have", "that no tar writes"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("parts", "why"),
     [
@@ -71,6 +72,7 @@ def test_archives_that_are_made_to_keep_a_reader_busy(parts: list[bytes], why: s
     assert read_member(archive, "./nothing", 100) is None
 
 
+@pytest.mark.full
 def test_what_came_before_is_known(tmp_path: Path) -> None:
     parts = [FILE, *often(header("x", 0, tarfile.REGTYPE))[: MEMBERS_MAX + 1]]
     built = read_archive(written(tmp_path / "built.tar", parts), "lab")

@@ -123,6 +123,7 @@ def test_a_listener_that_says_it_hears(tmp_path: Path) -> None:
     assert pairs(seen) & {CHATTER, ("/other", "/talker", "/listener")} == {("/other", "/talker", "/listener")}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("transport", ["TCPROS", "UDPROS"])
 def test_two_that_say_what_the_kernel_does_not_know_of(tmp_path: Path, transport: str) -> None:
     """Both lie; they call each other (XML-RPC), which is no topic's connection."""

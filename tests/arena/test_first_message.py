@@ -35,6 +35,7 @@ rospy.spin()
 """
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("start", [BEFORE, AFTER, UNTIMED], ids=["before", "after", "untimed"])
 @pytest.mark.parametrize("attempt", range(3))
 def test_first_value_is_recorded(tmp_path: Path, start: str, attempt: int) -> None:

@@ -93,6 +93,7 @@ for _ in range(3):
 """
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("how", ["ignore", "wait"])
 def test_time_of_children_that_nobody_waited_for_is_counted(how: str) -> None:
     found = find_cgroups().cpuacct

@@ -171,6 +171,7 @@ def test_one_end_may_know_later_than_the_other(node, monkeypatch) -> None:
     assert rounds(monkeypatch, Kernel(), apis) == ([[], [], FOUND, FOUND], [])
 
 
+@pytest.mark.full
 def test_who_does_not_answer_makes_nobody_a_liar(node, monkeypatch) -> None:
     with socket.create_server(("127.0.0.1", 0)) as mute:
         apis = {"/a": node([serves()]).api, "/b": f"http://127.0.0.1:{mute.getsockname()[1]}/"}

@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LAB = "leeds-comp3631-lab1"
 
 
+@pytest.mark.full
 @pytest.mark.skipif(bool(why_not()), reason=f"no sandbox here: {why_not()}")
 def test_no_name_is_needed(tmp_path: Path) -> None:
     hosts = tmp_path / "hosts"

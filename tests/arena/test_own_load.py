@@ -55,6 +55,7 @@ def counted_s(seen: Run) -> float:
     return sum((after - before) / 1e9 * (own or 0) * cores for (before, after), own in shares)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("load", "sandbox"),
     [(LASTING, "auto"), (LASTING, "none"), (SHORT, "auto"), (SHORT, "none"), (DAEMONS, "auto")],

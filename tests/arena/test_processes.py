@@ -44,6 +44,7 @@ def test_ctrl_c_ends_a_node(tmp_path: Path, sandbox: str) -> None:
     assert printed(run)[-1] == "ended well"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("sandbox", SANDBOXES)
 def test_node_that_ignores_ctrl_c_is_killed(tmp_path: Path, sandbox: str) -> None:
     code = (

@@ -52,6 +52,7 @@ def _two(anonymous: bool) -> tuple[dict[str, str], Scenario]:
     return {"scripts/sender.py": SENDER.format(anonymous)}, scenario
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("sandbox", SANDBOXES)
 def test_nodes_are_known_by_their_process(tmp_path: Path, sandbox: str) -> None:
     seen = _run(tmp_path, *_two(anonymous=True), sandbox=sandbox)
@@ -64,6 +65,7 @@ def test_nodes_are_known_by_their_process(tmp_path: Path, sandbox: str) -> None:
     ] * 2
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("sandbox", SANDBOXES)
 def test_a_name_that_is_taken_over(tmp_path: Path, sandbox: str) -> None:
     seen = _run(tmp_path, *_two(anonymous=False), sandbox=sandbox)
@@ -223,6 +225,7 @@ HEARER = (
 )
 
 
+@pytest.mark.full
 def test_a_publisher_that_waits_for_its_subscriber(tmp_path: Path) -> None:
     """The recorder's own connection must not be taken for the one that it waits for."""
     files = {"scripts/hearer.py": HEARER, "scripts/waiter.py": WAITER}

@@ -100,6 +100,7 @@ def number_of(machine: str, name: str) -> int:
     return int(libseccomp.resolve_syscall(arch, name))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("machine", MACHINES)
 def test_what_is_shipped_is_what_is_written(machine: str) -> None:
     shipped, compiled = (FILTERS / f"{machine}.bpf").read_bytes(), compile_filter(machine)

@@ -40,6 +40,7 @@ def test_large_files_are_there_and_workspaces_inside_are_not(tmp_path: Path, san
     assert int(size) == LARGE_BYTES + 1
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("sandbox", ["auto", "none"])
 @pytest.mark.parametrize(
     "shebang",

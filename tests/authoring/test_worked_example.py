@@ -56,6 +56,7 @@ def test_the_page_shows_each_command_once() -> None:
     assert len(COMMANDS) == len(set(COMMANDS)) == 6
 
 
+@pytest.mark.full
 @pytest.mark.ros
 @pytest.mark.slow
 def test_every_command_works_as_printed(tmp_path: Path) -> None:

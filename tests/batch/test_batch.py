@@ -42,6 +42,7 @@ def stamps(out: Path) -> dict[str, int]:
     return {path.parent.name: path.stat().st_mtime_ns for path in out.glob("*/result.json")}
 
 
+@pytest.mark.full
 def test_a_folder_of_submissions(tmp_path, capsys) -> None:
     handed_in(tmp_path / "in", ["ada", "bob"])
     handed_in(tmp_path / "in", ["cem"], WRONG_NAME)
@@ -76,6 +77,7 @@ def test_what_is_complete_is_not_done_again(tmp_path) -> None:
     assert run_of(out)["counts"]["kept"] == 1
 
 
+@pytest.mark.full
 def test_another_rubric_grades_all_again(tmp_path) -> None:
     handed_in(tmp_path / "in", ["ada"])
     out = tmp_path / "out"
@@ -127,6 +129,7 @@ def test_the_rosters_columns_are_carried_into_the_gradebook(tmp_path) -> None:
     assert line["roster"]["extra"]["Seat"] == "=cmd()"
 
 
+@pytest.mark.full
 def test_rows_that_cannot_be_graded_stand_in_the_gradebook(tmp_path, capsys) -> None:
     handed_in(tmp_path / "in", ["ada"])
     roster = roster_of(tmp_path / "in", ["ada,ada", "eve,../../etc", "ada,ada", "run.json,ada"])
@@ -166,6 +169,7 @@ def git(folder: Path, *arguments: str) -> None:
     subprocess.run([str(shutil.which("git")), *who, *arguments], cwd=folder, check=True, capture_output=True)
 
 
+@pytest.mark.full
 def test_ten_rows_that_are_bad_in_ten_ways(tmp_path, asking, capsys) -> None:
     """Each has a line of its own, and the others are graded."""
     folder = handed_in(tmp_path / "in", ["ada", "bob", "two/a", "two/b"])
@@ -267,6 +271,7 @@ def children_of(pid: int) -> list[int]:
     return [int(word) for text in lists for word in text.split()]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("signal_number", [signal.SIGKILL, signal.SIGINT])
 def test_a_batch_that_is_stopped_goes_on_where_it_stopped(tmp_path, signal_number) -> None:
     roster, out = handed_in(tmp_path / "in", NAMES), tmp_path / "out"
@@ -302,6 +307,7 @@ def wait_until_gone(pid: int) -> None:
         time.sleep(0.01)
 
 
+@pytest.mark.full
 def test_two_batches_in_one_folder(tmp_path) -> None:
     roster, out = handed_in(tmp_path / "in", NAMES), tmp_path / "out"
     process = started(roster, out, "--jobs", "1")
@@ -313,6 +319,7 @@ def test_two_batches_in_one_folder(tmp_path) -> None:
         process.wait(60)
 
 
+@pytest.mark.full
 def test_the_folder_of_results_inside_the_submissions(tmp_path) -> None:
     handed_in(tmp_path, ["ada"])
     assert batch(tmp_path, tmp_path / "out") == 0

@@ -5,6 +5,8 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import pytest
+
 from tests.batch.a_class import CORRECT, RUBRIC, WRONG_NAME, batch, lines_of, roster_of, run_of
 from tests.batch.repositories import repository
 
@@ -45,6 +47,7 @@ def test_the_last_commit_before_the_deadline_counts(tmp_path) -> None:
     assert "2026-10-30" in report
 
 
+@pytest.mark.full
 def test_a_time_on_the_command_line(tmp_path) -> None:
     work = repository(
         tmp_path / "ada", (CORRECT, "2026-10-01T12:00:00+02:00"), (WRONG_NAME, "2026-10-20T12:00:00+02:00")
@@ -56,6 +59,7 @@ def test_a_time_on_the_command_line(tmp_path) -> None:
     assert "not committed" in found["bob"]["handed_in"]["note"]
 
 
+@pytest.mark.full
 def test_nothing_before_the_deadline(tmp_path) -> None:
     work = repository(tmp_path / "ada", (CORRECT, "2026-11-01T12:00:00+00:00"))
     found = graded(tmp_path, [f"ada,{work.as_uri()},,"], f"deadline: {DEADLINE}")
@@ -64,6 +68,7 @@ def test_nothing_before_the_deadline(tmp_path) -> None:
     assert "2026-11-01" in found["ada"]["error"]["hint"]
 
 
+@pytest.mark.full
 def test_a_late_policy_shows_points_before_and_after(tmp_path) -> None:
     late = repository(tmp_path / "ada", (CORRECT, "2026-11-01T11:00:00+00:00")).as_uri()
     grace = repository(tmp_path / "bob", (CORRECT, "2026-10-30T12:10:00+00:00")).as_uri()
@@ -80,6 +85,7 @@ def test_a_late_policy_shows_points_before_and_after(tmp_path) -> None:
     assert "80 of 100" in (tmp_path / "out" / "ada" / "report.md").read_text()
 
 
+@pytest.mark.full
 def test_an_extension_that_comes_later_grades_nothing_again(tmp_path) -> None:
     late = repository(tmp_path / "ada", (CORRECT, "2026-11-01T11:00:00+00:00")).as_uri()
     assert graded(tmp_path, [f"ada,{late},,"], f"deadline: {DEADLINE}", POLICY)["ada"]["points"] == 80
@@ -87,6 +93,7 @@ def test_an_extension_that_comes_later_grades_nothing_again(tmp_path) -> None:
     assert run_of(tmp_path / "out")["counts"]["kept"] == 1
 
 
+@pytest.mark.full
 def test_an_override_that_comes_later_grades_nothing_again(tmp_path) -> None:
     shutil.copytree(CORRECT, tmp_path / "ada")
     assert graded(tmp_path, ["ada,ada,,"])["ada"]["points"] == 100
@@ -99,6 +106,7 @@ def test_an_override_that_comes_later_grades_nothing_again(tmp_path) -> None:
     assert graded(tmp_path, ["ada,ada,,"])["ada"]["points"] == 100
 
 
+@pytest.mark.full
 def test_people_give_points_for_what_could_not_be_graded(tmp_path) -> None:
     (tmp_path / "ada").mkdir()
     (tmp_path / "ada" / "notes.txt").write_text("by mail")
@@ -110,6 +118,7 @@ def test_people_give_points_for_what_could_not_be_graded(tmp_path) -> None:
     assert found["ada"]["error"]["kind"] == "package-not-found"
 
 
+@pytest.mark.full
 def test_what_came_after_the_cut_off_has_not_passed(tmp_path) -> None:
     shutil.copytree(CORRECT, tmp_path / "ada")
     graded(tmp_path, ["ada,ada,2026-11-20T12:00:00Z,"], f"deadline: {DEADLINE}", POLICY)

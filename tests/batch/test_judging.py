@@ -41,6 +41,7 @@ def handed_in(folder: Path, name: str, recording: str = "correct") -> Path:
     return folder / name
 
 
+@pytest.mark.full
 def test_every_submission_of_a_folder_is_judged_as_it_is_alone(tmp_path, capsys) -> None:
     handed_in(tmp_path / "results", "bob", "dies-at-128")
     handed_in(tmp_path / "results", "ada")
@@ -71,6 +72,7 @@ def test_what_is_wrong_with_one_is_told_and_stops_no_other(tmp_path, capsys) -> 
     assert f"{tmp_path / 'empty'}: no evidence" in told
 
 
+@pytest.mark.full
 def test_one_that_ends_the_process_stops_no_other(tmp_path) -> None:
     (tmp_path / "own.py").write_text(OWN)
     changes = [

@@ -65,6 +65,7 @@ def test_a_submission_that_cannot_be_graded(tmp_path: Path) -> None:
     assert _modes(out) == ({0o700}, {0o600})
 
 
+@pytest.mark.full
 def test_a_folder_that_was_there_keeps_its_mode_and_what_is_in_it_is_private(tmp_path: Path) -> None:
     handed_in(tmp_path / "in", ["ada"])
     out = tmp_path / "out"
@@ -82,6 +83,7 @@ def test_a_folder_that_was_there_keeps_its_mode_and_what_is_in_it_is_private(tmp
     assert files == {0o600}
 
 
+@pytest.mark.full
 def test_a_folder_that_a_batch_made_is_private_again(tmp_path: Path) -> None:
     handed_in(tmp_path / "in", ["ada"])
     out = tmp_path / "out"
@@ -93,6 +95,7 @@ def test_a_folder_that_a_batch_made_is_private_again(tmp_path: Path) -> None:
     assert _modes(out) == ({0o700}, {0o600})
 
 
+@pytest.mark.full
 def test_a_gradebook_at_a_path_that_was_named(tmp_path: Path) -> None:
     handed_in(tmp_path / "in", ["ada"])
     out = tmp_path / "out"

@@ -73,6 +73,7 @@ def kinds() -> dict[str, str]:
     return {"ada": "correct", "bob": "correct"}
 
 
+@pytest.mark.full
 def test_the_same_rubric_changes_nothing(tmp_path, capsys) -> None:
     out = recorded(tmp_path / "out", kinds())
     before = {name: (out / name / "result.json").read_bytes() for name in kinds()}
@@ -82,6 +83,7 @@ def test_the_same_rubric_changes_nothing(tmp_path, capsys) -> None:
     assert "2 of 2 judged again, 0 changed" in capsys.readouterr().out
 
 
+@pytest.mark.full
 def test_points_that_a_new_rubric_gives(tmp_path, capsys) -> None:
     out = recorded(tmp_path / "out", kinds())
     rubric = changed(tmp_path / "new.yaml", ("rate_hz: 10", "rate_hz: 20"))
@@ -106,6 +108,7 @@ def test_points_that_a_new_rubric_gives(tmp_path, capsys) -> None:
     assert open_batch(out).run.rubric_source == str(rubric)
 
 
+@pytest.mark.full
 def test_a_scenario_that_was_not_recorded(tmp_path, capsys) -> None:
     out = recorded(tmp_path / "out", kinds())
     (out / "ada" / "evidence" / "listener.mcap").unlink()
@@ -117,6 +120,7 @@ def test_a_scenario_that_was_not_recorded(tmp_path, capsys) -> None:
     assert statuses == {"ada": "inconclusive", "bob": "graded"}
 
 
+@pytest.mark.full
 def test_a_scenario_that_runs_something_else_now(tmp_path, capsys) -> None:
     """Evidence that does not say by which definition it was recorded counts; evidence of another one does not."""
     out = recorded(tmp_path / "out", {"ada": "correct"})
@@ -154,6 +158,7 @@ def spoil(path: Path) -> None:
     copy.replace(path)
 
 
+@pytest.mark.full
 def test_what_people_decided_stays_and_is_marked(tmp_path, capsys) -> None:
     out = recorded(tmp_path / "out", kinds())
     (out / "overrides.yaml").write_text(
@@ -173,6 +178,7 @@ def test_what_people_decided_stays_and_is_marked(tmp_path, capsys) -> None:
     assert {c["id"]: c["points"] for c in result["criteria"]}["chatter-rate"] == 4
 
 
+@pytest.mark.full
 def test_a_deadline_that_comes_later(tmp_path) -> None:
     """When it was handed in is in the result, so a late policy of a new rubric can be applied to it."""
     handed_in(tmp_path / "in", ["ada"])
@@ -192,6 +198,7 @@ def test_a_deadline_that_comes_later(tmp_path) -> None:
     assert line["late"]["points_before"] == 100
 
 
+@pytest.mark.full
 def test_what_could_not_be_graded_stays_as_it_was(tmp_path, capsys) -> None:
     handed_in(tmp_path / "in", ["ada"])
     (tmp_path / "in" / "bob").mkdir()
@@ -248,6 +255,7 @@ CRITERION = """\
 """
 
 
+@pytest.mark.full
 @pytest.mark.ros
 def test_what_was_not_recorded_is_run_of_the_same_commit(tmp_path, capsys) -> None:
     talker = CRITERION.format(name="talker", scenario="first", points=100)

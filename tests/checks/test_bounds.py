@@ -52,6 +52,7 @@ def node(name: str) -> LaunchNode:
     return LaunchNode(**given, name=name, namespace="/", remaps=(), line=1)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "part",
     [
@@ -68,12 +69,14 @@ def test_words_of_roslaunch(part: str) -> None:
         finished(run, node("a"))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("part", ["a", "aError", "a:1:", "CMake Error at a", "Error", "error "])
 def test_errors_of_a_build(part: str) -> None:
     with bounded():
         _first_error(lines_of(part))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "part", ["a_1", "a/", "1", "-1 ", "1.", "0x", "[", "[INFO] [", " ", "/a_1_123456789"]
 )
@@ -152,6 +155,7 @@ def test_texts_are_counted_as_before() -> None:
     assert printed_times(run, "p", ["x" * 1000], "{value}") == {}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["talker.py", "a" * 5000])
 @pytest.mark.parametrize("other", ["a" * 240, "talker", "pytalker"])
 def test_near_names_among_thousands(name: str, other: str) -> None:

@@ -37,6 +37,7 @@ def test_right_counters_pass(maximum: int, minimum: int, early: bool) -> None:
     assert verdict("counter-start", {"start": minimum}, values=values, count=count).status is Status.PASS
 
 
+@pytest.mark.full
 @settings(max_examples=40, deadline=None)
 @given(last=st.integers(0, 300), to=st.integers(-300, 299))
 def test_wrong_wraps_fail(last: int, to: int) -> None:

@@ -44,6 +44,7 @@ def test_no_other_pace_passes(start: float, rate_hz: float, pace: float) -> None
     assert found.hint
 
 
+@pytest.mark.full
 @settings(max_examples=40, deadline=None)
 @given(text=st.text(max_size=20), at=st.integers(0, 60))
 def test_one_message_with_other_words_fails(text: str, at: int) -> None:

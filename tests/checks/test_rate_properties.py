@@ -42,6 +42,7 @@ def test_small_jitter_costs_nothing(jitter_ms: list[float]) -> None:
     assert status({"count": 71, "jitter_ms": jitter_ms}) is Status.PASS
 
 
+@pytest.mark.full
 @settings(max_examples=30, deadline=None)
 @given(rate_hz=st.floats(0.5, 400).filter(lambda hz: not 9.49 < hz < 10.51))
 def test_no_other_rate_passes(rate_hz: float) -> None:

@@ -53,6 +53,7 @@ def test_a_loss_is_shown_at_its_line_and_the_step_fails(runner):
     assert 'ws/src/my lab/src/numeric_talker.py"' in (ran.artifact / "code-quality.json").read_text()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("mark", "code", "status"),
     [
@@ -82,6 +83,7 @@ def test_a_step_that_never_fails_still_says_how_it_ended(runner):
     assert ran.outputs["passed"] == "false"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("fail_on", "code"), [("", 4), ("inconclusive", 4), ("below-pass-mark,not-graded", 0)]
 )
@@ -107,6 +109,7 @@ def test_no_package_is_the_students_fault_whatever_a_machine_may_do(runner):
     assert (reporter(ran.outputs["result"]).points, reporter(ran.outputs["result"]).of) == (0, 100)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "inputs",
     [
@@ -200,6 +203,7 @@ def test_hidden_criteria_stay_hidden(runner):
     assert not [data for data in kept if b"talker-executable" in data]
 
 
+@pytest.mark.full
 def test_a_second_use_in_a_job_installs_nothing_and_has_a_folder_of_its_own(runner):
     handed_in(runner.workspace)
     first, second = runner.use(**STATIC), runner.use(**STATIC)
@@ -227,6 +231,7 @@ def test_an_installation_that_fails_is_nobodys_verdict(runner, tmp_path):
     assert ran.annotations("error") == ["Not graded: the grader could not be installed: see the log"]
 
 
+@pytest.mark.full
 @pytest.mark.ros
 def test_nodes_are_run_and_every_report_is_kept(runner):
     package = handed_in(runner.workspace)

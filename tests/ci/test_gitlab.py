@@ -107,6 +107,7 @@ def test_what_could_not_be_judged_is_a_warning(job):
     assert "no mark is lost" in job.log
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "given", [{"GRADER_LAB": "leeds"}, {"GRADER_PASS_MARK": "1000"}, {"GRADER_PATH": "nowhere"}]
 )
@@ -128,6 +129,7 @@ def test_results_that_were_handed_in_are_not_kept(job):
     assert not (job.results / "mine").exists()
 
 
+@pytest.mark.full
 def test_what_is_cached_is_no_part_of_the_submission(job):
     handed_in(job.project, ".")
     cache = job.project / ".grader-cache" / "pip"
@@ -224,6 +226,7 @@ def test_the_installation_is_made_once_and_kept_apart(tmp_path):
     assert (home / "venv" / "bin" / "grader").exists()
 
 
+@pytest.mark.full
 @pytest.mark.ros
 def test_nodes_are_run(job):
     handed_in(job.project, ".")

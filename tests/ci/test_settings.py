@@ -45,6 +45,7 @@ def test_a_mark_is_of_the_visible_points():
             assert points_to_pass(marked, 5) == "to pass, it takes 3"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("tenths", range(1, 1000, 37))
 def test_just_the_mark_is_reached_whatever_floating_point_says(tenths):
     lab = load_rubric("leeds-comp3631-lab1").rubric

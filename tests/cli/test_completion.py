@@ -62,6 +62,7 @@ def shell(request: pytest.FixtureRequest, folder: Path) -> Iterator[Typed | Aske
     shell.close()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("line", "words"), LINES, ids=[line.replace(" ", "_") for line, _ in LINES])
 def test_a_real_shell_completes(shell: Typed | Asked, line, words):
     shell.shows(line, *words)
@@ -139,6 +140,7 @@ def test_mutants_are_those_of_the_lab():
     assert mutants(parsed_args=argparse.Namespace(rubric="own.yaml")) == {}
 
 
+@pytest.mark.full
 def test_every_mistake_that_is_offered_is_one(tmp_path, capsys):
     offered = mistakes(parsed_args=argparse.Namespace(lab=LAB))
     assert offered

@@ -218,6 +218,7 @@ def test_diagnosis_without_ros_names_the_command_that_mends_it(monkeypatch):
     assert {"Python", "git", "sandbox", "memory", "disk", "host name", "encoding"} <= set(rows)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("delay_s", [0.05, 0.1, 0.15, 0.2, 0.3])
 def test_an_interrupt_while_the_program_loads_is_quiet(delay_s, tmp_path):
     """Started is what has its handlers in place: the Python that runs before them is not ours."""

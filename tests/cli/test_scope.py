@@ -152,6 +152,7 @@ def test_only_logins_are_left_for_a_scope(
     assert machine.noted("asked")[:1] == ([] if asked is None else [asked])
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "script", ["#!/bin/sh\nexit 1\n", "#!/bin/sh\nexec sleep 60\n", "#!/bin/sh\n", "\x7f"]
 )

@@ -32,6 +32,7 @@ def _none(_: str) -> None:
     pass
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_a_worker_killed_in_the_middle_costs_nobody_a_result(place: Cluster, tmp_path: Path) -> None:
     workers = [place.worker() for _ in range(3)]
@@ -53,6 +54,7 @@ def test_a_worker_killed_in_the_middle_costs_nobody_a_result(place: Cluster, tmp
     assert sorted(verdicts(out)) == NAMES
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_results_come_through_a_url_that_is_no_path(place: Cluster, tmp_path: Path, monkeypatch) -> None:
     shelf = tmp_path / "shelf"
@@ -91,6 +93,7 @@ def test_workers_that_differ_are_named_and_left_out(place: Cluster, tmp_path: Pa
     assert any("no grader like this one is installed there" in line for line in said)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("preload", "why"), [("without", "has no grader like this one"), ("older", "has grader 0.0.9")]
 )
@@ -103,6 +106,7 @@ def test_a_scheduler_that_differs_is_named(preload: str, why: str, tmp_path: Pat
     assert not out.exists()
 
 
+@pytest.mark.full
 @pytest.mark.ros
 def test_real_gradings_get_the_same_verdicts_with_a_worker_killed(place: Cluster, tmp_path: Path) -> None:
     names, count = ("counter-resets-to-1", "listener-silent", "chatter-capital"), 6

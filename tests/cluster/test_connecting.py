@@ -75,6 +75,7 @@ def _refusal(address: str, out: Path) -> HostError:
     return caught.value
 
 
+@pytest.mark.full
 def test_where_nothing_answers_one_line_says_so(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(connect, "CONNECT_S", 0.5)
     with socket.create_server(("127.0.0.1", 0)) as closed:

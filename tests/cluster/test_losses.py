@@ -32,6 +32,7 @@ def _none(_: str) -> None:
     pass
 
 
+@pytest.mark.full
 def test_a_submission_that_ends_its_workers_is_given_up_and_the_others_are_graded(
     place: Cluster, tmp_path: Path
 ) -> None:
@@ -51,6 +52,7 @@ def test_a_submission_that_ends_its_workers_is_given_up_and_the_others_are_grade
     assert sorted(verdicts(out)) == ["s000", "s001", "s002", "s003"]
 
 
+@pytest.mark.full
 def test_workers_that_come_later_take_over_from_those_that_are_gone(place: Cluster, tmp_path: Path) -> None:
     first = place.worker()
     out, outcomes = tmp_path / "out", []
@@ -64,6 +66,7 @@ def test_workers_that_come_later_take_over_from_those_that_are_gone(place: Clust
     assert {outcome.status for outcome in outcomes} == {"inconclusive"}
 
 
+@pytest.mark.full
 def test_a_caller_that_stops_leaves_nothing_running(place: Cluster, tmp_path: Path) -> None:
     worker = place.worker(threads=2)
     out = tmp_path / "out"
@@ -76,6 +79,7 @@ def test_a_caller_that_stops_leaves_nothing_running(place: Cluster, tmp_path: Pa
     assert worker.poll() is None
 
 
+@pytest.mark.full
 def test_a_killed_client_leaves_its_workers_free_and_the_next_one_goes_on(
     place: Cluster, tmp_path: Path
 ) -> None:
@@ -111,6 +115,7 @@ def test_without_its_scheduler_the_batch_ends_with_one_line(place: Cluster, tmp_
     assert not (out / EXCHANGE).exists()
 
 
+@pytest.mark.full
 def test_a_cluster_of_this_machine_is_started_and_ended(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert len(ids(ClusterExecutor("local", out).run(jobs_for(out, 3), begun=_none))) == 3

@@ -83,6 +83,7 @@ def ports(before: list[int], client: Any) -> list[int]:
     return [port for port in listening_ports(os.getpid()) if port not in before]
 
 
+@pytest.mark.full
 def test_nothing_listens_but_scheduler_nannies_and_workers(client: Any, ports: list[int]) -> None:
     known = client.scheduler_info(n_workers=-1)
     addresses = [known["address"], *known["workers"], *(one["nanny"] for one in known["workers"].values())]
@@ -107,6 +108,7 @@ def test_every_port_refuses_who_has_no_certificate_of_the_cluster(ports: list[in
             assert _told(plain) == b""
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("protocol", ["tcp", "tls"])
 @pytest.mark.parametrize("certificates", ["none", "foreign"])
 def test_a_client_without_the_certificates_is_refused(client: Any, protocol: str, certificates: str) -> None:

@@ -88,6 +88,7 @@ def test_the_wheel_lists_what_is_in_it_and_holds_what_grading_needs() -> None:
     assert not [path for path in names if "__pycache__" in path]
 
 
+@pytest.mark.full
 def test_the_wheel_is_installed_by_pip_and_exports_the_same_again(tmp_path) -> None:
     """From an installed wheel, too: what it packs is what was packed."""
     pytest.importorskip("pip", reason="no pip in this virtual environment")

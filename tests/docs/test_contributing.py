@@ -71,6 +71,7 @@ def test_the_tests_of_checks_accept_the_new_check(edited: Path) -> None:
     assert int(passed[1]) >= 7
 
 
+@pytest.mark.full
 def test_the_rubric_is_valid_and_the_check_explains_itself(edited: Path) -> None:
     _run(edited, "-m", "grader", "rubric", "validate", "rubrics/examples/turtle-square.yaml")
     assert "The manifest names a licence." in _run(edited, "-m", "grader", "explain", "licence")

@@ -78,6 +78,7 @@ def test_no_page_asks_for_a_diagram_that_would_be_drawn_by_a_script_from_elsewhe
     ] == []
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("written", "named"), FAULTS.values(), ids=list(FAULTS))
 def test_a_fault_of_a_page_ends_the_build(written: str, named: str, tmp_path: Path) -> None:
     (tmp_path / "docs").mkdir()

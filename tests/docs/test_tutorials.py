@@ -109,6 +109,7 @@ def test_a_tutorial_uses_the_grader_and_shows_what_it_prints(name: str) -> None:
     assert sum(bool(command.shown) for command in graded) >= 4
 
 
+@pytest.mark.full
 @pytest.mark.ros
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TUTORIALS)

@@ -98,6 +98,7 @@ def test_a_recording_that_was_not_ended_has_no_index(tmp_path):
     assert "cut short: it has no index" in refused(path)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("compression", [None, BZ2, LZ4])
 def test_cut_or_damaged_anywhere_it_is_refused_or_harmless(tmp_path, compression):
     whole = write_bag(tmp_path / "whole.bag", CHATTER, COUNT, compression=compression).read_bytes()

@@ -189,6 +189,7 @@ def test_what_the_arena_may_record_of_one_submission_can_be_read_again():
         shared.hold(SUBMISSION_MESSAGE_BYTES // 10, foreign=True)
 
 
+@pytest.mark.full
 def test_thousands_of_definitions_are_inspected_within_seconds():
     stream = BytesIO()
     writer = Writer(stream)

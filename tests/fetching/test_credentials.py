@@ -130,6 +130,7 @@ def test_each_token_is_for_its_own_server(environment, url, login, monkeypatch):
     assert TOKEN not in repr(ways) + " ".join(part for way in ways for part in way.options)
 
 
+@pytest.mark.full
 def test_a_private_repository_by_a_token(public, server, certificate, argv, monkeypatch):
     folder, head = public
     with_store(server)

@@ -43,6 +43,7 @@ def chosen(server, commits, rule, **fields):
     return next(name for name, value in commits.items() if value == found.source.ref), found.handed_in
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("rule", "fields", "name", "before"),
     [
@@ -87,6 +88,7 @@ def test_the_note_says_what_was_done(commits, server):
     assert "of 2026-10-30 20:14:05 +00:00 is the last one on main before the time asked for" in near
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("rule", "submitted", "name", "by", "words"),
     [

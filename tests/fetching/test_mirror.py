@@ -126,6 +126,7 @@ def damage_all(mirror):
     mirror.mkdir()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "damage",
     [damage_pack, damage_lock, damage_head, damage_config, damage_refs, damage_state, damage_all],
@@ -167,6 +168,7 @@ def test_a_grader_that_was_killed_in_the_middle_leaves_no_half_mirror(server):
     assert place.state() is None
 
 
+@pytest.mark.full
 def test_two_processes_fetch_once(server, monkeypatch):
     server.new()
     log = fetches(server, monkeypatch)

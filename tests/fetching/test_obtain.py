@@ -39,6 +39,7 @@ def grown(server):
     return repo
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("ref", ["", "@main", "@feature/x", "@v1", "@refs/heads/feature/x", "@HEAD"])
 def test_the_same_submission_through_the_mirror_and_without_it(ref, grown, server):
     direct, mirrored = both(server, f"{HOST}/student{ref}")

@@ -107,6 +107,7 @@ def test_paths(example: Example) -> None:
         assert figure.strayed is not None
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("check", DRAWN)
 def test_every_kind_is_drawn_from_some_timeline(check: str) -> None:
     """Or the tests above would hold of nothing."""

@@ -72,6 +72,7 @@ NUMBERS = st.one_of(
 )
 
 
+@pytest.mark.full
 @settings(max_examples=60)
 @given(sent=NUMBERS, count=st.integers(1, 2000), rate_hz=st.floats(0.5, 1000))
 def test_any_messages(sent: tuple[str, list[Any]], count: int, rate_hz: float) -> None:
@@ -135,6 +136,7 @@ def test_runs_that_the_rubric_does_not_know_and_none_at_all() -> None:
     assert figures_of(asked, {}, ()) == Figures()
 
 
+@pytest.mark.full
 def test_a_flood_of_a_hundred_thousand_messages_from_a_name_of_ten_thousand_letters() -> None:
     topic = {
         "topic": TOPIC,
@@ -153,6 +155,7 @@ def test_a_flood_of_a_hundred_thousand_messages_from_a_name_of_ten_thousand_lett
     assert len(wrap.wraps) >= 60
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("at", [700, 4321, 9998])
 def test_of_a_long_sequence_the_wrong_step_stays_with_its_surroundings(at: int) -> None:
     topic = {

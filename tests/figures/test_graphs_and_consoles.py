@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import pytest
+
 from grader.model.figure import ConsoleFigure, GraphFigure
 from grader.report.figures.runs import EDGES_MAX, LETTERS_MAX, NODES_MAX, TOPICS_MAX, console_of, graph_of
 from tests.checks.examples import runs_of
@@ -71,6 +73,7 @@ def test_another_tools_recording_tells_who_published() -> None:
     assert [e.publishes for e in found.edges] == [True]
 
 
+@pytest.mark.full
 def test_a_thousand_nodes() -> None:
     names = [f"/n{i}" for i in range(1000)]
     long = "/" + "x" * 10_000

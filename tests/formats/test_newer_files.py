@@ -200,6 +200,7 @@ def test_further_keys_and_channels_of_evidence_are_passed_over(tmp_path: Path, m
     assert found.metadata["sky"] == "blue"
 
 
+@pytest.mark.full
 def test_further_keys_of_a_class_are_passed_over(course: Path) -> None:
     edit(course / "run.json", weather="fine")
     assert run(["regrade", "class", "--rubric", "class.yaml"]) == 3  # one submission could not be graded
@@ -219,6 +220,7 @@ def test_further_keys_of_peoples_files_are_named(name: str, course: Path, capsys
     assert ".yaml:" in said
 
 
+@pytest.mark.full
 def test_files_without_a_schema_are_version_1(course: Path, capsys) -> None:
     rubric, overrides = course.parent / "class.yaml", course / "overrides.yaml"
     for path in (rubric, overrides):

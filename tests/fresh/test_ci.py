@@ -49,6 +49,7 @@ def installed(machine: Root, locks: Path) -> tuple[Root, subprocess.CompletedPro
     return machine, done
 
 
+@pytest.mark.full
 def test_a_job_of_gitlab_installs_the_grader_and_runs_nodes(installed) -> None:
     root, done = installed
     assert done.returncode == 0, done.stdout + done.stderr
@@ -58,6 +59,7 @@ def test_a_job_of_gitlab_installs_the_grader_and_runs_nodes(installed) -> None:
     assert "sandbox: " in done.stdout
 
 
+@pytest.mark.full
 def test_a_job_of_github_in_a_container_runs_what_is_installed(installed, locks) -> None:
     root, _ = installed
     home = f"{PROJECT}.grader"

@@ -94,12 +94,14 @@ def _failed(document: Mapping[str, Any]) -> list[str]:
     return [test["name"].split(":")[0] for test in document["tests"] if test["status"] != "passed"]
 
 
+@pytest.mark.full
 def test_gradescope_gives_full_marks_to_the_correct_package(rooms, autograder, locks) -> None:
     document = _graded_by_gradescope(rooms.fresh_root(on=autograder), _tree(CORRECT), locks)
     assert (document["score"], _failed(document)) == (100, []), document["stdout"]
     assert document["extra_data"]["rubric"]["id"] == LAB
 
 
+@pytest.mark.full
 def test_gradescope_takes_from_a_faulty_package_what_its_fault_costs(rooms, autograder, locks) -> None:
     root = rooms.fresh_root(on=autograder)
     document = _graded_by_gradescope(root, _tree(NO_TIME), locks)
@@ -116,6 +118,7 @@ def test_gradescope_says_that_there_is_no_package(rooms, autograder, locks) -> N
     assert "basic_comms" in document["output"]
 
 
+@pytest.mark.full
 def test_gradescope_without_a_sandbox_is_not_fooled_by_a_forger(rooms, autograder, locks) -> None:
     root = rooms.fresh_root(on=autograder)
     settings = root.path / "autograder" / "source" / "grader.json"
@@ -194,6 +197,7 @@ def _zip(folder: Path, file: Path) -> bytes:
     return Path(shutil.make_archive(str(file), "zip", folder.parent, folder.name)).read_bytes()
 
 
+@pytest.mark.full
 def test_prairielearn_gives_full_marks_to_the_correct_package(rooms, question, locks, tmp_path) -> None:
     data = _zip(CORRECT, tmp_path / "basic_comms")
     document = _graded_by_prairielearn(rooms, question, "basic_comms.zip", data, locks)
@@ -224,6 +228,7 @@ def _context() -> list[str]:
     ]  # fmt: skip
 
 
+@pytest.mark.full
 def test_docker_grades_the_package_in_its_folder_as_an_ordinary_user(rooms, docker) -> None:
     root = rooms.fresh_root(on=docker.root)
     root.copy_in(CORRECT, "/work")

@@ -35,12 +35,14 @@ def test_every_target_has_seeds_and_every_seed_a_target() -> None:
     assert READERS.keys() | ROS_SIDE == TARGETS.keys()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", EACH)
 def test_the_corpus(name: str, runner: Runner) -> None:
     found = {seed: TARGETS[name].run(runner, data) for seed, data in TARGETS[name].seeds.items()}
     assert {seed: str(outcome) for seed, outcome in found.items() if outcome.finding} == {}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", EACH)
 def test_mutations(name: str, runner: Runner) -> None:
     rng = random.Random(name)  # noqa: S311 - a fixed choice
@@ -51,6 +53,7 @@ def test_mutations(name: str, runner: Runner) -> None:
         assert not outcome.finding, f"{outcome}\n{data!r}"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", EACH)
 def test_structured_input(name: str, runner: Runner) -> None:
     @settings(

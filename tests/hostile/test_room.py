@@ -99,6 +99,7 @@ def test_only_the_words_that_an_attack_names_excuse_it_from_being_graded() -> No
     assert not was_refused(load_attack("bomb-memory"), said)
 
 
+@pytest.mark.full
 @pytest.mark.ros
 @pytest.mark.slow
 @pytest.mark.parametrize("name", WITHOUT_SANDBOX)

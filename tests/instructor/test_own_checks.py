@@ -215,6 +215,7 @@ def test_what_it_prints_does_not_spoil_the_json(tmp_path, capsys):
     assert "judging" in shown.err
 
 
+@pytest.mark.full
 def test_the_schema_offers_it(tmp_path, capsys):
     path = write_rubric(tmp_path, OWN, checks=GREETING)
     assert grader(["rubric", "schema", "--rubric", str(path)]) == 0

@@ -61,6 +61,7 @@ def test_each_test_is_a_share_of_the_points(tmp_path):
     assert found.hint.startswith("test_name: it is named lab1; test_counts[1]: assert ")
 
 
+@pytest.mark.full
 def test_all_pass_and_none(tmp_path):
     assert result(tmp_path, "def test_a(run):\n    assert run.scenario == 'talker'\n").status is Status.PASS
     found = result(tmp_path, "def test_a():\n    raise OSError('gone\\nfor ever')\n")
@@ -82,6 +83,7 @@ def test_a_test_of_no_points_is_advice(tmp_path):
     assert (found.status, found.hint) == (Status.PASS, "test_a: nicer")
 
 
+@pytest.mark.full
 def test_twice_the_same(tmp_path):
     text = (
         "def test_a(tmp_path):\n    assert object() == tmp_path\n"
@@ -98,6 +100,7 @@ def test_some_are_selected(tmp_path):
     assert result(tmp_path, MIXED, criteria=criteria).measured == "test_hello 1/1, test_name 0/3"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("tests", "hint"),
     [
@@ -118,6 +121,7 @@ def test_broken_tests_are_an_error_and_never_a_pass(tmp_path, tests, hint):
     assert hint in broken(tmp_path, tests)
 
 
+@pytest.mark.full
 def test_a_selection_of_nothing_or_of_nonsense_is_an_error(tmp_path):
     none = TESTS.replace("test_lab.py", "test_lab.py, select: nowhere")
     assert broken(tmp_path, MIXED, none) == "test_lab.py holds no test that fits 'nowhere'"
@@ -125,6 +129,7 @@ def test_a_selection_of_nothing_or_of_nonsense_is_an_error(tmp_path):
     assert "pytest ended with code 4" in broken(tmp_path, MIXED, nonsense)
 
 
+@pytest.mark.full
 def test_tests_that_take_too_long_end_with_what_they_started(tmp_path):
     text = (
         "import subprocess, pathlib\n"
@@ -163,6 +168,7 @@ def test_nothing_of_the_surrounding_folders_takes_part(tmp_path, monkeypatch):
     ]  # fmt: skip
 
 
+@pytest.mark.full
 def test_a_run_that_was_not_recorded_leaves_it_open(tmp_path):
     found = result(tmp_path, "def test_a():\n    pass\ndef test_b(evidence):\n    evidence['other']\n")
     assert (found.status, found.message) == (
@@ -180,6 +186,7 @@ def test_only_what_was_recorded_is_iterated(tmp_path):
     assert result(tmp_path, text).status is Status.PASS
 
 
+@pytest.mark.full
 def test_all_skipped_is_open_or_blocked(tmp_path):
     text = "import pytest\ndef test_a(run):\n    if not run.student_channels('/x'):\n        pytest.skip('no /x')\n"
     found = result(tmp_path, text)
@@ -196,6 +203,7 @@ def test_a_criterion_without_a_scenario_has_no_run(tmp_path):
     assert "names no scenario" in broken(tmp_path, "def test_a(run):\n    pass\n", criteria)
 
 
+@pytest.mark.full
 def test_tests_read_a_recording_of_another_tool(tmp_path):
     from grader.evidence.reader import load_evidence  # noqa: PLC0415 - this test only
 

@@ -264,6 +264,7 @@ def test_truncated(kind, keep, tmp_path):
     assert "damaged" in refused(path, tmp_path)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["zip", "tar.gz", "tar.xz", "tar.bz2"])
 def test_a_flipped_bit_is_never_a_crash(kind, tmp_path):
     path = tmp_path / f"lab1.{kind}"

@@ -163,6 +163,7 @@ def test_a_submodule_in_place_is_read_by_its_own_repository(tmp_path):
         assert opened(source, tmp_path).package.mode_source == "git"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "url", ["ext::sh -c touch% {mark}", "--upload-pack=touch {mark}", "file://{victim}", "-u touch {mark}"]
 )
@@ -266,6 +267,7 @@ def test_trees_with_a_path_for_a_name(name, tmp_path):
     assert not list(tmp_path.rglob("evil"))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("leaf", [b"", b"100644 x\0"])
 def test_a_tree_that_holds_itself_over_and_over(leaf, tmp_path, monkeypatch):
     """Some hundred bytes that stand for ten thousand million folders, with files in them or without."""

@@ -73,6 +73,7 @@ def after_a_build(facts: PackageFacts) -> PackageFacts:
     )
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("lab", "name"), SAMPLES)
 def test_what_is_final_stays_whatever_the_build_finds_out(lab, name, tmp_path) -> None:
     facts = facts_of_fixture(lab, name, tmp_path)

@@ -34,6 +34,7 @@ def without_the_wrap(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.full
 def test_a_rubric_with_a_criterion_taken_out_lets_a_mutant_survive(grader, tmp_path):
     argv = ("rubric", "test", without_the_wrap(tmp_path), "--only", *MUTANTS, "--jobs", "2", "--json")
     code, out, err = grader.run(*argv)
@@ -49,6 +50,7 @@ def test_a_rubric_with_a_criterion_taken_out_lets_a_mutant_survive(grader, tmp_p
     assert [path.name for path in Path(survivor["evidence"]).parent.iterdir()] == [survivor["name"]]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("how", ["interrupt", "terminate", "kill"])
 def test_stopping_leaves_nothing_behind(how, grader):
     process = grader.start("rubric", "test", LAB, "--only", *MUTANTS, "--jobs", "2")

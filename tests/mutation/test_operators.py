@@ -103,6 +103,7 @@ def is_yaml(data: bytes) -> bool:
     return True
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("lab", "package"), WRITTEN_OTHERWISE)
 def test_correct_packages_of_every_kind_stay_sound_python(lab, package):
     """Classes, timers, callbacks, one-liners: whatever is edited still compiles."""

@@ -230,6 +230,7 @@ def _write_many(path: str, names: list[str]) -> None:
         write_override(Path(path), name, "style", Override(points=1, comment=name))
 
 
+@pytest.mark.full
 def test_two_writers_at_once_lose_nothing(tmp_path):
     path = file(tmp_path)
     names = [[f"{side}{i}" for i in range(15)] for side in "xy"]
@@ -263,6 +264,7 @@ CHANGES = st.lists(
 )
 
 
+@pytest.mark.full
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(CHANGES)
 def test_any_changes_one_after_another(tmp_path, changes):

@@ -70,6 +70,7 @@ def test_a_trace_of_too_many_lines_is_named_and_cut(tmp_path):
     assert found.too_much == f"CMake's trace has more than {LINES_MAX} lines"
 
 
+@pytest.mark.full
 def test_files_that_take_too_long_to_parse_bear_out_nothing_and_are_named(tmp_path):
     for number in range(60):
         (tmp_path / f"c{number}.cmake").write_text("a(b)\n" * 39_000)

@@ -162,6 +162,7 @@ def test_very_many_launch_files():
 # CMake
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "text",
     [
@@ -184,6 +185,7 @@ def test_cmake_files_that_multiply(text, tmp_path):
     assert len(cmake.model_dump_json()) < 10_000_000
 
 
+@pytest.mark.full
 def test_cmake_files_that_include_each_other(tmp_path):
     files = {f"{n}.cmake": f"include({n + 1}.cmake)\n" + "a()\n" * 20_000 for n in range(30)}
     cmake = facts_of(tmp_path, files | {"CMakeLists.txt": "project(lab1)\ninclude(0.cmake)\n"}).cmake
@@ -266,6 +268,7 @@ def test_remarks_on_python_files_without_end(tmp_path):
     assert (len(report.slips), len(report.checked), report.faults) == (1000, 300, {})
 
 
+@pytest.mark.full
 def test_a_report_on_syntax_that_has_no_end():
     entry = b'{"file": "a.py", "faults": [], "slips": []}\n'
     with bounded():
@@ -315,6 +318,7 @@ def test_links_that_no_system_follows(tmp_path):
 MATTER = ("package.xml", "CMakeLists.txt", "src/a.py", "launch/a.launch")
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", MATTER)
 @pytest.mark.parametrize("what", ["folder", "pipe", "zero", "shadow", "terabyte", "binary"])
 def test_what_takes_the_place_of_a_file(name, what, tmp_path):

@@ -41,11 +41,13 @@ def folder(complete: Installed, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return folder
 
 
+@pytest.mark.full
 def test_a_cluster_grades(folder: Path):
     results = [json.loads(row) for row in (folder / "results" / "results.jsonl").read_text().splitlines()]
     assert {one["submission"]["id"] for one in results} == set(NAMES)
 
 
+@pytest.mark.full
 def test_submissions_are_compared(complete: Installed, folder: Path):
     out = complete("similar", "results", "--json", cwd=folder)
     assert all(name in out for name in NAMES)

@@ -19,6 +19,7 @@ MAN = shutil.which("man")
 RECORDING = ROOT / "tests" / "data" / "recordings" / "correct"
 
 
+@pytest.mark.full
 def test_pipx_shows_the_program_its_man_page_and_its_completion(pipx_home: Path, installed: Installed):
     assert installed.program.is_file()
     assert [name for name in SHARED if not (pipx_home / name).is_file()] == []
@@ -87,6 +88,7 @@ EXTRAS = {
 }
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("extra", EXTRAS)
 def test_without_its_extra_a_command_says_in_one_line_which_to_install(
     installed: Installed, package: Path, extra

@@ -45,6 +45,7 @@ def statuses(criteria: list[Mapping[str, object]]) -> dict[object, object]:
     return {one["id"]: one["status"] for one in criteria}
 
 
+@pytest.mark.full
 def test_it_judges_recordings_alike(grader: Installed, tmp_path: Path):
     correct = json.loads(grader("judge", RECORDINGS / "correct", "--rubric", LAB, cwd=tmp_path))
     dies = json.loads(grader("judge", RECORDINGS / "dies-at-128", "--rubric", LAB, cwd=tmp_path, code=1))

@@ -162,6 +162,7 @@ def test_junit_parses_and_gives_the_visible_text_back(shown):
     assert TO_A_CI.search(data.decode()) is None
 
 
+@pytest.mark.full
 @SOME
 @given(results())
 def test_json_is_the_result_itself(shown):
@@ -212,6 +213,7 @@ def test_a_message_of_a_megabyte_is_clipped_everywhere(text, tmp_path):
     assert len(terminal(spoiled(of(text)))) < 60_000
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("text", HUGE[1:3], ids=["hidden", "entities"])
 def test_two_hundred_criteria_of_the_longest_texts_make_a_few_megabytes(text, tmp_path):
     citations = (FileCitation(file=text),) * 100

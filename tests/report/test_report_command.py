@@ -45,6 +45,7 @@ def changed(folder: Path, **changes: object) -> None:
     path.write_text(json.dumps(json.loads(path.read_text()) | changes))
 
 
+@pytest.mark.full
 def test_a_class_gets_every_report_and_its_page(lab, capsys):
     before = {path: path.read_bytes() for path in lab.rglob("result.json")}
     assert run(["report", str(lab)]) == 0
@@ -64,6 +65,7 @@ def test_a_class_gets_every_report_and_its_page(lab, capsys):
     assert {path: path.read_bytes() for path in lab.rglob("result.json")} == before
 
 
+@pytest.mark.full
 def test_the_same_reports_come_again(lab):
     assert run(["report", str(lab / "bob")]) == 0
     first = {name: (lab / "bob" / name).read_bytes() for name in REPORTS}
@@ -71,6 +73,7 @@ def test_the_same_reports_come_again(lab):
     assert {name: (lab / "bob" / name).read_bytes() for name in REPORTS} == first
 
 
+@pytest.mark.full
 def test_a_page_without_names_is_written_beside_the_other(lab, tmp_path, capsys):
     assert run(["report", str(lab), "--anonymous", str(tmp_path / "page.html")]) == 0
     assert str(tmp_path / "page.html") in capsys.readouterr().out
@@ -79,6 +82,7 @@ def test_a_page_without_names_is_written_beside_the_other(lab, tmp_path, capsys)
     assert "bob" in (lab / "index.html").read_text().lower()
 
 
+@pytest.mark.full
 def test_what_cannot_be_read_costs_the_others_nothing(lab, capsys):
     (lab / "bob" / "result.json").write_text("{")
     shutil.rmtree(lab / "cy" / "evidence")
@@ -91,6 +95,7 @@ def test_what_cannot_be_read_costs_the_others_nothing(lab, capsys):
     assert "mermaid" not in (lab / "cy" / "report.md").read_text()
 
 
+@pytest.mark.full
 def test_another_version_of_the_rubric_is_said(lab, capsys):
     changed(lab / "bob", rubric={"id": "leeds-comp3631-lab1", "version": "0", "digest": "f" * 64})
     assert run(["report", str(lab)]) == 0
@@ -116,6 +121,7 @@ def test_the_rubric_is_the_batchs_or_the_one_of_that_id(lab, tmp_path, capsys):
     assert f"another version of {own}" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_a_folder_of_results_without_a_batch_has_no_page(lab, tmp_path, capsys):
     (lab / "run.json").unlink()
     assert run(["report", str(lab)]) == 0
@@ -145,6 +151,7 @@ def test_each_form_of_the_registry_is_tried():
     assert set(FORMS) == set(REGISTRY)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("form", FORMS)
 def test_each_form_goes_to_stdout_and_to_a_file(lab, tmp_path, capsys, form):
     assert run(["report", str(lab / "bob"), "--form", form]) == 0

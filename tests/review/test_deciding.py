@@ -67,6 +67,7 @@ def test_taking_back_gives_the_checks_points(page, out) -> None:
     assert result_of(out, "dana").overrides == ()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("points", "said"),
     [

@@ -31,6 +31,7 @@ def server(out):
     server.process.communicate()
 
 
+@pytest.mark.full
 def test_two_tabs_that_save_at_once_lose_nothing(server, out) -> None:
     tabs = [Tab(server), Tab(server)]
     todo = [
@@ -59,6 +60,7 @@ def test_two_tabs_that_save_at_once_lose_nothing(server, out) -> None:
         assert written[key][criterion]["comment"] == f"by {winner}"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_end_in_order_writes_the_books(server, out, number) -> None:
     tab = Tab(server)
@@ -72,6 +74,7 @@ def test_an_end_in_order_writes_the_books(server, out, number) -> None:
     assert points_of(out, "ada", "style") == 9
 
 
+@pytest.mark.full
 def test_a_killed_review_has_saved_and_the_next_one_writes_the_books(server, out) -> None:
     tab = Tab(server)
     tab.send("ada", "style", tab.form("ada", "style"), points="9")
@@ -81,6 +84,7 @@ def test_a_killed_review_has_saved_and_the_next_one_writes_the_books(server, out
     assert ",9," in (out / "gradebook.csv").read_text()
 
 
+@pytest.mark.full
 def test_it_says_its_token_once_and_nothing_of_its_requests(server) -> None:
     tab = Tab(server)
     tab.ask("GET", "/s/ada/")
@@ -90,6 +94,7 @@ def test_it_says_its_token_once_and_nothing_of_its_requests(server) -> None:
     assert "nowhere" not in said + errors
 
 
+@pytest.mark.full
 def test_tokens_are_new_each_time_and_long(server, out) -> None:
     other = Server(out)
     other.end()

@@ -16,6 +16,7 @@ def doubling(line: str, rounds: int = 40) -> str:
     return "a0: &a0 {x: 1}\n" + "".join(line.format(n, n - 1) for n in range(1, rounds))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("text", "says"),
     [

@@ -170,6 +170,7 @@ def test_a_criterion_that_requires_itself(tmp_path):
     ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("content", "fault"),
     [

@@ -36,6 +36,7 @@ def files_of(folder: Path) -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.full
 def test_copies_are_shown_and_written_and_results_stay_as_they_were(class_folder, capsys) -> None:
     before = files_of(class_folder)
     assert grader(["similar", str(class_folder)]) == 0
@@ -49,6 +50,7 @@ def test_copies_are_shown_and_written_and_results_stay_as_they_were(class_folder
     assert {path: after[path] for path in before} == before
 
 
+@pytest.mark.full
 def test_what_is_written_reads_back(class_folder) -> None:
     grader(["similar", str(class_folder)])
     data = json.loads((class_folder / "similarity.json").read_text(encoding="utf-8"))
@@ -62,18 +64,21 @@ def test_what_is_written_reads_back(class_folder) -> None:
     assert not any(re.match(r"[=+@-]", cell) for row in rows for cell in row.values())
 
 
+@pytest.mark.full
 def test_json_is_what_is_written(class_folder, capsys) -> None:
     assert grader(["similar", str(class_folder), "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)
     assert shown == json.loads((class_folder / "similarity.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.full
 def test_no_pairs_is_success_too(tmp_path, capsys) -> None:
     class_of(tmp_path, {"ann": SUBMISSIONS["ann"], "dan": SUBMISSIONS["dan"]})
     assert grader(["similar", str(tmp_path)]) == 0
     assert "no pairs are nearly the same" in capsys.readouterr().out
 
 
+@pytest.mark.full
 def test_names_and_groups_come_from_the_batch(tmp_path, capsys) -> None:
     ids = ("ann", "ben", "dan")
     class_of(tmp_path, {name: SUBMISSIONS[name] for name in ids} | {"eve": SUBMISSIONS["ann"]})
@@ -87,6 +92,7 @@ def test_names_and_groups_come_from_the_batch(tmp_path, capsys) -> None:
     assert "1 pair within a group is not listed." in shown
 
 
+@pytest.mark.full
 def test_a_submission_of_the_roster_without_evidence_is_named(tmp_path, capsys) -> None:
     class_of(tmp_path, {"ann": SUBMISSIONS["ann"]})
     write_run(tmp_path, ("ann", "", ""), ("ben", "", ""))
@@ -113,6 +119,7 @@ def test_starter_code_that_is_no_archive_is_refused(class_folder, tmp_path, caps
     assert "--starter handout.zip" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_starter_code_without_a_program_is_said(class_folder, tmp_path, capsys) -> None:
     (tmp_path / "handout").mkdir()
     assert grader(["similar", str(class_folder), "--starter", str(tmp_path / "handout")]) == 0

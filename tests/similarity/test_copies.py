@@ -57,6 +57,7 @@ def big_class(tmp_path_factory) -> dict[str, Path]:
     return class_of(tmp_path_factory.mktemp("class"), submissions)
 
 
+@pytest.mark.full
 def test_in_a_class_the_three_copied_pairs_are_named_and_nobody_else(big_class) -> None:
     similarity = compared(big_class)
     assert named(similarity) == {("ann", "zoe"), ("ben", "yan"), ("cem", "xia")}
@@ -65,6 +66,7 @@ def test_in_a_class_the_three_copied_pairs_are_named_and_nobody_else(big_class) 
     assert similarity.not_compared == ()
 
 
+@pytest.mark.full
 def test_what_most_of_the_class_has_is_taken_out(big_class) -> None:
     """The fixtures are one solution with small changes: of their own they have too little to say anything."""
     similarity = compared(big_class)
@@ -72,6 +74,7 @@ def test_what_most_of_the_class_has_is_taken_out(big_class) -> None:
     assert set(fixture_variants("leeds-comp3631-lab1", 24)) - set(similarity.too_little) == set()
 
 
+@pytest.mark.full
 def test_a_pair_says_where(big_class) -> None:
     pair = next(pair for pair in compared(big_class).pairs if pair.a == "ann")
     lines = {(match.file_a, match.file_b) for match in pair.files}
@@ -83,6 +86,7 @@ def test_a_pair_says_where(big_class) -> None:
     assert pair.lines_a == pair.lines_b > 50
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("disguise", DISGUISES)
 def test_disguised_copies_are_found(tmp_path, disguise) -> None:
     """Nine programs and a copy of each."""

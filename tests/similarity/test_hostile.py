@@ -30,6 +30,7 @@ FILES = {
 }
 
 
+@pytest.mark.full
 def test_such_files_are_read_or_named_and_the_rest_is_compared(tmp_path) -> None:
     """All in one submission, beside a copied program."""
     bad = {f"{name}.py": data for name, (data, _) in FILES.items()}
@@ -40,6 +41,7 @@ def test_such_files_are_read_or_named_and_the_rest_is_compared(tmp_path) -> None
     assert {(one.id, one.file, one.reason) for one in similarity.not_compared} == expected
 
 
+@pytest.mark.full
 def test_evidence_of_fifty_megabytes_on_one_line_is_named(tmp_path) -> None:
     folders = class_of(tmp_path, {"bad": {"a.py": b"x = 1; " * 7_500_000}, "good": {"b.py": GOOD}})
     similarity = compare(folders)
@@ -75,6 +77,7 @@ def test_what_harms_the_reader_is_said(tmp_path, monkeypatch, harm, reason) -> N
     ]
 
 
+@pytest.mark.full
 def test_evidence_that_cannot_be_read_is_named(tmp_path) -> None:
     good = {"b.py": GOOD}
     folders = class_of(tmp_path, dict.fromkeys(("cut", "gone", "linked", "one", "two"), good))
@@ -92,6 +95,7 @@ def test_evidence_that_cannot_be_read_is_named(tmp_path) -> None:
     assert all(one.reason and str(tmp_path) not in one.reason for one in similarity.not_compared)
 
 
+@pytest.mark.full
 def test_a_pipe_in_the_evidences_place_keeps_nobody_waiting(tmp_path) -> None:
     (tmp_path / "ann" / "evidence").mkdir(parents=True)
     os.mkfifo(tmp_path / "ann" / "evidence" / "package.mcap")
@@ -99,6 +103,7 @@ def test_a_pipe_in_the_evidences_place_keeps_nobody_waiting(tmp_path) -> None:
     assert one.reason == "its evidence cannot be opened: not a regular file"
 
 
+@pytest.mark.full
 def test_too_many_and_too_large_programs_are_named(tmp_path) -> None:
     files = {f"p{n:03}.py": f"x{n} = {n}\n".encode() for n in range(250)}
     large = {f"z{n}.py": b"# much text\n" * 10_000 for n in range(6)}
@@ -112,6 +117,7 @@ def test_too_many_and_too_large_programs_are_named(tmp_path) -> None:
     }
 
 
+@pytest.mark.full
 def test_no_program_is_said(tmp_path) -> None:
     (one,) = compare({"ann": hand_in(tmp_path / "ann", {"package.xml": b"<package/>"})}).not_compared
     assert one.reason == "holds no program in Python or C++"

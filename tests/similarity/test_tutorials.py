@@ -150,6 +150,7 @@ def test_without_the_starter_code_it_counts_as_their_own(tmp_path) -> None:
     assert "no starter code" in similarity.notes[0]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("form", ["folder", "archive", "program"])
 def test_the_starter_code_is_taken_out(tmp_path, form) -> None:
     folders = both_with_the_handout(tmp_path / "class")

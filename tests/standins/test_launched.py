@@ -52,6 +52,7 @@ def launched(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
         return run(place, scenario, folder / "run.mcap")
 
 
+@pytest.mark.full
 def test_talker_and_listener_are_connected_under_the_launch_files_names(launched: Run) -> None:
     (channel,) = launched.student_channels("/chatter")
     assert (channel.callerid, channel.type) == ("/talker", "std_msgs/String")

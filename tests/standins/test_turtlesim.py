@@ -152,6 +152,7 @@ def told(driven: Run) -> dict[str, list[Any]]:
     return _told(driven)
 
 
+@pytest.mark.full
 def test_it_all_ran(driven: Run, told: dict[str, list[Any]]) -> None:
     assert exit_of(driven, "drive").exit_code == 0, printed(driven, "drive")  # type: ignore[attr-defined]
     assert "after" in told

@@ -42,6 +42,7 @@ def lab(clone: Clone) -> Clone:
     return clone
 
 
+@pytest.mark.full
 def test_it_says_what_it_took_and_that_all_is_pushed(lab: Clone) -> None:
     done = check(cwd=lab.package / "launch")
     assert done.returncode == 0, done.stderr
@@ -51,6 +52,7 @@ def test_it_says_what_it_took_and_that_all_is_pushed(lab: Clone) -> None:
     assert "All of it is committed and pushed: origin/main has it" in done.stdout
 
 
+@pytest.mark.full
 def test_what_is_not_handed_in_stands_below_the_report_in_80_columns(lab: Clone) -> None:
     for number in range(30):
         (lab.package / f"a_script_with_a_rather_long_name_{number}.py").write_text(SCRIPT)
@@ -67,6 +69,7 @@ def test_what_is_not_handed_in_stands_below_the_report_in_80_columns(lab: Clone)
     assert max(map(len, done.stdout.splitlines())) <= 80
 
 
+@pytest.mark.full
 def test_the_verdicts_stay_what_the_disk_says(lab: Clone) -> None:
     before = json.loads(check("--json", cwd=lab.package).stdout)
     (lab.package / "src" / "new.py").write_text(SCRIPT)
@@ -77,12 +80,14 @@ def test_the_verdicts_stay_what_the_disk_says(lab: Clone) -> None:
     assert list(after)[:4] == ["schema", "submission", "rubric", "status"]
 
 
+@pytest.mark.full
 def test_no_file_of_results_has_it(lab: Clone, tmp_path: Path) -> None:
     (lab.package / "src" / "new.py").write_text(SCRIPT)
     assert check("--out", str(tmp_path / "out"), cwd=lab.package).returncode == 0
     assert "standing" not in json.loads((tmp_path / "out" / "lab1" / "result.json").read_text())
 
 
+@pytest.mark.full
 def test_in_ci_a_checkout_is_not_nagged(lab: Clone) -> None:
     lab.git("checkout", "-q", "--detach")
     lab.git("remote", "remove", "origin")
@@ -92,6 +97,7 @@ def test_in_ci_a_checkout_is_not_nagged(lab: Clone) -> None:
     assert "Before you submit" not in done.stdout
 
 
+@pytest.mark.full
 def test_packages_of_two_labs_one_after_the_other(lab: Clone, tmp_path: Path) -> None:
     shutil.copytree(SOLUTIONS / "mcr2-basic-comms" / "basic_comms", lab.top / "basic_comms")
     (lab.top / "basic_comms" / "package.xml").write_text("<package><name>basic_comms</name>")
@@ -103,12 +109,14 @@ def test_packages_of_two_labs_one_after_the_other(lab: Clone, tmp_path: Path) ->
     assert check("--json", cwd=lab.top).returncode == 2
 
 
+@pytest.mark.full
 def test_staged_goes_with_static_alone(lab: Clone) -> None:
     done = check("--staged", "--watch", cwd=lab.package)
     assert done.returncode == 2
     assert "--staged goes with --static" in done.stderr
 
 
+@pytest.mark.full
 def test_staged_outside_of_a_repository(tmp_path: Path) -> None:
     shutil.copytree(SOLUTIONS / "leeds-comp3631-lab1" / "lab1", tmp_path / "lab1")
     done = check("--staged", cwd=tmp_path / "lab1")
@@ -116,6 +124,7 @@ def test_staged_outside_of_a_repository(tmp_path: Path) -> None:
     assert "is in no git repository" in done.stderr
 
 
+@pytest.mark.full
 def test_staged_heeds_the_index_that_git_names(lab: Clone) -> None:
     """As `git commit -a` does to its hooks."""
     own = lab.top / ".git" / "next-index-1.lock"

@@ -39,6 +39,7 @@ def _workspace(lab: str, tmp_path: Path) -> tuple[Path, Path]:
     return workspace, package
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("lab", LABS)
 def test_every_folder_of_a_workspace_leads_to_the_package(lab: str, tmp_path: Path) -> None:
     workspace, package = _workspace(lab, tmp_path)

@@ -44,6 +44,7 @@ def work(clone: Clone, tmp_path: Path) -> Path:
     return clone.top / "lab1"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_files_are_checked_and_the_way_to_the_rest_is_said(system: str, work: Path) -> None:
     ran = run(system, "check", cwd=work)
@@ -78,6 +79,7 @@ def test_where_nobody_knows_a_mode_nothing_is_lost(work: Path, tmp_path: Path) -
     assert {c["id"]: c["status"] for c in found["criteria"]}["talker-executable"] == "inconclusive"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("kept_by_git", "status"), [("lf", "pass"), ("crlf", "fail")])
 def test_line_ends_of_a_checkout_on_windows_are_not_the_students(
     kept_by_git: str, status: str, work: Path
@@ -96,6 +98,7 @@ def test_line_ends_of_a_checkout_on_windows_are_not_the_students(
     assert {c["id"]: c["status"] for c in found["criteria"]}["talker-executable"] == status
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("system", ["win32", "darwin"])
 def test_a_shell_of_linux_is_known(system: str, tmp_path: Path) -> None:
     """The lab asks for a shell script that begins with `#!/bin/bash`."""
@@ -107,6 +110,7 @@ def test_a_shell_of_linux_is_known(system: str, tmp_path: Path) -> None:
     assert [c["id"] for c in found["criteria"] if c["status"] in ("fail", "partial")] == []
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("encoding", ["cp1252", "ascii", "cp437"])
 def test_a_console_without_signs_gets_plain_ones(encoding: str, work: Path) -> None:
     ran = run("win32", "check", "--static", cwd=work, PYTHONIOENCODING=encoding)
@@ -114,6 +118,7 @@ def test_a_console_without_signs_gets_plain_ones(encoding: str, work: Path) -> N
     assert "+ pass" in ran.stdout
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "argv",
     [
@@ -129,6 +134,7 @@ def test_what_needs_no_ros_works_on_windows(argv: tuple[str, ...], tmp_path: Pat
     assert ran.returncode == 0, ran.stderr
 
 
+@pytest.mark.full
 def test_judging_and_reporting_work_on_windows(work: Path, tmp_path: Path) -> None:
     out = tmp_path / "results"
     done = run("win32", "check", "--static", "--out", str(out), cwd=work)
@@ -141,6 +147,7 @@ def test_judging_and_reporting_work_on_windows(work: Path, tmp_path: Path) -> No
     assert ran.returncode == 0, ran.stderr
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("system", ["win32", "darwin"])
 def test_doctor_says_what_can_and_what_cannot_be_done(system: str, tmp_path: Path) -> None:
     ran = run(system, "doctor", "--json", cwd=tmp_path)

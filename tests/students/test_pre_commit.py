@@ -56,12 +56,14 @@ def _commit(top: Path, *options: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, cwd=top, env=environment, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.full
 def test_correct_packages_are_committed(student: Path) -> None:
     done = _commit(student)
     assert done.returncode == 0, done.stderr
     assert git(student, "log", "--format=%s") == "Work"
 
 
+@pytest.mark.full
 def test_a_failing_criterion_of_any_package_keeps_the_commit_back(student: Path) -> None:
     assert _commit(student).returncode == 0
     manifest = student / "basic_comms" / "package.xml"
@@ -73,6 +75,7 @@ def test_a_failing_criterion_of_any_package_keeps_the_commit_back(student: Path)
     assert "manifest" in done.stderr
 
 
+@pytest.mark.full
 def test_what_is_staged_decides_and_not_the_disk(student: Path) -> None:
     assert _commit(student).returncode == 0
     script = student / "lab1" / "src" / "numeric_talker.py"
@@ -88,6 +91,7 @@ def test_what_is_staged_decides_and_not_the_disk(student: Path) -> None:
     assert (done.returncode, "has no executable bit" in done.stderr) == (1, True)
 
 
+@pytest.mark.full
 def test_a_package_that_nobody_staged(student: Path) -> None:
     git(student, "rm", "-r", "-q", "--cached", "lab1")
     done = _commit(student)
@@ -95,6 +99,7 @@ def test_a_package_that_nobody_staged(student: Path) -> None:
     assert "git has nothing of the package in lab1" in done.stderr
 
 
+@pytest.mark.full
 def test_a_rubric_without_static_criteria_keeps_nothing_back(student: Path) -> None:
     rubric = yaml.safe_load((ROOT / "rubrics" / "leeds-comp3631-lab1.yaml").read_text(encoding="utf-8"))
     rubric["criteria"] = [
@@ -131,6 +136,7 @@ def test_pre_commit_knows_the_manifest() -> None:
     assert all(hook["language"] == "python" for hook in HOOKS)
 
 
+@pytest.mark.full
 @pytest.mark.slow
 def test_pre_commit_installs_it_from_a_repository(student: Path, tmp_path: Path) -> None:
     """As a student gets it: this repository, installed into an environment of the hook's own."""

@@ -48,6 +48,7 @@ def test_it_is_the_same_each_time(tmp_path) -> None:
     assert first.read_bytes() == second.read_bytes()
 
 
+@pytest.mark.full
 def test_ten_thousand_fit(tmp_path) -> None:
     page = tmp_path / "index.html"
     before = time.process_time()

@@ -5,11 +5,14 @@ from __future__ import annotations
 import html
 import shlex
 
+import pytest
+
 from grader.cli.main import run
 from tests.batch.a_class import CORRECT, ROOT, RUBRIC, WRONG_NAME, batch, handed_in, roster_of
 from tests.report.class_page.test_page import data_of
 
 
+@pytest.mark.full
 def test_a_batch_writes_the_page_beside_the_gradebook(tmp_path, capsys) -> None:
     handed_in(tmp_path, ["bob"], WRONG_NAME)
     rows = [f"ada,{CORRECT},Ada", "b b,bob,Bob", f"zoe,{tmp_path}/nowhere/at/all,Zoe"]
@@ -32,6 +35,7 @@ def test_a_batch_writes_the_page_beside_the_gradebook(tmp_path, capsys) -> None:
     assert "This batch" not in page
 
 
+@pytest.mark.full
 def test_a_regrade_writes_it_anew(tmp_path) -> None:
     out = tmp_path / "out"
     batch(roster_of(tmp_path, [f"ada,{CORRECT}"]), out, "--allow-local", str(ROOT))

@@ -355,6 +355,7 @@ def test_a_page_stays_below_400_kilobytes_whatever_is_in_it(text):
         is_harmless(shown)
 
 
+@pytest.mark.full
 def test_two_hundred_criteria_of_the_longest_texts_are_cut_and_it_says_so():
     fields = dict.fromkeys(("title", "message", "expected", "measured", "hint", "reproduce"), "&" * 100_000)
     criteria = tuple(
