@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     from grader.arena.asynchronous import Stop
     from grader.arena.recording import Recorder
     from grader.arena.static_recorder import Recording, StaticRecorder
-    from grader.model.submission import SandboxMode
+    from grader.model.sandbox_mode import SandboxMode
 
 LATER = ("grader.evidence.decode", "grader.evidence.reader")
 """Slow to import, and needed by no verdict that the files alone decide: imported while the build runs. The arena is

@@ -32,7 +32,7 @@ from grader.arena.workspace import Workspace, read_member
 from grader.errors import ArenaError, GraderError
 from grader.evidence.writer import EvidenceWriter
 from grader.files import atomic_write, open_untrusted, temporary_folder
-from grader.model.submission import SandboxMode
+from grader.model.sandbox_mode import SandboxMode
 
 NAME = "base workspace"
 MAKE_S = 60.0

@@ -44,7 +44,8 @@ from grader.files import read_untrusted, temporary_folder
 from grader.model.message_rate import RateBounds
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
-from grader.model.submission import SandboxMode, Submission
+from grader.model.sandbox_mode import SandboxMode
+from grader.model.submission import Submission
 from grader.package import SyntaxReport, python_paths, read_syntax_report, with_build_facts
 from grader.package.python import REPORT_BYTES_MAX
 from grader.rubric.model import Rubric

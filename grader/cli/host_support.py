@@ -20,7 +20,7 @@ from grader.cli.output import say_beside
 from grader.errors import GraderError, HostError, RosMissing
 from grader.host_programs import HOST_ENV, find_host_program
 from grader.model.record import Record
-from grader.model.submission import SandboxMode
+from grader.model.sandbox_mode import SandboxMode
 from grader.portable import system, user_id
 from grader.report.sentences import without_sandbox
 from grader.rubric.load import LoadedRubric, needs_ros

@@ -27,7 +27,7 @@ from grader.authoring.mutation.solution import (
 from grader.cli.display import open_progress
 from grader.files import atomic_write, check_writable
 from grader.model.mutants import LostCriterion, MutantResult, RubricTest
-from grader.model.submission import SandboxMode
+from grader.model.sandbox_mode import SandboxMode
 from grader.report.terminal import emit, open_console
 from grader.report.text import line, visible
 from grader.rubric.load import LoadedRubric, load_rubric

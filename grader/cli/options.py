@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Annotated
 
 from grader.cli.declare import Flag, Option
-from grader.model.submission import SandboxMode
+from grader.model.sandbox_mode import SandboxMode
 
 RUBRIC = Option("--rubric", "ID|FILE", "a lab's id or a rubric's file; see grader labs")
 SandboxOption = Annotated[

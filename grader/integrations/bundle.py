@@ -25,7 +25,7 @@ from grader.errors import GraderError, InternalError, UsageError
 from grader.files import atomic_write
 from grader.model.record import Record
 from grader.model.result import GradingResult
-from grader.model.submission import SandboxMode
+from grader.model.sandbox_mode import SandboxMode
 from grader.rubric.instructor import read_instructor
 from grader.rubric.load import LoadedRubric
 from grader.rubric.source import read_source

@@ -13,7 +13,7 @@ from typing import cast
 
 from grader.errors import UsageError
 from grader.integrations.ci_results import Outcome
-from grader.model.submission import SandboxMode
+from grader.model.sandbox_mode import SandboxMode
 from grader.rubric.load import LoadedRubric
 from grader.rubric.model import Rubric
 from grader.untrusted_text import line

@@ -7,8 +7,6 @@ from typing import Literal
 
 from grader.model.record import Record
 
-SandboxMode = Literal["auto", "require", "none"]
-"""Whether a sandbox is used where there is one, is needed, or is done without."""
 ModeSource = Literal["git", "archive", "disk", "none"]
 
 

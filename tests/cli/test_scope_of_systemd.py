@@ -35,7 +35,6 @@ PROGRAM = """
 import os, subprocess, sys, time
 from pathlib import Path
 from grader.arena import control_groups
-from grader.cli import scope
 from grader.cli import systemd_scope as scope
 asks = ["busctl", "--user", "--timeout=1", "--acquired", "--no-pager", "list"]
 until = time.monotonic() + float(os.environ["READY_S"])

@@ -19,7 +19,7 @@ COMMANDS = {
     "grade": (["grade", SOLUTION, "--rubric", LAB, "--out", "o"], GRADE),
     "check": (["check", SOLUTION, "--rubric", LAB], GRADE),
     "ci": (["ci", "gitlab"], GRADE),
-    "batch": (["batch", "roster.csv", "--rubric", LAB, "--out", "o"], "grader.classes.batch.flow.run_batch"),
+    "batch": (["batch", "roster.csv", "--rubric", LAB, "--out", "o"], "grader.classes.batch.run.run_batch"),
     "record": (["record", SOLUTION, "--rubric", LAB, "--out", "o"], "grader.pipeline.record"),
     "rubric new": (["rubric", "new", "--from", SOLUTION], "grader.authoring.propose.propose_rubric"),
     "rubric test": (["rubric", "test", LAB], "grader.cli.mutants.run_test"),

@@ -203,7 +203,7 @@ def test_while_a_batch_works_decisions_are_kept_and_applied_when_it_has_ended(pa
     form = page.form("ada", "style")
     with alone(out):
         answer = page.send("ada", "style", form, script=True, points="6")
-        assert "a batch works in this folder" in answer.json["said"]
+        assert "a batch is running in this folder" in answer.json["said"]
         assert overrides_of(out)["ada"]["style"]["points"] == 6
         assert points_of(out, "ada", "style") == 0
         assert "6 of 10" in page.text("/s/ada/")

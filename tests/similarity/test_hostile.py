@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from grader.classes.similarity import compare, fingerprints
+from grader.classes.similarity import compare, fingerprints, matching
 from grader.classes.similarity.comparison import Request
 from grader.classes.similarity.fingerprints import Place, read_files, read_place, reading_ended
 from grader.classes.similarity.sources import Source
@@ -124,9 +124,11 @@ def test_no_program_is_said(tmp_path) -> None:
 
 
 def test_a_class_with_too_much_code_is_compared_as_far_as_there_is_room(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(compare, "PRINTS_MAX", 700)
+    monkeypatch.setattr(matching, "PRINTS_MAX", 700)
     folders = class_of(tmp_path, {name: {"a.py": GOOD} for name in ("ann", "ben", "cem")})
-    similarity = compare.compare_class(Request(folders=folders, starter=(), groups={}, threshold=0.8, jobs=1))
+    similarity = matching.compare_class(
+        Request(folders=folders, starter=(), groups={}, threshold=0.8, jobs=1)
+    )
     assert [(pair.a, pair.b) for pair in similarity.pairs] == [("ann", "ben")]
     assert [(one.id, one.reason[:24]) for one in similarity.not_compared] == [
         ("cem", "the class has too much c")

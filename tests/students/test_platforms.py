@@ -26,7 +26,6 @@ LOADED = (
         "evidence",
         "report",
         "arena/static_recorder",
-        "arena/recorded",
         "arena/ros_env",
     ),
     *(

@@ -11,7 +11,7 @@ from grader.errors import ExitCode
 from grader.model.result import CriterionResult, ErrorInfo, GradingResult
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
-from grader.student.watching import UNDECIDED, WAIT_S, Outcome, Saves, Screen, Watch, take_snapshot
+from grader.student.watching import WAIT_S, Outcome, Saves, Screen, Watch, take_snapshot
 from tests.report.hostile import criterion, result
 
 Step = Callable[[], object]
@@ -78,7 +78,9 @@ class MadeUpGrading:
             return Outcome(result=self._result(error=self.error), code=ExitCode.NOT_GRADED, undecided=True)
         statuses = set(self.verdicts.values())
         code = ExitCode.BELOW_PASS_MARK if statuses - {Status.PASS} else ExitCode.PASSED
-        return Outcome(result=self._result(), code=code, undecided=bool(statuses & UNDECIDED))
+        return Outcome(
+            result=self._result(), code=code, undecided=any(status.is_retryable for status in statuses)
+        )
 
     def _result(self, **changes: object) -> GradingResult:
         criteria = tuple(self._criterion(name) for name in self.rubric.scenarios)

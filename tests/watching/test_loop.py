@@ -157,7 +157,6 @@ def test_a_file_that_cannot_be_read_for_a_moment_is_read_a_moment_later(error, m
     assert course.grading.ended == 2
 
 
-@pytest.mark.full
 @pytest.mark.parametrize("leave", [lambda p: p.rename(p.with_name("lab2")), shutil.rmtree])
 def test_a_package_folder_that_is_gone_ends_it(leave, make, package) -> None:
     course = make(lambda: (leave(package), package)[1])

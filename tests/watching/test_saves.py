@@ -68,7 +68,6 @@ def test_a_new_folder_is_looked_at(saves, package) -> None:
     assert saves.wait(0) == {str(new)}
 
 
-@pytest.mark.full
 def test_several_files_at_once_come_together(saves, package) -> None:
     def save() -> None:
         for number in range(10):
@@ -82,7 +81,6 @@ def test_several_files_at_once_come_together(saves, package) -> None:
     assert {Path(name).name for name in found} == {f"file{number}.py" for number in range(10)}
 
 
-@pytest.mark.full
 @pytest.mark.parametrize("when", ["before", "during"])
 def test_a_save_asks_what_runs_to_stop(when, saves, package) -> None:
     stop = Stop()

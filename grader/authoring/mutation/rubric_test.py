@@ -18,7 +18,7 @@ from grader.files import temporary_folder
 from grader.model.mutants import Cost, LostCriterion, MutantResult, ReferenceResult, RubricTest, State
 from grader.model.progress import Progress
 from grader.model.result import CriterionResult, GradingResult, RubricInfo
-from grader.model.submission import SandboxMode
+from grader.model.sandbox_mode import SandboxMode
 from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from grader.errors import GraderError
 from grader.model.progress import Silence, StepState
 from grader.model.result import GradingResult
-from grader.model.submission import SandboxMode
+from grader.model.sandbox_mode import SandboxMode
 from grader.pipeline import GradeOptions, grade, prepare
 from grader.rubric.load import load_rubric
 from grader.workers import WorkerEnded, run_each

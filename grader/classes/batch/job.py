@@ -26,7 +26,7 @@ from grader.model.batch import Entry
 from grader.model.progress import Silence
 from grader.model.record import Record
 from grader.model.result import NO_TIME, GradingResult, HandedIn, Override, SubmissionInfo
-from grader.model.submission import SandboxMode
+from grader.model.sandbox_mode import SandboxMode
 from grader.pipeline import GradeOptions, grade
 from grader.rubric.load import LoadedRubric
 from grader.workers import WorkerEnded, run_each

@@ -30,7 +30,7 @@ from grader.files import atomic_write
 from grader.judging.summary import overall_status, total_points
 from grader.model.batch import Entry, Roster
 from grader.model.result import CriterionResult, GradingResult
-from grader.model.submission import SandboxMode
+from grader.model.sandbox_mode import SandboxMode
 from grader.report.text import csv_text
 from grader.results import EVIDENCE
 from grader.rubric.load import LoadedRubric

@@ -27,7 +27,7 @@ from grader.intake import safe_name, without_password
 from grader.judging.summary import passed
 from grader.model.batch import MISSING, BatchRun, Counts, CriterionInfo, Entry, Roster, RosterFault, State
 from grader.model.result import GradingResult, RubricInfo
-from grader.model.submission import SandboxMode
+from grader.model.sandbox_mode import SandboxMode
 from grader.pipeline import GradeOptions, prepare
 from grader.report.class_page.page import write_class_page
 from grader.results import finish_killed
