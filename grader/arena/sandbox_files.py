@@ -21,7 +21,7 @@ BUILT = "/run/grader/built.tar"
 BASE_WORKSPACE = "/run/grader/base.tar"
 LARGE = "/run/grader/large"
 SHIMS = "/run/grader/bin"
-STANDINS = "/run/grader/arena/standins"
+STANDINS = "/run/grader/standins"
 ROS_SIDE = Path(__file__).parent / "ros"
 TERMINALS = (
     "gnome-terminal", "konsole", "lxterminal", "mate-terminal", "rxvt", "terminator", "tilix", "urxvt",

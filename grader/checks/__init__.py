@@ -1,6 +1,8 @@
-"""The checks: one pure function each, in family files. No I/O in here.
+"""The checks: one pure function each, in family files.
 
-What an instructor's own check needs can be imported from here (docs/how-to/own-checks.md) and stays.
+Facts come in, by the names of a check's parameters (`package`, `build`, `run`, `params`); a verdict goes out. Opening
+files, reading clocks and awarding points are not its business. What an instructor's own check needs can be imported
+from here (docs/how-to/own-checks.md), and stays.
 """
 
 from importlib import import_module
