@@ -107,6 +107,7 @@ ERRORS = [
 NAMES = [f"{type(error).__name__}-{kind}" for error, kind, _ in ERRORS]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("error", "kind", "blame"), ERRORS, ids=NAMES)
 def test_each_error_has_its_kind_and_leaves_a_result(tmp_path, monkeypatch, error, kind, blame) -> None:
     breaking(monkeypatch, error)

@@ -93,6 +93,7 @@ def test_one_cause_explains_what_is_blocked(lab, name) -> None:
     assert [i for i in blocked if not set(requires[i]) & set(expect)] == []
 
 
+@pytest.mark.full
 @each_lab
 def test_packages_are_written_and_listed(lab, tmp_path) -> None:
     names = fixture_names(lab)[:2]

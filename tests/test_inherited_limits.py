@@ -66,6 +66,7 @@ def test_so_does_grader_check(open_path: Path) -> None:
     assert "ulimit -u (processes) is 20" in done.stderr
 
 
+@pytest.mark.full
 @by_an_ordinary_user
 def test_a_class_is_refused_before_its_first_submission(open_path: Path) -> None:
     out, roster = open_path / "home" / "out", open_path / "roster.csv"
@@ -77,12 +78,14 @@ def test_a_class_is_refused_before_its_first_submission(open_path: Path) -> None
     assert not out.exists()
 
 
+@pytest.mark.full
 @by_an_ordinary_user
 def test_the_files_alone_can_be_looked_at_all_the_same(open_path: Path) -> None:
     done = ordinary.grader(open_path, "check", SOLUTION, "--rubric", LAB, "--static", limits="ulimit -n 100")
     assert done.returncode == ExitCode.PASSED, done.stderr
 
 
+@pytest.mark.full
 @by_an_ordinary_user
 def test_the_doctor_shows_the_same(open_path: Path) -> None:
     done = ordinary.grader(open_path, "doctor", "--json", limits="ulimit -u 700; ulimit -n 40")

@@ -24,12 +24,14 @@ def test_values_come_back_as_they_are() -> None:
     assert (answer.done, answer.timed_out) == (True, False)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("what", ["take_memory", "take_processor_time", "write_much", "crash"])
 def test_what_goes_beyond_a_limit_ends_and_what_came_before_counts(what, tmp_path) -> None:
     arguments = (str(tmp_path / "file"),) if what == "write_much" else ()
     assert ask(what, *arguments) == Answer(lines=b"1\n", done=False)
 
 
+@pytest.mark.full
 def test_what_takes_too_long_is_ended() -> None:
     found = ask("take_time", limits=replace(LIMITS, wall_s=3.0))
     assert found == Answer(lines=b"1\n", done=False, timed_out=True)

@@ -100,6 +100,7 @@ def killed_at(step: int, folder: Path) -> bool:
     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 9
 
 
+@pytest.mark.full
 def test_killed_at_any_step_the_result_fits_the_evidence_beside_it(tmp_path: Path) -> None:
     step = 0
     while True:

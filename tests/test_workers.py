@@ -85,6 +85,7 @@ def test_what_ends_a_process_costs_its_job(job, how: str, worker: Worker) -> Non
     assert worker.run(harm, 2) == 4
 
 
+@pytest.mark.full
 def test_a_job_is_limited_in_time(tmp_path: Path) -> None:
     worker = Worker(Limits(wall_s=1.0))
     with pytest.raises(WorkerEnded, match="by signal 9"):
@@ -100,6 +101,7 @@ def test_what_a_job_raises_is_raised(worker: Worker) -> None:
     assert caught.value.hint == "make some"
 
 
+@pytest.mark.full
 def test_every_job_has_a_result() -> None:
     begun: list[int] = []
     found = run_each(harm, range(6), 2, begun=begun.append, ended=lambda job, error: f"{job} {error.reason}")
@@ -107,6 +109,7 @@ def test_every_job_has_a_result() -> None:
     assert begun == list(range(6))
 
 
+@pytest.mark.full
 def test_a_caller_that_stops_leaves_nothing_running(tmp_path: Path) -> None:
     before, mark = children_of(os.getpid()), tmp_path / "mark"
     found = run_each(_mark_or_sleep, [str(mark), ""], 2, ended=lambda *_: "ended")
@@ -123,6 +126,7 @@ def _mark_or_sleep(path: str) -> str:
     return "asleep"
 
 
+@pytest.mark.full
 def test_an_idle_process_ends_and_a_new_one_does_the_next_job() -> None:
     worker = Worker(Limits(idle_s=0.1))
     first = worker.run(pid, None)
@@ -131,6 +135,7 @@ def test_an_idle_process_ends_and_a_new_one_does_the_next_job() -> None:
     worker.close()
 
 
+@pytest.mark.full
 def test_a_process_whose_parent_was_killed_cleans_up(tmp_path: Path) -> None:
     mark = tmp_path / "mark"
     parent = subprocess.Popen([sys.executable, "-c", PARENT, str(mark)], cwd=ROOT)

@@ -113,6 +113,7 @@ def test_progress_is_told(tmp_path: Path) -> None:
     assert {state for _, state, _ in told} <= {"waiting", "running", "done", "failed", "skipped"}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("step", ["intake", "package", "talker"])
 def test_what_progress_raises_ends_the_grading_and_is_raised(step: str, tmp_path: Path) -> None:
     class EnoughError(Exception):

@@ -40,6 +40,7 @@ def test_help_loads_none_of_it() -> None:
     assert fresh(code).endswith("False")
 
 
+@pytest.mark.full
 def test_judging_loads_no_arena() -> None:
     code = (
         "import sys; from grader import judge, load_rubric; print([m for m in sys.modules if '.arena' in m])"
@@ -77,6 +78,7 @@ def test_judge_is_the_function_whatever_was_imported_before(before: str) -> None
     )
 
 
+@pytest.mark.full
 def test_the_star_gives_them_all() -> None:
     names = fresh("from grader import *; print(sorted(n for n in dir() if not n.startswith('__')))")
     assert eval(names) == sorted(n for n in grader.__all__ if not n.startswith("__"))  # noqa: S307

@@ -94,6 +94,7 @@ def test_a_users_program_is_sound(place: Path) -> None:
     assert checked(place, PROGRAM) == []
 
 
+@pytest.mark.full
 def test_a_users_mistakes_are_found(place: Path) -> None:
     found = checked(place, MISTAKES)
     assert {line.split(":")[1] for line in found if ": error: " in line} == {"2", "4", "5", "6", "7", "8"}

@@ -114,6 +114,7 @@ def test_a_folder_of_very_many_files(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert "files" in built.too_much
 
 
+@pytest.mark.full
 def test_as_many_long_names_as_an_honest_build_has(tmp_path: Path) -> None:
     name = f"devel/lib/lab/{'n' * 150}"
     one = header("x", len(name) + 1, tarfile.GNUTYPE_LONGNAME) + padded(name.encode() + b"\0") + FILE

@@ -118,6 +118,7 @@ def test_only_some_of_them(tmp_path, capsys) -> None:
     assert "did you mean ada?" in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_the_rosters_columns_are_carried_into_the_gradebook(tmp_path) -> None:
     handed_in(tmp_path / "in", ["ada"])
     roster = roster_of(tmp_path / "in", ["ada,ada,Ada Lovelace,A,=cmd()"], "id,source,name,group,Seat")

@@ -57,6 +57,7 @@ def test_a_single_grading(tmp_path: Path) -> None:
     assert _modes(out) == ({0o700}, {0o600})
 
 
+@pytest.mark.full
 def test_a_submission_that_cannot_be_graded(tmp_path: Path) -> None:
     (tmp_path / "in" / "ada").mkdir(parents=True)
     out = tmp_path / "out"

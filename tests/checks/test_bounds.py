@@ -141,6 +141,7 @@ def test_what_such_names_stand_for(name: str, fits: list[str], not_: list[str]) 
     assert [bool(pattern.fullmatch(one)) for one in not_] == [False] * len(not_)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("text", "line"), [("1 " * 99 + "1", "1 " * 98 + "12 "), ("a " * 99 + "b", "a ")])
 def test_texts_that_nearly_are_in_lines(text: str, line: str) -> None:
     run = run_of(lines_of(line), stream="stdout")

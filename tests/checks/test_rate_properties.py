@@ -21,6 +21,7 @@ def status(topic: dict[str, Any], params: dict[str, Any] | None = None, **run: A
     return judge_runs("rate", params or PARAMS, runs).status
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("nominal_hz", [1, 2, 3, 7, 10, 30, 33.3, 50, 100])
 @pytest.mark.parametrize(
     ("share", "expected"), [(0.949, "fail"), (0.95, "pass"), (1.05, "pass"), (1.051, "fail")]

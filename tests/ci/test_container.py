@@ -97,6 +97,7 @@ def test_an_image_of_the_courses_own_is_not_built(runner, docker):
     assert "ghcr.io/course/grader:2026--privileged" in arguments
 
 
+@pytest.mark.full
 def test_the_static_part_needs_no_container(runner, docker):
     place, asked = docker
     place()

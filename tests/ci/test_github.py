@@ -32,6 +32,7 @@ def test_a_package_without_mistakes_passes(runner):
     assert (seen.points, seen.of, seen.failed) == (20, 20, "")
 
 
+@pytest.mark.full
 def test_a_loss_is_shown_at_its_line_and_the_step_fails(runner):
     package = handed_in(runner.workspace)
     (package / "src" / "numeric_talker.py").chmod(0o644)
@@ -75,6 +76,7 @@ def test_the_pass_mark(runner, mark, code, status):
         assert "pass-mark" in ran.summary
 
 
+@pytest.mark.full
 def test_a_step_that_never_fails_still_says_how_it_ended(runner):
     package = handed_in(runner.workspace)
     (package / "package.xml").unlink()
@@ -99,6 +101,7 @@ def test_a_machine_without_ros_takes_no_marks(runner, fail_on, code):
     assert reporter(ran.outputs["result"]).points is None
 
 
+@pytest.mark.full
 def test_no_package_is_the_students_fault_whatever_a_machine_may_do(runner):
     (runner.workspace / "README.md").write_text("# my lab\n")
     ran = runner.use(**STATIC, fail_on="below-pass-mark")
@@ -131,6 +134,7 @@ def test_wrong_inputs_are_named_in_an_annotation(runner, inputs):
     assert ran.outputs["passed"] == "false"
 
 
+@pytest.mark.full
 def test_packages_of_two_labs_and_no_word_which(runner):
     handed_in(runner.workspace, "a")
     other = next((ROOT / "reference_solutions" / "sheffield-com2009-week1").iterdir())
@@ -171,6 +175,7 @@ def test_nothing_that_a_student_wrote_is_obeyed(runner):
     assert not [row for row in reporter(ran.outputs["result"]).console.splitlines() if row.startswith("::")]
 
 
+@pytest.mark.full
 def test_more_mistakes_than_github_shows(runner):
     rubric = yaml.safe_load((ROOT / "rubrics" / "leeds-comp3631-lab1.yaml").read_text(encoding="utf-8"))
     first = next(c for c in rubric["criteria"] if c["id"] == "talker-executable")
@@ -184,6 +189,7 @@ def test_more_mistakes_than_github_shows(runner):
     assert "and 16 more of these" in ran.log
 
 
+@pytest.mark.full
 def test_hidden_criteria_stay_hidden(runner):
     text = (ROOT / "rubrics" / "leeds-comp3631-lab1.yaml").read_text(encoding="utf-8")
     begin = text.index("id: talker-executable")
@@ -211,6 +217,7 @@ def test_a_second_use_in_a_job_installs_nothing_and_has_a_folder_of_its_own(runn
     assert "installing" not in first.log + second.log
 
 
+@pytest.mark.full
 def test_no_artifact_where_none_is_wanted(runner):
     handed_in(runner.workspace)
     assert runner.use(**STATIC, artifact="").artifact is None

@@ -74,6 +74,7 @@ def job(tmp_path) -> Job:
     return made
 
 
+@pytest.mark.full
 def test_every_report_is_where_gitlab_looks_for_it(job):
     package = handed_in(job.project, ".")
     (package / "src" / "numeric_talker.py").chmod(0o644)
@@ -101,6 +102,7 @@ def test_a_package_without_mistakes_passes(job):
     assert job.log.rstrip().endswith("sandbox: nothing was run")
 
 
+@pytest.mark.full
 def test_what_could_not_be_judged_is_a_warning(job):
     handed_in(job.project)
     assert job.run().code in JOB["allow_failure"]["exit_codes"], job.log
@@ -118,6 +120,7 @@ def test_wrong_variables(job, given):
     assert (job.results / "grader.env").read_text() == "GRADER_STATUS=wrong-input\n"
 
 
+@pytest.mark.full
 def test_results_that_were_handed_in_are_not_kept(job):
     handed_in(job.project)
     (job.results / "evidence").mkdir(parents=True)
@@ -143,6 +146,7 @@ def test_what_is_cached_is_no_part_of_the_submission(job):
     assert json.loads((job.results / "result.json").read_text())["submission"]["digest"] == digest
 
 
+@pytest.mark.full
 def test_a_cache_that_was_handed_in_is_not_used(job):
     """What pip would install from it would do the grading."""
     handed_in(job.project, ".")
@@ -163,6 +167,7 @@ def test_an_image_without_the_grader_has_to_be_told_where_it_is(job):
     assert "GRADER_REPOSITORY is empty" in job.log
 
 
+@pytest.mark.full
 def test_the_grader_is_fetched_at_the_version_that_was_asked_for(job):
     """What `ci/install.sh` does has tests of its own: here it is a stand-in in another repository."""
     job.path = SYSTEM_PATH

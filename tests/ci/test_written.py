@@ -26,6 +26,7 @@ def _runs(*command: object) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("schema", "files"),
     [

@@ -129,6 +129,7 @@ def test_a_closed_pipe_is_quiet():
     assert done.returncode in {0, 141}
 
 
+@pytest.mark.full
 def test_closed_streams_do_no_harm():
     done = subprocess.run(
         ["/bin/bash", "-c", f"{shlex.quote(sys.executable)} -m grader labs >&- 2>&-"], check=False, timeout=60

@@ -117,6 +117,7 @@ def test_a_client_without_the_certificates_is_refused(client: Any, protocol: str
     assert said.startswith("refused")
 
 
+@pytest.mark.full
 def test_one_that_has_them_would_be_let_in(client: Any) -> None:
     assert _outside(client.scheduler.address, _files(client.security)) == "let in"
 

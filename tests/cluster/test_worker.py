@@ -35,6 +35,7 @@ def _errand(exchange: Exchange, tmp_path: Path, *, source: str = "", seen: bool 
     return Errand(job=job, exchange=exchange.url, batch=WORD, seen=seen)
 
 
+@pytest.mark.full
 def test_it_leaves_one_parcel_and_nothing_in_the_batchs_folder(exchange: Exchange, tmp_path: Path) -> None:
     report = worker.grade(_errand(exchange, tmp_path), lambda: True)
     assert report.outcome.status == "inconclusive"
@@ -49,18 +50,21 @@ def test_a_path_that_only_the_client_sees_is_the_machines_fault(exchange: Exchan
     assert "a path that all machines share" in caught.value.hint
 
 
+@pytest.mark.full
 def test_a_path_that_nobody_sees_is_the_submissions(exchange: Exchange, tmp_path: Path) -> None:
     report = worker.grade(_errand(exchange, tmp_path, source="/nowhere/ada", seen=False), lambda: True)
     assert (report.outcome.status, report.outcome.kind) == ("error", "submission")
     assert report.parcel is not None
 
 
+@pytest.mark.full
 def test_what_nobody_wants_any_more_is_not_delivered(exchange: Exchange, tmp_path: Path) -> None:
     report = worker.grade(_errand(exchange, tmp_path), lambda: False)
     assert report.parcel is None
     assert list(Path(exchange.url).iterdir()) == []
 
 
+@pytest.mark.full
 def test_an_exchange_that_cannot_be_written_is_said_with_the_machines_name(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
     with pytest.raises(HostError, match=rf"cannot be written: .* \(on {socket.gethostname()}\)"):
@@ -82,6 +86,7 @@ def test_dismissed_it_interrupts_what_runs_and_ends_its_processes(exchange: Exch
     assert set(children_of(os.getpid())) <= before
 
 
+@pytest.mark.full
 def test_a_process_serves_many_jobs_and_is_ended_when_it_has_none(
     exchange: Exchange, tmp_path: Path, monkeypatch
 ) -> None:

@@ -42,6 +42,7 @@ def parsed(line: str) -> str:
     return ""
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("path", pages(), ids=lambda path: str(path.relative_to(ROOT)))
 def test_command_lines_parse(path: Path) -> None:
     lines = command_lines(path.read_text(encoding="utf-8"))

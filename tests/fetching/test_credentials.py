@@ -208,6 +208,7 @@ def test_git_s_own_helpers_are_asked_for_a_user_s_password(public, server):
         assert server.obtain(f"http://ada@{place}/student").source.ref == public[1]
 
 
+@pytest.mark.full
 def test_a_token_that_is_refused_leaves_it_to_git_s_own_helpers(public, server, certificate, monkeypatch):
     with_store(server)
     monkeypatch.setenv("GIT_SSL_CAINFO", str(certificate))

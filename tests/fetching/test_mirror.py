@@ -207,6 +207,7 @@ def test_whoever_comes_second_waits(server):
     assert done.is_set()
 
 
+@pytest.mark.full
 def test_those_used_least_recently_go_first_and_none_that_is_in_use(server):
     for name in ("a", "b", "c", "d"):
         server.new(name)
@@ -238,6 +239,7 @@ def test_what_nobody_finished_goes_after_a_while(server):
     assert not place.folder.exists()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["file", "link", "relative", "nothing"])
 def test_without_a_cache_it_is_fetched_all_the_same(kind, server, monkeypatch):
     server.new()

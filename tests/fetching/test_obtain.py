@@ -47,6 +47,7 @@ def test_the_same_submission_through_the_mirror_and_without_it(ref, grown, serve
     assert mirrored["commit"]
 
 
+@pytest.mark.full
 def test_hashes_and_their_beginnings(grown, server):
     first = git(grown, "rev-parse", "v1^{commit}")
     for ref in (first, first[:8], first.upper()[:12]):
@@ -89,6 +90,7 @@ def test_a_commit_that_no_branch_reaches_is_fetched_by_its_hash(server):
     assert server.opened(ref=lost).source == f"{HOST}/student@{lost}"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("source", "message", "hint"),
     [

@@ -36,6 +36,7 @@ def _drawn(example: Example) -> tuple[tuple[Figure, ...], CriterionResult, Run]:
     return figures.by_criterion.get(example.check, ()), result, runs["run"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("example", _examples("rate"))
 def test_rates(example: Example) -> None:
     figures, result, run = _drawn(example)

@@ -87,6 +87,7 @@ def test_any_messages(sent: tuple[str, list[Any]], count: int, rate_hz: float) -
         assert result.status.value != "pass" or not any(marks)
 
 
+@pytest.mark.full
 @settings(max_examples=60)
 @given(
     values=st.lists(st.one_of(st.integers(), st.floats(), st.text(), st.none(), st.lists(st.integers()))),

@@ -35,6 +35,7 @@ def test_a_right_way_seen_from_its_start() -> None:
     assert figure.tolerance_m == pytest.approx(0.2)
 
 
+@pytest.mark.full
 def test_the_first_point_that_strays_stays_of_many() -> None:
     way = [*line((0, 0), (1, 0), 3000), *line((1, 0), (3, 0), 3000)]
     figures, results = drawn(poses(*way, rate_hz=100), SQUARE)

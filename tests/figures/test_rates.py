@@ -56,6 +56,7 @@ def test_silence_at_the_end_is_the_last_gap() -> None:
     assert figure.gaps_s[-1] == pytest.approx(6.1)
 
 
+@pytest.mark.full
 def test_of_a_flood_the_longest_and_the_shortest_gap_stay() -> None:
     flood = {
         "topic": "/chatter",
@@ -72,6 +73,7 @@ def test_of_a_flood_the_longest_and_the_shortest_gap_stay() -> None:
     assert figure.times_s[-1] == pytest.approx(53.5, abs=0.1)
 
 
+@pytest.mark.full
 def test_a_choice_of_points_keeps_the_share_of_short_gaps() -> None:
     """Ten messages in each burst: nine gaps in ten are short, and no rhythm of the choice meets that of the bursts."""
     figures, _ = drawn({"topics": [{"topic": "/chatter", "count": 20_000, "burst": 10}], "end_s": 2001}, RATE)

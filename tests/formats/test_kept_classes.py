@@ -29,6 +29,7 @@ def points(out: Path) -> dict[str, float]:
     return {name: json.loads((out / name / "result.json").read_bytes())["points"] for name in POINTS}
 
 
+@pytest.mark.full
 def test_it_is_judged_again_to_the_same_points(course: Path, capsys) -> None:
     assert run(["regrade", "class", "--rubric", "class.yaml"]) == 3  # dan's cannot be graded
     assert points(course / "class") == POINTS
@@ -39,6 +40,7 @@ def test_it_is_judged_again_to_the_same_points(course: Path, capsys) -> None:
     assert "Traceback" not in capsys.readouterr().err
 
 
+@pytest.mark.full
 def test_its_reports_and_its_page_are_written_again(course: Path) -> None:
     before = {path: path.read_bytes() for path in (course / "class").rglob("result.json")}
     assert run(["report", "class", "--rubric", "class.yaml"]) == 0

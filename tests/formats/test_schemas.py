@@ -130,6 +130,7 @@ def test_every_metadata_key_is_described() -> None:
     assert version.EVIDENCE.name == METADATA_NAME
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("path", LABS, ids=[path.stem for path in LABS])
 def test_every_rubric_fits_but_for_checks_of_its_own(path: Path) -> None:
     data = yaml.safe_load(path.read_text())

@@ -32,12 +32,14 @@ def test_the_page_shows_the_files(name):
     assert f"\n{(EXAMPLE / name).read_text(encoding='utf-8')}```\n" in PAGE
 
 
+@pytest.mark.full
 def test_a_correct_package_gets_everything():
     found, points = judged("correct")
     assert {c.status for c in found.values()} == {Status.PASS}
     assert points == 100
 
 
+@pytest.mark.full
 def test_one_that_dies_at_128_loses_what_the_page_says():
     found, points = judged("dies-at-128")
     counting = found["counting"]

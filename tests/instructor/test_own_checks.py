@@ -243,6 +243,7 @@ def _in_worker(loaded: LoadedRubric) -> list[str]:
     return [f"{c.status.value}: {c.message}" for c in judge(loaded.rubric, runs(), loaded.checks)]
 
 
+@pytest.mark.full
 def test_it_works_in_a_process_of_its_own(tmp_path):
     loaded = load_rubric(str(write_rubric(tmp_path, OWN, checks=GREETING)))
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:

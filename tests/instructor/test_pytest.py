@@ -50,6 +50,7 @@ def broken(tmp_path: Path, tests: str, criteria: str = TESTS) -> str:
     return found.hint.removeprefix("for the instructor: ")
 
 
+@pytest.mark.full
 def test_each_test_is_a_share_of_the_points(tmp_path):
     found = result(tmp_path, MIXED)
     assert found.status is Status.PARTIAL
@@ -68,6 +69,7 @@ def test_all_pass_and_none(tmp_path):
     assert (found.status, found.hint) == (Status.FAIL, "test_a: OSError: gone")
 
 
+@pytest.mark.full
 def test_an_error_in_a_fixture_counts_once(tmp_path):
     text = (
         "import pytest\n@pytest.fixture\ndef first(run):\n    yield run.channels[5]\n"
@@ -77,6 +79,7 @@ def test_an_error_in_a_fixture_counts_once(tmp_path):
     assert (found.points, found.measured) == (50, "test_a 0/1, test_b 1/1")
 
 
+@pytest.mark.full
 def test_a_test_of_no_points_is_advice(tmp_path):
     text = "import pytest\n@pytest.mark.points(0)\ndef test_a():\n    assert 0, 'nicer'\ndef test_b():\n    pass\n"
     found = result(tmp_path, text)
@@ -95,6 +98,7 @@ def test_twice_the_same(tmp_path):
     assert "0x…" in first.hint
 
 
+@pytest.mark.full
 def test_some_are_selected(tmp_path):
     criteria = TESTS.replace("file: test_lab.py", "file: test_lab.py, select: hello or name")
     assert result(tmp_path, MIXED, criteria=criteria).measured == "test_hello 1/1, test_name 0/3"
@@ -155,6 +159,7 @@ def runs_on(cmdline: Path) -> bool:
         return False
 
 
+@pytest.mark.full
 def test_nothing_of_the_surrounding_folders_takes_part(tmp_path, monkeypatch):
     (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --nonsense\n")
     (tmp_path / "conftest.py").write_text("raise RuntimeError\n")
@@ -178,6 +183,7 @@ def test_a_run_that_was_not_recorded_leaves_it_open(tmp_path):
     assert result(tmp_path, "def test_a(run):\n    pass\n", host).status is Status.INCONCLUSIVE
 
 
+@pytest.mark.full
 def test_only_what_was_recorded_is_iterated(tmp_path):
     text = (
         "def test_a(evidence):\n    assert list(evidence) == ['talker', 'package']\n"
@@ -198,6 +204,7 @@ def test_all_skipped_is_open_or_blocked(tmp_path):
     assert result(tmp_path, text, criteria=criteria).status is Status.BLOCKED
 
 
+@pytest.mark.full
 def test_a_criterion_without_a_scenario_has_no_run(tmp_path):
     criteria = TESTS.replace(", scenario: talker", "")
     assert "names no scenario" in broken(tmp_path, "def test_a(run):\n    pass\n", criteria)

@@ -137,6 +137,7 @@ def test_what_macos_adds_is_left_out(tmp_path):
     assert [path.name for path in submission.root.iterdir()] == ["lab1"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "name", ["../evil", "/evil", "lab1/../../evil", "C:/evil", "lab1/..", "..\\evil", "C:\\evil"]
 )
@@ -149,6 +150,7 @@ def test_names_that_lead_outside(name, tmp_path):
     assert not (tmp_path / "evil").exists()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "entries",
     [
@@ -278,6 +280,7 @@ def test_a_flipped_bit_is_never_a_crash(kind, tmp_path):
             assert error.hint  # noqa: PT017 - a flipped bit may also do no harm
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("name", "content", "says"),
     [

@@ -68,6 +68,7 @@ def refused(path, tmp_path, **fields):
 # Names
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "name", ["..\\evil", "a\\..\\..\\evil", "C:\\evil", "\\evil", "\\\\host\\evil", "x\\.."]
 )
@@ -100,6 +101,7 @@ def test_what_is_said_of_a_name_is_one_line(tmp_path):
     assert "evil\\n" in refused(tar_of(tmp_path / "a.tar", tar_entry("../evil\n")), tmp_path)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["CON", "con.py", "aux.launch", "end.", "end ", "a:b", "a\\b", "LPT1"])
 def test_names_that_windows_cannot_hold_are_named(name, tmp_path):
     submission = opened(tar_of(tmp_path / "a.tar", tar_entry(f"lab1/{name}")), tmp_path)
@@ -174,6 +176,7 @@ def test_more_links_than_anybody_follows(tmp_path):
     )
 
 
+@pytest.mark.full
 def test_a_chain_of_links_that_no_system_follows(tmp_path):
     entries = [tar_entry(f"lab1/{n}", type=tarfile.SYMTYPE, linkname=f"{n + 1}") for n in range(1500)]
     begin = time.process_time()
@@ -226,6 +229,7 @@ def test_a_repository_in_an_archive_is_left_out(tmp_path):
 # Sizes
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", ["zip", "tar", "gz", "bz2", "xz"])
 def test_a_giant_beside_the_package_is_left_out(kind, tmp_path):
     size = 3 << 20
@@ -286,6 +290,7 @@ def test_packings_that_zipfile_undoes_without_a_limit(packing, tmp_path):
     assert "not read here" in refused(path, tmp_path)
 
 
+@pytest.mark.full
 def test_a_zip_of_a_million_entries(tmp_path):
     """One local entry and a long list of contents: that alone would take hundreds of megabytes."""
     one = (
@@ -327,6 +332,7 @@ def test_a_header_of_a_gigabyte(kind, tmp_path):
     assert "takes more time or memory to unpack" in refused(tmp_path / "a.tar.gz", tmp_path)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "record",
     [
@@ -419,6 +425,7 @@ def test_an_entry_encrypted_by_aes(tmp_path):
     assert "password" in refused(path, tmp_path)
 
 
+@pytest.mark.full
 def test_pictures_and_models_leave_room_for_code(tmp_path):
     """A workspace full of meshes is no reason to refuse the package in it."""
     path = tmp_path / "workspace.zip"

@@ -242,6 +242,7 @@ POLICIES = st.none() | st.fixed_dictionaries(
 )
 
 
+@pytest.mark.full
 @given(results(), OVERRIDES, HANDED_IN, POLICIES, st.booleans())
 def test_settling_goes_back_and_forth(result, overrides, handed_in, policy, dated):
     dates = {"deadline": DEADLINE, "late": policy} if dated or policy else {}
@@ -255,6 +256,7 @@ def test_settling_goes_back_and_forth(result, overrides, handed_in, policy, date
     assert {o.criterion for o in once.overrides} == overrides.keys() & {c.id for c in result.criteria}
 
 
+@pytest.mark.full
 @given(results(), OVERRIDES, HANDED_IN)
 def test_a_result_that_was_written_and_read_settles_the_same(result, overrides, handed_in):
     lab = rubric(result.criteria, deadline=DEADLINE, late={"lost": 10})

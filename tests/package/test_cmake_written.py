@@ -83,6 +83,7 @@ def test_files_that_take_too_long_to_parse_bear_out_nothing_and_are_named(tmp_pa
     assert found.too_much == f"CMake's files are more than {FILES_BYTES_MAX // 1000} kB together"
 
 
+@pytest.mark.full
 def test_a_call_of_a_hundred_thousand_words_is_compared_at_once(tmp_path):
     (tmp_path / "CMakeLists.txt").write_text(f"a({'b ' * 90_000})\n")
     trace = (json.dumps(call(1, "a", "c")).encode() + b"\n") * 20_000

@@ -151,6 +151,7 @@ def test_included_files_that_multiply():
     assert (len(second.brings), second.include_faults) == (1900, ())
 
 
+@pytest.mark.full
 def test_very_many_launch_files():
     texts = {f"{n}.launch": f"<launch>{NODE_TAG * 900}</launch>".encode() for n in range(300)}
     with bounded():

@@ -88,6 +88,7 @@ def test_faults_have_line_and_plain_cause(tmp_path):
     assert report.faults["tabs.py"].kind == "TabError"
 
 
+@pytest.mark.full
 @pytest.mark.slow
 @pytest.mark.parametrize("python", PYTHONS)
 def test_other_pythons_lead_to_the_same_causes(tmp_path, python):

@@ -67,6 +67,7 @@ def test_pyproject_is_as_the_standards_say():
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [

@@ -183,6 +183,7 @@ def test_json_is_the_result_itself(shown):
     assert TO_A_CI.search(result_bytes(shown).decode()) is None
 
 
+@pytest.mark.full
 @SOME
 @given(results())
 def test_a_terminal_gets_no_escape_and_a_log_no_command(shown):
@@ -227,6 +228,7 @@ def test_two_hundred_criteria_of_the_longest_texts_make_a_few_megabytes(text, tm
     assert max(sizes.values()) < 4_200_000, sizes
 
 
+@pytest.mark.full
 def test_a_longer_console_says_that_it_goes_on(tmp_path):
     write_reports(result(), tmp_path, console="line\n" * 2_000_000, rubric=rubric())
     text = (tmp_path / "console.log").read_text()

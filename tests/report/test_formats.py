@@ -288,6 +288,7 @@ def test_a_run_that_is_for_hidden_criteria_alone_is_not_drawn():
     assert "`again`" not in source
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("text", [LONG, "*&" * 5000, "\U000e0001" * 5000, "学" * 5000])
 @pytest.mark.parametrize("many", [1, 40, 400])
 def test_markdown_of_any_result_fits_into_a_comment(text, many):

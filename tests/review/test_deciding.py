@@ -18,6 +18,7 @@ from tests.review.conftest import QUICK
 WAIT_S = 60
 
 
+@pytest.mark.full
 def test_points_of_a_manual_criterion_are_saved_at_once(page, out) -> None:
     answer = page.save("ada", "style", points="7.5", comment="clear names,\r\nlong functions")
     assert answer.status_code == 303
@@ -91,6 +92,7 @@ def test_points_that_are_none_are_named_and_what_was_typed_stays(page, out, poin
     assert not (out / "overrides.yaml").exists()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("typed", "points"), [("7,5", 7.5), (" 3 ", 3), ("0", 0), ("10.", 10), (".5", 0.5)])
 def test_points_as_people_type_them(page, out, typed, points) -> None:
     page.save("ada", "style", points=typed)
@@ -255,6 +257,7 @@ def test_a_review_beside_a_batch_that_is_ended_without_a_decision_leaves_nothing
     assert not review.batch_runs()
 
 
+@pytest.mark.full
 def test_who_changes_their_mind_quickly_gets_the_last_of_it(page, out, review) -> None:
     form = page.form("ada", "style")
     for points in range(1, 11):

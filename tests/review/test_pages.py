@@ -24,6 +24,7 @@ def rows(text: str) -> list[str]:
     return re.findall(r'class="row" href="/s/([^/]+)/', text)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("show", "names"),
     [
@@ -79,6 +80,7 @@ def test_a_place_in_an_empty_class() -> None:
     assert len(place.q) == 100
 
 
+@pytest.mark.full
 def test_hostile_names_stay_text(tmp_path) -> None:
     whos = (
         Who(

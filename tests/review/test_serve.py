@@ -102,6 +102,7 @@ def test_tokens_are_new_each_time_and_long(server, out) -> None:
     assert len(server.token) * 6 >= 128
 
 
+@pytest.mark.full
 def test_it_listens_on_loopback_only(server) -> None:
     listening = [
         line.split()[1]
@@ -112,6 +113,7 @@ def test_it_listens_on_loopback_only(server) -> None:
     assert [place.split(":")[0] for place in listening] == ["0100007F"]
 
 
+@pytest.mark.full
 def test_a_body_without_end_is_refused(server) -> None:
     with socket.create_connection(("127.0.0.1", server.port), timeout=WAIT_S) as connection:
         head = (
@@ -121,6 +123,7 @@ def test_a_body_without_end_is_refused(server) -> None:
         assert b" 413 " in connection.recv(1000).splitlines()[0]
 
 
+@pytest.mark.full
 def test_a_port_in_use_is_said_in_one_line(server, out, capsys) -> None:
     assert run(["review", str(out), "--no-browser", "--port", str(server.port)]) == 2
     errors = capsys.readouterr().err.splitlines()

@@ -14,6 +14,7 @@ from tests.rubric.samples import SOUND
 VALIDATOR = Draft202012Validator(rubric_schema())
 
 
+@pytest.mark.full
 def test_the_schema_is_one():
     Draft202012Validator.check_schema(rubric_schema())
     assert json.loads(json.dumps(rubric_schema())) == rubric_schema()
@@ -36,6 +37,7 @@ def test_a_criterion_for_a_person_is_valid():
     )
 
 
+@pytest.mark.full
 def test_sound_rubrics_are_valid():
     for text in [SOUND, *(loaded.path.read_text(encoding="utf-8") for loaded in all_rubrics())]:
         assert [error.message for error in VALIDATOR.iter_errors(yaml.safe_load(text))] == []

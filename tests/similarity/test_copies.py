@@ -97,6 +97,7 @@ def test_disguised_copies_are_found(tmp_path, disguise) -> None:
     assert named(compared(class_of(tmp_path, submissions))) == {(name, f"{name}-copy") for name in ALL}
 
 
+@pytest.mark.full
 def test_programs_written_alone_are_far_apart(tmp_path) -> None:
     """The same exercise, nine times."""
     similarity = compared(class_of(tmp_path, {name: programs(name) for name in ALL}), threshold=0.3)
@@ -104,6 +105,7 @@ def test_programs_written_alone_are_far_apart(tmp_path) -> None:
     assert similarity.too_little == ()
 
 
+@pytest.mark.full
 def test_half_a_copy_is_below_the_threshold_and_can_be_asked_for(tmp_path) -> None:
     half = {"node.py": (solution("timed") + solution("laser")).encode()}
     other = {"node.py": (solution("timed") + solution("odometry")).encode()}
@@ -112,6 +114,7 @@ def test_half_a_copy_is_below_the_threshold_and_can_be_asked_for(tmp_path) -> No
     assert named(compared(folders, threshold=0.3)) == {("one", "two")}
 
 
+@pytest.mark.full
 def test_who_hides_a_copy_in_much_other_code_is_found(tmp_path) -> None:
     padded = programs("timed", "laser", "service", "table")
     folders = class_of(tmp_path, {"one": programs("timed"), "two": padded})
@@ -120,6 +123,7 @@ def test_who_hides_a_copy_in_much_other_code_is_found(tmp_path) -> None:
     assert pair.similarity_b < 0.4
 
 
+@pytest.mark.full
 def test_one_group_may_share(tmp_path) -> None:
     folders = class_of(tmp_path, {name: programs("timed") for name in ("one", "two", "three")})
     similarity = compared(folders, groups={"one": "a", "two": "a", "three": ""})
@@ -127,12 +131,14 @@ def test_one_group_may_share(tmp_path) -> None:
     assert similarity.same_group == 1
 
 
+@pytest.mark.full
 def test_copies_of_copies_are_one_cluster(tmp_path) -> None:
     chain = {"one": ("timed",), "two": ("timed", "laser"), "three": ("laser",), "four": ("table",)}
     similarity = compared(class_of(tmp_path, {name: programs(*files) for name, files in chain.items()}))
     assert similarity.clusters == (("one", "three", "two"),)
 
 
+@pytest.mark.full
 def test_the_same_class_gives_the_same_answer_in_any_order(tmp_path) -> None:
     folders = class_of(tmp_path, {name: programs("timed", name) for name in ("laser", "table", "service")})
     forward = compared(folders, threshold=0.3)

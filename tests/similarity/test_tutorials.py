@@ -98,6 +98,7 @@ def talker(number: int) -> bytes:
     return TALKER.format(**names).encode()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("count", [2, 12])
 def test_two_with_the_tutorial_are_not_named(tmp_path, count) -> None:
     """Nor are twelve: in a class of two nothing else takes it out."""
@@ -107,12 +108,14 @@ def test_two_with_the_tutorial_are_not_named(tmp_path, count) -> None:
     assert len(similarity.too_little) == count
 
 
+@pytest.mark.full
 def test_two_with_the_tutorial_in_cpp_are_not_named(tmp_path) -> None:
     similarity = compared(class_of(tmp_path, {n: {"src/talker.cpp": TALKER_CPP.encode()} for n in "ab"}))
     assert similarity.pairs == ()
     assert similarity.too_little == ("a", "b")
 
 
+@pytest.mark.full
 def test_cpp_is_compared_where_it_is_more_than_the_tutorial(tmp_path) -> None:
     own = "".join(
         f"double part{n}(double x, int y) {{\n  double z = x * {n};\n  return z + y - {n * 7};\n}}\n"
@@ -126,6 +129,7 @@ def test_cpp_is_compared_where_it_is_more_than_the_tutorial(tmp_path) -> None:
     assert pair.files[0].lines_a == ((1, 20),)
 
 
+@pytest.mark.full
 def test_labs_own_solutions_with_the_tutorials_shape_have_little_of_their_own(tmp_path) -> None:
     """The reference solutions of the labs that are a talker and a listener, each of them by itself."""
     labs = ("leeds-comp3631-lab1", "mcr2-basic-comms", "york-ele00118m-lab7", "sheffield-com2009-week1")
@@ -144,6 +148,7 @@ def both_with_the_handout(tmp_path: Path) -> dict[str, Path]:
     return class_of(tmp_path, {name: {"square.py": given, "own.py": code} for name, code in own.items()})
 
 
+@pytest.mark.full
 def test_without_the_starter_code_it_counts_as_their_own(tmp_path) -> None:
     similarity = compared(both_with_the_handout(tmp_path))
     assert len(similarity.pairs) == 1
@@ -165,6 +170,7 @@ def test_the_starter_code_is_taken_out(tmp_path, form) -> None:
     assert similarity.notes == ()
 
 
+@pytest.mark.full
 def test_a_starter_with_other_names_is_the_starter(tmp_path) -> None:
     handout = tmp_path / "handout.py"
     handout.write_text(renamed(solution("timed")), encoding="utf-8")
@@ -172,6 +178,7 @@ def test_a_starter_with_other_names_is_the_starter(tmp_path) -> None:
     assert compared(folders, starter=(handout,)).pairs == ()
 
 
+@pytest.mark.full
 def test_many_alike_are_said_to_have_a_common_source(tmp_path) -> None:
     same = {f"same{n}": {"n.py": solution("timed").encode()} for n in range(6)}
     others = {f"other{n}": {"n.py": solution(name).encode()} for n, name in enumerate(("laser", "table") * 4)}

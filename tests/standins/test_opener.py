@@ -82,6 +82,7 @@ def _open(shims: Path, name: str, *arguments: str | bytes, **env: str) -> tuple[
     return done.returncode, done.stdout
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", BROWSERS)
 def test_it_tells_by_what_name_it_was_called(
     shims: Path, master: tuple[str, list[tuple[str, str, list[str]]]], name: str

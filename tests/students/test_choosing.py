@@ -54,6 +54,7 @@ def test_every_folder_of_a_workspace_leads_to_the_package(lab: str, tmp_path: Pa
         assert f"by {lab}, the lab for a package named {chosen.rubric.rubric.package}" in chosen.words
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("lab", LABS)
 def test_a_file_stands_for_its_package(lab: str, tmp_path: Path) -> None:
     _, package = _workspace(lab, tmp_path)
@@ -136,6 +137,7 @@ def test_what_is_no_package_is_said_to_be_none(kind: str, tmp_path: Path) -> Non
     assert caught.value.hint
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("place", ["/", "~"])
 def test_a_whole_disk_is_not_walked(place: str) -> None:
     begun = time.process_time()
@@ -143,6 +145,7 @@ def test_a_whole_disk_is_not_walked(place: str) -> None:
     assert time.process_time() - begun < 3
 
 
+@pytest.mark.full
 def test_a_folder_of_a_hundred_thousand_files(tmp_path: Path) -> None:
     package = write_package(tmp_path / "lab1")
     pictures = package / "pictures"

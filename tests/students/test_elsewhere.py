@@ -65,12 +65,14 @@ def test_a_static_check_says_the_same_everywhere(system: str, work: Path) -> Non
     assert points["talker-executable"] == points["manifest"] == 5
 
 
+@pytest.mark.full
 def test_where_disks_have_no_modes_git_is_asked(work: Path) -> None:
     git(work, "update-index", "--chmod=-x", "src/numeric_talker.py")
     found = json.loads(run("win32", "check", "--static", "--json", cwd=work).stdout)
     assert {c["id"]: c["status"] for c in found["criteria"]}["talker-executable"] == "fail"
 
 
+@pytest.mark.full
 def test_where_nobody_knows_a_mode_nothing_is_lost(work: Path, tmp_path: Path) -> None:
     alone = tmp_path / "alone" / "lab1"
     alone.parent.mkdir()

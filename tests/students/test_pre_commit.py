@@ -119,6 +119,7 @@ def test_a_rubric_without_static_criteria_keeps_nothing_back(student: Path) -> N
     assert done.returncode == 0, done.stderr + done.stdout
 
 
+@pytest.mark.full
 def test_rubrics_are_validated(student: Path) -> None:
     _configure(student, _hook("grader-rubric-validate"))
     (student / "rubrics").mkdir()

@@ -151,6 +151,7 @@ def test_a_package_folder_that_is_gone_ends_it_in_one_line(leave, package) -> No
         ]
 
 
+@pytest.mark.full
 def test_an_archive_is_not_watched(package) -> None:
     shutil.make_archive(str(package), "tar", package.parent, "lab1")
     command = Command(package.parent, "--rubric", LEEDS, "lab1.tar")

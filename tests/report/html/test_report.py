@@ -371,6 +371,7 @@ def test_two_hundred_criteria_of_the_longest_texts_are_cut_and_it_says_so():
     assert f"{cut} of them have no details here" in words(document)
 
 
+@pytest.mark.full
 def test_a_thousand_criteria_have_a_row_or_are_counted():
     criteria = tuple(criterion(f"c{i}", Status.FAIL, 0, 0.5, title="&" * 200) for i in range(1000))
     text = page(result(criteria=criteria), rubric=rubric())
