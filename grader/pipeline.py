@@ -302,9 +302,9 @@ def keep_recordings(
     submission: Submission | RecordedSubmission, rubric: LoadedRubric, evidence: Path, progress: Progress
 ) -> None:
     """Copy the recordings that scenarios name in the submission into the folder `evidence`."""
-    from grader import recordings  # noqa: PLC0415 - see LATER
+    from grader import submitted_recordings  # noqa: PLC0415 - see LATER
 
-    recordings.keep_scenarios(rubric.rubric, submission, evidence, progress)
+    submitted_recordings.keep_scenarios(rubric.rubric, submission, evidence, progress)
 
 
 def import_later(rubric: LoadedRubric) -> None:
@@ -340,7 +340,7 @@ def keep_and_judge(
     if submission.file is None:
         keep_recordings(submission, rubric, evidence, progress)
         return judge_folder(evidence, rubric)
-    from grader.recordings import keep_recording  # noqa: PLC0415 - see LATER
+    from grader.submitted_recordings import keep_recording  # noqa: PLC0415 - see LATER
 
     try:
         keep_recording(submission.file, evidence)

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena import inherited, sandbox_probe
-from grader.arena.inherited import MB, NEEDS, group, limits, make_room, tasks_of
+from grader.arena import inherited_limits, sandbox_probe
+from grader.arena.inherited_limits import MB, NEEDS, group, limits, make_room, tasks_of
 from grader.arena.limits import Limits
 from grader.errors import ExitCode, HostError
 from grader.model.result import GradingResult
@@ -119,7 +119,7 @@ def test_limits_that_may_be_raised_cost_nothing(open_path: Path, soft: str) -> N
 def test_a_run_needs_what_its_processes_may_have() -> None:
     needs = {need.option: need.run for need in NEEDS}
     most = Limits()
-    assert needs["nproc"] > most.tasks == inherited.TASKS
+    assert needs["nproc"] > most.tasks == inherited_limits.TASKS
     assert (needs["nofile"], needs["as"]) == (most.open_files, most.address_space_bytes)
     assert needs["fsize"] > max(most.file_bytes, most.built_bytes, most.run_bytes)
     assert needs["cpu"] == most.cpu_s + 10
@@ -134,12 +134,12 @@ def test_what_the_user_runs_already_is_counted(tmp_path: Path, monkeypatch) -> N
             f"Name:\tx\nUid:\t{owner}\t0\t0\t0\nThreads:\t{threads}\nFoo:\t1\n"
         )
     (tmp_path / "self").mkdir()
-    monkeypatch.setattr(inherited, "PROC", tmp_path)
-    monkeypatch.setattr(inherited, "_is_root", lambda: False)
+    monkeypatch.setattr(inherited_limits, "PROC", tmp_path)
+    monkeypatch.setattr(inherited_limits, "_is_root", lambda: False)
     assert tasks_of(uid) == 100
-    needed = inherited.TASKS + inherited.OTHER_TASKS + 100
+    needed = inherited_limits.TASKS + inherited_limits.OTHER_TASKS + 100
     for hard, command in ((needed, False), (needed - 1, True), (-1, False)):
-        monkeypatch.setattr(inherited.resource, "getrlimit", lambda _, hard=hard: (hard, hard))
+        monkeypatch.setattr(inherited_limits.resource, "getrlimit", lambda _, hard=hard: (hard, hard))
         assert bool(next(limits()).command) is command
 
 
@@ -154,7 +154,7 @@ def test_a_control_group_without_room_is_named(tmp_path: Path, monkeypatch) -> N
     found = list(group())
     assert [(one.name, one.found) for one in found] == [("pids.max", "200, with 60 in use")]
     assert found[0].command == f"echo {60 + 768} > {inner.parent}/pids.max"
-    monkeypatch.setattr(inherited, "limits", lambda _: iter(()))
+    monkeypatch.setattr(inherited_limits, "limits", lambda _: iter(()))
     with pytest.raises(HostError, match=r"pids\.max .* is 200, with 60 in use"):
         sandbox_probe.choose("none")
     make_room(begin=True)

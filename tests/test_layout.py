@@ -24,22 +24,22 @@ ALLOWED = {
     "wording": set[str](),
     "portable": {"errors"},
     "host_programs": set[str](),
-    "limited": {"host_programs"},
+    "limited_child": {"host_programs"},
     "workers": {"host_programs"},
     "files": {"errors", "portable"},
     "results": BASE | {"files"},
     "faults": BASE | {"files", "intake", "report", "results", "rubric"},
     "evidence": BASE | {"files"},
-    "package": BASE | {"host_programs", "limited"},
-    "intake": BASE | {"files", "host_programs", "limited"},
+    "package": BASE | {"host_programs", "limited_child"},
+    "intake": BASE | {"files", "host_programs", "limited_child"},
     "checks": BASE | {"evidence"},
     "rubric": BASE | {"checks", "evidence", "files"},
     "judging": BASE | {"checks", "evidence", "rubric"},
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},
     "arena": BASE | {"evidence", "files", "host_programs", "package", "rubric.model"},
-    "recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
+    "submitted_recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "pipeline": {
-        *BASE, "arena", "evidence", "faults", "files", "intake", "judging", "package", "recordings",
+        *BASE, "arena", "evidence", "faults", "files", "intake", "judging", "package", "submitted_recordings",
         "report", "results", "rubric"
     },
     "api": {
@@ -114,7 +114,7 @@ def test_checks_see_evidence_as_records_only() -> None:
 
 
 def test_the_support_of_checks_imports_no_family_of_checks() -> None:
-    shared = {"support", "registry", "evidence"}
+    shared = {"support", "registry", "all_runs"}
     found = {m for path in _sources(GRADER / "checks" / "support") for m in _imports(path)}
     assert {m.split(".")[2] for m in found if m.startswith("grader.checks.")} <= shared
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from grader.limited import Answer, ChildLimits, run_limited
+from grader.limited_child import Answer, ChildLimits, run_limited
 
 LIMITS = ChildLimits(memory_bytes=256 << 20, cpu_s=1, wall_s=30.0, file_bytes=1 << 20)
 

@@ -53,7 +53,7 @@ STARTS = {
     "intake/git.py:_started": Start(
         "environment", "cwd", "its repository's data; no setting, hook or filter of it"
     ),
-    "limited.py:run_limited": Start(
+    "limited_child.py:run_limited": Start(
         "loading_environment(os.environ)",
         "'/'",
         "its archive, and its source files, which are parsed and not run",

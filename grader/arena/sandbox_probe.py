@@ -66,7 +66,7 @@ def choose(mode: SandboxMode) -> Sandbox:
     Raises SandboxMissing where it cannot be known whether there is one, and HostError where the limits that were
     inherited are too short, or those of students' processes cannot be set: every one would fail.
     """
-    from grader.arena.inherited import make_room  # noqa: PLC0415 - elsewhere than on Linux nothing is run
+    from grader.arena.inherited_limits import make_room  # noqa: PLC0415 - elsewhere than on Linux nothing is run
 
     make_room()
     refused = refused_limits()

@@ -7,7 +7,7 @@ from here (docs/how-to/own-checks.md), and stays.
 
 from importlib import import_module
 
-from grader.checks.evidence import Evidence
+from grader.checks.all_runs import Evidence
 from grader.checks.registry import CHECKS, HEADINGS, Check, check
 from grader.evidence.run import Channel, Message, Run
 from grader.model.package import PackageFacts
@@ -34,7 +34,7 @@ FAMILIES = (
     "messages",
     "rate",
     "counter",
-    "hears",
+    "listener",
     "logs",
     "launch_xml",
     "launch_runs",
@@ -43,8 +43,8 @@ FAMILIES = (
     "parameters",
     "services",
     "connections",
-    "copies",
-    "path",
+    "two_copies",
+    "robot_path",
 )
 for family in FAMILIES:
     import_module(f"grader.checks.{family}")

@@ -30,9 +30,9 @@ LOADER = (
 )
 TELLING = ("[FATAL]", "what():")
 SAME_NAME = "new node registered with same name"
-ASTRAY = "run it with rosrun, and look for a pointer or an index that goes astray"
-LINK = (
-    "name every library in target_link_libraries(<program> ${catkin_LIBRARIES}), and every package in "
+INVALID_MEMORY_HINT = "run it with rosrun, and look for an invalid pointer or an out-of-range index"
+LINK_LIBRARIES_HINT = (
+    "list every library in target_link_libraries(<program> ${catkin_LIBRARIES}), and every package in "
     "find_package(catkin REQUIRED COMPONENTS …)"
 )
 EXPECTED = "catkin_make exits with 0"
@@ -280,10 +280,16 @@ def _broken(package: PackageFacts, run: Run, programs: list[Life]) -> Iterator[B
         unloaded = next((mark for mark in LOADER if mark in words), None)
         if one.end.signal is not None or one.end.stopped_by is not None:
             end = explain_end(one, run, package)
-            hint = "fix what its last words say" if any(mark in words for mark in TELLING) else ASTRAY
+            hint = (
+                "fix the error in its last output"
+                if any(mark in words for mark in TELLING)
+                else INVALID_MEMORY_HINT
+            )
             yield Broken(_name(one), f"{end.cause}{quoted}", hint, one)
         elif unloaded or code in CANNOT_START:
-            yield Broken(_name(one), f"it cannot be started (exit code {code}){quoted}", LINK, one)
+            yield Broken(
+                _name(one), f"it cannot be started (exit code {code}){quoted}", LINK_LIBRARIES_HINT, one
+            )
 
 
 def _gave_way(run: Run, one: Life) -> bool:

@@ -142,7 +142,8 @@ def _flood(found: Rhythm, package: PackageFacts, params: RateParams) -> Verdict 
     where = f" ({slips[0].file}, line {slips[0].line}: {slips[0].message})" if slips else ""
     return failed(
         f"{params.topic} is flooded with {hertz(found.mean_hz)}: the loop does not sleep{where}",
-        hint=f"call rate.sleep(), with brackets, in each turn; rate = rospy.Rate({significant(params.rate_hz)})",
+        hint="call rate.sleep(), with parentheses, in every iteration; "
+        f"rate = rospy.Rate({significant(params.rate_hz)})",
         citations=tuple(FileCitation(file=s.file, line=s.line) for s in slips[:3]),
     )
 

@@ -123,7 +123,7 @@ def _judged(offer: Offer, package: PackageFacts, run: Run, params: ServiceParams
         message = f"{offer.node} offered {params.service}, but {one.name} ended: {end.cause}"
         return end.verdict(unjudged, message)
     if not offer.type:
-        message = f"{params.service} is offered, but did not say of what type it is"
+        message = f"{params.service} is offered, but its type could not be determined"
         return inconclusive(message, hint=f"rosservice type {params.service} shows it; grade again")
     return passed(f"{offer.node} offers {params.service} of type {params.type}")
 

@@ -111,7 +111,7 @@ def _switch() -> str:
 
 
 def _inherited() -> Iterator[Row]:
-    from grader.arena.inherited import group, limits  # noqa: PLC0415 - other systems lack what it imports
+    from grader.arena.inherited_limits import group, limits  # noqa: PLC0415 - other systems lack what it imports
 
     for limit in (*limits(), *group()):
         detail = f"{limit.what}: {limit.found}; a run needs {limit.needed}"
@@ -184,6 +184,6 @@ def platform_rows() -> Iterator[Row]:
 def require_room(*, gradings: int) -> None:
     """Check that the limits inherited from the shell leave enough for so many gradings at a time. Raises HostError."""
     if sys.platform == "linux":
-        from grader.arena.inherited import make_room  # noqa: PLC0415 - other systems lack what it imports
+        from grader.arena.inherited_limits import make_room  # noqa: PLC0415 - other systems lack what it imports
 
         make_room(gradings=gradings)

@@ -41,7 +41,7 @@ def _dispatch(argv: Sequence[str]) -> int:
     runs_code = command.runs_code and not options.get("static")
     with loading():
         if runs_code and sys.platform == "linux":
-            inherited = import_module("grader.arena.inherited")
+            inherited = import_module("grader.arena.inherited_limits")
             inherited.make_room(
                 begin=True
             )  # before more is loaded: short limits would end that without a word

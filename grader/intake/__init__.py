@@ -1,8 +1,8 @@
 """A folder, an archive or a git URL becomes a folder on disk with the lab's package in it; nothing is run.
 
 SOURCE as it stands on the command line comes in, `model.submission.Submission` goes out. Everything hostile about a
-source is dealt with here: its size, its names, its links, its git settings. What the files say is not its business, but
-`package/`'s.
+source is dealt with here: its size, its names, its links, its git settings. Reading the files is the job of
+`package/`.
 
 Names are loaded when they are first asked for: the child that unpacks an archive needs little of this.
 """

@@ -28,7 +28,7 @@ from grader.intake.limits import Limits, too_much
 from grader.intake.names import brief, is_archive_name
 from grader.intake.tree import file_digest
 from grader.intake.unpack import Unpacker
-from grader.limited import Answer, ChildLimits, run_limited
+from grader.limited_child import Answer, ChildLimits, run_limited
 
 MEMORY_BYTES, CPU_S, WALL_S = 512 << 20, 60, 180.0
 CHUNK_BYTES = 1 << 20

@@ -69,7 +69,9 @@ def split_address(url: str) -> tuple[str, Login | None]:
         return f"{match['scheme']}://{user}@{match['host']}{match['path']}", None
     login = Login(user=unquote(user), password=unquote(password) if colon else None)
     if _UNFIT.search(login.user + (login.password or "")):
-        raise UsageError("the user's name or password in this address holds signs that no login has")
+        raise UsageError(
+            "the user's name or password in this address contains characters that are not allowed in a login"
+        )
     return f"{match['scheme']}://{match['host']}{match['path']}", login
 
 

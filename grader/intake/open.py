@@ -17,6 +17,7 @@ from typing import TypeVar
 from grader.errors import GraderError, OutputError, SubmissionError
 from grader.intake.archive import unpack
 from grader.intake.content import Content, package_content, remarks
+from grader.intake.file_modes import Modes, archive_modes, folder_modes, right_in_git, uploaded_modes
 from grader.intake.find import (
     Candidate,
     Choice,
@@ -29,7 +30,6 @@ from grader.intake.find import (
 from grader.intake.git import Git, Repository
 from grader.intake.gitdir import Repositories
 from grader.intake.limits import Limits
-from grader.intake.modes import Modes, archive_modes, folder_modes, right_in_git, uploaded_modes
 from grader.intake.names import brief, encodable, printable, safe_name
 from grader.intake.repository import clone
 from grader.intake.source import Source, parse_source

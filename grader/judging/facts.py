@@ -9,8 +9,8 @@ from pathlib import PurePosixPath
 
 from pydantic import ValidationError
 
+from grader.checks.all_runs import Evidence
 from grader.checks.build import run_hint
-from grader.checks.evidence import Evidence
 from grader.checks.registry import Check
 from grader.checks.support.scripts import find_script
 from grader.evidence.events import RECORDING_MISSING, RECORDING_PROBLEM

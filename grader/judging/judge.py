@@ -8,7 +8,7 @@ from pathlib import PurePath
 from traceback import extract_tb
 
 from grader.checks import CHECKS, Check
-from grader.checks.evidence import NotRecorded
+from grader.checks.all_runs import NotRecorded
 from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run

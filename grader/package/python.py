@@ -13,7 +13,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from grader.limited import ChildLimits, run_limited
+from grader.limited_child import ChildLimits, run_limited
 from grader.model.package import Fault, PythonSlip
 from grader.model.record import Record
 from grader.package.reading import printable

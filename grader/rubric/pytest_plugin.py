@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from grader.checks import Evidence, PackageFacts, Run
-from grader.checks.evidence import NoSuchScenario, NotRecorded
+from grader.checks.all_runs import NoSuchScenario, NotRecorded
 from grader.model.verdict import Status
 from grader.rubric.pytest_check import Outcome, SessionOutcome, TestOutcome
 from grader.wording import shorten

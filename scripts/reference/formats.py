@@ -6,8 +6,8 @@ import json
 from collections.abc import Callable, Iterator
 
 from grader.evidence.events import PACKAGE_TOPIC, TOPICS
-from grader.report.formats import FORMATS, Format, schema_of
-from grader.report.formats.schemas import Schema, records_in
+from grader.report.file_formats import FORMATS, Format, schema_of
+from grader.report.file_formats.schemas import Schema, records_in
 
 INTRODUCTION = """# Formats
 

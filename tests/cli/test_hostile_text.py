@@ -35,7 +35,7 @@ MAY_PRINT = {
     "cli/display.py",
     "cli/class_display.py",
     "cli/main.py",  # the list of commands, which is its own
-    "limited.py",  # JSON for the process that started it
+    "limited_child.py",  # JSON for the process that started it
     "integrations/github.py",  # annotations; tests/ci
     "integrations/autograde.py",  # a report as in a terminal; tests/deliver
 }

@@ -12,7 +12,7 @@ import pytest
 
 from grader.errors import OutputError, UsageError
 from grader.intake import archive
-from grader.limited import Answer
+from grader.limited_child import Answer
 from tests.intake.samples import NODE, commit, git, lab, lab_tar, lab_zip, manifest, opened, repository, write
 
 

@@ -33,7 +33,7 @@ LOADED = (
         "cli/commands",
         "cli/declare",
         "cli/doctor",
-        "cli/evidence",
+        "cli/evidence_commands",
         "cli/explanation",
         "cli/find_packages",
         "cli/main",

@@ -12,7 +12,7 @@ from pathlib import Path
 from grader import __version__
 from grader.classes.batch.folder import BatchFolder, write_run
 from grader.classes.batch.job import Executor
-from grader.classes.batch.judging import Judged, judge_all
+from grader.classes.batch.judge_many import Judged, judge_all
 from grader.classes.batch.reports import Settler, rewrite
 from grader.classes.batch.run import (
     BatchOptions,

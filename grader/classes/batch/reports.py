@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 
 from grader.checks import CHECKS
-from grader.classes.batch.judging import fitting_runs
+from grader.classes.batch.judge_many import fitting_runs
 from grader.errors import EvidenceError, GraderError, UsageError
 from grader.evidence.reader import load_evidence
 from grader.files import new_file, unwritable

@@ -1,4 +1,4 @@
-"""`grader review DIR`: a page of this machine alone, on which an instructor looks at a class and decides."""
+"""`grader review DIR`: a web page served only on this machine, on which an instructor looks at a class and decides."""
 
 from __future__ import annotations
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from grader.classes.roster.allowed_sources import OWN_FOLDER, Local
 from grader.classes.roster.entries import entries_of
 from grader.classes.roster.exports import (
     from_gitlab,
@@ -15,7 +16,6 @@ from grader.classes.roster.exports import (
     with_roster_columns,
 )
 from grader.classes.roster.folder import from_folder
-from grader.classes.roster.sources import OWN_FOLDER, Local
 from grader.classes.roster.table import read_table
 from grader.errors import UsageError
 from grader.model.batch import Entry, Roster

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
-from grader.classes.roster.sources import Local, ref_fault, source_fault, whole_source
+from grader.classes.roster.allowed_sources import Local, ref_fault, source_fault, whole_source
 from grader.classes.roster.table import Row, Table
 from grader.errors import UsageError
 from grader.intake.names import brief, encodable, safe_name

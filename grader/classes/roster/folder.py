@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from grader.classes.roster.allowed_sources import REFUSED, Local, local_fault
 from grader.classes.roster.entries import Found, columns_of, gather
-from grader.classes.roster.sources import REFUSED, Local, local_fault
 from grader.errors import UsageError
 from grader.intake.names import archive_stem, encodable, is_archive_name, listing, printable
 from grader.model.batch import Entry, Roster

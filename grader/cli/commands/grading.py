@@ -109,8 +109,8 @@ def judge(
 ) -> ExitCode:
     """Judge recorded evidence again, without ROS."""
     with loading():
-        from grader.classes.batch.judging import submissions_in
-        from grader.cli.evidence import judge_evidence, judge_submissions
+        from grader.classes.batch.judge_many import submissions_in
+        from grader.cli.evidence_commands import judge_evidence, judge_submissions
         from grader.portable import cores
         from grader.rubric.load import load_rubric
     loaded = load_rubric(rubric)
@@ -128,7 +128,7 @@ def inspect(
 ) -> ExitCode:
     """Show what is in an evidence file or a bag: rates, gaps, nodes."""
     with loading():
-        from grader.cli.evidence import print_inspection
+        from grader.cli.evidence_commands import print_inspection
         from grader.cli.output import say_json
         from grader.evidence.inspect import inspect_file
     inspection = inspect_file(file)

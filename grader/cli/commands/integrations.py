@@ -112,7 +112,7 @@ def export_bag(
 ) -> ExitCode:
     """Write recorded evidence as a ROS 1 bag."""
     with loading():
-        from grader.cli.evidence import export_bags
+        from grader.cli.evidence_commands import export_bags
     export_bags(evidence, out, everything=everything)
     return ExitCode.PASSED
 
@@ -142,8 +142,8 @@ def schema(
     """Print the JSON Schema of a format that the grader writes or reads."""
     with loading():
         from grader.cli.output import say, say_json
-        from grader.report.formats import FORMATS as KNOWN
-        from grader.report.formats import schema_of
+        from grader.report.file_formats import FORMATS as KNOWN
+        from grader.report.file_formats import schema_of
     if name is not None:
         say_json(schema_of(name))
         return ExitCode.PASSED

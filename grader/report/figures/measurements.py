@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 
 from grader.checks.counter import StartParams, StepParams, begins_with, missed_the_first
-from grader.checks.hears import HearsParams
-from grader.checks.path import PathParams
+from grader.checks.listener import HearsParams
 from grader.checks.rate import RateParams, judged_rhythm, sleeps_explain, was_late
+from grader.checks.robot_path import PathParams
 from grader.checks.support.console_output import (
     Line,
     Probe,

@@ -36,7 +36,12 @@ CRITERIA = (
     ("counter-step", "The counter goes up by one", 5.0, ("after {n} comes {n}",)),
     ("counter-wrap", "The counter wraps from 127 to 0", 15.0, ("after 127 comes -128", "after 127 comes 1, not 0")),
     ("listener-chatter", "The listener prints /chatter", 5.0, ("prints {n} of 8 messages",)),
-    ("listener-numeric", "The listener prints /numeric_chatter", 5.0, ("nothing of what was sent is printed",)),
+    (
+        "listener-numeric",
+        "The listener prints /numeric_chatter",
+        5.0,
+        ("none of the messages that were sent was printed",),
+    ),
     ("launch", "roslaunch connects both", 5.0, ("lab1.launch has no <node> for numeric_{x}.py",)),
     ("dependencies", "package.xml declares what is used", 0.0, ("std_msgs is not declared",)),
 )  # fmt: skip

@@ -3,7 +3,7 @@
 The reference page on them is made by `scripts/reference/formats.py`.
 """
 
-from grader.report.formats.known import FORMATS, Addition, Format
-from grader.report.formats.schemas import schema_of
+from grader.report.file_formats.known import FORMATS, Addition, Format
+from grader.report.file_formats.schemas import schema_of
 
 __all__ = ["FORMATS", "Addition", "Format", "schema_of"]

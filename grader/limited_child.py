@@ -25,7 +25,7 @@ except ImportError:  # Windows
     resource = None  # type: ignore[assignment]
 
 ROOT = Path(__file__).resolve().parents[1]
-BOOTSTRAP = "import sys; sys.path.append(sys.argv[1]); from grader.limited import main; main()"
+BOOTSTRAP = "import sys; sys.path.append(sys.argv[1]); from grader.limited_child import main; main()"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,7 +18,7 @@ from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.result import GradingResult, Override
 from grader.model.similarity import Similarity
-from grader.report.formats.known import FORMATS, Format
+from grader.report.file_formats.known import FORMATS, Format
 from grader.rubric.model import Rubric
 from grader.rubric.schema import DIALECT, rubric_schema
 

@@ -206,7 +206,7 @@ def _by_number(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequenc
     if len(missing) == len(probes):
         seen = f"it prints {shown(after[0]).strip(' :')!r}" if after else "it prints nothing at all"
         sent = f"; {probes[0].value!r} was sent first" if isinstance(probes[0].value, str) else ""
-        return failed(f"nothing of what was sent is printed{sent}; {seen}", hint=CALLBACK_HINT)
+        return failed(f"none of the messages that were sent was printed{sent}; {seen}", hint=CALLBACK_HINT)
     if len(missing) == len(probes) - 1 and missing[0] is not probes[0]:
         hint = "subscribe with a callback and rospy.spin(); wait_for_message(…) waits for one message only"
         return failed("only the first message is printed", hint=hint)
