@@ -57,7 +57,7 @@ def run_limited(function: str, *arguments: object, limits: ChildLimits) -> Answe
         code: int | None = None
         with contextlib.suppress(subprocess.TimeoutExpired):
             code = subprocess.run(
-                [sys.executable, "-I", "-S", "-c", BOOTSTRAP, str(ROOT)],
+                [sys.executable, "-I", "-S", "-B", "-c", BOOTSTRAP, str(ROOT)],
                 cwd="/",
                 env=loading_environment(os.environ),
                 input=json.dumps(request).encode("ascii"),

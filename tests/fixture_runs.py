@@ -27,7 +27,6 @@ ROOT = Path(__file__).resolve().parent.parent
 GIT = shutil.which("git") or "git"
 REFERENCE = "reference"
 CORRECT = Mutant.model_construct(summary="The reference solution.", expect={}, message={})
-MANY = 10
 SIDE_BY_SIDE = 4  # they wait most of the time, and take turns at starting
 
 
@@ -41,18 +40,25 @@ def fixture_names(lab: str) -> list[str]:
 
 
 def shorter_round(lab: str) -> list[str]:
-    """The fixtures that every run of the tests grades: the correct packages (where there are many, every second),
-    and for each way of missing each criterion the one that misses least beside it. `make test-all` grades all."""
-    expect = {name: read_fixture(lab, name).expect for name in fixture_names(lab)}
-    correct = [name for name in expect if name.startswith("ok-")]
-    chosen = set(correct[:: 2 if len(correct) > MANY else 1])
-    for criterion in rubric_of(lab).criteria:
-        for status in (Status.FAIL, Status.PARTIAL):
-            missed = [
-                (len(lost), name) for name, lost in expect.items() if lost.get(criterion.id) == status.value
-            ]
-            chosen.update(name for _, name in sorted(missed)[:1])
-    return [name for name in expect if name in chosen]
+    """Return the fixtures that `make test` grades: one correct package, and packages that miss every criterion between
+    them, each time the one that misses most of those that are left. `make test-all` grades all."""
+    missed = {name: frozenset(_missed(lab, name)) for name in fixture_names(lab)}
+    chosen = {name for name in missed if name.startswith("ok-")}
+    chosen = set(sorted(chosen)[:1])
+    left = {criterion.id for criterion in rubric_of(lab).criteria}
+    while left:
+        best = max(missed, key=lambda name: len(missed[name] & left))
+        if not missed[best] & left:
+            break
+        chosen.add(best)
+        left -= missed[best]
+    return [name for name in missed if name in chosen]
+
+
+def _missed(lab: str, name: str) -> Iterator[str]:
+    for criterion, status in read_fixture(lab, name).expect.items():
+        if status in {Status.FAIL.value, Status.PARTIAL.value}:
+            yield criterion
 
 
 def source_of(lab: str, name: str) -> Path:

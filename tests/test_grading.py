@@ -141,7 +141,7 @@ def test_all_reports_and_evidence_are_there(graded: tuple[Path, Grader]) -> None
     assert names == {"package.mcap", "talker.mcap", "wraps.mcap", "listener.mcap", "launch.mcap"}
     assert "I heard" in (folder / "console.log").read_text()
     assert grader.await_none(2) == []
-    assert list(grader.files.iterdir()) == []
+    assert list(grader.temporary.iterdir()) == []
 
 
 @pytest.mark.full
@@ -162,7 +162,7 @@ def test_stopping_leaves_nothing(grader: Grader, tmp_path: Path, seen: str, numb
     assert err.splitlines()[-1] == "grader: interrupted"
     assert grader.await_none(1) == []
     assert not out.exists()
-    assert list(grader.files.iterdir()) == []
+    assert list(grader.temporary.iterdir()) == []
 
 
 @pytest.mark.full

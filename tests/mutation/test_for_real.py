@@ -65,4 +65,4 @@ def test_stopping_leaves_nothing_behind(how, grader):
     assert process.returncode == (-signal.SIGKILL if how == "kill" else 130)
     assert grader.await_none(15) == []
     if how != "kill":
-        assert list(grader.files.iterdir()) == []
+        assert list(grader.temporary.iterdir()) == []

@@ -22,7 +22,6 @@ NOTE = """
 import json, sys
 from guard import Guard
 from master import ARGUMENT_CHARS, ARGUMENTS_MAX, OPENED_MAX, RecordingMaster
-from tests.arena.support import require_ros
 events = []
 class Wire:
     def event(self, topic, record): events.append((topic, record))
