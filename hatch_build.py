@@ -1,4 +1,4 @@
-"""Adds to the wheel what is written from the parser: the man page, and the completion of three shells."""
+"""Adds to the wheel the faulty packages, and what the parser writes: the man page, the completion of three shells."""
 
 from __future__ import annotations
 
@@ -22,8 +22,10 @@ class CustomBuildHook(BuildHookInterface):
     """Asks the grader of this very folder. Its parser needs the standard library only, the completion argcomplete."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Write the files into a temporary folder, and name them to the builder."""
+        """Name the faulty packages to the builder, write the other files into a temporary folder, and name them too."""
         del version  # of the kind of wheel, not of the grader
+        for path in Path(self.root, "fixtures").glob("*.yaml"):
+            build_data["force_include"][str(path)] = f"grader/_data/fixtures/{path.name}"
         sys.path.insert(0, self.root)
         from grader.cli.completion import script  # noqa: PLC0415 - found only now
         from scripts.man_page import man_page  # noqa: PLC0415 - as above

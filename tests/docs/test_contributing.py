@@ -1,94 +1,180 @@
-"""A new check is the three edits of CONTRIBUTING.md, no more and no less."""
+"""The guides of CONTRIBUTING.md: what each tells the reader to write is written into a clone, and CI accepts it."""
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from scripts.pages import ROOT
-from tests.docs.console import File, steps
+from tests.docs.console import TITLE, fences
 
 AT_ITS_END = ", at its end"
-EDITS = [
-    step for step in steps((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")) if isinstance(step, File)
-]
+GIT = shutil.which("git") or "git"
+STYLE = (("check", "--no-cache"), ("format", "--no-cache", "--check"))
+LIKE, LIKE_PACKAGE = "york-ele00118m-lab7", "lab_exercises"
+LAB, PACKAGE = "our-lab1", "our_first_node"
+LAB_FILES = re.compile(r"^\| `([^`]+)` \| .* \|$", re.MULTILINE)
+
+
+def _section(title: str) -> str:
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    return page.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
+
+
+def _follow(title: str, clone: Path) -> None:
+    """Write the files of a section, lengthen those that it adds to, and apply its diffs."""
+    for info, content in fences(_section(title)):
+        named = TITLE.search(info)
+        if info.startswith("diff "):
+            subprocess.run([GIT, "apply", "-"], cwd=clone, input=content, text=True, check=True)
+        elif named and named[1].endswith(AT_ITS_END):
+            path = clone / named[1].removesuffix(AT_ITS_END)
+            between = "\n\n" if path.suffix == ".py" else ""
+            path.write_text(path.read_text(encoding="utf-8") + between + content, encoding="utf-8")
+        elif named:
+            (clone / named[1]).write_text(content, encoding="utf-8")
+
+
+def _write_check(clone: Path) -> None:
+    _follow("A new check", clone)
+
+
+def _write_form(clone: Path) -> None:
+    _follow("A new report form", clone)
+    _run(clone, "-m", "pytest", "-q", "tests/report/test_golden.py", GRADER_REGENERATE="1")
+
+
+def _write_lab(clone: Path) -> None:
+    """Another lab under a new id, with a package of another name."""
+
+    def renamed(text: str) -> str:
+        return text.replace(LIKE, LAB).replace(LIKE_PACKAGE, PACKAGE)
+
+    solutions = clone / "reference_solutions"
+    tracked = [solutions / LIKE, *(clone / kind / f"{LIKE}.yaml" for kind in ("rubrics", "fixtures"))]
+    for path in (file for one in tracked for file in (one.rglob("*") if one.is_dir() else [one])):
+        target = clone / renamed(path.relative_to(clone).as_posix())
+        if path.is_file():
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(renamed(path.read_text(encoding="utf-8")), encoding="utf-8")
+            shutil.copymode(path, target)
+    readme = (clone / "README.md").read_text(encoding="utf-8")
+    row = next(line for line in readme.splitlines() if line.startswith(f"| `{LIKE}` |"))
+    (clone / "README.md").write_text(readme.replace(row, f"{row}\n{renamed(row)}"), encoding="utf-8")
+
+
+GUIDES: dict[str, Callable[[Path], None]] = {"check": _write_check, "form": _write_form, "lab": _write_lab}
+QUICK = {
+    "check": [
+        "tests/checks/test_timelines.py",
+        "tests/docs/test_reference.py",
+        "tests/test_fixtures.py",
+        *("-k", "message or status-in-the-loop or docs_are or shorter_round or enough or place_in_a_rubric"),
+    ],
+    "form": ["tests/report/test_golden.py", "tests/docs/test_reference.py"],
+    "lab": ["tests/test_fixtures.py", "tests/docs/test_reference.py", "-k", f"{LAB} or reference"],
+}
+"""Of each guide the tests that look at what it adds."""
 
 
 @pytest.fixture(scope="module")
-def edited(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A clone with the edits in it, and the pages made anew."""
-    clone = tmp_path_factory.mktemp("contributing") / "clone"
-    git = shutil.which("git")
-    assert git
-    subprocess.run([git, "clone", "-q", ROOT, clone], check=True)
-    for edit in EDITS:
-        path = clone / edit.name.removesuffix(AT_ITS_END)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        before = path.read_text(encoding="utf-8") + "\n\n" if edit.name.endswith(AT_ITS_END) else ""
-        before = before.rstrip("\n") + "\n" if path.suffix == ".yaml" and before else before
-        path.write_text(before + edit.content, encoding="utf-8")
-    _run(clone, "-m", "scripts.reference")
-    return clone
+def clones(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Return the clone in which a guide was followed, up to its `make reference`."""
+    made: dict[str, Path] = {}
+
+    def clone_of(guide: str) -> Path:
+        if guide not in made:
+            made[guide] = tmp_path_factory.mktemp("contributing") / guide
+            subprocess.run([GIT, "clone", "-q", ROOT, made[guide]], check=True)
+            GUIDES[guide](made[guide])
+            _run(made[guide], "-m", "scripts.reference")
+        return made[guide]
+
+    return clone_of
 
 
-def _run(clone: Path, *words: str) -> str:
+def _run(clone: Path, *words: str, limit_s: int = 250, **environment: str) -> str:
+    """Return what Python prints in the clone. Raises AssertionError where it does not end with 0."""
+    own = {"PYTHONPATH": str(clone), "PYTEST_ADDOPTS": "-p no:cacheprovider"}
+    inherited = {name: os.environ[name] for name in ("PATH", "HOME") if name in os.environ}
     done = subprocess.run(
         [sys.executable, *words],
         cwd=clone,
-        env={"PATH": "/usr/bin:/bin", "PYTHONPATH": str(clone), "PYTHONDONTWRITEBYTECODE": "1"},
+        env={**inherited, **own, **environment},
         capture_output=True,
         text=True,
         check=False,
-        timeout=250,
+        timeout=limit_s,
     )
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     return done.stdout
 
 
-def test_it_is_three_edits() -> None:
-    assert [edit.name.split("/")[0] for edit in EDITS] == ["grader", "rubrics", "tests"]
+def _changed(clone: Path) -> set[str]:
+    """Return every file that differs from the commit or is new."""
+    command = [GIT, "ls-files", "--modified", "--others", "--exclude-standard"]
+    listed = subprocess.run(command, cwd=clone, capture_output=True, text=True, check=True).stdout
+    return set(listed.splitlines())
 
 
-def test_the_tests_of_checks_accept_the_new_check(edited: Path) -> None:
-    said = _run(
-        edited,
-        "-m",
-        "pytest",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "tests/checks/test_timelines.py",
-        "-k",
-        "licence or docs_are",
-    )
+each_guide = pytest.mark.parametrize("guide", GUIDES)
+
+
+@each_guide
+def test_the_tests_of_what_it_adds_accept_it(guide: str, clones: Callable[[str], Path]) -> None:
+    said = _run(clones(guide), "-m", "pytest", "-q", "-m", "not ros and not full", *QUICK[guide])
     passed = re.search(r"(\d+) passed", said)
-    assert passed
+    assert passed, said
     assert int(passed[1]) >= 7
 
 
+@each_guide
+def test_its_code_is_in_shape(guide: str, clones: Callable[[str], Path]) -> None:
+    clone = clones(guide)
+    python = sorted(name for name in _changed(clone) if name.startswith("grader/"))
+    for words in STYLE:
+        _run(clone, "-m", "ruff", *words, *(python or ["."]))
+
+
+def test_a_form_is_a_file_an_entry_a_row_and_a_golden_file(clones: Callable[[str], Path]) -> None:
+    assert _changed(clones("form")) == {
+        "grader/report/tap.py",
+        "grader/report/forms.py",
+        "docs/how-to/reports.md",
+        "docs/reference/commands.md",
+        "tests/report/golden/report.tap",
+    }
+
+
+def test_a_lab_is_the_files_of_the_table(clones: Callable[[str], Path]) -> None:
+    listed = {name.replace("<lab>", LAB) for name in LAB_FILES.findall(_section("A new lab"))}
+    changed = _changed(clones("lab"))
+    assert {name for name in changed if not name.startswith(tuple(listed))} == set()
+    assert {name for name in listed if not any(one.startswith(name) for one in changed)} == set()
+
+
 @pytest.mark.full
-def test_the_rubric_is_valid_and_the_check_explains_itself(edited: Path) -> None:
-    _run(edited, "-m", "grader", "rubric", "validate", "rubrics/examples/turtle-square.yaml")
-    assert "The manifest names a licence." in _run(edited, "-m", "grader", "explain", "licence")
-    assert "## licence" in (edited / "docs" / "reference" / "checks.md").read_text(encoding="utf-8")
+def test_the_rubric_is_valid_and_the_check_explains_itself(clones: Callable[[str], Path]) -> None:
+    clone = clones("check")
+    _run(clone, "-m", "grader", "rubric", "validate", "rubrics/examples/turtle-square.yaml")
+    assert "carries no more messages" in _run(clone, "-m", "grader", "explain", "message-count")
+    assert "## message-count" in (clone / "docs" / "reference" / "checks.md").read_text(encoding="utf-8")
 
 
-def test_its_code_is_in_shape(edited: Path) -> None:
-    ruff = str(Path(sys.executable).parent / "ruff")
-    done = subprocess.run(
-        [ruff, "check", "--no-cache", "grader/checks/manifest.py"],
-        cwd=edited,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout
-    done = subprocess.run(
-        [ruff, "format", "--no-cache", "--check", "grader/checks/manifest.py"], cwd=edited, check=False
-    )
-    assert done.returncode == 0
+@pytest.mark.full
+@pytest.mark.timeout(1800)
+@each_guide
+def test_everything_that_needs_no_ros_accepts_it(guide: str, clones: Callable[[str], Path]) -> None:
+    clone = clones(guide)
+    for words in STYLE:
+        _run(clone, "-m", "ruff", *words, ".", "fixtures/make.py")
+    _run(clone, "-m", "mypy", f"--cache-dir={os.devnull}", limit_s=600)
+    own = f"--ignore={Path(__file__).relative_to(ROOT)}"
+    _run(clone, "-m", "pytest", "-q", "-n", "2", "-m", "not ros and not full", own, limit_s=1700)

@@ -15,7 +15,7 @@ from grader.cli.main import run
 from grader.model.result import RubricInfo
 from grader.model.verdict import FileCitation, Status
 from grader.report.files import write_reports
-from grader.report.forms import FORMS as REGISTRY
+from grader.report.forms import FORMS
 from grader.results import READY
 from tests.batch.test_regrade import LAB, recorded
 from tests.report.hostile import result
@@ -134,10 +134,9 @@ def test_a_folder_of_results_without_a_batch_has_no_page(lab, tmp_path, capsys):
     assert "contains no results" in capsys.readouterr().err
 
 
-FORMS = {
+BEGINNINGS = {
     "html": "<!DOCTYPE html>",
     "markdown": "# ",
-    "terminal": "",
     "junit": "<?xml",
     "sarif": "{",
     "code-quality": "[",
@@ -145,10 +144,6 @@ FORMS = {
     "gradescope": "{",
     "classroom": "eyJ2ZXJzaW9uIjogMSwg",
 }
-
-
-def test_each_form_of_the_registry_is_tried():
-    assert set(FORMS) == set(REGISTRY)
 
 
 @pytest.mark.full
@@ -159,7 +154,7 @@ def test_each_form_goes_to_stdout_and_to_a_file(lab, tmp_path, capsys, form):
     assert run(["report", str(lab / "bob"), "--form", form, "--out", str(tmp_path / "new" / "file")]) == 0
     assert capsys.readouterr().out == ""
     assert (tmp_path / "new" / "file").read_text(encoding="utf-8") == out
-    assert out.lower().startswith(FORMS[form].lower())
+    assert out.lower().startswith(BEGINNINGS.get(form, "").lower())
     assert "counter-wrap" in out or form in {"sarif", "code-quality", "classroom"}
     assert not (lab / "bob" / "report.md").exists()
 
