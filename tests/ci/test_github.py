@@ -24,7 +24,7 @@ def test_a_package_without_mistakes_passes(runner):
     assert told == {"status": "passed", "passed": "true", "points": "20", "max-points": "20"}
     assert [text.split(":")[0] for text in ran.annotations("notice")][:1] == ["Passed"]
     assert ran.annotations("error") == []
-    assert ran.summary.startswith("**Passed:** 20 of 20 points that the files alone decide")
+    assert ran.summary.startswith("**Passed:** 20 of 20 points that can be judged from the files alone")
     assert {path.name for path in ran.artifact.iterdir()} >= {*REPORTS, "evidence", "console.log"}
     assert ran.outputs["report"] == f"{ran.artifact}/report.html"
     assert ran.outputs["results"] == str(ran.artifact)
