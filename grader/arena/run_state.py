@@ -39,6 +39,7 @@ class RunState:
     nodes: set[str] = field(default_factory=set)
     helper_nodes: set[str] = field(default_factory=set)
     registered: set[str] = field(default_factory=set)
+    last_start_s: float = 0.0
     first_node_s: float = 0.0
     services: set[str] = field(default_factory=set)
     opened: set[str] = field(default_factory=set)
@@ -169,6 +170,7 @@ def describe_wait(live: RunState, until: Until) -> str:
 def next_look_s(live: RunState, until: Until, now_s: float) -> float:
     """How long nothing can change by time alone."""
     looks = [live.started_s + until.limit_s, live.started_s + until.first_message_s]
+    looks += [live.last_start_s + until.first_message_s]
     for seen in live.topics.values():
         looks += [
             seen.first_s + (until.window_s or 0),
@@ -203,6 +205,8 @@ def _window(live: RunState, until: Until, now_s: float) -> bool:
         return True
     if len(seen) == len(topics):
         return now_s >= max(s.first_s for s in seen) + until.window_s
+    if _is_starting(live, until, now_s):
+        return False
     return now_s >= max(s.first_s for s in seen) + max(until.window_s, until.silent_s)
 
 
@@ -239,7 +243,10 @@ def _nodes(live: RunState, until: Until, now_s: float) -> bool:
 
 
 def _quiet(live: RunState, until: Until, now_s: float) -> bool:
-    return until.quiet_s is None or (live.activity_s > 0 and now_s >= live.activity_s + until.quiet_s)
+    if until.quiet_s is None:
+        return True
+    quiet = live.activity_s > 0 and now_s >= live.activity_s + until.quiet_s
+    return quiet and not _is_starting(live, until, now_s)
 
 
 def _heard(live: RunState, until: Until, now_s: float) -> bool:
@@ -248,7 +255,14 @@ def _heard(live: RunState, until: Until, now_s: float) -> bool:
     return now_s > max(live.last_line_s, live.last_sent_s) + HEARD_S
 
 
+def _is_starting(live: RunState, until: Until, now_s: float) -> bool:
+    """Whether a process may yet become a node: on a busy machine, its imports alone can take many seconds."""
+    return bool(live.running - live.registered) and now_s <= live.last_start_s + until.first_message_s
+
+
 def _silent(live: RunState, until: Until, now_s: float) -> str:
+    if _is_starting(live, until, now_s):
+        return ""
     waited = (*until.topics, *until.messages)
     seen = _talking(live)
     if waited and not seen:

@@ -119,6 +119,7 @@ class ArenaSession:
 
     def start(self, spec: dict[str, Any]) -> None:
         (self.live.helpers if spec["role"] == "grader" else self.live.running).add(spec["name"])
+        self.live.last_start_s = time.monotonic()
         self.send(do="start", spec=spec)
 
     async def interrupt(self, name: str, *, int_s: float, term_s: float) -> None:

@@ -108,7 +108,8 @@ class Until(Record):
     published, registered or set, and something was before.
     A run gives up when no message came within `first_message_s`, when all that is waited for has been silent for
     `silent_s`, when nothing in the graph has changed for the longer of the two while a connection is waited for, or
-    after `limit_s`. With no condition at all it is watched for `limit_s`.
+    after `limit_s`. Neither silence nor quiet counts while a process may still become a node: until it is one, or
+    `first_message_s` after its start. With no condition at all it is watched for `limit_s`.
     """
 
     window_s: Seconds | None = None

@@ -12,8 +12,8 @@ from grader.rubric.model import Until
 
 
 def _live(**topics: tuple[int, float, float]) -> RunState:
-    """Topics as count, first, last; the run started at 0, its process runs."""
-    live = RunState(running={"node"})
+    """Topics as count, first, last; the run started at 0, its process runs and is a node."""
+    live = RunState(running={"node"}, registered={"node"})
     for name, (count, first_s, last_s) in topics.items():
         seen = live.topics["/" + name]
         seen.count, seen.first_s, seen.last_s = count, first_s, last_s
@@ -50,6 +50,27 @@ COUNT = Until(messages={"/a": 10}, silent_s=5, limit_s=60)
 def test_settled(until: Until, live: RunState, now_s: float, outcome: str | None) -> None:
     done = find_outcome(live, until, now_s)
     assert (done and done[0]) == outcome
+
+
+@pytest.mark.parametrize(
+    ("until", "live", "now_s", "outcome"),
+    [
+        (Until(quiet_s=3), _live(), 6.0, "complete"),
+        (WINDOW, _live(a=(5, 1.0, 2.0)), 9.0, "complete"),
+        (COUNT, _live(b=(9, 1.0, 9.0)), 9.0, "silent"),
+        (Until(nodes=2), _live(), 9.0, "silent"),
+    ],
+)
+def test_a_process_that_is_no_node_yet_is_waited_for(
+    until: Until, live: RunState, now_s: float, outcome: str
+) -> None:
+    live.nodes, live.first_node_s, live.activity_s, live.news_s = {"/node"}, 1.0, 1.0, 1.0
+    done = find_outcome(live, until, now_s)
+    assert done is not None
+    assert done[0] == outcome
+    live.running, live.last_start_s = {"node", "late"}, 2.0
+    assert find_outcome(live, until, now_s) is None
+    assert find_outcome(live, until, 2.1 + until.first_message_s) is not None
 
 
 def test_ended_comes_before_all_else() -> None:
