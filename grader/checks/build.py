@@ -71,7 +71,7 @@ class BuildError(NamedTuple):
     line: int | None
 
 
-@check("build", params=BuildParams)
+@check("build", params=BuildParams, run_anyway=True)
 def build(package: PackageFacts, build: Run, params: BuildParams) -> Verdict:
     """The package builds.
 

@@ -25,7 +25,7 @@ class CMakeParams(Record):
     name: str
 
 
-@check("cmake", params=CMakeParams)
+@check("cmake", params=CMakeParams, run_anyway=True)
 def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
     """CMakeLists.txt makes it a catkin package.
 
@@ -124,7 +124,7 @@ class Lack(NamedTuple):
     follows: bool = False
 
 
-@check("cmake-install", params=CMakeInstallParams)
+@check("cmake-install", params=CMakeInstallParams, run_anyway=True)
 def cmake_install(package: PackageFacts, params: CMakeInstallParams) -> Verdict:
     """CMakeLists.txt installs the scripts with catkin_install_python.
 

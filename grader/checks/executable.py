@@ -22,7 +22,7 @@ from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts, SourceFile
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed
+from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words
 
 RIGHT_SHEBANG = "#!/usr/bin/env python3"
@@ -44,7 +44,7 @@ class Obstacle(NamedTuple):
     fix: str
 
 
-@check("executable", params=ExecutableParams)
+@check("executable", params=ExecutableParams, run_anyway=True)
 def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> Verdict:
     """The script can be run as a node.
 
@@ -109,7 +109,7 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     movable = [p for p in near if PurePosixPath(p).suffix not in C_SOURCES]
     scripts = [p for n, p in names.items() if n.endswith(".py")]
     seen = f"; there is {join_words(near)}" if near else ""
-    return failed(
+    return unjudged(
         f"{path} is not in the package{seen}",
         measured=f"scripts: {join_words(sorted(scripts))}" if scripts else "no Python script in the package",
         hint=f"git mv {movable[0]} {path}" if movable else add_hint(path),

@@ -27,7 +27,7 @@ class DependenciesParams(Record):
     names: tuple[str, ...]
 
 
-@check("manifest", params=ManifestParams)
+@check("manifest", params=ManifestParams, run_anyway=True)
 def manifest(package: PackageFacts, params: ManifestParams) -> Verdict:
     """The manifest names the package.
 
@@ -77,7 +77,7 @@ def _judged(package: PackageFacts, params: ManifestParams) -> Verdict:
     return passed(message, measured=measured, hint=hint, citations=place)
 
 
-@check("dependencies", params=DependenciesParams)
+@check("dependencies", params=DependenciesParams, run_anyway=True)
 def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
     """The manifest declares what the nodes need at run time.
 
@@ -104,7 +104,7 @@ def dependencies(package: PackageFacts, params: DependenciesParams) -> Verdict:
     return (_lacking(found, params.names) or declared).about(expected=expected)
 
 
-@check("maintainer", params=NoParams)
+@check("maintainer", params=NoParams, run_anyway=True)
 def maintainer(package: PackageFacts) -> Verdict:
     """The manifest names a maintainer who can be reached.
 

@@ -32,7 +32,8 @@ class Check:
 
     `messages_only` checks ask a run for its messages alone, so they judge another tool's recording too. For such a
     run `package` is empty where there is none. `heeds_losses` checks look for themselves at what the recorder lost.
-    `source` is the file of an instructor's own check.
+    What a check of `run_anyway` finds wrong with files is repaired before anything is run, so it explains no empty run,
+    unless the file is not there at all. `source` is the file of an instructor's own check.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Check:
     sections: dict[str, str]
     messages_only: bool = False
     heeds_losses: bool = False
+    run_anyway: bool = False
     source: str = ""
 
     @property
@@ -85,7 +87,12 @@ def collecting(source: str) -> Iterator[Collection]:
 
 
 def check(
-    name: str, *, params: type[Record] = NoParams, messages_only: bool = False, heeds_losses: bool = False
+    name: str,
+    *,
+    params: type[Record] = NoParams,
+    messages_only: bool = False,
+    heeds_losses: bool = False,
+    run_anyway: bool = False,
 ) -> Callable[[Callable[..., Verdict]], Callable[..., Verdict]]:
     """Register a function under a name. Raises ValueError for a name that is taken or a fact that nobody has."""
 
@@ -108,6 +115,7 @@ def check(
             sections=sections,
             messages_only=messages_only,
             heeds_losses=heeds_losses,
+            run_anyway=run_anyway,
             source=own.source if own else "",
         )
         return function

@@ -7,6 +7,7 @@ import struct
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path, PurePath
 from typing import Any, BinaryIO
@@ -20,7 +21,7 @@ from grader.errors import EvidenceError
 from grader.evidence.container import MAX_FILE_BYTES, ContainerError, records
 from grader.evidence.events import FIELDS, METADATA_NAME, PACKAGE_TOPIC, TOPICS
 from grader.evidence.memory_budget import LESS, BudgetExceeded, MemoryBudget
-from grader.evidence.run import Channel, Message, Run, merge_channels
+from grader.evidence.run import OTHER_RUNS, Channel, Message, Run, merge_channels
 from grader.model.package import PackageFacts
 from grader.model.version import EVIDENCE, UPDATE
 
@@ -67,14 +68,18 @@ def load_run(source: Path | BinaryIO, budget: MemoryBudget | None = None) -> Run
 def load_evidence(paths: Sequence[Path]) -> dict[str, Run]:
     """Read the runs of these files by scenario; a folder stands for its recordings and those of `evidence/` in it.
 
-    Recordings are `*.mcap` and `*.bag`. Raises EvidenceError where nothing is found, a file cannot be read,
-    another tool's recording is empty, or two files hold the same scenario.
+    Recordings are `*.mcap` and `*.bag`. What a repaired copy or a repeated run showed has its folder before its name:
+    `repaired-1/talker`. Raises EvidenceError where nothing is found, a file cannot be read, another tool's recording is
+    empty, or two files hold the same scenario.
     """
     runs: dict[str, Run] = {}
     origin: dict[str, Path] = {}
-    budget = MemoryBudget()
+    budgets: dict[str, MemoryBudget] = defaultdict(MemoryBudget)
     for path in _files(paths):
-        run = load_run(path, budget)
+        other = path.parent.name if OTHER_RUNS.fullmatch(path.parent.name) else ""
+        run = load_run(path, budgets[other])
+        if other:
+            run = replace(run, scenario=f"{other}/{run.scenario}", evidence=f"{other}/{run.evidence}")
         if run.foreign and not any(channel.messages for channel in run.channels):
             raise EvidenceError(f"{path}: holds no messages", hint="record while the nodes run")
         if run.scenario in runs:
@@ -175,7 +180,8 @@ def _files(paths: Iterable[Path]) -> list[Path]:
 
 def _recordings(folder: Path) -> list[Path]:
     with _listable(folder):
-        places = (folder, folder / "evidence")
+        places = [folder, folder / "evidence"]
+        places += [f for p in places for f in sorted(p.glob("*")) if OTHER_RUNS.fullmatch(f.name)]
         found = [f for p in places for f in sorted(p.glob("*")) if f.suffix in SUFFIXES]
         return [f for f in found if f.is_file() and not f.name.startswith(".")]
 

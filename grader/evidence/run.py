@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 OWN_NODE = re.compile(r"/grader_(recorder|actor|calibration)_[0-9a-f]{8}(_knock)?")
 BARE_NAME = "/grader"
+OTHER_RUNS = re.compile(r"(repaired|repeated)-[1-9]")
+"""Folders of evidence beside the first runs: of a repaired copy, and of scenarios that were run once more."""
 DECODER_BYTES = 200_000
 LETTER_BYTES = 1_400
 """What a decoder takes, and for each letter of its definition: time more than memory."""

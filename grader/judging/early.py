@@ -68,7 +68,9 @@ class _Judging:
             if not self.results.keys() >= set(criterion.requires):
                 return
             final = final and all(self.results[r].final for r in criterion.requires)
-            verdict = apply_requirements(criterion, verdict, self._verdicts, self._roots)
+            verdict = apply_requirements(
+                criterion, verdict, self._verdicts, self._roots, self._checks, self._criteria
+            )
         if not verdict.status.is_open:
             self._verdicts[name] = verdict
             result = result_of(criterion, verdict, self._rubric.digits)

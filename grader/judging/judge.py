@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from graphlib import TopologicalSorter
 from pathlib import PurePath
 from traceback import extract_tb
+from typing import NamedTuple
 
 from grader.checks import CHECKS, Check
 from grader.checks.all_runs import NotRecorded
@@ -13,8 +14,9 @@ from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
 from grader.judging.facts import Facts, try_facts
+from grader.judging.other_runs import judged_on_copy, repairs_of, seen_twice, split_runs
 from grader.judging.summary import round_half_up
-from grader.model.result import CriterionResult
+from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import Status, Verdict, inconclusive
 from grader.rubric.model import Criterion, Rubric
 
@@ -29,14 +31,46 @@ def judge(
     `checks` are the grader's and the rubric's own (`LoadedRubric.checks`). The same evidence and rubric always give
     equal results; nothing that is wrong with the evidence raises.
     """
+    return judge_all_runs(rubric, runs, checks).criteria
+
+
+class Judgement(NamedTuple):
+    """The criteria in the rubric's order, and the scenarios whose losses one run's timing could have made."""
+
+    criteria: tuple[CriterionResult, ...]
+    doubtful: frozenset[str]
+
+
+def judge_all_runs(
+    rubric: Rubric, runs: Mapping[str, Run], checks: Mapping[str, Check] = CHECKS
+) -> Judgement:
+    """Judge the first runs, then what repeated runs and a repaired copy say besides."""
+    first, repeated, repaired = split_runs(runs)
+    verdicts = judge_runs(rubric, first, checks)
+    doubtful = frozenset(c.scenario for c in rubric.criteria if verdicts[c.id].timing and c.scenario)
+    if repeated:
+        again = judge_runs(rubric, {**first, **repeated}, checks)
+        verdicts = seen_twice(rubric, verdicts, again, repeated.keys())
+    uses: dict[str, Repaired] = {}
+    if repaired:
+        on_copy = judge_runs(rubric, {**first, **repaired}, checks)
+        verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs_of(rubric, repaired))
+    results = (result_of(c, verdicts[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
+    return Judgement(tuple(results), doubtful)
+
+
+def judge_runs(
+    rubric: Rubric, runs: Mapping[str, Run], checks: Mapping[str, Check] = CHECKS
+) -> dict[str, Verdict]:
+    """Return the verdict of each criterion by its id."""
     facts = try_facts(rubric, runs)
     criteria = {c.id: c for c in rubric.criteria}
     verdicts: dict[str, Verdict] = {}
     roots: dict[str, str] = {}
     for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():
         verdict = verdict_of(criteria[name], facts, checks)
-        verdicts[name] = apply_requirements(criteria[name], verdict, verdicts, roots)
-    return tuple(result_of(c, verdicts[c.id], rubric.digits) for c in rubric.criteria)
+        verdicts[name] = apply_requirements(criteria[name], verdict, verdicts, roots, checks, criteria)
+    return verdicts
 
 
 def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> Verdict:
@@ -85,15 +119,26 @@ def _broken(check: Check, error: Exception) -> Verdict:
 
 
 def apply_requirements(
-    criterion: Criterion, verdict: Verdict, verdicts: Mapping[str, Verdict], roots: dict[str, str]
+    criterion: Criterion,
+    verdict: Verdict,
+    verdicts: Mapping[str, Verdict],
+    roots: dict[str, str],
+    checks: Mapping[str, Check],
+    criteria: Mapping[str, Criterion],
 ) -> Verdict:
-    """`blocked` where there was nothing to judge and a required criterion explains it, named by its root."""
+    """`blocked` where there was nothing to judge and a required criterion explains it, named by its root.
+
+    What was found here stays in the message.
+    """
     if not verdict.unjudged:
         return verdict
-    blocking = next((r for r in criterion.requires if verdicts[r].status.is_lost), None)
-    if blocking is not None:
+    lost = [r for r in criterion.requires if _explains(verdicts[r], criteria[r], criterion, checks)]
+    if lost:
+        blocking = min(lost, key=lambda r: not verdicts[r].unjudged)  # what is not there explains most
         root = roots[criterion.id] = roots.get(blocking, blocking)
         message = f"blocked by {root}: {verdicts[root].message}"
+        if verdict.message not in message:
+            message = f"{message}; here: {verdict.message}"
         update = {"status": Status.BLOCKED, "message": message, "hint": f"fix {root} first"}
         return verdict.model_copy(update=update)
     undecided = next((r for r in criterion.requires if verdicts[r].status.is_open), None)
@@ -103,7 +148,18 @@ def apply_requirements(
     return verdict
 
 
-def result_of(criterion: Criterion, verdict: Verdict, digits: int) -> CriterionResult:
+def _explains(
+    verdict: Verdict, required: Criterion, criterion: Criterion, checks: Mapping[str, Check]
+) -> bool:
+    """Return whether the loss of a required criterion can be why there was nothing to judge for this one."""
+    check = checks.get(required.check)
+    repaired = check is not None and check.run_anyway and criterion.scenario is not None
+    return verdict.status.is_lost and (verdict.unjudged or not repaired)
+
+
+def result_of(
+    criterion: Criterion, verdict: Verdict, digits: int, repaired: Repaired | None = None
+) -> CriterionResult:
     """Return the report's line of a criterion, with the points of its verdict."""
     lost = verdict.status.is_lost or verdict.status is Status.INCONCLUSIVE
     return CriterionResult(
@@ -120,4 +176,5 @@ def result_of(criterion: Criterion, verdict: Verdict, digits: int) -> CriterionR
         hint=verdict.hint or (criterion.hint if lost else ""),
         reproduce=criterion.reproduce,
         citations=verdict.citations,
+        repaired=repaired,
     )

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from pydantic import AwareDatetime, Field
 
 from grader.model.record import Record
+from grader.model.repair import Repair
 from grader.model.verdict import EvidenceCitation, FileCitation, Status
 
 Day = date | datetime
@@ -108,6 +109,17 @@ class Standing(Record):
     """What git has, in one line, where nothing differs."""
 
 
+class Repaired(Record):
+    """What a repaired copy of the package says of one criterion."""
+
+    repairs: tuple[Repair, ...]
+    """The repairs that the criterion needs to be judged, in the order in which a student meets them."""
+    share: float
+    """The share of its points that it earns when it is judged on the copy, 0 to 1."""
+    charged: bool = False
+    """Whether this criterion asks for what was repaired: it loses its points, so that the others keep theirs."""
+
+
 class CriterionResult(Record):
     """One criterion: a line of the report."""
 
@@ -138,6 +150,8 @@ class CriterionResult(Record):
     """A command that shows the same."""
     citations: tuple[FileCitation | EvidenceCitation, ...]
     """The lines of files and the parts of the evidence that the verdict rests on."""
+    repaired: Repaired | None = Field(default=None, exclude_if=lambda value: value is None)
+    """What a repaired copy of the package shows of it. Only there if one was run and changes something."""
 
 
 class EarlyVerdict(Record):

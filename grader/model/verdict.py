@@ -64,7 +64,8 @@ class Verdict(Record):
     """One check's judgement.
 
     `score` is the share of the points, 0 to 1. `unjudged` marks a verdict that rests on the absence of
-    evidence: the judge turns it into `blocked` where a required criterion explains the absence.
+    evidence: the judge turns it into `blocked` where a required criterion explains the absence. `timing` marks a loss
+    that one run's timing could have made: it counts only if it is seen twice.
     """
 
     status: Status
@@ -75,6 +76,7 @@ class Verdict(Record):
     hint: str = ""
     citations: Citations = ()
     unjudged: bool = False
+    timing: bool = False
 
     def about(
         self, *, expected: str | None = None, measured: str | None = None, citations: Citations | None = None

@@ -9,8 +9,10 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, AwareDatetime, Field
 
 from grader.model.record import Record
+from grader.model.repair import DEFAULT_SHARES, RepairKind
 
 Seconds = Annotated[float, Field(ge=0)]
+Share = Annotated[float, Field(ge=0, le=1)]
 NAME_PATTERN = r"^[a-z][a-z0-9-]*$"
 PROGRAM_PATTERN = r"^[A-Za-z][\w-]*/[\w.-]+$"
 TYPE_PATTERN = r"^[A-Za-z]\w*/[A-Za-z]\w*$"
@@ -188,7 +190,8 @@ class Rubric(Record):
 
     A file without `schema` is read as version 1. `digits` is how many decimals points keep. `checks` is a Python file
     beside the rubric with checks of the instructor's own. `deadline` has a time zone; `late` says what later costs, and
-    without it nothing is lost.
+    without it nothing is lost. `repairs` has shares by kind of repair: what is judged on a copy with such a repair earns
+    that share of its points; 0 switches the repair off.
     """
 
     schema_: Annotated[Literal["grader.rubric/1"], Field(alias="schema")] = "grader.rubric/1"
@@ -202,8 +205,13 @@ class Rubric(Record):
     checks: str | None = None
     deadline: Deadline | None = None
     late: Late | None = None
+    repairs: Annotated[dict[RepairKind, Share], Field(default_factory=dict)]
     scenarios: dict[Name, Scenario]
     criteria: Annotated[tuple[Criterion, ...], Field(min_length=1)]
+
+    def share_of(self, kind: RepairKind) -> float:
+        """Return the share of its points, 0 to 1, that a criterion earns on a copy with such a repair."""
+        return self.repairs.get(kind, DEFAULT_SHARES[kind])
 
     @property
     def max_points(self) -> float:

@@ -1,0 +1,170 @@
+"""What runs besides the first say of a criterion: scenarios that were run once more, and a repaired copy. Pure."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Collection, Iterator, Mapping
+from pathlib import PurePosixPath
+
+from pydantic import ValidationError
+
+from grader.evidence.run import Run
+from grader.model.repair import Repair
+from grader.model.result import Repaired
+from grader.model.verdict import Status, Verdict, failed
+from grader.rubric.model import Criterion, Rubric, Scenario
+from grader.wording import join_words
+
+PACKAGE_RUN, REPAIRS = "package", "repairs"
+NAMES = {"topic-name", "node-name", "parameter-name", "file-name", "package-name", "launch-type"}
+EVERYWHERE = {"build-line", "manifest-line", "package-name"}
+SHARES = {1.0: "all", 0.5: "half"}
+
+Runs = dict[str, Run]
+
+
+def split_runs(runs: Mapping[str, Run]) -> tuple[Runs, Runs, Runs]:
+    """Return the first runs, the repeated ones and those of the repaired copy, each by scenario."""
+    first, repeated, repaired = Runs(), Runs(), Runs()
+    for name, run in runs.items():
+        folder, _, scenario = name.rpartition("/")
+        found = repaired if folder.startswith("repaired") else repeated if folder else first
+        found[scenario] = run
+    return first, repeated, repaired
+
+
+def seen_twice(
+    rubric: Rubric, first: Mapping[str, Verdict], again: Mapping[str, Verdict], scenarios: Collection[str]
+) -> dict[str, Verdict]:
+    """Return the verdicts without those losses that one run's timing could have made and that did not come again."""
+    verdicts = dict(first)
+    for criterion in rubric.criteria:
+        one, other = first[criterion.id], again[criterion.id]
+        if criterion.scenario not in scenarios or not one.status.is_lost:
+            continue
+        if (one.timing or one.status is Status.BLOCKED) and other.status is Status.PASS:
+            message = f"{other.message} (seen once and not again, so it costs nothing: {one.message})"
+            verdicts[criterion.id] = other.model_copy(update={"message": message})
+        elif one.timing and other.status.is_lost:
+            update = {"citations": one.citations + other.citations}
+            verdicts[criterion.id] = one.model_copy(update=update)
+    return verdicts
+
+
+def repairs_of(rubric: Rubric, repaired: Mapping[str, Run]) -> tuple[Repair, ...]:
+    """Return the repairs of the copy that was run, as far as the rubric lets them count."""
+    written = repaired[PACKAGE_RUN].metadata.get(REPAIRS, "[]") if PACKAGE_RUN in repaired else "[]"
+    try:
+        found = tuple(Repair.model_validate(entry) for entry in json.loads(written))
+    except (ValueError, ValidationError):
+        return ()
+    return found if all(rubric.share_of(one.kind) > 0 for one in found) else ()
+
+
+def judged_on_copy(
+    rubric: Rubric, first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], repairs: tuple[Repair, ...]
+) -> tuple[dict[str, Verdict], dict[str, Repaired]]:
+    """Return the verdicts with what the copy shows, and for each criterion that it changes the repairs behind it.
+
+    For each repair, the criterion that asks for what was wrong keeps its loss. The others earn the share of the repairs
+    that they needed; where they are lost on the copy too, they say why.
+    """
+    verdicts, uses = dict(first), dict[str, Repaired]()
+    better = {c.id for c in rubric.criteria if first[c.id].status.is_lost and not _is_worse(first, on_copy, c)}
+    charges = _charges(rubric, first, better, repairs)
+    for criterion in rubric.criteria:
+        needed = tuple(one for one in repairs if concerns(one, criterion, rubric, first[criterion.id]))
+        if criterion.id not in better or not needed:
+            continue
+        verdict, copy = first[criterion.id], on_copy[criterion.id]
+        charged = tuple(one for one in needed if criterion.id in charges.get(one, ()))
+        share = min(rubric.share_of(one.kind) for one in needed)
+        if charged:
+            verdicts[criterion.id] = _charge(verdict, copy, charged[0])
+        else:
+            verdicts[criterion.id] = _share(copy, needed, share)
+        uses[criterion.id] = Repaired(repairs=charged or needed, share=share, charged=bool(charged))
+    return verdicts, uses
+
+
+def concerns(repair: Repair, criterion: Criterion, rubric: Rubric, verdict: Verdict) -> bool:
+    """Return whether the criterion may depend on what was repaired: its files cite it, or its run uses the file."""
+    if repair.kind in EVERYWHERE:
+        return True
+    if criterion.scenario is None:
+        return any(getattr(cited, "file", None) == repair.file for cited in verdict.citations)
+    return is_used_by(rubric.scenarios[criterion.scenario], repair, rubric)
+
+
+def is_used_by(scenario: Scenario, repair: Repair, rubric: Rubric) -> bool:
+    """Return whether the scenario runs the repaired file, as far as the rubric says. A launch file may run any."""
+    if any(start.launch for start in scenario.start) or repair.kind in EVERYWHERE:
+        return True
+    name = PurePosixPath(repair.file).name
+    started = {PurePosixPath(s.script).name for s in scenario.start if s.script}
+    every = {PurePosixPath(s.script).name for one in rubric.scenarios.values() for s in one.start if s.script}
+    return name in started or name not in every
+
+
+def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], criterion: Criterion) -> bool:
+    """Return whether the copy shows no more of a lost criterion than the package as it is."""
+    one, copy = first[criterion.id], on_copy[criterion.id]
+    if copy.status.is_lost and copy.score <= one.score:
+        return not one.unjudged or copy.unjudged
+    return copy.status.is_open
+
+
+def _charges(
+    rubric: Rubric, first: Mapping[str, Verdict], better: Collection[str], repairs: tuple[Repair, ...]
+) -> dict[Repair, set[str]]:
+    """Return for each repair the criterion that asks for what was wrong: by its name where a name was wrong, else the
+    first that failed by itself."""
+    charges: dict[Repair, set[str]] = {}
+    for repair in repairs:
+        possible = [
+            c for c in rubric.criteria if c.id in better and concerns(repair, c, rubric, first[c.id])
+        ]
+        named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
+        failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
+        counting = [c for c in (*named, *failing, *possible) if c.points > 0]
+        charges[repair] = {counting[0].id} if counting else set()
+    return charges
+
+
+def _names(criterion: Criterion, repair: Repair) -> bool:
+    """Return whether the criterion asks for the name that the repair puts in place."""
+    new = set(re.findall(r"[\w.-]+", repair.after)) - set(re.findall(r"[\w.-]+", repair.before))
+    return any(text.strip("/").rpartition("/")[2] in new for text in _texts(criterion.parameters))
+
+
+def _texts(value: object) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping):
+        for item in value.values():
+            yield from _texts(item)
+    elif isinstance(value, (list, tuple)):
+        for item in value:
+            yield from _texts(item)
+
+
+def _charge(verdict: Verdict, copy: Verdict, repair: Repair) -> Verdict:
+    """Return the loss, with the repair that was seen to help as its hint."""
+    if verdict.status is Status.BLOCKED:
+        verdict = failed(repair.message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations)
+    return verdict.model_copy(update={"hint": f"{place_of(repair)}: {repair.fix}"})
+
+
+def place_of(repair: Repair) -> str:
+    """Return `src/talker.py line 12`, or the file alone."""
+    return repair.file if repair.line is None else f"{repair.file} line {repair.line}"
+
+
+def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:
+    where = join_words([place_of(repair) for repair in repairs])
+    earned = SHARES.get(share, f"{share:.0%}")
+    score = copy.score * share
+    status = copy.status if share == 1 or copy.status.is_lost else Status.PARTIAL
+    message = f"judged on a copy with {where} repaired: {earned} of the points; {copy.message}"
+    return copy.model_copy(update={"status": status, "score": score, "message": message})
