@@ -30,7 +30,7 @@ ALLOWED = {
     "results": BASE | {"files"},
     "faults": BASE | {"files", "intake", "report", "results", "rubric"},
     "evidence": BASE | {"files"},
-    "package": BASE | {"host_programs", "limited_child"},
+    "package": BASE | {"files", "host_programs", "limited_child", "rubric.model"},
     "intake": BASE | {"files", "host_programs", "limited_child"},
     "checks": BASE | {"evidence"},
     "rubric": BASE | {"checks", "evidence", "files"},

@@ -1,0 +1,112 @@
+"""What a rubric names: files, topics, nodes and parameters, to which a near name in the package can be set right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import PurePosixPath
+from typing import Any
+
+from grader.model.record import Record
+from grader.rubric.model import Criterion, Rubric
+
+
+class Wanted(Record):
+    """Names as the rubric writes them, each once: topics and parameters from `/` on, paths from the package's folder
+    on. `installed` are the scripts that `CMakeLists.txt` has to install, `dependencies` what the manifest has to
+    declare, `types` the message types (`std_msgs/Int8`) of topics."""
+
+    package: str
+    scripts: tuple[str, ...] = ()
+    launch_files: tuple[str, ...] = ()
+    topics: tuple[str, ...] = ()
+    nodes: tuple[str, ...] = ()
+    params: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    installed: tuple[str, ...] = ()
+    dependencies: tuple[str, ...] = ()
+    types: tuple[str, ...] = ()
+
+
+NAMES_ARE = {
+    "node-name": "nodes",
+    "node-lives": "nodes",
+    "dependencies": "dependencies",
+    "params-loaded": "params",
+    "params-read": "params",
+    "launch-loads": "params",
+}
+"""What the parameter `names` of a check holds."""
+PARAMETER_CHECKS = ("params-set", "param-value")
+
+
+def wanted_of(rubric: Rubric) -> Wanted:
+    """Return what the rubric's scenarios and criteria name."""
+    found: dict[str, dict[str, None]] = {}
+    for field, name in (*_of_scenarios(rubric), *_of_criteria(rubric.criteria)):
+        if isinstance(name, str) and name and "*" not in name:
+            found.setdefault(field, {})[name] = None
+    return Wanted(package=rubric.package, **{field: tuple(names) for field, names in found.items()})
+
+
+def _of_scenarios(rubric: Rubric) -> Iterator[tuple[str, Any]]:
+    for scenario in rubric.scenarios.values():
+        for start in scenario.start:
+            yield from (("scripts", start.script), ("launch_files", start.launch), ("files", start.load))
+        for param in scenario.params:
+            yield from (("params", param.name), ("files", param.file))
+            yield from _each("params", param.also)
+        for probe in scenario.probes:
+            yield from (("topics", probe.topic), ("types", probe.type))
+        until = scenario.until
+        yield from _each("topics", (*until.topics, *until.messages, *until.connected))
+
+
+def _of_criteria(criteria: Iterable[Criterion]) -> Iterator[tuple[str, Any]]:
+    for criterion in criteria:
+        check, given = criterion.check, criterion.parameters
+        yield from (("launch_files", given.get("launch")), ("files", given.get("file")))
+        yield from (
+            ("topics", given.get("topic")),
+            ("types", given.get("type") if "topic" in given else None),
+        )
+        yield from _each("topics", given.get("topics"))
+        yield from _each("files", given.get("files"))
+        yield from _each("dependencies", given.get("dependencies"))
+        yield from _each("installed" if check == "cmake-install" else "scripts", given.get("scripts"))
+        yield from (("scripts", given.get("script")), ("scripts", given.get("path")))
+        yield from _each(NAMES_ARE.get(check, ""), given.get("names"))
+        if check in PARAMETER_CHECKS:
+            yield "params", given.get("name")
+            yield from _each("params", given.get("unchanged"))
+
+
+def _each(field: str, names: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 - as an instructor wrote it
+    if field and isinstance(names, list | tuple | dict):
+        yield from ((field, name) for name in names)
+
+
+# ---- names that are nearly right
+
+
+def is_near(name: str, wanted: str) -> bool:
+    """Return whether `name` is a slip of `wanted`: one letter, capitals, a leading slash, or a suffix left out."""
+    if name == wanted or min(len(name), len(wanted)) < SHORTEST:
+        return False
+    one, other = (text.casefold().lstrip("/~") for text in (name, wanted))
+    return one == other or is_one_edit(one, other) or one == PurePosixPath(other).stem
+
+
+SHORTEST = 3
+"""Shorter names differ by one letter because they are different names."""
+
+
+def is_one_edit(one: str, other: str) -> bool:
+    """Return whether one letter added, left out, changed, or swapped with its neighbour makes one the other."""
+    if abs(len(one) - len(other)) > 1:
+        return False
+    start = next((i for i, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), None)
+    if start is None:
+        return len(one) != len(other)
+    one, other = one[start:], other[start:]
+    swapped = one[:2] == other[1::-1] and one[2:] == other[2:]
+    return swapped or one[1:] == other[1:] or one[1:] == other or one == other[1:]
