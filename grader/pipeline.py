@@ -17,9 +17,9 @@ call `grade`.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -30,15 +30,17 @@ from grader import __version__
 from grader.errors import EvidenceError, GraderError, SubmissionError, UsageError
 from grader.evidence.run import Run, console_log
 from grader.faults import NOTHING_RUN, GradingContext, classify_errors
-from grader.files import temporary_folder
+from grader.files import make_folder, temporary_folder
 from grader.intake import open_recorded, open_recording, open_submission
 from grader.intake.source import Source
 from grader.judging import judge
 from grader.judging.early import judge_files
+from grader.judging.judge import judge_all_runs
+from grader.judging.other_runs import REPAIRS
 from grader.judging.summary import notes_of, overall_status, total_points
 from grader.model.figure import Figures
 from grader.model.package import PackageFacts
-from grader.model.progress import Progress
+from grader.model.progress import Progress, Silence
 from grader.model.result import (
     CriterionResult,
     EarlyVerdict,
@@ -243,7 +245,62 @@ def record_and_judge(
                 break
             recorder.record_again(again)
             runs, criteria = judge_folder(evidence, rubric)
+        others = record_other_runs(
+            submission,
+            recorder,
+            runs=runs,
+            rubric=rubric,
+            evidence=evidence,
+            options=options,
+            progress=progress,
+        )
+        if others:
+            runs, criteria = judge_folder(evidence, rubric)
     return recorder.recording, runs, criteria
+
+
+def record_other_runs(
+    submission: Submission,
+    recorder: Recorder | StaticRecorder,
+    *,
+    runs: dict[str, Run],
+    rubric: LoadedRubric,
+    evidence: Path,
+    options: GradeOptions,
+    progress: Progress,
+) -> bool:
+    """Record what a lost mark needs besides the first runs, and return whether there was anything.
+
+    What one run's timing could have lost is run once more. Where a mechanical repair could be the reason, a repaired
+    copy is run.
+    """
+    if recorder.recording.sandbox is None and recorder.recording.ros is None:
+        return False
+    from grader import repaired_copy as copies  # noqa: PLC0415 - only a lost mark needs it
+
+    judged = judge_all_runs(rubric.rubric, runs, rubric.checks)
+    repairs, scenarios = copies.choose_repairs(
+        submission, recorder.recording.facts, rubric.rubric, judged.criteria
+    )
+    doubtful = sorted(judged.doubtful - set(scenarios))
+    if doubtful:
+        recorder.repeat(doubtful, evidence / copies.REPEATED)
+    if scenarios:
+        with copies.repaired_copy(submission, repairs) as copy:
+            again = make_recorder(
+                copy,
+                read_facts(copy, Silence()),
+                rubric,
+                evidence / copies.REPAIRED,
+                options=replace(options, reused={}),
+                progress=copies.CopyProgress(progress),
+                only=scenarios,
+                about={REPAIRS: copies.dump_repairs(repairs)},
+            )
+            with again:
+                again.record_all(lambda: None)
+            recorder.recording.add(again.recording)
+    return bool(doubtful or scenarios)
 
 
 def read_facts(submission: Submission, progress: Progress) -> PackageFacts:
@@ -262,16 +319,19 @@ def make_recorder(
     *,
     options: GradeOptions,
     progress: Progress,
+    only: Collection[str] | None = None,
+    about: Mapping[str, str] | None = None,
 ) -> Recorder | StaticRecorder:
-    """Return what records the rubric's scenarios into the folder `evidence`, to be used as a context: the arena, or a
-    recorder of files alone where nothing is to be run, or can be."""
+    """Return what records the rubric's scenarios (`only` these) into the folder `evidence`, to be used as a context:
+    the arena, or a recorder of files alone where nothing is to be run, or can be. `about` goes into the metadata."""
     from grader.arena.static_recorder import (  # noqa: PLC0415 - see LATER
         STATIC_ONLY,
         StaticRecorder,
         why_unrun,
     )
 
-    scenarios = started(rubric.rubric)
+    make_folder(evidence)
+    scenarios = started(rubric.rubric, only)
     reason = STATIC_ONLY if options.static_only or not needs_ros(rubric) else why_unrun()
     if reason:
         return StaticRecorder(
@@ -295,6 +355,7 @@ def make_recorder(
         progress=progress,
         recorded=options.reused,
         stop=options.stop,
+        about=about,
     )
 
 

@@ -38,7 +38,9 @@ ALLOWED = {
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},
     "arena": BASE | {"evidence", "files", "host_programs", "package", "rubric.model"},
     "submitted_recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
+    "repaired_copy": {"files", "judging", "model", "package", "rubric"},
     "pipeline": {
+        "repaired_copy",
         *BASE, "arena", "evidence", "faults", "files", "intake", "judging", "package", "submitted_recordings",
         "report", "results", "rubric"
     },

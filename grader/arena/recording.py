@@ -40,7 +40,7 @@ from grader.arena.workspace import make_workspace
 from grader.errors import ArenaError, RosMissing
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
-from grader.files import read_untrusted, temporary_folder
+from grader.files import make_folder, read_untrusted, temporary_folder
 from grader.model.message_rate import RateBounds
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress
@@ -60,7 +60,8 @@ class Recorder:
     """Records one submission into a folder. Use as a context: its workspaces live as long as it does.
 
     `rates` are judged, by scenario: a run that is to show them ends when they are clear. `recorded` is evidence, by
-    scenario, that stands for a run of it: it is copied. `stop` ends the runs from another thread.
+    scenario, that stands for a run of it: it is copied. `stop` ends the runs from another thread. `about` is metadata
+    for all its evidence.
     """
 
     def __init__(
@@ -75,8 +76,10 @@ class Recorder:
         rates: Mapping[str, tuple[RateBounds, ...]] | None = None,
         recorded: Mapping[str, Path] | None = None,
         stop: Stop | None = None,
+        about: Mapping[str, str] | None = None,
     ) -> None:
         self._submission = submission
+        self._about = about or {}
         self._recorded = recorded or {}
         self._stop = stop
         self._rates = rates or {}
@@ -110,6 +113,13 @@ class Recorder:
     def record_again(self, scenarios: Iterable[str]) -> None:
         """These scenarios once more, one after the other, with no other run on the machine."""
         run_until_signal(self._record_alone(tuple(scenarios)), self._stop)
+
+    def repeat(self, scenarios: Iterable[str], folder: Path) -> None:
+        """These scenarios once more, side by side, into another folder: what was recorded before stays as well."""
+        make_folder(folder)
+        if self._place is not None:
+            runs = [self._record_scenario(self._place, name, folder=folder) for name in scenarios]
+            run_until_signal(run_together(*runs), self._stop)
 
     async def _record_all(self, meanwhile: Callable[[], None]) -> None:
         self._admission = Admission(shared_folder())
@@ -208,7 +218,9 @@ class Recorder:
         matches = (script if script in paths else names.get(Path(script).name) for script in sorted(wanted))
         return [match for match in matches if match is not None]
 
-    async def _record_scenario(self, place: Place, name: str, *, alone: bool = False) -> None:
+    async def _record_scenario(
+        self, place: Place, name: str, *, alone: bool = False, folder: Path | None = None
+    ) -> None:
         scenario, shown = self._rubric.scenarios[name], ""
 
         def tell(detail: str) -> None:
@@ -218,7 +230,7 @@ class Recorder:
                 self._progress.step(name, "running", detail, expected_s(scenario))
 
         self._progress.step(name, "waiting", WAITING_ALONE if alone else WAITING, expected_s(scenario))
-        path = self.recording.folder / f"{name}.mcap"
+        path = (folder or self.recording.folder) / f"{name}.mcap"
         async with self._admission.run(alone=alone):
             self.recording.add(
                 await run_scenario(
@@ -239,7 +251,7 @@ class Recorder:
         self._progress.step(name, "done")
 
     def _metadata(self) -> dict[str, str]:
-        return metadata(self._submission, self.recording, self._limits)
+        return {**metadata(self._submission, self.recording, self._limits), **self._about}
 
 
 def _syntax_report(path: Path | None, writer: EvidenceWriter) -> SyntaxReport | None:

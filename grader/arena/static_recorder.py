@@ -61,7 +61,7 @@ class Recording:
     student_cpu_s: float = 0.0
     files: list[Path] = field(default_factory=list)
 
-    def add(self, cost: RunCost) -> None:
+    def add(self, cost: RunCost | Recording) -> None:
         self.cpu_s += cost.cpu_s
         self.student_cpu_s += cost.student_cpu_s
 
@@ -161,6 +161,9 @@ class StaticRecorder:
                 self._progress.step(name, "skipped", self._reason)
 
     def record_again(self, scenarios: Iterable[str]) -> None:
+        """None of them."""
+
+    def repeat(self, scenarios: Iterable[str], folder: Path) -> None:
         """None of them."""
 
     def _write_package(self) -> None:

@@ -9,10 +9,9 @@ from typing import Any, cast
 from grader.checks import CHECKS, Check
 from grader.evidence.run import Run
 from grader.judging.facts import NOT_RUN, PACKAGE_RUN, Facts
-from grader.judging.judge import apply_requirements, result_of, verdict_of
+from grader.judging.judge import Requirements, result_of, verdict_of
 from grader.model.package import PackageFacts
 from grader.model.result import EarlyVerdict
-from grader.model.verdict import Verdict
 from grader.rubric.model import Rubric
 
 FROM_FILES = {"package", "build", "params"}
@@ -52,8 +51,7 @@ class _Judging:
         self._package = package
         self._checks = checks
         self._criteria = {c.id: c for c in rubric.criteria}
-        self._verdicts: dict[str, Verdict] = {}
-        self._roots: dict[str, str] = {}
+        self._requirements = Requirements(rubric, checks)
         self.results: dict[str, EarlyVerdict] = {}
 
     def judge(self, name: str) -> None:
@@ -68,11 +66,9 @@ class _Judging:
             if not self.results.keys() >= set(criterion.requires):
                 return
             final = final and all(self.results[r].final for r in criterion.requires)
-            verdict = apply_requirements(
-                criterion, verdict, self._verdicts, self._roots, self._checks, self._criteria
-            )
+            verdict = self._requirements.apply(criterion, verdict)
         if not verdict.status.is_open:
-            self._verdicts[name] = verdict
+            self._requirements.verdicts[name] = verdict
             result = result_of(criterion, verdict, self._rubric.digits)
             self.results[name] = EarlyVerdict(criterion=result, final=final)
 

@@ -65,12 +65,11 @@ def judge_runs(
     """Return the verdict of each criterion by its id."""
     facts = try_facts(rubric, runs)
     criteria = {c.id: c for c in rubric.criteria}
-    verdicts: dict[str, Verdict] = {}
-    roots: dict[str, str] = {}
+    requirements = Requirements(rubric, checks)
     for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():
         verdict = verdict_of(criteria[name], facts, checks)
-        verdicts[name] = apply_requirements(criteria[name], verdict, verdicts, roots, checks, criteria)
-    return verdicts
+        requirements.verdicts[name] = requirements.apply(criteria[name], verdict)
+    return requirements.verdicts
 
 
 def verdict_of(criterion: Criterion, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> Verdict:
@@ -118,43 +117,43 @@ def _broken(check: Check, error: Exception) -> Verdict:
     return Verdict(status=Status.ERROR, score=0.0, message=message, hint=hint)
 
 
-def apply_requirements(
-    criterion: Criterion,
-    verdict: Verdict,
-    verdicts: Mapping[str, Verdict],
-    roots: dict[str, str],
-    checks: Mapping[str, Check],
-    criteria: Mapping[str, Criterion],
-) -> Verdict:
-    """`blocked` where there was nothing to judge and a required criterion explains it, named by its root.
+class Requirements:
+    """Applies `requires`: give it each criterion's verdict after those of the criteria that it requires."""
 
-    What was found here stays in the message.
-    """
-    if not verdict.unjudged:
-        return verdict
-    lost = [r for r in criterion.requires if _explains(verdicts[r], criteria[r], criterion, checks)]
-    if lost:
-        blocking = min(lost, key=lambda r: not verdicts[r].unjudged)  # what is not there explains most
-        root = roots[criterion.id] = roots.get(blocking, blocking)
-        message = f"blocked by {root}: {verdicts[root].message}"
-        if verdict.message not in message:
-            message = f"{message}; here: {verdict.message}"
-        update = {"status": Status.BLOCKED, "message": message, "hint": f"fix {root} first"}
-        return verdict.model_copy(update=update)
-    undecided = next((r for r in criterion.requires if verdicts[r].status.is_open), None)
-    if undecided is not None:
+    def __init__(self, rubric: Rubric, checks: Mapping[str, Check]) -> None:
+        self._criteria = {c.id: c for c in rubric.criteria}
+        self._checks = checks
+        self._roots: dict[str, str] = {}
+        self.verdicts: dict[str, Verdict] = {}
+
+    def apply(self, criterion: Criterion, verdict: Verdict) -> Verdict:
+        """Return `blocked` where there was nothing to judge and a required criterion explains it, named by its root.
+
+        What was found here stays in the message.
+        """
+        if not verdict.unjudged:
+            return verdict
+        lost = [r for r in criterion.requires if self._explains(r, criterion)]
+        if lost:
+            # what is not there at all explains most
+            blocking = min(lost, key=lambda r: not self.verdicts[r].unjudged)
+            root = self._roots[criterion.id] = self._roots.get(blocking, blocking)
+            message = f"blocked by {root}: {self.verdicts[root].message}"
+            if verdict.message not in message:
+                message = f"{message}; here: {verdict.message}"
+            update = {"status": Status.BLOCKED, "message": message, "hint": f"fix {root} first"}
+            return verdict.model_copy(update=update)
+        undecided = next((r for r in criterion.requires if self.verdicts[r].status.is_open), None)
+        if undecided is None:
+            return verdict
         message = f"{verdict.message}; and {undecided} could not be judged"
         return inconclusive(message, expected=verdict.expected, measured=verdict.measured, hint=verdict.hint)
-    return verdict
 
-
-def _explains(
-    verdict: Verdict, required: Criterion, criterion: Criterion, checks: Mapping[str, Check]
-) -> bool:
-    """Return whether the loss of a required criterion can be why there was nothing to judge for this one."""
-    check = checks.get(required.check)
-    repaired = check is not None and check.run_anyway and criterion.scenario is not None
-    return verdict.status.is_lost and (verdict.unjudged or not repaired)
+    def _explains(self, required: str, criterion: Criterion) -> bool:
+        """Return whether the loss of a required criterion can be why there was nothing to judge for this one."""
+        verdict, check = self.verdicts[required], self._checks.get(self._criteria[required].check)
+        repaired = check is not None and check.run_anyway and criterion.scenario is not None
+        return verdict.status.is_lost and (verdict.unjudged or not repaired)
 
 
 def result_of(

@@ -71,7 +71,9 @@ def judged_on_copy(
     that they needed; where they are lost on the copy too, they say why.
     """
     verdicts, uses = dict(first), dict[str, Repaired]()
-    better = {c.id for c in rubric.criteria if first[c.id].status.is_lost and not _is_worse(first, on_copy, c)}
+    better = {
+        c.id for c in rubric.criteria if first[c.id].status.is_lost and not _is_worse(first, on_copy, c)
+    }
     charges = _charges(rubric, first, better, repairs)
     for criterion in rubric.criteria:
         needed = tuple(one for one in repairs if concerns(one, criterion, rubric, first[criterion.id]))
@@ -122,9 +124,7 @@ def _charges(
     first that failed by itself."""
     charges: dict[Repair, set[str]] = {}
     for repair in repairs:
-        possible = [
-            c for c in rubric.criteria if c.id in better and concerns(repair, c, rubric, first[c.id])
-        ]
+        possible = [c for c in rubric.criteria if c.id in better and concerns(repair, c, rubric, first[c.id])]
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
         failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
         counting = [c for c in (*named, *failing, *possible) if c.points > 0]
@@ -152,7 +152,9 @@ def _texts(value: object) -> Iterator[str]:
 def _charge(verdict: Verdict, copy: Verdict, repair: Repair) -> Verdict:
     """Return the loss, with the repair that was seen to help as its hint."""
     if verdict.status is Status.BLOCKED:
-        verdict = failed(repair.message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations)
+        verdict = failed(
+            repair.message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
+        )
     return verdict.model_copy(update={"hint": f"{place_of(repair)}: {repair.fix}"})
 
 

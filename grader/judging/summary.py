@@ -106,7 +106,7 @@ def notes_of(runs: Mapping[str, Run]) -> tuple[Note, ...]:
     return tuple(
         note
         for scenario, run in runs.items()
-        if not run.foreign
+        if not run.foreign and "/" not in scenario  # what a repaired copy does is not the student's
         for kind in KINDS
         for note in _bounded(scenario, kind, tuple(dict.fromkeys(_notes(scenario, kind, run))))
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cache
 from pathlib import Path
 
@@ -126,9 +126,13 @@ def _faults(source: Source, beside: Beside) -> list[str]:
     return [*told, *(f"{file}:{line}: {message}" for line, message in beside.own.faults)]
 
 
-def started(rubric: Rubric) -> Rubric:
-    """The rubric without the scenarios for which nothing is run."""
-    scenarios = {name: s for name, s in rubric.scenarios.items() if s.recording is None}
+def started(rubric: Rubric, only: Collection[str] | None = None) -> Rubric:
+    """Return the rubric without the scenarios for which nothing is run, and with `only` these of the others."""
+    scenarios = {
+        name: s
+        for name, s in rubric.scenarios.items()
+        if s.recording is None and (only is None or name in only)
+    }
     return rubric.model_copy(update={"scenarios": scenarios})
 
 

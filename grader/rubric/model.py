@@ -190,8 +190,8 @@ class Rubric(Record):
 
     A file without `schema` is read as version 1. `digits` is how many decimals points keep. `checks` is a Python file
     beside the rubric with checks of the instructor's own. `deadline` has a time zone; `late` says what later costs, and
-    without it nothing is lost. `repairs` has shares by kind of repair: what is judged on a copy with such a repair earns
-    that share of its points; 0 switches the repair off.
+    without it nothing is lost. `repairs` has shares by kind of repair: what is judged on a copy with such a repair
+    earns that share of its points; 0 switches the repair off.
     """
 
     schema_: Annotated[Literal["grader.rubric/1"], Field(alias="schema")] = "grader.rubric/1"

@@ -74,7 +74,7 @@ def fitting_runs(rubric: Rubric, runs: Mapping[str, Run]) -> dict[str, Run]:
     return {
         name: run
         for name, run in runs.items()
-        if run.metadata.get(SCENARIO, digests.get(name)) == digests.get(name)
+        if run.metadata.get(SCENARIO, wanted := digests.get(name.rpartition("/")[2])) == wanted
     }
 
 

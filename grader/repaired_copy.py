@@ -1,0 +1,92 @@
+"""A repaired copy of a submission: which repairs could be the reason for a lost mark, and what runs with them.
+
+A judged submission comes in, another submission with a copy of its package goes out. What the copy then shows is the
+business of `judging`, what a repair is of `package.repairs`.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from grader.files import temporary_folder
+from grader.judging.other_runs import is_used_by
+from grader.model.package import PackageFacts
+from grader.model.progress import Progress, Silence, StepState
+from grader.model.repair import Repair
+from grader.model.result import CriterionResult
+from grader.model.submission import Submission
+from grader.package.repairs import apply_repair, find_repairs, wanted_of
+from grader.rubric.model import Rubric
+
+REPAIRED, REPEATED = "repaired-1", "repeated-1"
+REPAIRS_MAX = 4
+DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding"}
+"""The arena repairs these in whatever it runs, so they alone are no reason for a copy."""
+
+
+def choose_repairs(
+    submission: Submission, facts: PackageFacts, rubric: Rubric, criteria: Sequence[CriterionResult]
+) -> tuple[tuple[Repair, ...], tuple[str, ...]]:
+    """Return the repairs to try together, and the scenarios to run with them: those that lost a mark.
+
+    Both are empty where nothing was lost in a run, or no mechanical repair could be the reason.
+    """
+    lost = {c.scenario for c in criteria if c.status.is_lost and c.scenario is not None}
+    if not lost:
+        return (), ()
+    found = find_repairs(submission.package.folder, facts, wanted_of(rubric))
+    counting = [one for one in found if rubric.share_of(one.kind) > 0]
+    chosen = [one for one in counting if one.kind not in DONE_BEFORE_RUNS][:REPAIRS_MAX]
+    scenarios = {
+        name for name in lost if any(is_used_by(rubric.scenarios[name], one, rubric) for one in chosen)
+    }
+    before = [one for one in counting if one.kind in DONE_BEFORE_RUNS]
+    return ((*before, *chosen), tuple(sorted(scenarios))) if scenarios else ((), ())
+
+
+@contextmanager
+def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator[Submission]:
+    """Return the submission with a repaired copy of its package, there for as long as the block runs."""
+    package = submission.package
+    with temporary_folder("repaired") as folder:
+        copy = folder / package.folder.name
+        shutil.copytree(
+            package.folder, copy, symlinks=True, ignore=_left_out(package.folder, package.left_out)
+        )
+        executable = dict(package.executable)
+        for repair in repairs:
+            apply_repair(copy, repair)
+            if repair.kind == "executable-bit":
+                executable[repair.file] = True
+            elif repair.kind == "file-name" and repair.before in executable:
+                executable[repair.after] = executable.pop(repair.before)
+        repaired = package.model_copy(update={"folder": copy, "executable": executable})
+        yield submission.model_copy(update={"package": repaired})
+
+
+def dump_repairs(repairs: Sequence[Repair]) -> str:
+    """Return the repairs as the metadata of the copy's evidence holds them."""
+    return json.dumps([one.model_dump() for one in repairs])
+
+
+class CopyProgress(Silence):
+    """Shows the steps of a copy's runs beside those of the first."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+
+    def step(self, name: str, state: StepState, detail: str = "", expected_s: float | None = None) -> None:
+        """Show the step under a name of its own."""
+        self._progress.step(f"{name} (repaired copy)", state, detail, expected_s)
+
+
+def _left_out(root: Path, paths: frozenset[str]) -> Callable[[str, list[str]], set[str]]:
+    def ignore(folder: str, names: list[str]) -> set[str]:
+        below = Path(folder).relative_to(root)
+        return {name for name in names if (below / name).as_posix() in paths}
+
+    return ignore
