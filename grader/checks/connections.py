@@ -94,7 +94,7 @@ def _apart(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
     if absent := no_node(package, run, f"{first} and {second} were not seen connected over {params.topic}"):
         return absent
     message = f"{first} and {second} are both on {params.topic}, but not connected"
-    return failed(message, hint="do both use the same message type?")
+    return failed(message, hint="do both use the same message type?").once()
 
 
 def _misnamed(run: Run, end: End, params: ConnectedParams) -> Verdict | None:

@@ -169,7 +169,7 @@ def _early_end(one: Life, run: Run, package: PackageFacts) -> Verdict | None:
 def _registration(one: Life, run: Run, nodes: tuple[str, ...]) -> Verdict | None:
     if not nodes:
         hint = "call rospy.init_node(…) before anything that waits"
-        return failed(f"{_script(one)} runs, but never registers as a node", hint=hint)
+        return failed(f"{_script(one)} runs, but never registers as a node", hint=hint).once()
     if len(nodes) > (1 if are_noted(run) else max(1, len(lives(run)))):
         hint = "one script is one node: call rospy.init_node(…) once, start no other process"
         return failed(f"{_script(one)} registers as {len(nodes)} nodes: {join_words(nodes)}", hint=hint)

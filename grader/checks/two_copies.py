@@ -113,7 +113,7 @@ def _not_started(package: PackageFacts, run: Run, params: CopiesParams) -> Verdi
             return end.verdict(unjudged, f"{one.name} ended before the copies were started: {end.cause}")
         if not nodes_of(run, one.name):
             message = f"{one.name} never registers as a node, so what waits for it was not started"
-            return unjudged(message, hint="call rospy.init_node(…) before anything that waits")
+            return unjudged(message, hint="call rospy.init_node(…) before anything that waits").once()
     if any(one.name in {params.first, params.second} for one in waited_for):
         return inconclusive("only one copy was started", hint="grade again")
     return unjudged("no copy was started: there is no script to run", hint=NO_SCRIPT_HINT)
@@ -164,7 +164,7 @@ def _unnamed(run: Run, trio: Trio) -> Verdict | None:
     which = "second" if trio.first_nodes else "first" if trio.second_nodes else ""
     if not which:
         message = "neither copy registers as a node"
-        return unjudged(message, hint="call rospy.init_node(…) before anything that waits")
+        return unjudged(message, hint="call rospy.init_node(…) before anything that waits").once()
     message = f"the {which} copy never registers as a node beside the other"
     return failed(message, hint="call rospy.init_node('…', anonymous=True) before anything that waits")
 

@@ -21,7 +21,7 @@ from grader.integrations.bundle import (
     wheel,
 )
 from grader.model.result import CriterionResult, GradingResult
-from grader.report.sentences import late_words
+from grader.report.sentences import score_words
 from grader.report.text import html, line, text_limit
 from grader.report.view import hidden_ids
 from grader.rubric.load import LoadedRubric
@@ -130,7 +130,7 @@ def _message(result: GradingResult, shown: list[CriterionResult]) -> Iterator[st
     if waiting:
         yield f"{LOOK}: {number(waiting)} points are not settled yet; no points are lost for good."
     yield f"{number(result.points)} of {number(result.max_points)} points"
-    yield from (line(words, LIMIT) for words in late_words(result))
+    yield from (line(words, LIMIT) for words in score_words(result))
 
 
 def _test(criterion: CriterionResult, limit: int) -> dict[str, Any]:

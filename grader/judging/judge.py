@@ -141,7 +141,12 @@ class Requirements:
             message = f"blocked by {root}: {self.verdicts[root].message}"
             if verdict.message not in message:
                 message = f"{message}; here: {verdict.message}"
-            update = {"status": Status.BLOCKED, "message": message, "hint": f"fix {root} first"}
+            update = {
+                "status": Status.BLOCKED,
+                "message": message,
+                "hint": f"fix {root} first",
+                "blocked_by": root,
+            }
             return verdict.model_copy(update=update)
         undecided = next((r for r in criterion.requires if self.verdicts[r].status.is_open), None)
         if undecided is None:
@@ -175,5 +180,6 @@ def result_of(
         hint=verdict.hint or (criterion.hint if lost else ""),
         reproduce=criterion.reproduce,
         citations=verdict.citations,
+        blocked_by=verdict.blocked_by,
         repaired=repaired,
     )

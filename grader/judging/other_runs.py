@@ -10,7 +10,7 @@ from pathlib import PurePosixPath
 from pydantic import ValidationError
 
 from grader.evidence.run import Run
-from grader.model.repair import Repair
+from grader.model.repair import Repair, place_of
 from grader.model.result import Repaired
 from grader.model.verdict import Status, Verdict, failed
 from grader.rubric.model import Criterion, Rubric, Scenario
@@ -156,11 +156,6 @@ def _charge(verdict: Verdict, copy: Verdict, repair: Repair) -> Verdict:
             repair.message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
         )
     return verdict.model_copy(update={"hint": f"{place_of(repair)}: {repair.fix}"})
-
-
-def place_of(repair: Repair) -> str:
-    """Return `src/talker.py line 12`, or the file alone."""
-    return repair.file if repair.line is None else f"{repair.file} line {repair.line}"
 
 
 def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:

@@ -50,3 +50,8 @@ class Repair(Record):
     after: str = ""
     message: str
     fix: str
+
+
+def place_of(repair: Repair) -> str:
+    """Return `src/talker.py line 12`, or the file alone."""
+    return repair.file if repair.line is None else f"{repair.file} line {repair.line}"

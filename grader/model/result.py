@@ -150,6 +150,8 @@ class CriterionResult(Record):
     """A command that shows the same."""
     citations: tuple[FileCitation | EvidenceCitation, ...]
     """The lines of files and the parts of the evidence that the verdict rests on."""
+    blocked_by: str = Field(default="", exclude_if=lambda value: not value)
+    """The `id` of the criterion that keeps this one from being judged. Only there if it is `blocked`."""
     repaired: Repaired | None = Field(default=None, exclude_if=lambda value: value is None)
     """What a repaired copy of the package shows of it. Only there if one was run and changes something."""
 

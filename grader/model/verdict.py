@@ -65,7 +65,8 @@ class Verdict(Record):
 
     `score` is the share of the points, 0 to 1. `unjudged` marks a verdict that rests on the absence of
     evidence: the judge turns it into `blocked` where a required criterion explains the absence. `timing` marks a loss
-    that one run's timing could have made: it counts only if it is seen twice.
+    that one run's timing could have made: it counts only if it is seen twice. `blocked_by` is the criterion that
+    explains the absence.
     """
 
     status: Status
@@ -77,6 +78,7 @@ class Verdict(Record):
     citations: Citations = ()
     unjudged: bool = False
     timing: bool = False
+    blocked_by: str = ""
 
     def about(
         self, *, expected: str | None = None, measured: str | None = None, citations: Citations | None = None
@@ -84,6 +86,10 @@ class Verdict(Record):
         """Return the verdict with what was expected, what was measured and where it shows; None leaves a field."""
         fields = {"expected": expected, "measured": measured, "citations": citations}
         return self.model_copy(update={name: value for name, value in fields.items() if value is not None})
+
+    def once(self) -> Verdict:
+        """Return the verdict marked as a loss that one run's timing could have made."""
+        return self.model_copy(update={"timing": True})
 
 
 def passed(

@@ -17,7 +17,7 @@ from typing import Any
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import FileCitation, Status
 from grader.report.findings import repository_path
-from grader.report.sentences import late_words
+from grader.report.sentences import score_words
 from grader.report.text import line
 from grader.report.view import is_students_fault, not_graded
 from grader.rubric.model import Rubric
@@ -79,7 +79,7 @@ def _tests(result: GradingResult, rubric: Rubric, prefix: str, limit: int) -> It
         yield _criterion(criterion, prefix, limit)
     late = round(result.points - reached, rubric.digits)
     if late:
-        words = " ".join(line(text, NAME_CHARS) for text in late_words(result))
+        words = " ".join(line(text, NAME_CHARS) for text in score_words(result))
         yield _test(words or "what people decided, or being late", status="fail", points=late)
 
 

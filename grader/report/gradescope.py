@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from grader.errors import GraderError
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
-from grader.report.sentences import decided, decision, late_words, look_again, missing_hidden, visible_words
+from grader.report.sentences import decided, decision, look_again, missing_hidden, score_words, visible_words
 from grader.report.text import json_text, line, text_limit
 from grader.report.view import hidden_ids, is_students_fault, places, points_of
 from grader.rubric.model import Rubric
@@ -77,7 +77,7 @@ class _Writer:
             yield self._text(visible_words(result.model_copy(update={"criteria": tuple(shown)}), hidden))
         else:
             yield f"{number(result.points)} of {number(result.max_points)} points"
-            yield from map(self._text, late_words(result))
+            yield from map(self._text, score_words(result))
 
     def _test(self, place: str, criterion: CriterionResult) -> dict[str, object]:
         waits = criterion.status.is_open

@@ -17,8 +17,8 @@ from grader.report.sentences import (
     automatic_words,
     decided,
     decision,
-    late_words,
     look_again,
+    score_words,
     verdict_words,
     visible_words,
     without_sandbox,
@@ -120,7 +120,7 @@ class _Writer:
         yield from (f"# {'Not graded' if not_graded(result) else graded}", "")
         unwalled = without_sandbox(result.environment.sandbox)
         yield from (f"**{self._text(unwalled)}**", "") if unwalled else ()
-        for words in late_words(result):
+        for words in score_words(result):
             yield from (self._text(words), "")
         if result.error is not None:
             yield from ([] if not_graded(result) else ["It could not be graded automatically:", ""])

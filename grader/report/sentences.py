@@ -8,14 +8,43 @@ from datetime import datetime
 
 from grader.errors import GraderError
 from grader.judging.summary import passed
+from grader.model.repair import Repair, place_of
 from grader.model.result import AppliedOverride, Automatic, CriterionResult, GradingResult, HandedIn, Note
 from grader.model.verdict import Status
 from grader.report.view import ReportView, hidden_ids, not_graded
 from grader.rubric.model import Rubric
-from grader.wording import number, plural
+from grader.wording import join_words, number, plural
 
 DECIDED_TITLE = "Decided by a person"
 BY = {"roster": "as the roster says", "commit": "the commit's date", "nobody": "not known"}
+
+
+def score_words(result: GradingResult) -> tuple[str, ...]:
+    """Return the lines that stand below the score: what each repaired fault cost, and what being late cost."""
+    return (*repair_words(result), *late_words(result))
+
+
+def repair_words(result: GradingResult) -> tuple[str, ...]:
+    """Return a sentence for each fault that a repaired copy was judged without: what it costs, and what it does not."""
+    judged: dict[Repair, list[CriterionResult]] = {}
+    for criterion in result.criteria:
+        for repair in criterion.repaired.repairs if criterion.repaired else ():
+            judged.setdefault(repair, []).append(criterion)
+    return tuple(_repair_words(repair, criteria) for repair, criteria in judged.items())
+
+
+def _repair_words(repair: Repair, criteria: list[CriterionResult]) -> str:
+    charged = [c for c in criteria if c.repaired and c.repaired.charged]
+    others = [c for c in criteria if c not in charged]
+    cost = sum(c.max_points - c.points for c in charged)
+    words = f"{repair.message} ({place_of(repair)}): this costs you {plural(cost, 'point')}"
+    words += f" ({', '.join(c.id for c in charged)})" if charged else ""
+    if others:
+        share = min(c.repaired.share for c in others if c.repaired)
+        earned = "" if share == 1 else f", for {share:.0%} of the points"
+        were = "was" if len(others) == 1 else "were"
+        words += f"; {join_words(c.id for c in others)} {were} judged with it repaired{earned}"
+    return f"{words[:1].upper()}{words[1:]}"
 
 
 def late_words(result: GradingResult) -> tuple[str, ...]:

@@ -114,7 +114,7 @@ class Terminal:
         parts: list[RenderableType] = [self._head(result, rubric)]
         unwalled = without_sandbox(result.environment.sandbox)
         parts += [Text(self._show(unwalled), "yellow")] if unwalled else []
-        parts += [Text(self._show(words)) for words in sentences.late_words(result)]
+        parts += [Text(self._show(words)) for words in sentences.score_words(result)]
         parts += self._section(
             sentences.DECIDED_TITLE, [self._decision(o, c) for o, c in sentences.decided(result)]
         )

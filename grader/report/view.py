@@ -94,6 +94,8 @@ def is_students_fault(result: GradingResult) -> bool:
 def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric) -> str:
     """The id of the criterion that a blocked one comes down to; its own id for any other."""
     by_id = {c.id: c for c in result.criteria}
+    if criterion.blocked_by in by_id:
+        return criterion.blocked_by
     requires = {c.id: c.requires for c in rubric.criteria}
     seen = {criterion.id}
     while criterion.status is Status.BLOCKED:

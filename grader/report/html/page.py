@@ -125,7 +125,7 @@ def _head(result: GradingResult, rubric: Rubric, view: ReportView, hidden: int) 
         else None,
         pass_mark=sentences.pass_mark(result, rubric, hidden),
         unwalled=without_sandbox(result.environment.sandbox),
-        late=sentences.late_words(result),
+        late=sentences.score_words(result),
         short=sentences.in_short(result, view),
         left_out=visible_words(result, hidden) if graded else "",
         fault=sentences.FAULTS[sentences.blame(result.error.kind)] if result.error else "",
