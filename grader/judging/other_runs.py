@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Collection, Iterator, Mapping
+from graphlib import TopologicalSorter
 from pathlib import PurePosixPath
 
 from pydantic import ValidationError
@@ -121,10 +122,13 @@ def _charges(
     rubric: Rubric, first: Mapping[str, Verdict], better: Collection[str], repairs: tuple[Repair, ...]
 ) -> dict[Repair, set[str]]:
     """Return for each repair the criterion that asks for what was wrong: by its name where a name was wrong, else the
-    first that failed by itself."""
+    first that failed by itself. What others require comes first."""
     charges: dict[Repair, set[str]] = {}
+    by_id = {c.id: c for c in rubric.criteria}
+    order = TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order()
+    criteria = [by_id[name] for name in order if name in better]
     for repair in repairs:
-        possible = [c for c in rubric.criteria if c.id in better and concerns(repair, c, rubric, first[c.id])]
+        possible = [c for c in criteria if concerns(repair, c, rubric, first[c.id])]
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
         failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
         counting = [c for c in (*named, *failing, *possible) if c.points > 0]

@@ -35,21 +35,22 @@ DEFAULT_SHARES: dict[RepairKind, float] = {kind: 0.5 if kind in HALF else 1.0 fo
 
 
 class Repair(Record):
-    """One mistake, and how it is put right. Logic is never repaired.
-
-    `file` is relative to the package's folder, `line` the first line that changes (None for permission bits and
-    renames). `before` and `after` are the changed lines, joined by newlines, after the repairs that come before this
-    one; of a rename they are the two paths. Where a line is only added, the line beside it is part of both.
-    `message` says what is wrong, `fix` how it is repaired by hand: a command, or the line as it should be.
-    """
+    """One mistake, and how it is repaired. Logic is never repaired."""
 
     kind: RepairKind
+    """What kind of repair it is; the rubric's `repairs` go by it."""
     file: str
+    """A file of the submission, from the package's root."""
     line: int | None = None
+    """The first line that changes, counted from 1; null for permission bits and renames."""
     before: str = ""
+    """The changed lines as they are after the repairs that come before this one; of a rename, the path."""
     after: str = ""
+    """The same lines, repaired, or the new path. Where a line is only added, the line beside it is part of both."""
     message: str
+    """What is wrong."""
     fix: str
+    """How it is repaired by hand: a command, or the line as it should be."""
 
 
 def place_of(repair: Repair) -> str:

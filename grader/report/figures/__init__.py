@@ -14,6 +14,7 @@ from typing import ParamSpec, TypeVar
 from grader.checks import CHECKS
 from grader.evidence.run import Run
 from grader.judging.facts import PACKAGE_RUN, Facts, try_facts
+from grader.judging.other_runs import split_runs
 from grader.model.figure import Figure, Figures
 from grader.model.result import CriterionResult
 from grader.model.verdict import Verdict
@@ -50,24 +51,31 @@ def figures_of(rubric: Rubric, runs: Mapping[str, Run], criteria: Sequence[Crite
     `runs` are the recorded runs by scenario, and `package`, as the judge takes them. A criterion without any figure, a
     scenario without nodes and one in which nothing was printed are not in it.
     """
-    facts = _made(try_facts, rubric, runs)
+    facts, on_copy = (_made(try_facts, rubric, found) for found in _first_and_copy(runs))
     known = facts.runs if facts else runs
     shown = {
         name: run for name, run in islice(known.items(), RUNS_MAX) if name in {*rubric.scenarios, PACKAGE_RUN}
     }
     return Figures(
-        by_criterion=_by_criterion(rubric, facts, criteria) if facts else {},
+        by_criterion=_by_criterion(rubric, facts, on_copy or facts, criteria) if facts else {},
         graphs=_each(graph_of, {name: run for name, run in shown.items() if name != PACKAGE_RUN}),
         consoles=_each(console_of, shown),
     )
 
 
+def _first_and_copy(runs: Mapping[str, Run]) -> tuple[dict[str, Run], dict[str, Run]]:
+    """Return the first runs, and the same with those of a repaired copy in their place."""
+    first, _, repaired = split_runs(runs)
+    return first, {**first, **repaired}
+
+
 def _by_criterion(
-    rubric: Rubric, facts: Facts, criteria: Iterable[CriterionResult]
+    rubric: Rubric, first: Facts, on_copy: Facts, criteria: Sequence[CriterionResult]
 ) -> dict[str, tuple[Figure, ...]]:
     asked = {criterion.id: criterion for criterion in rubric.criteria}
+    judged_by = {c.id: on_copy if c.repaired and not c.repaired.charged else first for c in criteria}
     found = {
-        result.id: (*_drawn(facts, asked[result.id]), *_cited(facts, result))
+        result.id: (*_drawn(judged_by[result.id], asked[result.id]), *_cited(judged_by[result.id], result))
         for result in criteria
         if result.id in asked
     }

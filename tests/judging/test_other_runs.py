@@ -1,0 +1,115 @@
+"""What repaired copies and repeated runs change: who is charged, what the others earn, and what was seen only once."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+from grader.judging import judge
+from grader.judging.judge import judge_all_runs
+from grader.model.repair import Repair
+from grader.model.result import CriterionResult
+from tests.judging.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, rubric
+from tests.support.timeline import build_runs
+
+DIED = {"processes": [{"name": "talker", "exit_s": 0.3, "exit_code": 1}], "outcome": "ended"}
+TABS = Repair(
+    kind="python-syntax",
+    file="src/numeric_talker.py",
+    line=7,
+    before="\tx = 1",
+    after="        x = 1",
+    message="tabs and spaces are mixed in its indentation",
+    fix="indent every line with four spaces",
+)
+TOPIC = Repair(
+    kind="topic-name",
+    file="src/numeric_talker.py",
+    line=9,
+    before="pub = rospy.Publisher('/chater', String, queue_size=10)",
+    after="pub = rospy.Publisher('/chatter', String, queue_size=10)",
+    message="the topic is /chatter, not /chater",
+    fix="'/chatter'",
+)
+
+
+def judged(
+    first: dict[str, Any], copy: dict[str, Any], *repairs: Repair, **keys: Any
+) -> dict[str, CriterionResult]:
+    runs = build_runs({"runs": {"talker": first}, "package": PACKAGE})
+    about = {"repairs": json.dumps([one.model_dump() for one in repairs])}
+    for name, run in build_runs({"runs": {"talker": copy}, "package": PACKAGE}).items():
+        runs[f"repaired-1/{name}"] = replace(run, metadata={**run.metadata, **about})
+    return {c.id: c for c in judge(rubric(*ALL, **keys), runs)}
+
+
+def test_one_fault_is_charged_once_and_the_rest_earns_its_share() -> None:
+    found = judged(DIED, GOOD_RUN, TABS)
+    assert {name: (c.status.value, c.points) for name, c in found.items()} == {
+        "rate": ("partial", 5),
+        "chatter": ("partial", 5),
+        "node": ("fail", 0),
+        "executable": ("pass", 10),
+    }
+    assert found["node"].hint == "src/numeric_talker.py line 7: indent every line with four spaces"
+    assert found["node"].repaired is not None
+    assert found["node"].repaired.charged
+    assert found["rate"].message.startswith(
+        "judged on a copy with src/numeric_talker.py line 7 repaired: half of the points; "
+    )
+    assert found["executable"].repaired is None
+
+
+def test_a_name_is_charged_where_the_rubric_asks_for_it() -> None:
+    misspelt = {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 61}]}
+    found = judged(misspelt, GOOD_RUN, TOPIC)
+    assert {name: (c.status.value, c.points) for name, c in found.items()} == {
+        "rate": ("pass", 10),
+        "chatter": ("fail", 0),
+        "node": ("pass", 10),
+        "executable": ("pass", 10),
+    }
+    assert "/chatter" in found["chatter"].hint
+
+
+def test_two_faults_are_two_losses() -> None:
+    found = judged(DIED, GOOD_RUN, TABS, TOPIC)
+    assert (found["node"].points, found["chatter"].points, found["rate"].points) == (0, 0, 5)
+    assert found["chatter"].message == TOPIC.message
+
+
+def test_the_rubric_has_its_own_shares_and_may_switch_a_repair_off() -> None:
+    assert judged(DIED, GOOD_RUN, TABS, repairs={"python-syntax": 0.3})["rate"].points == 3
+    off = judged(DIED, GOOD_RUN, TABS, repairs={"python-syntax": 0})
+    assert (off["rate"].status.value, off["rate"].points) == ("blocked", 0)
+    assert off["rate"].repaired is None
+
+
+def test_what_fails_on_the_copy_too_says_why() -> None:
+    slow = {**GOOD_RUN, "topics": [{"topic": "/chatter", "count": 31, "rate_hz": 5}]}
+    found = judged(DIED, slow, TABS)
+    assert (found["rate"].status.value, found["rate"].points) == ("fail", 0)
+    assert "repaired" in found["rate"].message
+    assert "5" in found["rate"].measured
+
+
+def test_a_copy_that_helps_nothing_changes_nothing() -> None:
+    runs = build_runs({"runs": {"talker": DIED}, "package": PACKAGE})
+    alone = judge(rubric(*ALL), runs)
+    assert judged(DIED, DIED, TABS) == {c.id: c for c in alone}
+
+
+def test_what_was_seen_once_costs_nothing() -> None:
+    alone = {name: value for name, value in NODE.items() if name != "requires"}
+    silent = {**GOOD_RUN, "topics": [], "graph": []}
+    runs = build_runs({"runs": {"talker": silent}, "package": PACKAGE})
+    first = judge_all_runs(rubric(alone), runs)
+    assert [c.status.value for c in first.criteria] == ["fail"]
+    assert first.doubtful == {"talker"}
+    again = build_runs({"runs": {"talker": GOOD_RUN}, "package": PACKAGE})
+    (node,) = judge(rubric(alone), {**runs, "repeated-1/talker": again["talker"]})
+    assert (node.status.value, node.points) == ("pass", 10)
+    assert "seen once and not again" in node.message
+    (node,) = judge(rubric(alone), {**runs, "repeated-1/talker": runs["talker"]})
+    assert (node.status.value, node.points) == ("fail", 0)
