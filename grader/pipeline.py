@@ -227,24 +227,13 @@ def submission_info(submission: Submission | RecordedSubmission) -> SubmissionIn
 def record_and_judge(
     submission: Submission, rubric: LoadedRubric, evidence: Path, options: GradeOptions, progress: Progress
 ) -> tuple[Recording, dict[str, Run], tuple[CriterionResult, ...]]:
-    """Record every scenario into the folder `evidence`, and judge it.
-
-    What cannot be judged because the machine was late is recorded again, alone, at most `RETRIES` times.
-    """
+    """Record every scenario into the folder `evidence`, and judge it; then what a lost mark needs besides."""
     facts = read_facts(submission, progress)
     progress.early(lambda: judge_early(facts, rubric, options))
-    from grader.arena.static_recorder import RETRIES  # noqa: PLC0415 - see LATER
-
     with make_recorder(submission, facts, rubric, evidence, options=options, progress=progress) as recorder:
         recorder.record_all(partial(import_later, rubric))
         keep_recordings(submission, rubric, evidence, progress)
-        runs, criteria = judge_folder(evidence, rubric)
-        for _ in range(RETRIES):
-            again = inconclusive_scenarios(criteria, recorder.recording)
-            if not again:
-                break
-            recorder.record_again(again)
-            runs, criteria = judge_folder(evidence, rubric)
+        runs, criteria = judge_recorded(recorder, evidence, rubric)
         others = record_other_runs(
             submission,
             recorder,
@@ -299,8 +288,24 @@ def record_other_runs(
             )
             with again:
                 again.record_all(lambda: None)
+                judge_recorded(again, evidence, rubric)
             recorder.recording.add(again.recording)
     return bool(doubtful or scenarios)
+
+
+def judge_recorded(recorder: Recorder | StaticRecorder, evidence: Path, rubric: LoadedRubric) -> Judged:
+    """Judge what is in the folder `evidence`. What this recorder recorded and nobody can judge because the machine was
+    late is recorded again, alone, at most `RETRIES` times."""
+    from grader.arena.static_recorder import RETRIES  # noqa: PLC0415 - see LATER
+
+    runs, criteria = judge_folder(evidence, rubric)
+    for _ in range(RETRIES):
+        again = inconclusive_scenarios(criteria, recorder.recording)
+        if not again:
+            break
+        recorder.record_again(again)
+        runs, criteria = judge_folder(evidence, rubric)
+    return runs, criteria
 
 
 def read_facts(submission: Submission, progress: Progress) -> PackageFacts:

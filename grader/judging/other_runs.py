@@ -115,7 +115,7 @@ def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], crit
     one, copy = first[criterion.id], on_copy[criterion.id]
     if copy.status.is_lost and copy.score <= one.score:
         return not one.unjudged or copy.unjudged
-    return copy.status.is_open
+    return copy.status is Status.ERROR
 
 
 def _charges(
@@ -166,6 +166,6 @@ def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:
     where = join_words([place_of(repair) for repair in repairs])
     earned = SHARES.get(share, f"{share:.0%}")
     score = copy.score * share
-    status = copy.status if share == 1 or copy.status.is_lost else Status.PARTIAL
+    status = Status.PARTIAL if share < 1 and copy.status is Status.PASS else copy.status
     message = f"judged on a copy with {where} repaired: {earned} of the points; {copy.message}"
     return copy.model_copy(update={"status": status, "score": score, "message": message})

@@ -37,7 +37,8 @@ def _repair_words(repair: Repair, criteria: list[CriterionResult]) -> str:
     charged = [c for c in criteria if c.repaired and c.repaired.charged]
     others = [c for c in criteria if c not in charged]
     cost = sum(c.max_points - c.points for c in charged)
-    words = f"{repair.message} ({place_of(repair)}): this costs you {plural(cost, 'point')}"
+    place = "" if repair.file in repair.message else f" ({place_of(repair)})"
+    words = f"{repair.message}{place}: this costs you {plural(cost, 'point')}"
     words += f" ({', '.join(c.id for c in charged)})" if charged else ""
     if others:
         share = min(c.repaired.share for c in others if c.repaired)
