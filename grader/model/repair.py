@@ -8,10 +8,10 @@ from grader.model.record import Record
 
 RepairKind = Literal[
     "executable-bit",
+    "encoding",
+    "byte-order-mark",
     "line-ends",
     "shebang",
-    "byte-order-mark",
-    "encoding",
     "file-name",
     "python-syntax",
     "manifest-line",

@@ -6,19 +6,121 @@ one on a copy, or on the student's own files. Nothing of the student's is execut
 
 from __future__ import annotations
 
-from pathlib import Path
+import re
+from pathlib import Path, PurePosixPath
 
-from grader.model.package import PackageFacts
-from grader.model.repair import DEFAULT_SHARES, Repair, RepairKind
+from grader.model.package import PackageFacts, SourceFile
+from grader.model.repair import DEFAULT_SHARES, KINDS, Repair, RepairKind
+from grader.package.repairs.build import rename_package, repair_cmake, repair_manifest
+from grader.package.repairs.editing import (
+    BOM,
+    MANIFEST,
+    Files,
+    NotRepairable,
+    make_executable,
+    read_data,
+    rename_everywhere,
+    rename_file,
+    replace_lines,
+    write_data,
+)
+from grader.package.repairs.files import find_renames, is_own, rename_files, repair_files, to_utf8
+from grader.package.repairs.names import repair_launch_names, repair_script_names, repair_yaml_names
+from grader.package.repairs.python import repair_python
 from grader.package.repairs.wanted import Wanted, wanted_of
 
-__all__ = ["DEFAULT_SHARES", "Repair", "RepairKind", "Wanted", "apply_repair", "find_repairs", "wanted_of"]
+__all__ = [
+    "DEFAULT_SHARES",
+    "NotRepairable",
+    "Repair",
+    "RepairKind",
+    "Wanted",
+    "apply_repair",
+    "find_repairs",
+    "wanted_of",
+]
+
+SCRIPTS_MAX = 40
+IMPORTED = re.compile(r"^\s*(?:from|import)\s+([\w.]+)", re.MULTILINE)
+UNREAD = ("PythonCrash", "NotChecked")
 
 
 def find_repairs(folder: Path, package: PackageFacts, wanted: Wanted) -> tuple[Repair, ...]:
-    """Return the repairs in the order in which a student would meet them. To be applied in this order, all or some."""
-    return ()
+    """Return the repairs in the order in which a student would meet them.
+
+    They may be applied in this order, all of them or some: each names its file and its lines as they are after those
+    before it. A package that is right may have some too: a name that the lab does not fix can be near one that it does.
+    """
+    files = Files(folder=folder.resolve())
+    renames = find_renames(package, wanted)
+    scripts = _scripts(files, package, wanted, renames)
+    repair_files(files, scripts)
+    rename_files(files, renames)
+    paths = [renames.get(f.path, f.path) for f in scripts if f.python and f.link is None]
+    names = repair_python(files, paths, wanted.types)
+    name = repair_manifest(files, package, wanted)
+    repair_cmake(files, package, name, wanted)
+    rename_package(files, wanted)
+    files_now = [renames.get(f.path, f.path) for f in package.files if is_own(f.path)]
+    repair_launch_names(files, package, files_now, wanted)
+    for script in names:
+        repair_script_names(files, script, names[script], wanted)
+    repair_yaml_names(files, package, names, wanted)
+    return tuple(sorted(files.repairs, key=lambda repair: KINDS.index(repair.kind)))
 
 
 def apply_repair(folder: Path, repair: Repair) -> None:
-    """Make the repair in the package's folder. Raises ValueError where its file is no longer as it was."""
+    """Make the repair in the package's folder: files are replaced whole and keep their modes, and no link is followed.
+
+    Raises NotRepairable where the file is no longer as the repair knows it, and OSError where it cannot be written.
+    """
+    folder = folder.resolve()
+    if repair.kind == "executable-bit":
+        make_executable(folder, repair.file)
+    elif repair.kind == "file-name":
+        rename_file(folder, repair)
+    else:
+        data = read_data(folder, repair.file)
+        if data is None:
+            raise NotRepairable(f"{repair.file} is no file that can be repaired")
+        write_data(folder, repair.file, _repaired(data, repair))
+        if repair.kind == "package-name" and repair.file == MANIFEST:
+            _rename_package(folder, repair)
+
+
+def _repaired(data: bytes, repair: Repair) -> bytes:
+    if repair.kind == "line-ends":
+        return data.replace(b"\r\n", b"\n")
+    if repair.kind == "byte-order-mark":
+        return data.removeprefix(BOM)
+    if repair.kind == "encoding":
+        return to_utf8(data)
+    return replace_lines(data, repair)
+
+
+def _rename_package(folder: Path, repair: Repair) -> None:
+    old, new = (re.search(r"<name>\s*([\w-]+)", text) for text in (repair.before, repair.after))
+    if old and new:
+        rename_everywhere(folder, old[1], new[1])
+
+
+def _scripts(
+    files: Files, package: PackageFacts, wanted: Wanted, renames: dict[str, str]
+) -> list[SourceFile]:
+    """The files that are run: those of the lab in its order, then those of launch files, then what they import."""
+    own = [f for f in package.files if is_own(f.path) and not f.link_problem]
+    python = [f for f in own if f.python_fault is None or f.python_fault.kind not in UNREAD]
+    named = [PurePosixPath(path).name for path in (*wanted.scripts, *wanted.installed)]
+    named += [node.type or "" for launch in package.launch_files for node in launch.nodes]
+    named += [f"{name}.py" for name in named]
+    found: dict[str, SourceFile] = {}
+    for name in dict.fromkeys(named):
+        for file in python:
+            if name in (PurePosixPath(file.path).name, PurePosixPath(renames.get(file.path, "")).name):
+                found[file.path] = file
+    texts = "\n".join(filter(None, map(files.text, found)))
+    modules = {part for module in IMPORTED.findall(texts) for part in module.split(".")}
+    for file in python:
+        if file.python and PurePosixPath(file.path).stem in modules:
+            found.setdefault(file.path, file)
+    return list(found.values())[:SCRIPTS_MAX]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from pathlib import PurePosixPath
 from typing import Any
 
 from grader.model.record import Record
@@ -89,11 +88,11 @@ def _each(field: str, names: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 
 
 
 def is_near(name: str, wanted: str) -> bool:
-    """Return whether `name` is a slip of `wanted`: one letter, capitals, a leading slash, or a suffix left out."""
+    """Return whether `name` is a slip of `wanted`: one letter, capitals, or a leading slash."""
     if name == wanted or min(len(name), len(wanted)) < SHORTEST:
         return False
     one, other = (text.casefold().lstrip("/~") for text in (name, wanted))
-    return one == other or is_one_edit(one, other) or one == PurePosixPath(other).stem
+    return one == other or is_one_edit(one, other)
 
 
 SHORTEST = 3

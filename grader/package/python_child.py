@@ -1,0 +1,426 @@
+"""What a child process with limits makes of Python sources that do not run: each mistake with the text that has it
+repaired, and the names that the last text uses. The standard library and fissix only; nothing is executed."""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import re
+import sys
+import warnings
+from collections.abc import Iterable, Iterator
+from itertools import chain
+from typing import Any
+
+STEPS_MAX = 60
+STATEMENT_LINES_MAX = 12
+FIXERS = ("print", "except", "exec", "raise", "repr", "ne", "numliterals", "long", "unicode")
+OLD_NAMES = {"raw_input": "input", "xrange": "range", "unicode": "str", "basestring": "str", "unichr": "chr"}
+PLAIN = str.maketrans(
+    {
+        **dict.fromkeys("\u2018\u2019\u201a\u201b\u2032\u00b4", "'"),
+        **dict.fromkeys("\u201c\u201d\u201e\u201f\u2033\u00ab\u00bb", '"'),
+        **dict.fromkeys("\u00a0\u2002\u2003\u2007\u2009\u202f\u3000", " "),
+        **dict.fromkeys("\u200b\u200c\u200d\u2060\ufeff", ""),
+    }
+)
+MESSAGES = {
+    "std_msgs": "Bool Byte Char ColorRGBA Empty Float32 Float32MultiArray Float64 Float64MultiArray Int16 "
+    "Int16MultiArray Int32 Int32MultiArray Int64 Int8 Int8MultiArray String UInt16 UInt32 UInt64 UInt8",
+    "geometry_msgs": "Point PoseStamped PoseWithCovarianceStamped Quaternion Twist TwistStamped Vector3 Wrench",
+    "nav_msgs": "OccupancyGrid Odometry",
+    "sensor_msgs": "CompressedImage Image Imu JointState Joy LaserScan NavSatFix PointCloud2 Range",
+}
+MODULES = frozenset({"math", "os", "random", "rospy", "sys", "time"})
+LOOPED = frozenset({"is_shutdown", "sleep", "spin"})
+CALLED = frozenset({"is_shutdown", "sleep", "spin"})
+PARAM_CALLS = frozenset({"delete_param", "get_param", "has_param", "set_param"})
+BLOCKS = re.compile(r"\s*(if|elif|else|for|while|def|class|try|except|finally|with)\b")
+
+Step = dict[str, Any]
+"""`cause`, `line`, the `text` that comes out, and for what does not parse the `error`."""
+Error = dict[str, Any]
+
+
+def examine(files: list[list[str]], types: list[str], site: str) -> Iterator[dict[str, Any]]:
+    """Yield for each pair of name and text its steps and its names. `types` are message types that the lab uses, `site`
+    is the folder that has fissix."""
+    warnings.simplefilter("ignore")
+    sys.path.append(site)
+    for file, text in files:
+        try:
+            steps = list(_steps(text, types))
+            names = _names(steps[-1]["text"] if steps else text)
+        except (RecursionError, MemoryError):
+            steps, names = [], []
+        yield {"file": file, "steps": steps, "names": names}
+
+
+def _steps(text: str, types: list[str]) -> Iterator[Step]:
+    for step in _readable(text):
+        text = step["text"]
+        yield step
+    if _error(text) is None:
+        for repair in (_without_old_names, lambda t: _with_imports(t, types), _with_calls, _with_spin):
+            for step in repair(text):
+                text = step["text"]
+                yield step
+
+
+# ---- what does not parse
+
+
+def _error(text: str) -> Error | None:
+    try:
+        compile(text, "script", "exec", dont_inherit=True)
+    except SyntaxError as error:
+        line = error.lineno or 1
+        faulty = "".join(text.split("\n")[line - 1 : line])[:300]
+        place = {"line": line, "column": error.offset, "text": faulty}
+        return {"kind": type(error).__name__, "message": str(error.msg)[:500], **place}
+    except (ValueError, OverflowError, RecursionError, MemoryError):
+        return {"kind": "ValueError", "message": "", "line": 1, "column": None, "text": ""}
+    return None
+
+
+def _readable(text: str) -> list[Step]:
+    """Return the steps after which it parses; none where no such repair does it."""
+    steps: list[Step] = []
+    error = _error(text)
+    while error is not None and len(steps) < STEPS_MAX:
+        step = _one_step(text, error)
+        if step is None:
+            return []
+        steps.append(step)
+        text = step["text"]
+        error = _error(text)
+    return steps if error is None else []
+
+
+def _one_step(text: str, error: Error) -> Step | None:
+    for cause, candidate in _candidates(text, error):
+        if candidate == text:
+            continue
+        left = _error(candidate)
+        further = left is not None and (left["line"] > error["line"] or _is_next(error, left))
+        if left is None or further:
+            return {"cause": cause, "line": error["line"], "error": error, "text": candidate}
+    return None
+
+
+def _is_next(error: Error, left: Error) -> bool:
+    """Tabs are told before all else, wherever they are."""
+    spaces = ("TabError", "IndentationError")
+    return error["kind"] in spaces and left["kind"] not in spaces
+
+
+def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
+    if error["kind"] in {"TabError", "IndentationError"}:
+        for width in (8, 4):
+            yield "tabs", "\n".join(_expanded(line, width) for line in text.split("\n"))
+    lines = text.split("\n")
+    at = error["line"] - 1
+    if not 0 <= at < len(lines):
+        return
+    yield from (("python2", candidate) for candidate in _as_python3(lines, at))
+    yield "characters", _with_line(lines, at, lines[at].translate(PLAIN))
+    for line in dict.fromkeys((at, max(at - 1, 0))):
+        for changed in _with_token(lines[line], error if line == at else None):
+            yield "token", _with_line(lines, line, changed)
+
+
+def _expanded(line: str, width: int) -> str:
+    code = line.lstrip(" \t")
+    return line[: len(line) - len(code)].expandtabs(width) + code
+
+
+def _with_line(lines: list[str], at: int, line: str) -> str:
+    return "\n".join([*lines[:at], line, *lines[at + 1 :]])
+
+
+def _as_python3(lines: list[str], at: int) -> Iterator[str]:
+    """Yield the text with the statement at the line read as Python 2."""
+    for start in range(at, max(-1, at - STATEMENT_LINES_MAX), -1):
+        for end in range(at + 1, min(len(lines), start + STATEMENT_LINES_MAX) + 1):
+            fixed = _fixed_statement(lines[start:end])
+            if fixed is not None:
+                yield "\n".join([*lines[:start], *fixed, *lines[end:]])
+                return
+
+
+def _fixed_statement(lines: list[str]) -> list[str] | None:
+    """The same as Python 3; None where it is no statement by itself, or nothing of it is Python 2."""
+    indentation = lines[0][: len(lines[0]) - len(lines[0].lstrip())]
+    first = lines[0].strip()
+    keyword = re.match(r"\w*", first)
+    head = {"elif": "if x:\n    pass\n", "else": "if x:\n    pass\n", "except": "try:\n    pass\n"}
+    before = head.get(keyword[0] if keyword else "", "")
+    after = "    pass\n" if _code(lines[-1]).endswith(":") else ""
+    source = before + "\n".join([first, *lines[1:]]) + "\n" + after
+    fixed = next((f for tool in _tools() if (f := _refactored(tool, source)) not in (None, source)), None)
+    if fixed is None:
+        return None
+    body = fixed.removeprefix(before).removesuffix("\n" + after if after else "\n").split("\n")
+    return [indentation + body[0], *body[1:]]
+
+
+_TOOLS: list[Any] = []
+
+
+def _tools() -> list[Any]:
+    """First for a file whose `print` is Python 3 already."""
+    if not _TOOLS:
+        from fissix.refactor import RefactoringTool  # noqa: PLC0415 - found once `site` is in the path
+
+        names = [f"fissix.fixes.fix_{name}" for name in FIXERS]
+        _TOOLS.append(RefactoringTool([n for n in names if "print" not in n], {"print_function": True}))
+        _TOOLS.append(RefactoringTool(names))
+    return _TOOLS
+
+
+def _refactored(tool: Any, source: str) -> str | None:  # noqa: ANN401 - a library without types
+    try:
+        return str(tool.refactor_string(source, "script"))
+    except Exception:  # noqa: BLE001 - the library raises whatever its parser and tokenizer do
+        return None
+
+
+def _code(line: str) -> str:
+    """The line without its comment and its texts' contents."""
+    emptied = re.sub(r"""("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')|#.*""", lambda m: '""' if m[1] else "", line)
+    return emptied.rstrip()
+
+
+def _with_token(line: str, error: Error | None) -> Iterator[str]:
+    """Yield the line with one token more: a quote, a colon or a closing bracket."""
+    if not line.strip():
+        return
+    comment = re.search(r"\s*(#[^'\"]*)?$", line)
+    end = comment.start() if comment else len(line)
+    code, rest = line[:end], line[end:]
+    if error is not None and re.search("unterminated|EOL while", error["message"]):
+        at = (error["column"] or 1) - 1
+        quote = line[at : at + 1].strip("rbfu") or line[at + 1 : at + 2]
+        tail = re.search(r"[)\]}:,\s]*$", line)
+        cut = tail.start() if tail else len(line)
+        if quote in ("'", '"'):
+            yield line[:cut] + quote + line[cut:]
+            yield line + quote
+    if BLOCKS.match(line) and not code.endswith(":"):
+        yield f"{code}:{rest}"
+    for bracket in ")]}":
+        yield code + bracket + rest
+        if code.endswith(":"):
+            yield f"{code[:-1]}{bracket}:{rest}"
+
+
+# ---- what parses, and is not meant
+
+
+def _span(lines: list[str], node: ast.expr) -> tuple[int, int, int] | None:
+    """Return line (from 0), start and end of an expression on one line, in characters."""
+    line = node.lineno - 1
+    if node.end_lineno != node.lineno or line >= len(lines) or node.end_col_offset is None:
+        return None
+    raw = lines[line].encode("utf-8", "surrogatepass")
+    start, end = (len(raw[:at].decode("utf-8", "replace")) for at in (node.col_offset, node.end_col_offset))
+    return line, start, end
+
+
+def _edited(text: str, edits: Iterable[tuple[int, int, int, str]]) -> str:
+    lines = text.split("\n")
+    for line, start, end, new in sorted(edits, reverse=True):
+        lines[line] = lines[line][:start] + new + lines[line][end:]
+    return "\n".join(lines)
+
+
+def _step(cause: str, line: int, before: str, after: str, word: str = "") -> Iterator[Step]:
+    """Yield the step if it changes anything, and what comes out parses."""
+    if after != before and _error(after) is None:
+        yield {"cause": cause, "line": line, "word": word, "error": None, "text": after}
+
+
+def _without_old_names(text: str) -> Iterator[Step]:
+    tree, lines = ast.parse(text), text.split("\n")
+    bound = _bound(tree)
+    uses = [n for n in ast.walk(tree) if isinstance(n, ast.Name) and n.id in OLD_NAMES and n.id not in bound]
+    spans = [(span, OLD_NAMES[n.id]) for n in uses if (span := _span(lines, n))]
+    if spans:
+        names = ", ".join(sorted({n.id for n in uses}))
+        after = _edited(text, [(*span, new) for span, new in spans])
+        yield from _step("old-name", min(n.lineno for n in uses), text, after, names)
+
+
+def _bound(tree: ast.Module) -> set[str]:
+    found: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
+            found.add(node.id)
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif isinstance(node, ast.arg):
+            found.add(node.arg)
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            found.update((a.asname or a.name).partition(".")[0] for a in node.names)
+        elif isinstance(node, ast.ExceptHandler | ast.MatchAs | ast.MatchStar):
+            found.add(node.name or "")
+    return found
+
+
+def _with_imports(text: str, types: list[str]) -> Iterator[Step]:
+    tree = ast.parse(text)
+    bound = _bound(tree)
+    if "*" in bound:
+        return
+    packages = {name: package for package, names in MESSAGES.items() for name in names.split()}
+    packages |= {name: package for package, _, name in (kind.partition("/") for kind in types)}
+    modules = {
+        n.value.id for n in ast.walk(tree) if isinstance(n, ast.Attribute) and isinstance(n.value, ast.Name)
+    }
+    loaded = [n for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)]
+    missing = {n.id: n.lineno for n in sorted(loaded, key=lambda n: -n.lineno) if n.id not in bound}
+    for name in sorted(missing, key=lambda name: (missing[name], name)):
+        if hasattr(builtins, name):
+            continue
+        if name in MODULES and name in modules:
+            after = _imported(text, f"import {name}", "", "")
+        elif name in packages:
+            after = _imported(text, f"from {packages[name]}.msg import {name}", f"{packages[name]}.msg", name)
+        else:
+            continue
+        for step in _step("import", missing[name], text, after, name):
+            text = step["text"]
+            yield step
+
+
+def _imported(text: str, statement: str, module: str, name: str) -> str:
+    """The text with one more import: in the line that imports from this module, or below the last import."""
+    body, lines = ast.parse(text).body, text.split("\n")
+    imports = [s for s in body if isinstance(s, ast.Import | ast.ImportFrom)]
+    for one in imports:
+        if module and isinstance(one, ast.ImportFrom) and one.module == module and not one.level:
+            span = _span(lines, one.names[-1])  # type: ignore[arg-type] # an alias has a place too
+            if span is not None:
+                return _edited(text, [(span[0], span[2], span[2], f", {name}")])
+    first = next((s for s in body if not _is_docstring(s)), None)
+    at = (imports[-1].end_lineno or 0) if imports else (first.lineno - 1 if first else len(lines))
+    return "\n".join([*lines[:at], statement, *lines[at:]])
+
+
+def _is_docstring(statement: ast.stmt) -> bool:
+    return isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+
+
+def _last(node: ast.AST | None) -> str:
+    return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+
+
+def _with_calls(text: str) -> Iterator[Step]:
+    tree, lines = ast.parse(text), text.split("\n")
+    own = {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
+    named = [n for n in chain.from_iterable(map(_uncalled, ast.walk(tree))) if _is_callable(n, own)]
+    spans = [span for n in named if (span := _span(lines, n))]
+    if spans:
+        after = _edited(text, [(line, end, end, "()") for line, _, end in spans])
+        word = ast.unparse(min(named, key=lambda n: n.lineno))
+        yield from _step("call", min(spans)[0] + 1, text, after, word)
+
+
+def _uncalled(node: ast.AST) -> Iterator[ast.expr]:
+    """Yield what stands there by itself and says nothing: a statement, or a condition."""
+    if isinstance(node, ast.Expr):
+        yield node.value
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+        yield node.operand
+    elif isinstance(node, ast.While | ast.If):
+        yield node.test
+
+
+def _is_callable(node: ast.expr, own: set[str]) -> bool:
+    return (isinstance(node, ast.Attribute) and node.attr in CALLED) or (
+        isinstance(node, ast.Name) and node.id in own
+    )
+
+
+def _with_spin(text: str) -> Iterator[Step]:
+    """A node that only waits for messages, and ends at once."""
+    tree = ast.parse(text)
+    calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call)]
+    waits = [c for c in calls if _last(c.func) in {"Subscriber", "Service", "Timer"}]
+    rospy = next((a.asname or a.name for n in ast.walk(tree) if isinstance(n, ast.Import)
+                  for a in n.names if a.name == "rospy"), "")  # fmt: skip
+    loops = any(isinstance(n, ast.While) for n in ast.walk(tree))
+    makes_node = any(_last(c.func) == "init_node" for c in calls)
+    if not waits or loops or not rospy or not makes_node or LOOPED & {_last(c.func) for c in calls}:
+        return
+    lines = text.split("\n")
+    block = _last_block(tree, waits)
+    last = block[-1]
+    before = isinstance(last, ast.Return) or (len(block) == 1 and isinstance(last, ast.Pass))
+    first_line = lines[last.lineno - 1]
+    indentation = first_line[: len(first_line) - len(first_line.lstrip())]
+    at = last.lineno - 1 if before else last.end_lineno or last.lineno
+    after = "\n".join([*lines[:at], f"{indentation}{rospy}.spin()", *lines[at:]])
+    yield from _step("spin", at + 1, text, after, f"{rospy}.spin()")
+
+
+def _last_block(tree: ast.Module, waits: list[ast.Call]) -> list[ast.stmt]:
+    """The body in which the node would have to stay: of the function that subscribes, or else of the script."""
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef) and any(c in set(ast.walk(node)) for c in waits):
+            return node.body
+    block = tree.body
+    while isinstance(block[-1], ast.If | ast.Try):
+        block = block[-1].body
+    return block
+
+
+# ---- names that ROS is told
+
+
+def _names(text: str) -> list[dict[str, Any]]:
+    """Return the texts that name a topic, a node or a parameter, each with its role, value and place."""
+    if _error(text) is not None:
+        return []
+    tree, lines = ast.parse(text), text.split("\n")
+    constants = _constants(tree)
+    found = []
+    for role, node in _named(tree):
+        given = constants.get(node.id) if isinstance(node, ast.Name) else node
+        if not isinstance(given, ast.Constant) or not isinstance(given.value, str):
+            continue
+        span = _span(lines, given)
+        if span is not None and _is_literal(lines[span[0]][span[1] : span[2]], given.value):
+            place = {"line": span[0] + 1, "start": span[1], "end": span[2]}
+            found.append({"role": role, "value": given.value, **place})
+    return found
+
+
+def _named(tree: ast.Module) -> Iterator[tuple[str, ast.expr]]:
+    for call in ast.walk(tree):
+        if isinstance(call, ast.Subscript) and isinstance(call.slice, ast.Constant):
+            yield "key", call.slice
+        if not isinstance(call, ast.Call):
+            continue
+        name = _last(call.func)
+        role = {"Publisher": "publisher", "Subscriber": "subscriber", "init_node": "node"}.get(name, "")
+        role = "param" if name in PARAM_CALLS else role
+        keyword = "param_name" if role == "param" else "name"
+        given = [*call.args[:1], *(k.value for k in call.keywords if k.arg == keyword)]
+        if role and given:
+            yield role, given[0]
+
+
+def _constants(tree: ast.Module) -> dict[str, ast.expr]:
+    """Names that are given one value, once, in the whole file."""
+    found: dict[str, list[ast.expr]] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assign):
+            for target in node.targets:
+                if isinstance(target, ast.Name):
+                    found.setdefault(target.id, []).append(node.value)
+    return {name: values[0] for name, values in found.items() if len(values) == 1}
+
+
+def _is_literal(source: str, value: str) -> bool:
+    return len(source) < 300 and source.endswith((f"'{value}'", f'"{value}"')) and "\n" not in value

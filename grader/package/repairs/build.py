@@ -1,0 +1,281 @@
+"""Lines of `package.xml` and `CMakeLists.txt` without which nothing builds, or which the lab asks for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import PurePosixPath
+
+from cmake_parser.ast import Command, Token
+
+from grader.model.package import PackageFacts
+from grader.model.repair import RepairKind
+from grader.package.cmake_parse import commands_of
+from grader.package.manifest import parse_manifest
+from grader.package.repairs.editing import CMAKE, MANIFEST, Files, naming_files, rename_word
+from grader.package.repairs.files import is_own
+from grader.package.repairs.wanted import Wanted, is_near
+from grader.package.xml import parse_xml
+from grader.wording import join_words
+
+BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
+INSTALL = "catkin_install_python"
+CALL_LINES_MAX = 30
+ALL_NEEDS = re.compile(r"<(build_depend|depend|run_depend|exec_depend)>\s*([\w-]+)\s*<")
+OPEN_TAG = re.compile(r"tag mismatch: (?P<tag>\S+) line (?P<line>\d+)")
+
+
+# ---- package.xml
+
+
+def repair_manifest(files: Files, package: PackageFacts, wanted: Wanted) -> str:
+    """Find what the manifest lacks, and return the name that the package has in the end."""
+    text = files.text(MANIFEST)
+    if text is None:
+        return package.name
+    _close_tag(files)
+    _add_buildtool(files)
+    for name in wanted.dependencies:
+        _add_dependency(files, name)
+    manifest, _ = parse_manifest((files.text(MANIFEST) or "").encode())
+    if manifest is None:
+        return package.name
+    return manifest.name
+
+
+def rename_package(files: Files, wanted: Wanted) -> None:
+    """Find a name that is nearly the lab's, in the manifest; whatever else has it follows."""
+    text = files.text(MANIFEST)
+    manifest, _ = parse_manifest(text.encode()) if text is not None else (None, None)
+    if text is None or manifest is None or not is_near(manifest.name, wanted.package):
+        return
+    old, new = manifest.name, wanted.package
+    message = f"line {manifest.name_line} of {MANIFEST}: the package is called {old}, not {new}"
+    fix = f'write {new} for {old} in {MANIFEST}, in project(…) and in every pkg="…"'
+    files.change("package-name", MANIFEST, rename_word(text, old, new), message, fix)
+    for file in naming_files(files.folder):
+        other = files.text(file)
+        if file != MANIFEST and other is not None:
+            files.put(file, rename_word(other, old, new))
+
+
+def _parses(text: str) -> bool:
+    return parse_xml(text.encode(), MANIFEST, root="package")[0] is not None
+
+
+def _close_tag(files: Files) -> None:
+    text = files.text(MANIFEST) or ""
+    _, fault = parse_xml(text.encode(), MANIFEST, root="package")
+    found = OPEN_TAG.search(fault.message) if fault is not None else None
+    if found is None:
+        return
+    lines, at = text.split("\n"), int(found["line"]) - 1
+    if 0 <= at < len(lines):
+        lines[at] = f"{lines[at].rstrip()}</{found['tag']}>"
+        if _parses("\n".join(lines)):
+            message = f"line {at + 1} of {MANIFEST}: <{found['tag']}> is never closed"
+            files.change("manifest-line", MANIFEST, "\n".join(lines), message)
+
+
+def _add_buildtool(files: Files) -> None:
+    text = files.text(MANIFEST) or ""
+    if not re.search(r"<buildtool_depend[^>]*>\s*catkin\s*<", _uncommented(text)) and _parses(text):
+        message = f"{MANIFEST} does not name catkin as its build tool"
+        _insert(files, "<buildtool_depend>catkin</buildtool_depend>", message)
+
+
+def _add_dependency(files: Files, name: str) -> None:
+    text = files.text(MANIFEST) or ""
+    given = {match[2] for match in ALL_NEEDS.finditer(_uncommented(text))}
+    if name in given or not _parses(text):
+        return
+    old = re.search(r"<package(\s+format\s*=\s*[\"']1[\"'])?\s*>", text) is not None
+    lines = [f"<build_depend>{name}</build_depend>", f"<run_depend>{name}</run_depend>"]
+    message = f"{MANIFEST} does not name {name}, which the lab needs"
+    _insert(files, "\n".join(lines) if old else f"<depend>{name}</depend>", message)
+
+
+def _uncommented(text: str) -> str:
+    return re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
+
+
+def _insert(files: Files, tags: str, message: str) -> None:
+    """Put the tags below the last dependency, or the licence, or before the end, where the file still parses."""
+    text = files.text(MANIFEST) or ""
+    lines = text.split("\n")
+    after = [i for i, line in enumerate(lines) if re.search(r"</(\w*depend|license)>\s*$", line)]
+    end = next((i for i, line in reversed(list(enumerate(lines))) if "</package>" in line), len(lines))
+    for at in (*[i + 1 for i in reversed(after)], end):
+        around = lines[at - 1] if at else ""
+        indentation = around[: len(around) - len(around.lstrip())] if at in [i + 1 for i in after] else "  "
+        changed = "\n".join([*lines[:at], *(f"{indentation}{tag}" for tag in tags.split("\n")), *lines[at:]])
+        if (
+            _parses(changed)
+            and _uncommented(changed) != _uncommented(text)
+            and tags.split("\n", 1)[0] in _uncommented(changed)
+        ):
+            files.change("manifest-line", MANIFEST, changed, message)
+            return
+
+
+# ---- CMakeLists.txt
+
+
+def repair_cmake(files: Files, package: PackageFacts, name: str, wanted: Wanted) -> None:
+    """Find what `CMakeLists.txt` lacks. `name` is the package's name in the manifest."""
+    if files.text(CMAKE) is None:
+        return
+    _close_bracket(files)
+    if commands_of(_cmake(files).encode()) is None:
+        return
+    needs = " ".join(wanted.dependencies or ("rospy", "std_msgs"))
+    if not _calls_catkin(files, package):
+        line = f"find_package(catkin REQUIRED COMPONENTS {needs})"
+        _add_call(files, "find_package(catkin …)", r"find_package\s*\(\s*catkin\b", line, ("project",))
+    if not _has(files, package, "catkin_package"):
+        below = ("find_package", "project")
+        _add_call(files, "catkin_package()", r"catkin_package\s*\(", "catkin_package()", below)
+    _install(files, package, wanted)
+    _name_project(files, name, wanted.package)
+
+
+def _cmake(files: Files) -> str:
+    return files.text(CMAKE) or ""
+
+
+def _commands(files: Files, *names: str) -> list[Command]:
+    found = commands_of(_cmake(files).encode()) or []
+    return [c for c in found if c.identifier.lower() in names]
+
+
+def _words(command: Command) -> list[Token]:
+    return [token for token in command.args if token.kind != "COMMENT"]
+
+
+def _has(files: Files, package: PackageFacts, name: str) -> bool:
+    told = package.cmake.calls if package.cmake is not None else ()
+    return bool(_commands(files, name)) or any(call.name == name for call in told)
+
+
+def _calls_catkin(files: Files, package: PackageFacts) -> bool:
+    told = package.cmake.calls if package.cmake is not None else ()
+    written = [[t.value for t in _words(c)] for c in _commands(files, "find_package")]
+    known = [list(c.args) for c in told if c.name == "find_package"]
+    return any(words[:1] == ["catkin"] for words in (*written, *known))
+
+
+def _replaced(text: str, token: Token, new: str) -> str:
+    return text[: token.span.start] + new + text[token.span.stop :]
+
+
+def _close_bracket(files: Files) -> None:
+    text = _cmake(files)
+    if commands_of(text.encode()) is None and commands_of(f"{text.rstrip()}\n)\n".encode()) is not None:
+        last = text.rstrip().count("\n") + 1
+        message = f"line {last} of {CMAKE}: a bracket that is opened is never closed"
+        files.change("build-line", CMAKE, f"{text.rstrip()})\n", message)
+
+
+def _name_project(files: Files, name: str, wanted: str) -> None:
+    """A manifest whose name is nearly the lab's gets that name later."""
+    right = wanted if is_near(name, wanted) else name
+    for command in _commands(files, "project")[:1]:
+        words = _words(command)
+        if words and words[0].value.strip('"') not in (name, right) and "$" not in words[0].value:
+            given = words[0].value
+            message = f"line {command.line} of {CMAKE}: project({given}) is not the package's name, {name}"
+            kind: RepairKind = "package-name" if is_near(given, name) else "build-line"
+            files.change(kind, CMAKE, _replaced(_cmake(files), words[0], name), message)
+
+
+def _add_call(files: Files, what: str, pattern: str, line: str, below: Sequence[str]) -> None:
+    """Take the call out of its comment, or write it below the first of these commands that is there."""
+    text = _cmake(files)
+    changed = _uncomment(text, pattern)
+    if changed is None:
+        lines = text.split("\n")
+        above = next((found[0] for name in below if (found := _commands(files, name))), None)
+        at = text.count("\n", 0, above.span.stop) + 1 if above is not None else len(lines)
+        changed = "\n".join([*lines[:at], line, *lines[at:]])
+    files.change("build-line", CMAKE, changed, f"{CMAKE} does not call {what}")
+
+
+def _uncomment(text: str, pattern: str) -> str | None:
+    """The text with the first such call taken out of its comment, up to its closing bracket; None without one."""
+    lines = text.split("\n")
+    for first, line in enumerate(lines):
+        if not re.match(rf"\s*#+\s?{pattern}", line, re.IGNORECASE):
+            continue
+        call: list[str] = []
+        for line_of_call in lines[first : first + CALL_LINES_MAX]:
+            call.append(re.sub(r"^(\s*)#+ ?", r"\1", line_of_call, count=1))
+            if commands_of("\n".join(call).encode()):
+                return "\n".join([*lines[:first], *call, *lines[first + len(call) :]])
+    return None
+
+
+def _install(files: Files, package: PackageFacts, wanted: Wanted) -> None:
+    own = [f.path for f in package.files if is_own(f.path)]
+    there = {path for path in (_place(own, files, script) for script in wanted.installed) if path}
+    calls = _commands(files, INSTALL)
+    named = {_plain(t.value) for c in calls for t in _words(c)}
+    if any("$" in name and name != BIN for name in named):
+        return  # which scripts a variable holds is for CMake to say
+    missing = sorted(there - named)
+    if missing and not calls:
+        line = f"{INSTALL}(PROGRAMS {' '.join(missing)}\n  DESTINATION {BIN}\n)"
+        changed = _uncomment(_cmake(files), rf"{INSTALL}\s*\(")
+        if changed is None or not all(path in changed for path in missing):
+            changed = f"{_cmake(files).rstrip()}\n\n{line}\n"
+        fix = f"write {' '.join(line.split())}"
+        files.change("build-line", CMAKE, changed, f"{CMAKE} does not install {join_words(missing)}", fix)
+        return
+    for path in missing:
+        _name_script(files, own, path)
+    _correct_destination(files)
+
+
+def _place(own: Sequence[str], files: Files, script: str) -> str:
+    """Where the script lies; the empty text where it is not there."""
+    name = PurePosixPath(script).name
+    copies = [p for p in own if PurePosixPath(p).name == name]
+    renamed = [
+        r.after for r in files.repairs if r.kind == "file-name" and PurePosixPath(r.after).name == name
+    ]
+    return script if script in (*copies, *renamed) else next(iter([*copies, *renamed]), "")
+
+
+def _plain(word: str) -> str:
+    return re.sub(r"^\$\{(PROJECT_SOURCE_DIR|CMAKE_CURRENT_SOURCE_DIR)\}/|^\./", "", word.strip('"'))
+
+
+def _name_script(files: Files, own: Sequence[str], path: str) -> None:
+    """In place of a file that does not exist and has nearly its name, or beside the others."""
+    text, name = _cmake(files), PurePosixPath(path).name
+    call = next((c for c in _commands(files, INSTALL) if any(t.value == "PROGRAMS" for t in _words(c))), None)
+    if call is None:
+        return
+    programs = next(t for t in _words(call) if t.value == "PROGRAMS")
+    stray = [
+        t for t in _words(call) if _plain(t.value) not in own and _is_about(PurePosixPath(t.value).name, name)
+    ]
+    if stray:
+        message = f"line {call.line} of {CMAKE}: {stray[0].value} does not exist; the script is {path}"
+        files.change("build-line", CMAKE, _replaced(text, stray[0], path), message)
+    else:
+        message = f"line {call.line} of {CMAKE}: {INSTALL}(…) does not name {path}"
+        files.change("build-line", CMAKE, _replaced(text, programs, f"PROGRAMS {path}"), message)
+
+
+def _is_about(given: str, name: str) -> bool:
+    return given == name or is_near(given, name) or f"{given}.py" == name
+
+
+def _correct_destination(files: Files) -> None:
+    for call in _commands(files, INSTALL):
+        words = _words(call)
+        at = next((i for i, t in enumerate(words) if t.value == "DESTINATION"), len(words))
+        if at + 1 < len(words) and words[at + 1].value.startswith("${CATKIN_") and words[at + 1].value != BIN:
+            message = f"line {call.line} of {CMAKE}: {words[at + 1].value} is not where rosrun looks"
+            files.change("build-line", CMAKE, _replaced(_cmake(files), words[at + 1], BIN), message)
+            return

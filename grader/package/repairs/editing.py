@@ -1,0 +1,234 @@
+"""A package's files as repairs see them, in memory, and how one repair is written to the disk.
+
+Files are opened without following any link, from the package's folder on, and replaced whole.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import secrets
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+
+from grader.files import open_untrusted
+from grader.model.repair import Repair, RepairKind
+from grader.package.reading import LEFT_OUT
+from grader.portable import BINARY, CLOEXEC, DIRECTORY, NOFOLLOW, READ
+
+TEXT_BYTES_MAX = 64_000
+"""Larger files are no student's work, and are left as they are."""
+BOM = b"\xef\xbb\xbf"
+UTF16 = (b"\xff\xfe", b"\xfe\xff")
+MANIFEST, CMAKE = "package.xml", "CMakeLists.txt"
+NAMING = (".launch", ".launch.xml", ".test")
+
+
+class NotRepairable(ValueError):
+    """The file is no longer as the repair knows it, or is none that the grader would write."""
+
+
+def read_data(folder: Path, file: str, limit_bytes: int = TEXT_BYTES_MAX) -> bytes | None:
+    """Return a file's bytes; None for what is no regular file inside the folder, or too large."""
+    try:
+        with open_untrusted(folder, *parts_of(file)) as stream:
+            data = stream.read(limit_bytes + 1)
+    except (OSError, ValueError):
+        return None
+    return data if len(data) <= limit_bytes else None
+
+
+def parts_of(file: str) -> tuple[str, ...]:
+    """Return the names on the way to a file. Raises NotRepairable for a path that could lead out of the folder."""
+    parts = tuple(file.split("/"))
+    if not file or "\0" in file or {"", ".", ".."} & set(parts):
+        raise NotRepairable(f"{file} is no path inside the package")
+    return parts
+
+
+@dataclass(kw_only=True)
+class Files:
+    """The texts of a package's files with the repairs so far made in them. Nothing is written."""
+
+    folder: Path
+    repairs: list[Repair] = field(default_factory=list)
+    _texts: dict[str, str | None] = field(default_factory=dict)
+
+    def text(self, file: str) -> str | None:
+        """Return the file's text, line ends as on Linux; None where it is no text that can be repaired."""
+        if file not in self._texts:
+            data = read_data(self.folder, file)
+            self._texts[file] = None if data is None else as_text(data)
+        return self._texts[file]
+
+    def put(self, file: str, text: str | None) -> None:
+        """Remember what the file will be."""
+        self._texts[file] = text
+
+    def add(self, repair: Repair) -> None:
+        """Remember a repair that changes no line of a text."""
+        self.repairs.append(repair)
+
+    def change(self, kind: RepairKind, file: str, after: str, message: str, fix: str = "") -> None:
+        """Remember that the file's text becomes `after`. Without a `fix`, the changed lines say it."""
+        before = self.text(file)
+        if before is None or before == after or not _is_unicode(before + after):
+            return
+        line, old, new = changed_lines(before, after)
+        self._texts[file] = after
+        words = {"message": message, "fix": fix or added_lines(old, new)}
+        self.repairs.append(Repair(kind=kind, file=file, line=line, before=old, after=new, **words))
+
+
+def _is_unicode(text: str) -> bool:
+    return not any("\ud800" <= char <= "\udfff" for char in text)
+
+
+def as_text(data: bytes) -> str | None:
+    """Return the bytes as text, without a mark and with Linux's line ends; None for what is no UTF-8."""
+    try:
+        text = data.removeprefix(BOM).decode("utf-8")
+    except UnicodeDecodeError:
+        return None
+    text = text.replace("\r\n", "\n")
+    return None if "\0" in text or "\r" in text else text
+
+
+def changed_lines(before: str, after: str) -> tuple[int, str, str]:
+    """Return the first line that differs (from 1), and the lines that do, before and after.
+
+    Where lines are only added or only left out, one that stays is part of both.
+    """
+    old, new = before.split("\n"), after.split("\n")
+    shorter = min(len(old), len(new))
+    start = next((i for i in range(shorter) if old[i] != new[i]), shorter)
+    end = next((i for i in range(shorter - start) if old[-1 - i] != new[-1 - i]), shorter - start)
+    if end in (len(old) - start, len(new) - start):
+        start, end = (start - 1, end) if start else (start, end - 1)
+    first, last = old[start : len(old) - end], new[start : len(new) - end]
+    return start + 1, "\n".join(first), "\n".join(last)
+
+
+def added_lines(before: str, after: str) -> str:
+    """Return the lines that are new, in one line."""
+    old = before.split("\n")
+    return "; ".join(line.strip() for line in after.split("\n") if line not in old and line.strip())
+
+
+# ---- on the disk
+
+
+def replace_lines(data: bytes, repair: Repair) -> bytes:
+    """Return a file's bytes with the repair's lines in them; a mark and the line ends stay. Raises NotRepairable."""
+    text = as_text(data)
+    if text is None or repair.line is None:
+        raise NotRepairable(f"{repair.file} is no text any more")
+    lines, old = text.split("\n"), repair.before.split("\n")
+    places = [i for i in range(len(lines) - len(old) + 1) if lines[i : i + len(old)] == old]
+    if not places:
+        raise NotRepairable(f"{repair.file} has changed: line {repair.line} is not as it was")
+    at = min(places, key=lambda place: abs(place + 1 - (repair.line or 0)))
+    lines[at : at + len(old)] = repair.after.split("\n")
+    ends = b"\r\n" if b"\r\n" in data else b"\n"
+    mark = BOM if data.startswith(BOM) else b""
+    return mark + "\n".join(lines).encode().replace(b"\n", ends)
+
+
+def rename_word(text: str, old: str, new: str) -> str:
+    """Return the text with a file's or package's name replaced, where it stands as a whole word."""
+    return re.sub(rf"(?<![\w.-]){re.escape(old)}(?![\w-]|\.\w)", lambda _: new, text)
+
+
+def naming_files(folder: Path) -> Iterator[str]:
+    """Yield the files that name the package and its scripts: the manifest, CMake's file and launch files."""
+    for place, folders, names in os.walk(folder):
+        folders[:] = sorted(name for name in folders if name not in LEFT_OUT)
+        for name in sorted(names):
+            if name in (MANIFEST, CMAKE) or name.lower().endswith(NAMING):
+                yield (Path(place) / name).relative_to(folder).as_posix()
+
+
+@contextmanager
+def _opened_parent(folder: Path, file: str) -> Iterator[tuple[int, str]]:
+    """Open the folder that the file lies in, following no link below the package's own folder."""
+    *above, name = parts_of(file)
+    descriptor = os.open(folder, READ | DIRECTORY)
+    try:
+        for part in above:
+            inner = os.open(part, READ | NOFOLLOW | DIRECTORY, dir_fd=descriptor)
+            os.close(descriptor)
+            descriptor = inner
+        yield descriptor, name
+    finally:
+        os.close(descriptor)
+
+
+def write_data(folder: Path, file: str, data: bytes, *, mode: int | None = None) -> None:
+    """Replace a file whole, its mode kept unless another is given. Raises OSError or NotRepairable."""
+    with _opened_parent(folder, file) as (parent, name):
+        was = os.stat(name, dir_fd=parent, follow_symlinks=False)
+        if not stat.S_ISREG(was.st_mode):
+            raise NotRepairable(f"{file} is no regular file")
+        beside = f".{secrets.token_hex(8)}"
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | CLOEXEC | NOFOLLOW | BINARY
+        try:
+            with os.fdopen(os.open(beside, flags, 0o600, dir_fd=parent), "wb") as stream:
+                stream.write(data)
+                stream.flush()
+                os.fchmod(stream.fileno(), stat.S_IMODE(was.st_mode) if mode is None else mode)
+                os.fsync(stream.fileno())
+            os.rename(beside, name, src_dir_fd=parent, dst_dir_fd=parent)
+        except BaseException:
+            with suppress(OSError):
+                os.unlink(beside, dir_fd=parent)
+            raise
+
+
+def make_executable(folder: Path, file: str) -> None:
+    """Set the executable bits of those who may read it. Raises OSError or NotRepairable.
+
+    A file that has another name elsewhere gets a copy: its bits would change there too.
+    """
+    with open_untrusted(folder, *parts_of(file)) as stream:
+        was = os.fstat(stream.fileno())
+        mode = stat.S_IMODE(was.st_mode)
+        mode |= (mode & 0o444) >> 2
+        if was.st_nlink == 1:
+            os.fchmod(stream.fileno(), mode)
+            return
+    data = read_data(folder, file)
+    if data is None:
+        raise NotRepairable(f"{file} is too large to be copied")
+    write_data(folder, file, data, mode=mode)
+
+
+def rename_file(folder: Path, repair: Repair) -> None:
+    """Give a file its name, and write this name where the build files and launch files have the old one."""
+    old, new = repair.before, repair.after
+    if PurePosixPath(old).parent != PurePosixPath(new).parent:
+        raise NotRepairable(f"{new} lies in another folder")
+    with _opened_parent(folder, old) as (parent, name):
+        target = parts_of(new)[-1]
+        if not stat.S_ISREG(os.stat(name, dir_fd=parent, follow_symlinks=False).st_mode):
+            raise NotRepairable(f"{old} is no regular file")
+        with suppress(FileNotFoundError):
+            found = os.stat(target, dir_fd=parent, follow_symlinks=False)
+            if not os.path.samestat(found, os.stat(name, dir_fd=parent, follow_symlinks=False)):
+                raise NotRepairable(f"there is a {new} already")
+        os.rename(name, target, src_dir_fd=parent, dst_dir_fd=parent)
+    rename_everywhere(folder, PurePosixPath(old).name, PurePosixPath(new).name)
+
+
+def rename_everywhere(folder: Path, old: str, new: str) -> None:
+    """Write the new name where the build files and launch files have the old one."""
+    for file in naming_files(folder):
+        data = read_data(folder, file)
+        text = as_text(data) if data is not None else None
+        if data is None or text is None or (changed := rename_word(text, old, new)) == text:
+            continue
+        line, before, after = changed_lines(text, changed)
+        whole = Repair(kind="file-name", file=file, line=line, before=before, after=after, message="", fix="")
+        write_data(folder, file, replace_lines(data, whole))

@@ -1,0 +1,190 @@
+"""Repairs of files as such: permission bits, line ends, first lines, encodings and names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import PurePosixPath
+
+from grader.model.package import PackageFacts, SourceFile
+from grader.model.repair import Repair, RepairKind
+from grader.package.reading import LEFT_OUT
+from grader.package.repairs.editing import (
+    BOM,
+    CMAKE,
+    MANIFEST,
+    UTF16,
+    Files,
+    as_text,
+    naming_files,
+    read_data,
+    rename_word,
+)
+from grader.package.repairs.wanted import Wanted, is_near
+from grader.wording import join_words
+
+SHEBANG = "#!/usr/bin/env python3"
+SHELL = "#!/bin/bash"
+COOKIE = re.compile(r"^[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+).*$")
+SHOWN_BYTES = 200
+
+
+def repair_files(files: Files, scripts: Iterable[SourceFile]) -> None:
+    """Find what keeps the scripts from being started or read: bit, line ends, first line, mark, encoding."""
+    for script in scripts:
+        if script.executable is False:
+            command = f"chmod +x {script.path}"
+            message = f"{script.path} is not executable"
+            files.add(Repair(kind="executable-bit", file=script.path, message=message, fix=command))
+        if script.link is None and not script.binary:
+            _repair_bytes(files, script)
+
+
+def _repair_bytes(files: Files, script: SourceFile) -> None:
+    data = read_data(files.folder, script.path)
+    if not data:
+        return
+    if data.startswith(UTF16) or (script.encoding == "unknown-8bit" and as_text(data) is None):
+        data = _repair_encoding(files, script, data)
+    if data.startswith(BOM) and data[3:5] == b"#!":
+        message = f"{script.path} begins with an invisible byte order mark (BOM), so its first line is no #!"
+        _add_bytes(
+            files, "byte-order-mark", script.path, data, message=message, fix="save it as UTF-8 without BOM"
+        )
+        data = data.removeprefix(BOM)
+    if b"\r\n" in data and (data.startswith(b"#!") or script.path.endswith(".sh")):
+        message = f"the lines of {script.path} end as on Windows (CR LF)"
+        _add_bytes(files, "line-ends", script.path, data, message=message, fix=f"dos2unix {script.path}")
+    text = as_text(data)
+    files.put(script.path, text)
+    if text is not None and script.shebang_problem:
+        _repair_shebang(files, script, text)
+
+
+def _add_bytes(files: Files, kind: RepairKind, file: str, data: bytes, *, message: str, fix: str) -> None:
+    first = data.split(b"\n", 1)[0][:SHOWN_BYTES].decode("utf-8", "replace")
+    after = first.removeprefix("\ufeff").removesuffix("\r")
+    files.add(Repair(kind=kind, file=file, line=1, before=first, after=after, message=message, fix=fix))
+
+
+def _repair_encoding(files: Files, script: SourceFile, data: bytes) -> bytes:
+    after = to_utf8(data)
+    wide = data.startswith(UTF16)
+    message = f"{script.path} is {'saved as UTF-16' if wide else 'not saved as UTF-8'}"
+    old = b"" if wide else next((line for line in data.split(b"\n") if not line.isascii()), b"")
+    line = data[: data.find(old)].count(b"\n")
+    files.add(
+        Repair(
+            kind="encoding",
+            file=script.path,
+            line=line + 1,
+            before=old[:SHOWN_BYTES].decode("utf-8", "replace"),
+            after=after.split(b"\n")[line][:SHOWN_BYTES].decode("utf-8", "replace"),
+            message=message,
+            fix=f"save {script.path} as UTF-8 in your editor",
+        )
+    )
+    return after
+
+
+def to_utf8(data: bytes) -> bytes:
+    """Return the bytes as UTF-8: from UTF-16, or from the encoding of Windows in western Europe."""
+    if data.startswith(UTF16):
+        text = data.decode("utf-16", "replace")
+    else:
+        try:
+            text = data.decode("cp1252")
+        except UnicodeDecodeError:
+            text = data.decode("latin-1")
+    head, newline, rest = text.partition("\n")
+    lines = [head, *rest.split("\n", 1)] if newline else [head]
+    for number, line in enumerate(lines[:2]):
+        if COOKIE.match(line):
+            lines[number] = "# -*- coding: utf-8 -*-"
+    return "\n".join(lines).encode()
+
+
+def _repair_shebang(files: Files, script: SourceFile, text: str) -> None:
+    """What a line that ends in CR, or stands behind a mark, says is judged by itself."""
+    lines = text.split("\n")
+    wanted = SHELL if script.path.endswith((".sh", ".bash")) else SHEBANG if script.python else ""
+    problem = script.shebang_problem
+    if "byte order mark" in problem or "CRLF" in problem:
+        usable = script.shebang is None or script.shebang.found
+        problem = "" if usable else f"there is no {script.shebang.interpreter} on a ROS machine"  # type: ignore[union-attr]
+    if not wanted or not problem or problem == "the file is empty":
+        return
+    first = next((i for i, line in enumerate(lines[:50]) if re.match(r"\s*(#\s*!|!\s*#)", line)), None)
+    looks_like = first is not None and bool(re.search(r"python|/(ba)?sh|bin/", lines[first]))
+    above = lines[:first] if looks_like and first is not None else []
+    if looks_like and first is not None and all(not line.strip() or line.startswith("#") for line in above):
+        rest = lines[first + 1 :]
+        after = [wanted, *(line for line in above if line.strip()), *rest]
+    else:
+        after = [wanted, *lines]
+    message = f"{script.path} cannot be started: {problem.split(': write')[0]}"
+    files.change("shebang", script.path, "\n".join(after), message, f"write {wanted} as the very first line")
+
+
+# ---- names of files
+
+
+def find_renames(package: PackageFacts, wanted: Wanted) -> dict[str, str]:
+    """Return the paths of files whose names are nearly those that are wanted, and their paths with the right names."""
+    present = [f.path for f in package.files if is_own(f.path) and f.link is None]
+    names = {PurePosixPath(path).name for path in present}
+    right = {PurePosixPath(path).name: path for path in _wanted_files(wanted)}
+    renames: dict[str, str] = {}
+    for name, path in right.items():
+        near = [
+            p
+            for p in present
+            if p not in renames and PurePosixPath(p).name not in right and _is_slip(p, name)
+        ]
+        if name not in names and near:
+            old = min(near, key=lambda p: (PurePosixPath(p).parent != PurePosixPath(path).parent, p))
+            renames[old] = str(PurePosixPath(old).with_name(name))
+    return renames
+
+
+def rename_files(files: Files, renames: dict[str, str]) -> None:
+    """Give files their names, here and where the build files and launch files name them."""
+    for old, new in renames.items():
+        name = PurePosixPath(new).name
+        message = f"{old} should be called {name}"
+        fix = f"git mv {old} {new}"
+        others = [file for file in naming_files(files.folder) if file != old]
+        naming = [file for file in others if _put_word(files, file, PurePosixPath(old).name, name)]
+        words = f"{fix}, and write {name} in {join_words(naming)}" if naming else fix
+        files.add(Repair(kind="file-name", file=old, before=old, after=new, message=message, fix=words))
+        files.put(new, files.text(old))
+
+
+def _put_word(files: Files, file: str, old: str, new: str) -> bool:
+    text = files.text(file)
+    if text is None or (changed := rename_word(text, old, new)) == text:
+        return False
+    files.put(file, changed)
+    return True
+
+
+def _wanted_files(wanted: Wanted) -> Iterator[str]:
+    yield from (MANIFEST, CMAKE)
+    yield from (*wanted.scripts, *wanted.launch_files, *wanted.files, *wanted.installed)
+
+
+def _is_slip(path: str, name: str) -> bool:
+    """One letter or capitals; of a script or launch file, the suffix may be missing, and is else right."""
+    given, right = PurePosixPath(path), PurePosixPath(name)
+    if name in (MANIFEST, CMAKE):
+        return given.name == path and is_near(path, name)
+    return (
+        is_near(given.name, name)
+        or given.name == right.stem
+        or (given.suffix == right.suffix and is_near(given.stem, right.stem))
+    )
+
+
+def is_own(path: str) -> bool:
+    """Return whether the student wrote it; what a build made is none of theirs."""
+    return not LEFT_OUT & set(PurePosixPath(path).parts[:1])

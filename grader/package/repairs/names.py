@@ -1,0 +1,223 @@
+"""Names of topics, nodes and parameters that are nearly those of the lab: in scripts, launch files and YAML files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import PurePosixPath
+
+from grader.model.package import LaunchFile, LaunchNode, PackageFacts
+from grader.model.repair import RepairKind
+from grader.package.repairs.editing import Files
+from grader.package.repairs.python import Name
+from grader.package.repairs.wanted import Wanted, is_near
+
+KINDS: dict[str, RepairKind] = {
+    "publisher": "topic-name",
+    "subscriber": "topic-name",
+    "node": "node-name",
+    "param": "parameter-name",
+    "key": "parameter-name",
+}
+ROLES = ("node", "publisher", "subscriber", "param")
+NO_SCRIPTS = (".launch", ".xml", ".txt", ".yaml", ".yml", ".md", ".test")
+WORDS = {"topic-name": "topic", "node-name": "node", "parameter-name": "parameter"}
+TAG_LINES_MAX = 20
+_KEY = re.compile(r"^(?P<indent> *)(?P<quote>[\"']?)(?P<key>[A-Za-z_][\w-]*)(?P=quote)(?=\s*:(\s|$))")
+
+
+def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: Wanted) -> None:
+    """Find the literals of a script that are slips of what the lab asks for, where it asks for nothing else there."""
+    node = next((name.value for name in names if name.role == "node"), "")
+    slips = []
+    for role in ROLES:
+        asked = {"node": wanted.nodes, "param": wanted.params}.get(role, wanted.topics)
+        given = [name for name in names if name.role == role]
+        used = {_resolved(name, node) for name in given}
+        absent = [w for w in asked if _bare(w, role) not in used]
+        for name in given:
+            right = next((w for w in absent if _is_slip(name, w, node)), "")
+            if right and _resolved(name, node) not in {_bare(w, role) for w in asked}:
+                slips.append((name, right))
+    for name, right in dict.fromkeys(slips):
+        _replace_literal(files, file, name, _literal(name, right, node), right)
+
+
+def _bare(name: str, role: str) -> str:
+    return name.strip("/") if role == "node" else f"/{name.lstrip('/')}"
+
+
+def _resolved(name: Name, node: str) -> str:
+    """The whole name, as ROS resolves it for a node in the root namespace."""
+    if name.role == "node":
+        return name.value.strip("/")
+    if name.value.startswith("~"):
+        return f"/{node}/{name.value[1:].lstrip('/')}"
+    return f"/{name.value.lstrip('/')}"
+
+
+def _is_slip(name: Name, right: str, node: str) -> bool:
+    resolved, bare = _resolved(name, node), _bare(right, name.role)
+    astray = resolved != bare and name.value.lstrip("/~") == bare.lstrip("/")
+    return is_near(resolved, bare) or astray
+
+
+def _literal(name: Name, right: str, node: str) -> str:
+    """The right name in the way that the wrong one is written: relative, private, or whole."""
+    own = f"/{node.strip('/')}/"
+    if name.role == "node":
+        return right.strip("/")
+    if name.value.startswith("~") and node and right.startswith(own):
+        return f"~{right.removeprefix(own)}"
+    return right if name.value.startswith(("/", "~")) else right.lstrip("/")
+
+
+def _replace_literal(files: Files, file: str, name: Name, value: str, right: str) -> None:
+    """Where an earlier replacement has moved the literal, it is found by its value."""
+    text = files.text(file)
+    if text is None:
+        return
+    lines = text.split("\n")
+    line = lines[name.line - 1]
+    at = line.find(name.value, name.start)
+    if at < 0:
+        at = line.find(name.value)
+    if at < 0:
+        return
+    lines[name.line - 1] = line[:at] + value + line[at + len(name.value) :]
+    kind = KINDS[name.role]
+    message = f"line {name.line} of {file}: the {WORDS[kind]} {name.value} should be {right}"
+    files.change(kind, file, "\n".join(lines), message)
+
+
+# ---- YAML files
+
+
+def repair_yaml_names(
+    files: Files, package: PackageFacts, scripts: dict[str, tuple[Name, ...]], wanted: Wanted
+) -> None:
+    """Find keys of parameter files that are slips of the lab's parameters, and the scripts that read them so."""
+    branches = {
+        tuple(parts[:n])
+        for w in wanted.params
+        for parts in [w.strip("/").split("/")]
+        for n in range(1, len(parts) + 1)
+    }
+    names = {PurePosixPath(file).name for file in wanted.files}
+    for file in (
+        f.path
+        for f in package.files
+        if PurePosixPath(f.path).name in names and f.path.endswith((".yaml", ".yml"))
+    ):
+        for old, new in _repair_keys(files, file, branches):
+            for script, used in scripts.items():
+                for name in used:
+                    if name.role == "key" and name.value == old:
+                        _replace_literal(files, script, name, new, new)
+
+
+def _repair_keys(files: Files, file: str, branches: set[tuple[str, ...]]) -> Iterator[tuple[str, str]]:
+    text = files.text(file)
+    keys = list(_keys(text)) if text else []
+    there = {path for _, path in keys}
+    for number, path in keys:
+        absent = sorted(b for b in branches if b not in there and b[:-1] == path[:-1])
+        right = next((b[-1] for b in absent if path not in branches and is_near(path[-1], b[-1])), "")
+        text = files.text(file)
+        if not right or text is None:
+            continue
+        lines = text.split("\n")
+        lines[number] = _KEY.sub(rf"\g<indent>\g<quote>{right}\g<quote>", lines[number])
+        message = f"line {number + 1} of {file}: the key {path[-1]} should be {right}"
+        files.change("parameter-name", file, "\n".join(lines), message)
+        there.add((*path[:-1], right))
+        yield path[-1], right
+
+
+def _keys(text: str) -> Iterator[tuple[int, tuple[str, ...]]]:
+    """Yield the line (from 0) and the whole path of each key of a block of YAML, by its indentation."""
+    above: list[tuple[int, str]] = []
+    for number, line in enumerate(text.split("\n")):
+        found = _KEY.match(line)
+        if found:
+            depth = len(found["indent"])
+            above = [(d, key) for d, key in above if d < depth]
+            above.append((depth, found["key"]))
+            yield number, tuple(key for _, key in above)
+
+
+# ---- launch files
+
+
+def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str], wanted: Wanted) -> None:
+    """Find attributes of launch files that name a script without its `.py`, another package, or a node or parameter
+    nearly as the lab does. `names` are the files of the package once they are renamed."""
+    given = package.manifest.name if package.manifest is not None else wanted.package
+    own = wanted.package if is_near(given, wanted.package) else given
+    ours = {own, given, PurePosixPath(package.path).name}
+    scripts = {name for path in names if not (name := PurePosixPath(path).name).endswith(NO_SCRIPTS)}
+    programs = scripts | _programs(package)
+    nodes = [(launch, node) for launch in package.launch_files for node in launch.nodes]
+    for launch, node in nodes:
+        pkg, kind = node.pkg or "", node.type or ""
+        if pkg != own and (is_near(pkg, own) or (pkg in ours and {kind, f"{kind}.py"} & scripts)):
+            _set_attribute(files, launch.path, node.line, ("pkg", pkg, own), kind="package-name")
+    for launch, node in nodes:
+        kind = node.type or ""
+        if kind and kind not in programs and (node.pkg in ours or is_near(node.pkg or "", own)):
+            near = (
+                [f"{kind}.py"]
+                if f"{kind}.py" in scripts
+                else [s for s in sorted(scripts) if is_near(kind, s)]
+            )
+            for right in near[:1]:
+                _set_attribute(files, launch.path, node.line, ("type", kind, right), kind="launch-type")
+    for launch, node in nodes:
+        _repair_node(files, launch, node, wanted)
+    for launch in package.launch_files:
+        _repair_params(files, launch, wanted)
+
+
+def _repair_params(files: Files, launch: LaunchFile, wanted: Wanted) -> None:
+    there = {param.name for param in launch.params}
+    for param in launch.params:
+        right = next((w for w in wanted.params if w not in there and is_near(param.name, w)), "")
+        if right and param.file == launch.path and param.name not in wanted.params:
+            old, new = param.name.rpartition("/")[2], right.rpartition("/")[2]
+            _set_attribute(files, launch.path, param.line, ("name", old, new), kind="parameter-name")
+
+
+def _programs(package: PackageFacts) -> set[str]:
+    calls = package.cmake.calls if package.cmake is not None else ()
+    return {call.args[0] for call in calls if call.name == "add_executable" and call.args}
+
+
+def _repair_node(files: Files, launch: LaunchFile, node: LaunchNode, wanted: Wanted) -> None:
+    name = node.name or ""
+    others = {one.name for one in launch.nodes}
+    right = next((w for w in wanted.nodes if w.strip("/") not in others and is_near(name, w.strip("/"))), "")
+    if right and name not in {w.strip("/") for w in wanted.nodes}:
+        _set_attribute(files, launch.path, node.line, ("name", name, right.strip("/")), kind="node-name")
+
+
+def _set_attribute(
+    files: Files, file: str, line: int, change: tuple[str, str, str], *, kind: RepairKind
+) -> None:
+    """Replace the attribute's value where it next stands, from the tag's line on."""
+    attribute, old, new = change
+    text = files.text(file)
+    if text is None or line < 1:
+        return
+    lines = text.split("\n")
+    pattern = re.compile(
+        rf"(?P<head>\b{attribute}\s*=\s*(?P<quote>[\"'])\s*){re.escape(old)}(?=\s*(?P=quote))"
+    )
+    for number in range(line - 1, min(len(lines), line - 1 + TAG_LINES_MAX)):
+        changed = pattern.sub(lambda m: m["head"] + new, lines[number], count=1)
+        if changed != lines[number]:
+            lines[number] = changed
+            message = f'line {number + 1} of {file}: {attribute}="{old}" should be {attribute}="{new}"'
+            files.change(kind, file, "\n".join(lines), message)
+            return
+        if number >= line and "<" in lines[number].replace("<!--", ""):
+            return

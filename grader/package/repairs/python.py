@@ -1,0 +1,139 @@
+"""Repairs of Python sources: what does not parse, names and calls that are missing, and names that ROS is told.
+
+The sources are read in a child process with limits (`grader/package/python_child.py`); here its answer is put in words.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Literal
+
+from grader.limited_child import ChildLimits, run_limited
+from grader.model.record import Record
+from grader.model.repair import RepairKind
+from grader.package.python import cause_of
+from grader.package.repairs.editing import Files
+
+EXAMINE = "grader.package.python_child:examine"
+LIMITS = {"memory_bytes": 1 << 30, "cpu_s": 20, "file_bytes": 32 << 20, "answer_bytes": 16 << 20}
+WALL_S = 10.0
+ATTEMPTS = 3
+"""A source that crashes Python costs its own repairs, not those of the others."""
+
+Cause = Literal["tabs", "python2", "characters", "token", "old-name", "import", "call", "spin"]
+KINDS: dict[str, RepairKind] = {"import": "missing-import", "call": "missing-call", "spin": "missing-call"}
+
+
+class _Error(Record):
+    kind: str
+    line: int
+    column: int | None
+    message: str
+    text: str
+
+
+class _Step(Record):
+    cause: Cause
+    line: int
+    word: str = ""
+    error: _Error | None = None
+    text: str
+
+
+class Name(Record):
+    """A text in a script that names something; `start` and `end` are columns of its line, from 0."""
+
+    role: Literal["publisher", "subscriber", "node", "param", "key"]
+    value: str
+    line: int
+    start: int
+    end: int
+
+
+class _Entry(Record):
+    file: str
+    steps: tuple[_Step, ...]
+    names: tuple[Name, ...]
+
+
+def repair_python(files: Files, scripts: Sequence[str], types: Sequence[str]) -> dict[str, tuple[Name, ...]]:
+    """Find what keeps the sources from running, and return the names that they use once they do."""
+    texts = {script: text for script in scripts if (text := files.text(script))}
+    names: dict[str, tuple[Name, ...]] = {}
+    for entry in _examined(texts, types):
+        for cause, steps in _joined(entry.steps):
+            _change(files, entry.file, cause, steps)
+        names[entry.file] = entry.names
+    return names
+
+
+def _examined(texts: dict[str, str], types: Sequence[str]) -> Iterator[_Entry]:
+    deadline, left = time.monotonic() + WALL_S, list(texts)
+    for _ in range(ATTEMPTS):
+        wall_s = deadline - time.monotonic()
+        if not left or wall_s <= 0:
+            return
+        request = [[file, texts[file]] for file in left]
+        answer = run_limited(
+            EXAMINE, request, list(types), _site(), limits=ChildLimits(wall_s=wall_s, **LIMITS)
+        )
+        for entry in filter(None, map(_entry, answer.lines.splitlines())):
+            if entry.file in left:
+                left.remove(entry.file)
+                yield entry
+        left = left[1:]  # of those that are left, the first one ended the child
+
+
+def _site() -> str:
+    """The folder that has fissix, which the child finds nowhere else."""
+    spec = find_spec("fissix")
+    return str(Path(spec.origin).parents[1]) if spec is not None and spec.origin else ""
+
+
+def _entry(line: bytes) -> _Entry | None:
+    try:
+        return _Entry.model_validate(json.loads(line))
+    except (ValueError, RecursionError):
+        return None
+
+
+def _joined(steps: Sequence[_Step]) -> Iterator[tuple[Cause, list[_Step]]]:
+    """Steps of one cause that follow each other are one mistake, but each missing token and import is its own."""
+    groups: list[tuple[Cause, list[_Step]]] = []
+    for step in steps:
+        if groups and groups[-1][0] == step.cause and step.cause not in ("token", "import"):
+            groups[-1][1].append(step)
+        else:
+            groups.append((step.cause, [step]))
+    yield from groups
+
+
+def _change(files: Files, file: str, cause: Cause, steps: list[_Step]) -> None:
+    kind = KINDS.get(cause, "python-syntax")
+    message, fix = _words(file, cause, steps)
+    files.change(kind, file, steps[-1].text, message, fix)
+
+
+def _words(file: str, cause: Cause, steps: list[_Step]) -> tuple[str, str]:
+    """What is wrong, and how it is repaired; "" where the changed line says it."""
+    first = steps[0]
+    place = f"line {first.line} of {file}"
+    if cause == "tabs":
+        message = f"{place}: tabs and spaces are mixed in the indentation"
+        return message, "replace each tab by spaces (in the editor: convert indentation to spaces)"
+    if cause == "old-name":
+        return f"{place}: {first.word} is Python 2", ""
+    if cause == "import":
+        return f"{place} uses {first.word}, which is not imported", ""
+    if cause == "call":
+        return f"{place}: {first.word} is named but not called", f"write {first.word}()"
+    if cause == "spin":
+        message = f"{file} ends as soon as it has subscribed, because nothing keeps it running"
+        return message, f"write {first.word} as the last line of what makes the node"
+    error = first.error
+    told = cause_of(error.message, error.text, column=error.column) if error else ""
+    return f"{place}: {told or (error.message if error else 'not Python 3')}", ""
