@@ -234,3 +234,25 @@ def test_root_with_a_closed_temporary_folder(grader: Grader, tmp_path: Path) -> 
     closed.mkdir(mode=0o700)
     argv = ("grade", SOLUTION, "--rubric", LAB, "--out", tmp_path / "out")
     assert grader.run(*argv, TMPDIR=str(closed))[0] == 0
+
+
+def test_a_repaired_copy_is_evidence_like_any_other(grader: Grader, tmp_path: Path) -> None:
+    package = tmp_path / "misspelt"
+    shutil.copytree(SOLUTION, package)
+    talker = package / "lab1" / "src" / "numeric_talker.py"
+    talker.write_text(talker.read_text().replace("numeric_chatter", "numeric_chater"))
+    code, out, err = grader.run("grade", package, "--rubric", LAB, "--out", tmp_path / "out")
+    assert code == 1, out + err
+    folder = tmp_path / "out" / "misspelt"
+    result = json.loads((folder / "result.json").read_text())
+    lost = {c["id"]: c for c in result["criteria"] if c["status"] != "pass"}
+    assert (result["points"], list(lost)) == (90, ["numeric-type"])
+    assert lost["numeric-type"]["repaired"]["charged"] is True
+    judged = [c["id"] for c in result["criteria"] if "repaired" in c and not c["repaired"]["charged"]]
+    assert judged == ["numeric-rate", "counter-start", "counter-step", "counter-wrap"]
+    copies = {path.name for path in (folder / "evidence" / "repaired-1").iterdir()}
+    assert copies == {"package.mcap", "talker.mcap", "wraps.mcap"}
+    assert "this costs you 10 points (numeric-type)" in (folder / "report.md").read_text()
+    code, out, err = grader.run("judge", folder, "--rubric", LAB)
+    assert code == 1, err
+    assert json.loads(out) == result["criteria"]
