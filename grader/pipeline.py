@@ -137,22 +137,13 @@ def grade(
                     submission, rubric, results.evidence, options, progress
                 )
             timing = clock.timing(recording)
-            automatic = assemble_result(
-                context.submission, rubric, runs, criteria, recording=recording, timing=timing
+            result = options.settle(
+                assemble_result(
+                    context.submission, rubric, runs, criteria, recording=recording, timing=timing
+                )
             )
-            result = options.settle(automatic)
-            if not options.files:
-                return result
-            write_reports(
-                result,
-                results.new,
-                console=console_log(runs),
-                rubric=rubric.rubric,
-                keep_hidden=options.keep_hidden,
-                figures=draw_figures(rubric, runs, result),
-                docs=rubric.docs,
-            )
-            results.commit()
+            if options.files:
+                write(result, results, rubric, runs, keep_hidden=options.keep_hidden)
     return result
 
 
@@ -468,6 +459,22 @@ def assemble_result(
         timing=timing,
         notes=notes_of(runs),
     )
+
+
+def write(
+    result: GradingResult, results: Results, rubric: LoadedRubric, runs: dict[str, Run], *, keep_hidden: bool
+) -> None:
+    """Write the reports, and replace earlier evidence and reports together."""
+    write_reports(
+        result,
+        results.new,
+        console=console_log(runs),
+        rubric=rubric.rubric,
+        keep_hidden=keep_hidden,
+        figures=draw_figures(rubric, runs, result),
+        docs=rubric.docs,
+    )
+    results.commit()
 
 
 def draw_figures(rubric: LoadedRubric, runs: dict[str, Run], result: GradingResult) -> Figures | None:

@@ -1,11 +1,18 @@
 """Worker processes: each does one job after another, and whatever ends it costs only the job that it was doing.
 
-A job is a function of a module and its argument. Both sides send pickles, each preceded by its length, through pipes
+A job is a function of a module and its argument. Both sides send messages, each preceded by its length, through pipes
 that no other process holds. A worker imports nothing from the current folder, and ends itself when its parent is gone.
+
+A job travels as a pickle: what the parent sends is the grader's own, and a submission is in it as text only. An answer
+travels as JSON, because a worker reads recordings and source files, and what is hostile in them may one day take a
+decoder over: a pickle would then run code in the parent. The parent reads an answer as the type that the job's function
+is declared to return, and an exception as one of the grader's or of Python's by its name, and calls nothing else.
 """
 
 from __future__ import annotations
 
+import builtins
+import json
 import os
 import pickle
 import select
@@ -18,15 +25,21 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from queue import LifoQueue
 from types import FrameType
-from typing import IO, Any, TypeVar
+from typing import IO, Any, TypeVar, get_type_hints
 
+from pydantic import TypeAdapter
+
+from grader import errors
+from grader.errors import GraderError, RubricError
 from grader.host_programs import module_command, with_absolute_paths
 
 HEAD_BYTES = 8
+ANSWER_BYTES_MAX = 256 << 20
 LEAVE_S = 30.0
 """How long a worker may take to clean up once it is told to stop."""
 IDLE_CODE = 75
@@ -69,7 +82,12 @@ class Worker:
         self._lock = threading.Lock()
 
     def run(self, function: Callable[[Job], Result], job: Job) -> Result:
-        """Return what `function(job)` returns in the process, or raise what it raises. Raises WorkerEnded."""
+        """Return what `function(job)` returns in the process, or raise what it raises. Raises WorkerEnded.
+
+        Its declared type must survive JSON as pydantic writes it. Of an exception arrive the type, unless it is of
+        another library (then RuntimeError), and the text.
+        """
+        answer_type = _answer_type(function)
         message = pickle.dumps((function, job, self._limits))
         while True:
             with self._lock:
@@ -79,8 +97,8 @@ class Worker:
                 if process is None or process.poll() is not None:
                     process, is_new = self._start(), True
             try:
-                raised, answer = self._exchange(process, message)
-            except (EOFError, OSError, pickle.UnpicklingError) as error:
+                answer = self._exchange(process, message)
+            except (EOFError, OSError) as error:
                 if self.stopped:
                     raise WorkerEnded("interrupted", interrupted=True) from error
                 process.kill()
@@ -89,10 +107,12 @@ class Worker:
                     continue  # it had waited too long just as the job came
                 how = f"by signal {-code}" if code < 0 else f"with {code}"
                 raise WorkerEnded(f"ended {how}") from error
-            if raised:
-                raise answer
-            result: Result = answer
-            return result
+            try:
+                return _read_answer(answer, answer_type)
+            except ValueError as error:
+                process.kill()
+                process.wait()
+                raise WorkerEnded("gave an answer that cannot be read") from error
 
     def interrupt(self) -> None:
         """Let the current job clean up and end, and begin no other."""
@@ -130,7 +150,7 @@ class Worker:
         )
         return self._process
 
-    def _exchange(self, process: subprocess.Popen[bytes], message: bytes) -> Any:  # noqa: ANN401 - whatever was pickled
+    def _exchange(self, process: subprocess.Popen[bytes], message: bytes) -> bytes:
         assert process.stdin is not None  # noqa: S101 - opened with PIPE
         assert process.stdout is not None  # noqa: S101 - opened with PIPE
         timer = threading.Timer(self._limits.wall_s or 0.0, process.kill)
@@ -139,7 +159,7 @@ class Worker:
             timer.start()
         try:
             _send(process.stdin, message)
-            return _receive(process.stdout)
+            return _receive(process.stdout, ANSWER_BYTES_MAX)
         finally:
             timer.cancel()
 
@@ -207,9 +227,12 @@ def _send(stream: IO[bytes], content: bytes) -> None:
     stream.flush()
 
 
-def _receive(stream: IO[bytes]) -> Any:  # noqa: ANN401 - whatever the other side has pickled
+def _receive(stream: IO[bytes], bytes_max: int = sys.maxsize) -> bytes:
+    """Return the next message. Raises EOFError at the end, OSError for one that is too long."""
     size = int.from_bytes(_read(stream, HEAD_BYTES), "big")
-    return pickle.loads(_read(stream, size))  # noqa: S301 - our own process is at the other end
+    if size > bytes_max:
+        raise OSError(f"a message of {size} bytes")
+    return _read(stream, size)
 
 
 def _read(stream: IO[bytes], size: int) -> bytes:
@@ -221,6 +244,36 @@ def _read(stream: IO[bytes], size: int) -> bytes:
             raise EOFError
         parts += part
     return bytes(parts)
+
+
+def _answer_type(function: Callable[..., Result]) -> TypeAdapter[Result]:
+    """Return what reads and writes the type that a function is declared to return."""
+    while isinstance(function, partial):
+        function = function.func
+    return TypeAdapter(get_type_hints(function, include_extras=True)["return"])
+
+
+def _read_answer(answer: bytes, answer_type: TypeAdapter[Result]) -> Result:
+    """Return the result in an answer, or raise the exception in it. Raises ValueError if it is neither."""
+    found = json.loads(answer)
+    if not isinstance(found, dict) or found.keys() not in ({"result"}, {"raised", "message", "hint"}):
+        raise ValueError("neither a result nor an exception")
+    if "result" in found:
+        return answer_type.validate_python(found["result"])
+    raise _exception(*(str(value) for value in found.values()))
+
+
+def _exception(name: str, message: str, hint: str) -> Exception:
+    """Return an exception of the grader's or of Python's with this name; RuntimeError for any other."""
+    kind = getattr(errors, name, None) or getattr(builtins, name, None)
+    if isinstance(kind, type) and issubclass(kind, RubricError):
+        return kind(message.splitlines(), hint=hint)
+    if isinstance(kind, type) and issubclass(kind, GraderError):
+        return kind(message, hint=hint)
+    if isinstance(kind, type) and issubclass(kind, Exception):
+        with suppress(TypeError):  # it takes more than a text
+            return kind(message)
+    return RuntimeError(f"{name}: {message}")
 
 
 # ---- inside the process
@@ -248,7 +301,7 @@ def main() -> None:
     with suppress(EOFError, BrokenPipeError, KeyboardInterrupt):
         while not _State.stopped:
             _wait_for_job(jobs.fileno(), limits)
-            function, job, now = _receive(jobs)
+            function, job, now = pickle.loads(_receive(jobs))  # noqa: S301 - from the parent; see above
             _State.busy = True
             try:
                 if _State.stopped:
@@ -262,15 +315,15 @@ def main() -> None:
 
 
 def _answer(function: Callable[[Any], object], job: object) -> bytes:
-    """Pickle whether the job raised an exception, and its result or that exception."""
+    """Return the job's result, or the exception that it raised, as JSON."""
     try:
-        return pickle.dumps((False, function(job)))
+        result = _answer_type(function).dump_python(
+            function(job), mode="json", by_alias=True, warnings="error"
+        )
+        return json.dumps({"result": result}).encode()
     except Exception as error:  # noqa: BLE001 - it is raised again in the parent
-        with suppress(Exception):
-            answer = pickle.dumps((True, error))
-            pickle.loads(answer)  # noqa: S301 - some exceptions can be pickled and not be read
-            return answer
-        return pickle.dumps((True, RuntimeError(f"{type(error).__name__}: {error}")))
+        message, hint = (error.message, error.hint) if isinstance(error, GraderError) else (str(error), "")
+        return json.dumps({"raised": type(error).__name__, "message": message, "hint": hint}).encode()
 
 
 def _limit(limits: Limits, *, is_first: bool) -> None:

@@ -25,7 +25,7 @@ ALLOWED = {
     "portable": {"errors"},
     "host_programs": set[str](),
     "limited_child": {"host_programs"},
-    "workers": {"host_programs"},
+    "workers": {"errors", "host_programs"},
     "files": {"errors", "portable"},
     "results": BASE | {"files"},
     "faults": BASE | {"files", "intake", "report", "results", "rubric"},

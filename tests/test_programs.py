@@ -61,7 +61,7 @@ STARTS = {
     "workers.py:_start": Start(
         "{**with_absolute_paths(os.environ), **self._env}",
         None,
-        "nothing: jobs come through a pipe, as pickles",
+        "what it submitted, as text in jobs that come through a pipe",
     ),
     "classes/review/serve.py:git_user": Start("with_absolute_paths(os.environ)", "'/'", "nothing"),
 }

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import os
+import pickle
 import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
+from grader import workers
 from grader.errors import HostError
-from grader.workers import Limits, Worker, WorkerEnded, run_each
+from grader.workers import HEAD_BYTES, Limits, Worker, WorkerEnded, run_each
 from tests.cluster.clusters import children_of, lives, until
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -99,6 +104,57 @@ def test_what_a_job_raises_is_raised(worker: Worker) -> None:
     with pytest.raises(HostError, match="no room") as caught:
         worker.run(fail, None)
     assert caught.value.hint == "make some"
+
+
+class Evil:
+    """What a child that was taken over would like its parent to load."""
+
+    def __reduce__(self) -> tuple:
+        return os.putenv, ("GRADER_TAKEN_OVER", "yes")
+
+
+def answer_with(message: bytes) -> int:
+    """As a job that was taken over: write an answer of its own to the pipe, which only it and its parent hold."""
+    for pipe in range(3, 20):
+        with suppress(OSError):
+            os.write(pipe, len(message).to_bytes(HEAD_BYTES, "big") + message)
+    return 1
+
+
+CALL = {"raised": "eval", "message": "exit(9)", "hint": ""}
+
+
+@pytest.mark.parametrize(
+    ("answer", "raised"),
+    [
+        (pickle.dumps((False, Evil())), WorkerEnded),
+        (b"not json", WorkerEnded),
+        (b'{"result": "os.system"}', WorkerEnded),
+        (b'{"result": 1, "raised": "OSError"}', WorkerEnded),
+        (json.dumps(CALL).encode(), RuntimeError),
+        (json.dumps({**CALL, "raised": "SystemExit"}).encode(), RuntimeError),
+        (json.dumps({**CALL, "raised": "Literal"}).encode(), RuntimeError),
+    ],
+    ids=["pickle", "words", "wrong-type", "both", "function", "exit", "import"],
+)
+def test_an_answer_cannot_run_code_in_the_parent(answer: bytes, raised: type, worker: Worker) -> None:
+    with (
+        patch.object(pickle, "loads", side_effect=AssertionError("unpickled")),
+        pytest.raises(raised) as caught,
+    ):
+        worker.run(answer_with, answer)
+    assert raised is WorkerEnded or str(caught.value) == f"{json.loads(answer)['raised']}: exit(9)"
+    assert raised is not WorkerEnded or worker.run(harm, 2) == 4
+
+
+def test_an_answer_without_end_is_not_read(worker: Worker, monkeypatch) -> None:
+    monkeypatch.setattr(workers, "ANSWER_BYTES_MAX", 10)
+    with pytest.raises(WorkerEnded):
+        worker.run(say_much, 100)
+
+
+def say_much(count: int) -> str:
+    return "a" * count
 
 
 @pytest.mark.full

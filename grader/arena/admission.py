@@ -123,13 +123,13 @@ START_PATIENCE_S, ALONE_PATIENCE_S, ROOM_PATIENCE_S = 300.0, 900.0, 120.0
 class Leave:
     """Leave to start processes, given back by `release`, or with the block that asked for it."""
 
-    def __init__(self, lock: FileLock | bool) -> None:
-        self._lock = lock
+    def __init__(self, held: FileLock | bool) -> None:
+        self._held = held
 
     def release(self) -> None:
         """Give it back: they have started, and others may. A second time without effect."""
-        if isinstance(self._lock, FileLock):
-            self._lock.close()
+        if isinstance(self._held, FileLock):
+            self._held.close()
 
 
 class Admission:
@@ -164,8 +164,8 @@ class Admission:
     async def start(self) -> AsyncIterator[Leave]:
         """Wait until processes may be started: one start a core at a time, fewer while the machine is late."""
         async with self._next:
-            lock = await _until(self._free, START_PATIENCE_S)
-        leave = Leave(lock)
+            held = await _until(self._free, START_PATIENCE_S)
+        leave = Leave(held)
         try:
             yield leave
         finally:
@@ -182,10 +182,10 @@ class Admission:
         if self._folder is None:
             return True
         for number in range(self._allowed(self._folder)):
-            lock = FileLock(self._folder / f"start-{number}")
-            if lock.take():
-                return lock
-            lock.close()
+            place = FileLock(self._folder / f"start-{number}")
+            if place.take():
+                return place
+            place.close()
         return False
 
     def _allowed(self, folder: Path) -> int:

@@ -263,8 +263,8 @@ def _ends_short(path: Sequence[Pose], way: Way, course: Course) -> Words:
     goal = min(course.reached, len(way.points) - 1)
     left = metres(math.dist(path[-1].point, way.points[goal]))
     every = course.reached == len(way.points)
-    passed = "it passes every point" if every else f"it passes {course.reached} of {len(way.points)} points"
-    message = f"{passed} and ends at {spot(path[-1].point)}, {left} from {way.name(goal)}"
+    points = "it passes every point" if every else f"it passes {course.reached} of {len(way.points)} points"
+    message = f"{points} and ends at {spot(path[-1].point)}, {left} from {way.name(goal)}"
     if every:
         return Words(message, "publish a zero velocity once you are at the last point")
     return Words(message, "drive longer, or let the node live until it is there")

@@ -102,11 +102,11 @@ def service_answers(package: PackageFacts, run: Run, params: ServiceAnswersParam
         or _uncalled(made, package, run, params)
         or passed(f"{params.service} answers {plural(len(pairs), 'call')} as it should")
     )
-    shown = wrong[0] if wrong else next(reversed(made), None)
+    call = wrong[0] if wrong else next(reversed(made), None)
     return verdict.about(
         expected=join_words(f"call {n}: {fields_text(w)}" for n, w in enumerate(params.expect, 1)),
-        measured=verdict.measured or _measured(shown),
-        citations=(*verdict.citations, _citation(shown, run)),
+        measured=verdict.measured or _measured(call),
+        citations=(*verdict.citations, _citation(call, run)),
     )
 
 

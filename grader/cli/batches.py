@@ -7,18 +7,42 @@ from datetime import datetime
 from pathlib import Path
 
 from grader.classes.batch.job import Executor, LocalExecutor
-from grader.classes.batch.run import BatchOptions
-from grader.classes.roster import Local
+from grader.classes.batch.run import BatchOptions, run_batch
+from grader.classes.roster import Local, Roster
 from grader.classes.roster.entries import parse_time
+from grader.cli.class_display import open_class_display, print_batch
+from grader.cli.host_support import require_room, warn_without_sandbox
 from grader.cli.output import say_beside
 from grader.errors import ExitCode, UsageError
 from grader.model.batch import BatchRun
 from grader.portable import cores
-from grader.rubric.load import LoadedRubric
+from grader.rubric.load import LoadedRubric, needs_ros
 from grader.untrusted_text import line
 
 JOBS_PER_CORE = 4
 """Most of a grading's time is spent waiting for what the student's nodes send."""
+
+
+def grade_class(
+    roster: Roster,
+    rubric: str,
+    loaded: LoadedRubric,
+    options: BatchOptions,
+    exchange: str | None,
+    *,
+    as_json: bool,
+) -> ExitCode:
+    """Grade a class by the value of `--rubric`, print what came of it, and return the exit code."""
+    if needs_ros(loaded) and not (options.static_only or options.cluster):
+        require_room(gradings=options.jobs)
+        warn_without_sandbox(options.sandbox, loaded)
+    for fault in roster.faults:
+        say_beside(f"roster: {fault}")
+    with open_class_display() as watcher:
+        chosen = executor(options, exchange)
+        folder = run_batch(roster, rubric_source(rubric), loaded, options, executor=chosen, watcher=watcher)
+    print_batch(folder, as_json=as_json)
+    return exit_code(folder.run)
 
 
 def rubric_source(rubric: str) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -20,12 +20,12 @@ from rich.text import Text
 
 from grader import pipeline
 from grader.cli.display import open_progress
-from grader.cli.host_support import how_to_run_nodes, why_nothing_runs
-from grader.cli.outcome import exit_code, settled, show, staged_code
+from grader.cli.host_support import how_to_run_nodes, warn_without_sandbox, why_nothing_runs
+from grader.cli.outcome import exit_code, settled, show, staged_code, worst
 from grader.cli.output import say, say_beside
-from grader.cli.select_rubric import Chosen
+from grader.cli.select_rubric import Chosen, only
 from grader.errors import ExitCode, UsageError
-from grader.files import temporary_folder
+from grader.files import check_writable, temporary_folder
 from grader.intake import safe_name
 from grader.model.progress import Progress, Silence
 from grader.model.result import GradingResult, Point, Standing
@@ -53,6 +53,35 @@ class Check:
     staged: bool
     several: bool
     told: set[str] = field(default_factory=set)
+
+
+def check_packages(
+    path: str,
+    chosen: Sequence[Chosen],
+    options: pipeline.GradeOptions,
+    *,
+    watch: bool,
+    out: Path | None,
+    as_json: bool,
+    staged: bool,
+) -> ExitCode:
+    """Check the packages chosen for `path` one after the other, or watch the only one. Return the worst exit code."""
+    if watch or as_json:
+        only(chosen)
+    if watch and not Path(chosen[0].source).is_dir():
+        raise UsageError(
+            f"{path} is not a folder, so it cannot be watched", hint="watch your package's folder"
+        )
+    if out is not None:
+        check_writable(out)
+    if not options.static_only and any(needs_ros(one.rubric) for one in chosen):
+        warn_without_sandbox(options.sandbox)
+    if watch:
+        say_choice(chosen[0])
+        source = str(Path(chosen[0].source).resolve())
+        return watch_package(source, chosen[0].rubric, options, out=out, as_json=as_json)
+    check = Check(options=options, out=out, as_json=as_json, staged=staged, several=len(chosen) > 1)
+    return worst(check_package(one, check) for one in chosen)
 
 
 def say_choice(chosen: Chosen) -> None:

@@ -140,8 +140,8 @@ class LiveSteps(Steps):
             table.add_column(no_wrap=True)
         table.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
         for step in steps:
-            mark, style = WORDS[step.state]
-            name = Text(f"{mark} {line(step.name, NAME_LIMIT)}", style)
+            symbol, style = WORDS[step.state]
+            name = Text(f"{symbol} {line(step.name, NAME_LIMIT)}", style)
             detail = Text(_shown(step.detail), "dim")
             table.add_row(name, Text(step.state, style), Text(_times(step, now_s)), detail)
         table.add_row(

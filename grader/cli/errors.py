@@ -62,9 +62,9 @@ def _line(text: object) -> str:
     return line(str(text), LINE_CHARS)
 
 
-def _say(line: str) -> None:
+def _say(text: str) -> None:
     with suppress(OSError, ValueError):  # a closed stderr leaves nowhere to complain to
-        print(line, file=sys.stderr, flush=True)
+        print(text, file=sys.stderr, flush=True)
 
 
 def _trace(debug: bool) -> None:

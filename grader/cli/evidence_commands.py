@@ -42,7 +42,7 @@ def judge_evidence(evidence: Sequence[Path], loaded: LoadedRubric, out: str) -> 
 def judge_submissions(folders: Sequence[Path], loaded: LoadedRubric, out: str, jobs: int) -> ExitCode:
     """Judge several submissions and write a list of them. One that cannot be judged is reported and does not affect the
     others. Return the exit code of the worst."""
-    order = {folder: number for number, folder in enumerate(folders)}
+    order = {folder: index for index, folder in enumerate(folders)}
     judged = sorted(judge_all(folders, loaded, jobs), key=lambda one: order[one.folder])
     _write(out, lambda ascii_only: judged_text(loaded.rubric, map(_named, judged), ascii_only=ascii_only))
     for one in judged:

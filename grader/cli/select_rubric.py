@@ -36,7 +36,7 @@ class Chosen:
     words: str = ""
 
 
-def only(chosen: tuple[Chosen, ...]) -> Chosen:
+def only(chosen: Sequence[Chosen]) -> Chosen:
     """Return the one that was chosen. Raises UsageError if there are several."""
     if len(chosen) > 1:
         named = ", ".join(one.rubric.rubric.id for one in chosen)

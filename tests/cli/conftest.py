@@ -23,9 +23,9 @@ LOADED = "grader.cli.checking"
 @dataclass(frozen=True, kw_only=True)
 class GradeOptions:
     sandbox: str
-    submission_id: str | None
-    static_only: bool
-    keep_hidden: bool
+    submission_id: str | None = None
+    static_only: bool = False
+    keep_hidden: bool = True
     files: bool = True
 
 

@@ -280,12 +280,12 @@ class GivenUp(Exception):
         self.tries = tries
 
 
-def patiently(ask: Callable[[], Answer], patience: Patience) -> Answer:
-    """The answer of `ask`. Raises GivenUp, or the GitFailed that no waiting would help."""
+def patiently(attempt: Callable[[], Answer], patience: Patience) -> Answer:
+    """Return what `attempt` returns. Raises GivenUp, or the GitFailed that no waiting would help."""
     failed = 0
     while True:
         try:
-            return ask()
+            return attempt()
         except GitFailed as failure:
             failed += 1
             if not may_pass(failure):

@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import re
 import signal
+from base64 import b64decode, b64encode
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import FrameType
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 import numpy as np
 from copydetect.utils import filter_code, get_copied_slices, hashed_kgrams
 from numpy.typing import NDArray
+from pydantic import PlainSerializer, PlainValidator
 from pygments import token
 from pygments.lexer import Lexer
 from pygments.lexers import get_lexer_by_name
@@ -40,7 +42,17 @@ ENVIRONMENT = {
 GRAM = 25
 """Signs in one fingerprint, `copydetect`'s own default: about two short statements."""
 
-Numbers: TypeAlias = NDArray[np.int64]
+
+def _decode_numbers(text: str) -> NDArray[np.int64]:
+    return np.frombuffer(b64decode(text), dtype=np.int64)
+
+
+Numbers: TypeAlias = Annotated[
+    NDArray[np.int64],
+    PlainValidator(_decode_numbers),
+    PlainSerializer(lambda numbers: b64encode(numbers.tobytes()).decode(), return_type=str),
+]
+"""In a worker's answer, the numbers' bytes in base64."""
 Marks: TypeAlias = NDArray[np.bool_]
 
 # In Python; what C++ includes becomes one sign anyway.

@@ -103,13 +103,10 @@ def batch(
 ) -> ExitCode:
     """Grade a class, or continue a batch that was stopped."""
     with loading():
-        from grader.classes.batch.run import BatchOptions, run_batch
+        from grader.classes.batch.run import BatchOptions
         from grader.classes.roster import read_roster
         from grader.cli import batches
-        from grader.cli.class_display import open_class_display, print_batch
-        from grader.cli.host_support import require_room, warn_without_sandbox
-        from grader.cli.output import say_beside
-        from grader.rubric.load import load_rubric, needs_ros
+        from grader.rubric.load import load_rubric
     loaded = load_rubric(rubric)
     local = batches.allowed_folders(allow_local, remote_only=remote_only)
     named = read_roster(roster, local)
@@ -125,18 +122,7 @@ def batch(
         allow_local=tuple(str(folder) for folder in local.folders),
         remote_only=remote_only,
     )
-    if needs_ros(loaded) and not (static or cluster):
-        require_room(gradings=options.jobs)
-        warn_without_sandbox(sandbox, loaded)
-    for fault in named.faults:
-        say_beside(f"roster: {fault}")
-    with open_class_display() as watcher:
-        executor = batches.executor(options, exchange)
-        folder = run_batch(
-            named, batches.rubric_source(rubric), loaded, options, executor=executor, watcher=watcher
-        )
-    print_batch(folder, as_json=as_json)
-    return batches.exit_code(folder.run)
+    return batches.grade_class(named, rubric, loaded, options, exchange, as_json=as_json)
 
 
 @command("regrade", group=INSTRUCTORS, exit_codes=CLASS_EXIT_CODES, runs_code=True)

@@ -38,37 +38,13 @@ def check(
     if staged and (watch or not static):
         raise UsageError("--staged goes with --static, and not with --watch", hint="add --static")
     with loading():
-        from grader import pipeline
-        from grader.cli.checking import Check, check_package, say_choice, watch_package
-        from grader.cli.host_support import warn_without_sandbox
-        from grader.cli.outcome import worst
-        from grader.cli.select_rubric import choose_all, only
-        from grader.files import check_writable
-        from grader.rubric.load import needs_ros
+        from grader.cli.checking import check_packages
+        from grader.cli.select_rubric import choose_all
+        from grader.pipeline import GradeOptions
+    keep_files = watch or out is not None
+    options = GradeOptions(sandbox=sandbox, static_only=static, keep_hidden=False, files=keep_files)
     chosen = choose_all(Path(path), rubric)
-    if watch or as_json:
-        only(chosen)
-    if watch and not Path(chosen[0].source).is_dir():
-        raise UsageError(
-            f"{path} is not a folder, so it cannot be watched", hint="watch your package's folder"
-        )
-    if out is not None:
-        check_writable(out)
-    options = pipeline.GradeOptions(
-        sandbox=sandbox,
-        submission_id=None,
-        static_only=static,
-        keep_hidden=False,
-        files=watch or out is not None,
-    )
-    if not static and any(needs_ros(one.rubric) for one in chosen):
-        warn_without_sandbox(sandbox)
-    if watch:
-        say_choice(chosen[0])
-        source = str(Path(chosen[0].source).resolve())
-        return watch_package(source, chosen[0].rubric, options, out=out, as_json=as_json)
-    checked = Check(options=options, out=out, as_json=as_json, staged=staged, several=len(chosen) > 1)
-    return worst(check_package(one, checked) for one in chosen)
+    return check_packages(path, chosen, options, watch=watch, out=out, as_json=as_json, staged=staged)
 
 
 @command("explain", group=STUDENTS)

@@ -64,12 +64,12 @@ def gather_anonymous(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]],
     return Gathered(lines=lines, diagnoses=diagnoses)
 
 
-def _unnamed(line: Line, pseudonym: str, words: frozenset[str]) -> Line:
-    problem = line.problem
+def _unnamed(named: Line, pseudonym: str, words: frozenset[str]) -> Line:
+    problem = named.problem
     if problem is not None:
         problem = replace(problem, message=without_words(problem.message, words), hint="")
-    why = without_words(line.why, words)
-    return replace(line, id=pseudonym, name="", group="", folder="", why=why, problem=problem)
+    why = without_words(named.why, words)
+    return replace(named, id=pseudonym, name="", group="", folder="", why=why, problem=problem)
 
 
 WORDINGS_MAX = 40

@@ -69,23 +69,23 @@ def write_class_page(
 def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
     """Without `out`, nothing is said of where anything is."""
     lines = found.lines
-    judged = [line for line in lines if line.judged]
+    judged = [one for one in lines if one.judged]
     heat = heat_map(lines, run.criteria)
-    points = spread([line.points for line in judged], run.max_points)
+    points = spread([one.points for one in judged], run.max_points)
     cost = costs(lines, run.criteria)
     shared, alone = _listed(run, found.diagnoses)
     parts: dict[str, Any] = {
         "run": run,
         "anonymous": out is None,
         "lines": lines,
-        "states": Counter(line.state for line in lines),
-        "unwalled": Counter(line.unwalled for line in lines if line.unwalled).most_common(UNWALLED_MAX),
+        "states": Counter(one.state for one in lines),
+        "unwalled": Counter(one.unwalled for one in lines if one.unwalled).most_common(UNWALLED_MAX),
         "todos": list(todos(run, lines, out)),
         "points": points,
         "histogram": histogram(points) if points else "",
         "costs": most_first(cost),
         "unlost": [one.criterion.title for one in cost if one.judged and not one.lost and not one.open],
-        "late": [line for line in lines if line.late_s > 0],
+        "late": [one for one in lines if one.late_s > 0],
         "shared": shared,
         "alone": alone,
         "heat": heat,
@@ -121,16 +121,16 @@ def _listed(run: BatchRun, found: Sequence[Diagnosis]) -> tuple[list[Listed], li
 def _columns(lines: Sequence[Line]) -> Iterator[tuple[str, str]]:
     """The table's, as the script knows them and as they are called; what nobody has is left out."""
     yield "id", "Submission"
-    if any(line.name for line in lines):
+    if any(one.name for one in lines):
         yield "name", "Name"
-    if any(line.group for line in lines):
+    if any(one.group for one in lines):
         yield "group", "Group"
     yield "points", "Points"
     yield "letters", "Criteria"
     yield "state", "Status"
-    if any(line.late_s > 0 for line in lines):
+    if any(one.late_s > 0 for one in lines):
         yield "late", "Late"
-    if any(line.decided for line in lines):
+    if any(one.decided for one in lines):
         yield "decided", "Decided by a person"
     yield "time", "Time"
 

@@ -23,14 +23,14 @@ FAR = 10**15
 
 def counter_plots(figure: CounterFigure, name: str) -> list[Markup]:
     """The whole of it, and where it is long the surroundings of the first wrong step, or of the first wrap."""
-    plural = len(figure.values)
-    if plural < 2:
+    count = len(figure.values)
+    if count < 2:
         return []
-    drawn = [_plot(figure, name, range(plural), WHOLE, f"{figure.topic} over time")]
+    drawn = [_plot(figure, name, range(count), WHOLE, f"{figure.topic} over time")]
     around = (*figure.wrong[:1], *figure.wraps[:1])
-    if plural > MANY and around:
+    if count > MANY and around:
         first = max(0, around[0] - AROUND)
-        near = range(first, min(plural, around[0] + AROUND + 1))
+        near = range(first, min(count, around[0] + AROUND + 1))
         what = "wrong step" if figure.wrong else "wrap"
         drawn.append(_plot(figure, f"{name}-close", near, CLOSE, f"{figure.topic} around the first {what}"))
     return drawn
@@ -340,9 +340,9 @@ def _histogram(figure: RateFigure, name: str) -> Markup:
     children = _gap_bounds(figure, frame)
     children += frame.axes("milliseconds from message to message", "messages")
     children += [
-        frame.box((i * width, (i + 1) * width), (0, plural), class_="column")
-        for i, plural in enumerate(counts)
-        if plural
+        frame.box((i * width, (i + 1) * width), (0, count), class_="column")
+        for i, count in enumerate(counts)
+        if count
     ]
     longer = sum(gap > longest for gap in figure.gaps_s)
     if longer:
