@@ -26,7 +26,7 @@ from grader.rubric.model import Rubric
 ROOT = Path(__file__).resolve().parent.parent
 GIT = shutil.which("git") or "git"
 REFERENCE = "reference"
-CORRECT = Mutant.model_construct(summary="The reference solution.", expect={}, message={})
+CORRECT = Mutant.model_construct(summary="The reference solution.", expect={}, message={}, says={})
 SIDE_BY_SIDE = 4  # they wait most of the time, and take turns at starting
 
 
@@ -133,3 +133,4 @@ def _surprises_of(criterion: CriterionResult, fixture: Mutant) -> Iterator[str]:
     pattern = fixture.message.get(criterion.id, "")
     if not re.search(pattern, said, re.IGNORECASE):
         yield f"{criterion.id}: says nothing like {pattern!r}: {said}"
+    yield from fixture.wrong_words(criterion)

@@ -78,7 +78,8 @@ def test_declaration(lab, name) -> None:
     fixture, rubric = read_fixture(lab, name), rubric_of(lab)
     ids = {criterion.id for criterion in rubric.criteria}
     assert SUMMARY.fullmatch(fixture.summary)
-    assert set(fixture.expect) | set(fixture.message) <= ids
+    banned = set(fixture.never_says) if isinstance(fixture.never_says, dict) else set()
+    assert set(fixture.expect) | set(fixture.message) | set(fixture.says) | banned <= ids
     assert 0 <= expected_points(fixture, rubric) <= rubric.max_points
     assert name.startswith("ok-") == (expected_points(fixture, rubric) == rubric.max_points)
     for pattern in fixture.message.values():

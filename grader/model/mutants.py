@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from grader.model.record import Record
-from grader.model.result import RubricInfo
+from grader.model.result import CriterionResult, RubricInfo
 
 Cost = Literal["fail", "partial", "blocked"]
 State = Literal["killed", "survived", "differs", "inconclusive", "error"]
 MutantName = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9.-]*$", max_length=100)]
+Texts = tuple[Annotated[str, Field(min_length=1)], ...]
 KINDS = ("operator", "replace", "write", "append", "mode", "crlf", "bom", "delete", "link", "move")
 
 
@@ -106,12 +108,17 @@ class Mutant(Record):
     All other criteria must pass. With an empty `expect` it is another correct package. The grader's own tests also use
     `message` (a pattern, case ignored, for what the report says of a criterion), `points` (where a score is partial)
     and `git_links` (the package is handed in as a repository with submodules at these paths and no .gitmodules).
+
+    `says` holds texts that message, measurement and hint of a criterion must contain, `never_says` texts that they must
+    not: of one criterion, or, as a list, of any. Case does not matter, nor does how words are spaced.
     """
 
     summary: str = ""
     edits: Annotated[tuple[PackageEdit, ...], Field(min_length=1)]
     expect: dict[str, Cost]
     message: Annotated[dict[str, str], Field(default_factory=dict)]
+    says: Annotated[dict[str, Texts], Field(default_factory=dict)]
+    never_says: Texts | dict[str, Texts] = ()
     points: float | None = None
     git_links: tuple[str, ...] = ()
 
@@ -119,6 +126,21 @@ class Mutant(Record):
     def operators(self) -> tuple[str, ...]:
         """The mutation operators among its edits."""
         return tuple(edit.operator for edit in self.edits if edit.operator is not None)
+
+    def wrong_words(self, criterion: CriterionResult) -> Iterator[str]:
+        """Yield what the report should say of a criterion and does not, and what it should not say and does."""
+        said = _plain(f"{criterion.message} {criterion.measured} {criterion.hint}")
+        banned = self.never_says
+        for text in self.says.get(criterion.id, ()):
+            if _plain(text) not in said:
+                yield f"{criterion.id} does not say {text!r}: {said}"
+        for text in banned.get(criterion.id, ()) if isinstance(banned, dict) else banned:
+            if _plain(text) in said:
+                yield f"{criterion.id} says {text!r}: {said}"
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.casefold().split())
 
 
 class MutantsFile(Record):
@@ -143,7 +165,7 @@ class MutantResult(Record):
     """One mutant's grading. `expected` is None where nothing was declared, `operator` empty where none was used.
 
     `missing` are declared criteria that were reached or are not in the rubric, `surplus` those that were lost
-    though not declared, `differing` those with another status, each with its reason in words. `evidence` is the
+    though not declared, `differing` those with another status or other words, each with its reason. `evidence` is the
     folder of the grading, None where it was not kept.
     """
 

@@ -16,6 +16,7 @@ from tests.support.timeline import build_runs
 INT8 = st.integers(-128, 127)
 FORMS = [
     "{}", "data: {}", "I heard {}", "I heard{}", "heard: {}.", "({})", "[{}]", "{},", "number={}", "'{}'", "{}!",
+    "I heard...{}", "number-{}", "2026-11-22 21:17:35,123 - INFO - {}", "[2026-11-22T21:17:35.123456+00:00] {} of 3",
     "{} (Int8)", "Int8 {}", "{}.0", "+{}", "\x1b[32m{}\x1b[0m", "got {} at 12:30:05.25", "received {}\n",
 ]  # fmt: skip
 
@@ -59,6 +60,36 @@ def test_who_prints_all_passes(sent: list[int], form: str) -> None:
     if form == "+{}" and min(sent) < 0:
         return
     assert status("/numeric_chatter", sent, [form.format(v).strip() for v in sent]) is Status.PASS
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    sent=st.lists(INT8, min_size=3, max_size=12, unique=True),
+    between=st.sampled_from([", ", "\r", " ", "\t", "; "]),
+)
+def test_who_prints_all_in_one_line_passes(sent: list[int], between: str) -> None:
+    run = {
+        "processes": [{"name": "listener", "stopped_by": "INT", "exit_s": 9}],
+        "actors": [{"action": "publish", "topic": "/n", "type": "std_msgs/Int8", "values": sent, "at_s": 1}],
+        "console": [{"process": "listener", "line": between.join(map(str, sent)), "at_s": 9}],
+    }
+    runs = build_runs({"runs": {"run": run}, "package": {}})
+    assert judge_runs("hears", {"topic": "/n"}, runs).status is Status.PASS
+
+
+@settings(max_examples=40, deadline=None)
+@given(sent=st.lists(INT8, min_size=3, max_size=12, unique=True))
+def test_who_prints_what_came_so_far_passes(sent: list[int]) -> None:
+    lines = [f"received {value} so far {sent[: i + 1]}" for i, value in enumerate(sent)]
+    assert status("/numeric_chatter", sent, lines) is Status.PASS
+
+
+@pytest.mark.parametrize("form", ["number-{}", "number...-{}", "number: {}", "number={}"])
+def test_who_prints_the_absolute_value_fails(form: str) -> None:
+    assert (
+        status("/numeric_chatter", [-128, 5, 127, -7], [form.format(n) for n in (128, 5, 127, 7)])
+        is Status.FAIL
+    )
 
 
 @settings(max_examples=40, deadline=None)

@@ -10,10 +10,11 @@ import pytest
 
 from grader.authoring.mutation import rubric_test
 from grader.authoring.mutation.plan import Planned, plan_all
-from grader.authoring.mutation.rubric_test import Plan, compare, find_lost, run_test
+from grader.authoring.mutation.rubric_test import Comparison, Plan, compare, find_lost, run_test
 from grader.authoring.mutation.solution import Solution
 from grader.classes.batch.gradings import Graded, Job
 from grader.errors import HostError
+from grader.model.mutants import Mutant
 from grader.model.progress import Silence
 from grader.model.result import CriterionResult
 from grader.rubric.load import load_rubric
@@ -242,3 +243,21 @@ def test_advice_that_the_reference_gets_too_is_no_loss():
 
 def test_a_person_gives_no_points_away():
     assert find_lost(criteria(a="pass", b="manual")) == ()
+
+
+@pytest.mark.parametrize(
+    ("words", "differing"),
+    [
+        ({"says": {"a": ("Rate(1)", "too  fast")}}, ()),
+        ({"says": {"a": ("flooded",)}}, ("a does not say 'flooded': too fast use rospy.rate(1)",)),
+        ({"never_says": ("rospy.Rate",)}, ("a says 'rospy.Rate': too fast use rospy.rate(1)",)),
+        ({"never_says": {"b": ("rospy.Rate",)}}, ()),
+    ],
+)
+def test_words_of_the_report_are_compared(words, differing):
+    mutant = Mutant.model_validate({"edits": ({"crlf": {"file": "x"}},), "expect": {"a": "fail"}, **words})
+    (found,) = criteria(a="fail")
+    found = found.model_copy(update={"message": "Too fast", "measured": "", "hint": "use rospy.Rate(1)"})
+    compared = Comparison(state="killed").with_words(mutant, [found])
+    assert compared.differing == differing
+    assert compared.state == ("differs" if differing else "killed")

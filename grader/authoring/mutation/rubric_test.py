@@ -6,7 +6,7 @@ import shutil
 import time
 from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.authoring.mutation.package_tree import Tree, unified_diff, write_tree
@@ -15,7 +15,7 @@ from grader.authoring.mutation.solution import Solution
 from grader.classes.batch.gradings import Graded, Job, grade_all
 from grader.errors import HostError
 from grader.files import temporary_folder
-from grader.model.mutants import Cost, LostCriterion, MutantResult, ReferenceResult, RubricTest, State
+from grader.model.mutants import Cost, LostCriterion, Mutant, MutantResult, ReferenceResult, RubricTest, State
 from grader.model.progress import Progress
 from grader.model.result import CriterionResult, GradingResult, RubricInfo
 from grader.model.sandbox_mode import SandboxMode
@@ -154,6 +154,8 @@ def _judge_mutant(
 ) -> MutantResult:
     criteria = graded.result.criteria if graded.result else ()
     compared = compare(mutant.costs, criteria, ignored) if graded.result else Comparison(state="error")
+    if compared.state in {"killed", "differs"}:
+        compared = compared.with_words(mutant.mutant, criteria)
     return MutantResult(
         name=mutant.name,
         label=mutant.label,
@@ -222,6 +224,11 @@ class Comparison:
     missing: tuple[str, ...] = ()
     surplus: tuple[str, ...] = ()
     differing: tuple[str, ...] = ()
+
+    def with_words(self, mutant: Mutant, criteria: Sequence[CriterionResult]) -> Comparison:
+        """Return the same with the words that the report should have used, or should not."""
+        words = [line for criterion in criteria for line in mutant.wrong_words(criterion)]
+        return replace(self, state="differs", differing=(*self.differing, *words)) if words else self
 
 
 def find_lost(

@@ -7,15 +7,17 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from itertools import accumulate
 from typing import Literal, NamedTuple
 
 from grader.checks.support.exit_causes import HEADING, tracebacks
 from grader.checks.support.text import VALUE, bare, line_pattern, words_pattern
 from grader.evidence.run import Run
 
-NUMBERS_PER_LINE = 6
+OTHER_NUMBERS_PER_LINE = 6
+"""Besides those that were sent: a line with more of them hears nothing."""
 LINES_PER_PROBE = 8
 LINES_SPARE = 20
 NAMES_MAX = 100
@@ -25,7 +27,10 @@ _LOG_PREFIX = re.compile(r"^\s*\[\s*(?:DEBUG|INFO|WARN|ERROR|FATAL)\s*\]\s*(?:\[
 _WORD = re.compile(r"/?[A-Za-z][\w/]*")
 _ANONYMOUS_END = re.compile(r"(?=(_\d+_\d{9,}))")
 _HEX = re.compile(r"0[xX][0-9a-fA-F]+")
-_NUMBER = re.compile(r"(?<![\d.])([-+]?)(\d+)(\.\d+)?(?!\d)", re.ASCII)
+_TIME = re.compile(
+    r"\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d)?|\d{1,2}:\d\d:\d\d(?:[.,]\d+)?|(?<=\d:\d\d):\d\d(?:[.,]\d+)?"
+)
+_NUMBER = re.compile(r"(?<!\d)(?<!\d\.)(?<!\s\.)(?<!^\.)([-+]?)(\d+)(\.\d+)?(?!\d)", re.ASCII)
 _BEFORE, _BEHIND = r"(?<![\w.])", r"(?![\w]|[.,]\d)"
 _Lines = list[tuple[str, str]]
 """Lines with their blanks squeezed, and as they are."""
@@ -115,15 +120,21 @@ def _without_anonymous(word: re.Match[str]) -> str:
 
 def numbers_in(text: str) -> frozenset[int]:
     """A line's whole numbers: `12` is not in `127` and not in `3.12`. A `-` after a letter may be a dash."""
-    found: set[int] = set()
-    for match in _NUMBER.finditer(_HEX.sub(" ", text)):
+    return frozenset(n for dashes in (False, True) for _, n in _numbers(text, dashes=dashes))
+
+
+def _numbers(text: str, *, dashes: bool) -> Iterator[tuple[int, int]]:
+    """Yield each whole number with its offset. With `dashes`, a `-` after a letter or a dot is no sign."""
+    for match in _NUMBER.finditer(_TIME.sub(_blanked, _HEX.sub(_blanked, text))):
         sign, whole, fraction = match.groups()
         if len(whole) > 18 or (fraction and fraction.strip(".0")):
             continue
-        found.add(int(sign + whole))
-        if sign and match.string[: match.start()][-1:].isalpha():
-            found.add(int(whole))
-    return frozenset(found)
+        before = match.string[: match.start()][-1:]
+        yield match.start(), int(whole if dashes and (before.isalpha() or before == ".") else sign + whole)
+
+
+def _blanked(match: re.Match[str]) -> str:
+    return " " * len(match[0])
 
 
 def places_of(
@@ -131,7 +142,7 @@ def places_of(
 ) -> list[tuple[int, ...]] | None:
     """Return for each probe where it was printed; None where so many numbers are printed that nobody can tell.
 
-    Places follow each other as the lines do; `line_finder` gives a place's line.
+    Places are offsets in all that was printed; `line_finder` gives a place's line.
     """
     if not _are_numbers(probes):
         return text_places(probes, lines, template)
@@ -141,9 +152,7 @@ def places_of(
 
 def line_finder(probes: Sequence[Probe], lines: Sequence[Line], template: str) -> Callable[[int], Line]:
     """From a place of `places_of` to the line that begins there, or before it."""
-    if _are_numbers(probes):
-        return lambda place: lines[place]
-    starts = [offset for _, offset in _joined(lines, template)[1]]
+    starts = _starts(lines) if _are_numbers(probes) else [offset for _, offset in _joined(lines, template)[1]]
     return lambda place: lines[bisect_right(starts, place) - 1]
 
 
@@ -151,27 +160,38 @@ def _are_numbers(probes: Sequence[Probe]) -> bool:
     return all(isinstance(p.value, int) for p in probes)
 
 
+def _starts(lines: Sequence[Line]) -> list[int]:
+    return list(accumulate((len(line.text) + 1 for line in lines[:-1]), initial=0))
+
+
 def number_places(
     probes: Sequence[Probe], lines: Sequence[Line], texts: Iterable[str]
 ) -> list[tuple[int, ...]] | None:
-    """Return for each probe the indices of the lines that hold it, at its time or later.
+    """Return for each probe the offsets at which it was printed, at its time or later.
 
     `texts` are other probes that the lines may show too; digits in them are no numbers. None where so many
-    numbers are printed that any probe would be among them.
+    numbers are printed that any probe would be among them. A `-` after a letter is a sign in all lines or in none.
     """
     hidden = re.compile("|".join(map(re.escape, sorted(texts, key=len, reverse=True))) or r"(?!)")
-    found = ((i, line.at_ns, numbers_in(hidden.sub(" ", line.text))) for i, line in enumerate(lines))
-    rows = [(i, t, numbers) for i, t, numbers in found if numbers]
-    if len(rows) > LINES_PER_PROBE * (len(probes) + len(set(texts))) + LINES_SPARE:
+    shown = [Line(line.at_ns, hidden.sub(_blanked, line.text)) for line in lines]
+    rows = sum(_NUMBER.search(line.text) is not None for line in shown)
+    if rows > LINES_PER_PROBE * (len(probes) + len(set(texts))) + LINES_SPARE:
         return None
-    return [
-        tuple(
-            i
-            for i, t, numbers in rows
-            if p.value in numbers and len(numbers) <= NUMBERS_PER_LINE and t >= p.at_ns - CLOCK_SLACK_NS
-        )
-        for p in probes
-    ]
+    signs, dashes = (_places_read(probes, shown, dashes=dashes) for dashes in (False, True))
+    with_dashes = any(found and not other for found, other in zip(dashes, signs, strict=True))
+    return dashes if with_dashes and not all(signs) else signs
+
+
+def _places_read(probes: Sequence[Probe], lines: Sequence[Line], *, dashes: bool) -> list[tuple[int, ...]]:
+    sent = {p.value for p in probes}
+    found = defaultdict[int, list[tuple[int, int]]](list)
+    for start, line in zip(_starts(lines), lines, strict=False):
+        numbers = list(_numbers(line.text, dashes=dashes))
+        if len({n for _, n in numbers} - sent) <= OTHER_NUMBERS_PER_LINE:
+            for at, n in numbers:
+                found[n].append((start + at, line.at_ns))
+    values = ((p.at_ns, p.value) for p in probes if isinstance(p.value, int))
+    return [tuple(at for at, t in found[value] if t >= sent_ns - CLOCK_SLACK_NS) for sent_ns, value in values]
 
 
 def text_places(probes: Sequence[Probe], lines: Sequence[Line], template: str) -> list[tuple[int, ...]]:
