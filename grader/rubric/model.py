@@ -188,7 +188,8 @@ class Rubric(Record):
 
     A file without `schema` is read as version 1. `digits` is how many decimals points keep. `checks` is a Python file
     beside the rubric with checks of the instructor's own. `deadline` has a time zone; `late` says what later costs, and
-    without it nothing is lost.
+    without it nothing is lost. With `fixes: none`, `grader check --fix` repairs nothing: students are to find it
+    themselves.
     """
 
     schema_: Annotated[Literal["grader.rubric/1"], Field(alias="schema")] = "grader.rubric/1"
@@ -202,6 +203,7 @@ class Rubric(Record):
     checks: str | None = None
     deadline: Deadline | None = None
     late: Late | None = None
+    fixes: Literal["offered", "none"] = "offered"
     scenarios: dict[Name, Scenario]
     criteria: Annotated[tuple[Criterion, ...], Field(min_length=1)]
 
