@@ -34,7 +34,16 @@ MESSAGES = {
 MODULES = frozenset({"math", "os", "random", "rospy", "sys", "time"})
 LOOPED = frozenset({"is_shutdown", "sleep", "spin"})
 CALLED = frozenset({"is_shutdown", "sleep", "spin"})
-PARAM_CALLS = frozenset({"delete_param", "get_param", "has_param", "set_param"})
+ROLES = {
+    "Publisher": "publisher",
+    "Subscriber": "subscriber",
+    "init_node": "node",
+    "get_param": "param",
+    "has_param": "param",
+    "set_param": "set-param",
+    "delete_param": "set-param",
+}
+OLD_PRINT = re.compile(r"\bprint\b(?!\s*\()")
 BLOCKS = re.compile(r"\s*(if|elif|else|for|while|def|class|try|except|finally|with)\b")
 
 Step = dict[str, Any]
@@ -61,7 +70,13 @@ def _steps(text: str, types: list[str]) -> Iterator[Step]:
         text = step["text"]
         yield step
     if _error(text) is None:
-        for repair in (_without_old_names, lambda t: _with_imports(t, types), _with_calls, _with_spin):
+        for repair in (
+            _without_old_names,
+            _without_old_print,
+            lambda t: _with_imports(t, types),
+            _with_calls,
+            _with_spin,
+        ):
             for step in repair(text):
                 text = step["text"]
                 yield step
@@ -109,9 +124,11 @@ def _one_step(text: str, error: Error) -> Step | None:
 
 
 def _is_next(error: Error, left: Error) -> bool:
-    """Tabs are told before all else, wherever they are."""
+    """Tabs are told before all else, wherever they are, and of open brackets the last one."""
     spaces = ("TabError", "IndentationError")
-    return error["kind"] in spaces and left["kind"] not in spaces
+    if error["kind"] in spaces:
+        return left["kind"] not in spaces
+    return all("never closed" in one["message"] for one in (error, left)) and left["line"] < error["line"]
 
 
 def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
@@ -157,7 +174,8 @@ def _fixed_statement(lines: list[str]) -> list[str] | None:
     before = head.get(keyword[0] if keyword else "", "")
     after = "    pass\n" if _code(lines[-1]).endswith(":") else ""
     source = before + "\n".join([first, *lines[1:]]) + "\n" + after
-    fixed = next((f for tool in _tools() if (f := _refactored(tool, source)) not in (None, source)), None)
+    tools = _tools()[::-1] if OLD_PRINT.search(source) else _tools()
+    fixed = next((f for tool in tools if (f := _refactored(tool, source)) not in (None, source)), None)
     if fixed is None:
         return None
     body = fixed.removeprefix(before).removesuffix("\n" + after if after else "\n").split("\n")
@@ -251,6 +269,18 @@ def _without_old_names(text: str) -> Iterator[Step]:
         yield from _step("old-name", min(n.lineno for n in uses), text, after, names)
 
 
+def _without_old_print(text: str) -> Iterator[Step]:
+    """`print >>file, x` parses, as a shift."""
+    for node in ast.walk(ast.parse(text)):
+        value = node.value if isinstance(node, ast.Expr) else None
+        first = value.elts[0] if isinstance(value, ast.Tuple) and value.elts else value
+        if isinstance(first, ast.BinOp) and isinstance(first.op, ast.RShift) and _last(first.left) == "print":
+            for after in _as_python3(text.split("\n"), first.lineno - 1):
+                for step in _step("old-name", first.lineno, text, after, "print >>"):
+                    text = step["text"]
+                    yield step
+
+
 def _bound(tree: ast.Module) -> set[str]:
     found: set[str] = set()
     for node in ast.walk(tree):
@@ -322,8 +352,8 @@ def _with_calls(text: str) -> Iterator[Step]:
     spans = [span for n in named if (span := _span(lines, n))]
     if spans:
         after = _edited(text, [(line, end, end, "()") for line, _, end in spans])
-        word = ast.unparse(min(named, key=lambda n: n.lineno))
-        yield from _step("call", min(spans)[0] + 1, text, after, word)
+        words = dict.fromkeys(ast.unparse(n) for n in sorted(named, key=lambda n: n.lineno))
+        yield from _step("call", min(spans)[0] + 1, text, after, ", ".join(words))
 
 
 def _uncalled(node: ast.AST) -> Iterator[ast.expr]:
@@ -402,10 +432,8 @@ def _named(tree: ast.Module) -> Iterator[tuple[str, ast.expr]]:
             yield "key", call.slice
         if not isinstance(call, ast.Call):
             continue
-        name = _last(call.func)
-        role = {"Publisher": "publisher", "Subscriber": "subscriber", "init_node": "node"}.get(name, "")
-        role = "param" if name in PARAM_CALLS else role
-        keyword = "param_name" if role == "param" else "name"
+        role = ROLES.get(_last(call.func), "")
+        keyword = "param_name" if role.endswith("param") else "name"
         given = [*call.args[:1], *(k.value for k in call.keywords if k.arg == keyword)]
         if role and given:
             yield role, given[0]

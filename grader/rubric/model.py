@@ -192,6 +192,7 @@ class Rubric(Record):
     beside the rubric with checks of the instructor's own. `deadline` has a time zone; `late` says what later costs, and
     without it nothing is lost. `repairs` has shares by kind of repair: what is judged on a copy with such a repair
     earns that share of its points; 0 switches the repair off.
+    With `fixes: none`, `grader check --fix` repairs nothing: students are to find it themselves.
     """
 
     schema_: Annotated[Literal["grader.rubric/1"], Field(alias="schema")] = "grader.rubric/1"
@@ -206,6 +207,7 @@ class Rubric(Record):
     deadline: Deadline | None = None
     late: Late | None = None
     repairs: Annotated[dict[RepairKind, Share], Field(default_factory=dict)]
+    fixes: Literal["offered", "none"] = "offered"
     scenarios: dict[Name, Scenario]
     criteria: Annotated[tuple[Criterion, ...], Field(min_length=1)]
 

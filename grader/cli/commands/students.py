@@ -24,6 +24,17 @@ def check(
     watch: Annotated[
         bool, Flag("--watch", "stay, and check again whenever you save a file, until Ctrl-C")
     ] = False,
+    fix: Annotated[
+        bool,
+        Flag(
+            "--fix",
+            "first show how to repair modes, line ends, tabs and misspelt names, and do it if you agree",
+        ),
+    ] = False,
+    dry_run: Annotated[
+        bool, Flag("--dry-run", "with --fix: only show it, and exit 1 if a file would change")
+    ] = False,
+    yes: Annotated[bool, Flag("--yes", "with --fix: do not ask")] = False,
     out: Annotated[
         Path | None,
         Option("--out", "DIR", "keep the results in DIR/<submission id>/ (default: only show them)"),
@@ -35,8 +46,19 @@ def check(
 
     Hidden criteria are left out. If there are packages of several labs, they are checked one after the other.
     """
-    if staged and (watch or not static):
-        raise UsageError("--staged goes with --static, and not with --watch", hint="add --static")
+    _refuse_together(
+        (
+            staged and (watch or not static),
+            "--staged goes with --static, and not with --watch",
+            "add --static",
+        ),
+        ((dry_run or yes) and not fix, "--dry-run and --yes go with --fix", "add --fix"),
+        (
+            fix and (staged or watch or as_json),
+            "--fix goes with none of --staged, --watch and --json",
+            "fix first",
+        ),
+    )
     with loading():
         from grader.cli.checking import check_packages
         from grader.cli.select_rubric import choose_all
@@ -44,7 +66,20 @@ def check(
     keep_files = watch or out is not None
     options = GradeOptions(sandbox=sandbox, static_only=static, keep_hidden=False, files=keep_files)
     chosen = choose_all(Path(path), rubric)
+    if fix:
+        from grader.cli.fixing import fix_packages
+
+        wrong = fix_packages(chosen, dry_run=dry_run, yes=yes)
+        if dry_run:
+            return ExitCode.BELOW_PASS_MARK if wrong else ExitCode.PASSED
     return check_packages(path, chosen, options, watch=watch, out=out, as_json=as_json, staged=staged)
+
+
+def _refuse_together(*pairs: tuple[bool, str, str]) -> None:
+    """Raise UsageError for options that do not go together: whether they are given, what is wrong, and a hint."""
+    for given, message, hint in pairs:
+        if given:
+            raise UsageError(message, hint=hint)
 
 
 @command("explain", group=STUDENTS)

@@ -47,7 +47,7 @@ def rename_package(files: Files, wanted: Wanted) -> None:
     """Find a name that is nearly the lab's, in the manifest; whatever else has it follows."""
     text = files.text(MANIFEST)
     manifest, _ = parse_manifest(text.encode()) if text is not None else (None, None)
-    if text is None or manifest is None or not is_near(manifest.name, wanted.package):
+    if text is None or manifest is None or not _is_meant(files, manifest.name, wanted.package):
         return
     old, new = manifest.name, wanted.package
     message = f"line {manifest.name_line} of {MANIFEST}: the package is called {old}, not {new}"
@@ -57,6 +57,12 @@ def rename_package(files: Files, wanted: Wanted) -> None:
         other = files.text(file)
         if file != MANIFEST and other is not None:
             files.put(file, rename_word(other, old, new))
+
+
+def _is_meant(files: Files, name: str, wanted: str) -> bool:
+    """Return whether the name is nearly the lab's, or the manifest alone has another one."""
+    projects = [words[0].value for command in _commands(files, "project") if (words := _words(command))]
+    return is_near(name, wanted) or (name != wanted and projects == [wanted])
 
 
 def _parses(text: str) -> bool:
@@ -169,16 +175,23 @@ def _replaced(text: str, token: Token, new: str) -> str:
 
 
 def _close_bracket(files: Files) -> None:
+    """At the end of the last line that is no comment, or in a line of its own."""
     text = _cmake(files)
-    if commands_of(text.encode()) is None and commands_of(f"{text.rstrip()}\n)\n".encode()) is not None:
-        last = text.rstrip().count("\n") + 1
-        message = f"line {last} of {CMAKE}: a bracket that is opened is never closed"
-        files.change("build-line", CMAKE, f"{text.rstrip()})\n", message)
+    if commands_of(text.encode()) is not None:
+        return
+    lines = text.rstrip().split("\n")
+    last = max((i for i, line in enumerate(lines) if line.split("#", maxsplit=1)[0].strip()), default=0)
+    for added in ([lines[last] + ")"], [lines[last], ")"]):
+        changed = "\n".join([*lines[:last], *added, *lines[last + 1 :], ""])
+        if commands_of(changed.encode()) is not None:
+            message = f"line {last + 1} of {CMAKE}: a bracket that is opened is never closed"
+            files.change("build-line", CMAKE, changed, message)
+            return
 
 
 def _name_project(files: Files, name: str, wanted: str) -> None:
     """A manifest whose name is nearly the lab's gets that name later."""
-    right = wanted if is_near(name, wanted) else name
+    right = wanted if _is_meant(files, name, wanted) else name
     for command in _commands(files, "project")[:1]:
         words = _words(command)
         if words and words[0].value.strip('"') not in (name, right) and "$" not in words[0].value:
@@ -219,7 +232,7 @@ def _install(files: Files, package: PackageFacts, wanted: Wanted) -> None:
     there = {path for path in (_place(own, files, script) for script in wanted.installed) if path}
     calls = _commands(files, INSTALL)
     named = {_plain(t.value) for c in calls for t in _words(c)}
-    if any("$" in name and name != BIN for name in named):
+    if any("$" in name and not name.startswith("${CATKIN_") for name in named):
         return  # which scripts a variable holds is for CMake to say
     missing = sorted(there - named)
     if missing and not calls:

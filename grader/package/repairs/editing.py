@@ -187,6 +187,15 @@ def write_data(folder: Path, file: str, data: bytes, *, mode: int | None = None)
             raise
 
 
+def is_executable(folder: Path, file: str) -> bool:
+    """Return whether its owner may execute the file on this disk, whatever git has of it."""
+    try:
+        with open_untrusted(folder, *parts_of(file)) as stream:
+            return bool(os.fstat(stream.fileno()).st_mode & stat.S_IXUSR)
+    except (OSError, ValueError):
+        return False
+
+
 def make_executable(folder: Path, file: str) -> None:
     """Set the executable bits of those who may read it. Raises OSError or NotRepairable.
 

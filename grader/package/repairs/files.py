@@ -16,6 +16,7 @@ from grader.package.repairs.editing import (
     UTF16,
     Files,
     as_text,
+    is_executable,
     naming_files,
     read_data,
     rename_word,
@@ -33,7 +34,8 @@ def repair_files(files: Files, scripts: Iterable[SourceFile]) -> None:
     """Find what keeps the scripts from being started or read: bit, line ends, first line, mark, encoding."""
     for script in scripts:
         if script.executable is False:
-            command = f"chmod +x {script.path}"
+            in_git = script.mode_source == "git" and is_executable(files.folder, script.path)
+            command = f"{'git update-index --chmod=+x' if in_git else 'chmod +x'} {script.path}"
             message = f"{script.path} is not executable"
             files.add(Repair(kind="executable-bit", file=script.path, message=message, fix=command))
         if script.link is None and not script.binary:

@@ -8,7 +8,8 @@ from pathlib import PurePosixPath
 
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
 from grader.model.repair import RepairKind
-from grader.package.repairs.editing import Files
+from grader.package.manifest import parse_manifest
+from grader.package.repairs.editing import MANIFEST, Files
 from grader.package.repairs.python import Name
 from grader.package.repairs.wanted import Wanted, is_near
 
@@ -17,9 +18,10 @@ KINDS: dict[str, RepairKind] = {
     "subscriber": "topic-name",
     "node": "node-name",
     "param": "parameter-name",
+    "set-param": "parameter-name",
     "key": "parameter-name",
 }
-ROLES = ("node", "publisher", "subscriber", "param")
+ROLES = ("node", "publisher", "subscriber", "param", "set-param")
 NO_SCRIPTS = (".launch", ".xml", ".txt", ".yaml", ".yml", ".md", ".test")
 WORDS = {"topic-name": "topic", "node-name": "node", "parameter-name": "parameter"}
 TAG_LINES_MAX = 20
@@ -29,9 +31,11 @@ _KEY = re.compile(r"^(?P<indent> *)(?P<quote>[\"']?)(?P<key>[A-Za-z_][\w-]*)(?P=
 def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: Wanted) -> None:
     """Find the literals of a script that are slips of what the lab asks for, where it asks for nothing else there."""
     node = next((name.value for name in names if name.role == "node"), "")
+    asked_of = {"node": wanted.nodes, "publisher": wanted.topics, "subscriber": wanted.topics}
+    branches = [f"/{'/'.join(branch)}" for branch in _branches(wanted)]
     slips = []
     for role in ROLES:
-        asked = {"node": wanted.nodes, "param": wanted.params}.get(role, wanted.topics)
+        asked = asked_of.get(role, branches)
         given = [name for name in names if name.role == role]
         used = {_resolved(name, node) for name in given}
         absent = [w for w in asked if _bare(w, role) not in used]
@@ -90,6 +94,13 @@ def _replace_literal(files: Files, file: str, name: Name, value: str, right: str
     files.change(kind, file, "\n".join(lines), message)
 
 
+def _branches(wanted: Wanted) -> Iterator[tuple[str, ...]]:
+    """Yield the lab's parameters, and all that they lie below, by their parts."""
+    for param in wanted.params:
+        parts = param.strip("/").split("/")
+        yield from (tuple(parts[:length]) for length in range(len(parts), 0, -1))
+
+
 # ---- YAML files
 
 
@@ -97,12 +108,7 @@ def repair_yaml_names(
     files: Files, package: PackageFacts, scripts: dict[str, tuple[Name, ...]], wanted: Wanted
 ) -> None:
     """Find keys of parameter files that are slips of the lab's parameters, and the scripts that read them so."""
-    branches = {
-        tuple(parts[:n])
-        for w in wanted.params
-        for parts in [w.strip("/").split("/")]
-        for n in range(1, len(parts) + 1)
-    }
+    branches = set(_branches(wanted))
     names = {PurePosixPath(file).name for file in wanted.files}
     for file in (
         f.path
@@ -153,7 +159,7 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
     """Find attributes of launch files that name a script without its `.py`, another package, or a node or parameter
     nearly as the lab does. `names` are the files of the package once they are renamed."""
     given = package.manifest.name if package.manifest is not None else wanted.package
-    own = wanted.package if is_near(given, wanted.package) else given
+    own = _own_name(files, given)
     ours = {own, given, PurePosixPath(package.path).name}
     scripts = {name for path in names if not (name := PurePosixPath(path).name).endswith(NO_SCRIPTS)}
     programs = scripts | _programs(package)
@@ -176,6 +182,12 @@ def repair_launch_names(files: Files, package: PackageFacts, names: Sequence[str
         _repair_node(files, launch, node, wanted)
     for launch in package.launch_files:
         _repair_params(files, launch, wanted)
+
+
+def _own_name(files: Files, given: str) -> str:
+    """The package's name once its manifest is repaired."""
+    manifest, _ = parse_manifest((files.text(MANIFEST) or "").encode())
+    return manifest.name if manifest is not None else given
 
 
 def _repair_params(files: Files, launch: LaunchFile, wanted: Wanted) -> None:

@@ -47,7 +47,7 @@ class _Step(Record):
 class Name(Record):
     """A text in a script that names something; `start` and `end` are columns of its line, from 0."""
 
-    role: Literal["publisher", "subscriber", "node", "param", "key"]
+    role: Literal["publisher", "subscriber", "node", "param", "set-param", "key"]
     value: str
     line: int
     start: int
@@ -130,7 +130,8 @@ def _words(file: str, cause: Cause, steps: list[_Step]) -> tuple[str, str]:
     if cause == "import":
         return f"{place} uses {first.word}, which is not imported", ""
     if cause == "call":
-        return f"{place}: {first.word} is named but not called", f"write {first.word}()"
+        calls = ", ".join(f"{word}()" for word in first.word.split(", "))
+        return f"{place}: {first.word} is named but not called", f"write {calls}"
     if cause == "spin":
         message = f"{file} ends as soon as it has subscribed, because nothing keeps it running"
         return message, f"write {first.word} as the last line of what makes the node"
