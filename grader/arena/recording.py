@@ -19,8 +19,8 @@ from typing_extensions import Self
 from grader.arena.admission import Admission, shared_folder
 from grader.arena.asynchronous import Stop, run_together, run_until_signal
 from grader.arena.build import BUILD_EXPECTED_S, build
-from grader.arena.limits import Limits
-from grader.arena.process_environment import Place
+from grader.arena.limits import RunLimits
+from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.ros_env import INSTALL_HINT, find_ros
 from grader.arena.sandbox import temporary_base
 from grader.arena.sandbox_files import prepare
@@ -82,13 +82,13 @@ class Recorder:
         self._rates = rates or {}
         self._rubric = rubric
         self._progress = progress
-        self._limits = Limits().shared_by(len(rubric.scenarios))
+        self._limits = RunLimits().shared_by(len(rubric.scenarios))
         ros = find_ros()
         if ros is None:
             raise RosMissing(NO_ROS, hint=INSTALL_HINT)
         self._ros, self._sandbox, self._not_run = ros, choose(mode), ""
         self.recording = Recording(folder=folder, facts=facts, ros=ros, sandbox=self._sandbox)
-        self._place: Place | None = None
+        self._place: ProcessEnvironment | None = None
         self._stack = ExitStack()
         self._admission = Admission(None)
         self._runs: Counter[str] = Counter()
@@ -150,7 +150,7 @@ class Recorder:
                 writer.event("/grader/actor", time.time_ns(), event)
         recording.files.append(path)
 
-    async def _build(self, place: Place, writer: EvidenceWriter, *, last: bool) -> None:
+    async def _build(self, place: ProcessEnvironment, writer: EvidenceWriter, *, last: bool) -> None:
         self._progress.step("build", "waiting", WAITING, BUILD_EXPECTED_S)
         recording = self.recording
         faulty = [script for script in self._scripts() if _needs_answer(recording.facts, script)]
@@ -178,7 +178,7 @@ class Recorder:
         )
         self._progress.step("build", *(("done", "") if outcome.ok else ("failed", "catkin_make failed")))
 
-    def _make_place(self, folder: Path) -> Place:
+    def _make_place(self, folder: Path) -> ProcessEnvironment:
         folder.mkdir()
         folder.chmod(0o711)
         with _readable_by_all():
@@ -187,7 +187,7 @@ class Recorder:
                 folder, self._submission, self.recording.facts, self._scripts(), self._sandbox
             )
         named = self.recording.facts.manifest or self._submission.package
-        return Place(
+        return ProcessEnvironment(
             folder=folder,
             ros=self._ros,
             sandbox=self._sandbox,
@@ -208,7 +208,7 @@ class Recorder:
         matches = (script if script in paths else names.get(Path(script).name) for script in sorted(wanted))
         return [match for match in matches if match is not None]
 
-    async def _record_scenario(self, place: Place, name: str, *, alone: bool = False) -> None:
+    async def _record_scenario(self, place: ProcessEnvironment, name: str, *, alone: bool = False) -> None:
         scenario, shown = self._rubric.scenarios[name], ""
 
         def tell(detail: str) -> None:

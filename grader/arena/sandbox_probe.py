@@ -16,7 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from grader.arena.control_groups import find_cgroups
-from grader.arena.limits import Limits
+from grader.arena.limits import RunLimits
 from grader.arena.sandbox import NAMESPACES, NO_NESTING, WALLS, Sandbox, system_call_filter
 from grader.errors import HostError, SandboxMissing
 from grader.host_programs import HOST_ENV, find_host_program
@@ -91,7 +91,7 @@ def refused_limits() -> str:
     prlimit = find_host_program("prlimit")
     if prlimit is None:
         return ""
-    limits = Sandbox(bubblewrap=False, uid=None).rlimits(Limits())
+    limits = Sandbox(bubblewrap=False, uid=None).rlimits(RunLimits())
     return _said([*_drop(), prlimit, *limits, "--", "/bin/true"])
 
 

@@ -17,7 +17,7 @@ from typing_extensions import Self
 from grader.arena.admission import MEMINFO, read_numbers
 from grader.arena.arena_process import ArenaProcess
 from grader.arena.control_groups import remove_groups
-from grader.arena.process_environment import Place
+from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.run_state import RunState
 from grader.errors import ArenaError
@@ -56,7 +56,7 @@ class ArenaSession:
 
     def __init__(
         self,
-        place: Place,
+        place: ProcessEnvironment,
         writer: EvidenceWriter,
         *,
         master: bool = True,

@@ -31,7 +31,7 @@ HELLO = "hello"
 BLAME_SUBMISSION = (SubmissionError.kind, PackageNotFound.kind)
 
 
-class Errand(Record):
+class GradeRequest(Record):
     """A job on its way to a worker. `exchange` is the URL for its results, `batch` names the client's batch.
 
     `seen`: the job's source is a path that the client sees.
@@ -52,7 +52,7 @@ class Parcel(Record):
 
 
 class Report(Record):
-    """What became of an errand. Without a `parcel` there are no results to put into place."""
+    """What became of a request. Without a `parcel` there are no results to put into place."""
 
     outcome: Outcome
     parcel: Parcel | None = None

@@ -24,7 +24,15 @@ from typing import Any, BinaryIO
 from grader.classes.batch.job import Job, Outcome, failed
 from grader.classes.cluster import worker
 from grader.classes.cluster.connect import LOCAL, Needs, Recruits, check_address, connect, is_encrypted
-from grader.classes.cluster.exchange import Errand, Exchange, Parcel, Report, check_url, is_machines, unpack
+from grader.classes.cluster.exchange import (
+    Exchange,
+    GradeRequest,
+    Parcel,
+    Report,
+    check_url,
+    is_machines,
+    unpack,
+)
 from grader.errors import GraderError, HostError
 from grader.intake import safe_name
 from grader.results import RESULT, Results
@@ -173,11 +181,11 @@ class _Tasks:
     def _hand_out(self, task: _Task) -> None:
         source = Path(task.job.entry.source)
         seen = source.is_absolute() and (source.exists() or source.is_symlink())
-        errand = Errand(job=task.job, exchange=self._exchange.url, batch=self._batch, seen=seen)
+        request = GradeRequest(job=task.job, exchange=self._exchange.url, batch=self._batch, seen=seen)
         task.workers = frozenset(self._recruits.fit)
         task.future = self._client.submit(
             worker.perform,
-            pickle.dumps(errand),
+            pickle.dumps(request),
             key=f"grade-{self._batch}-{self._count}",
             pure=False,
             retries=RETRIES,

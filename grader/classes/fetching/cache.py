@@ -46,7 +46,7 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Place:
+class MirrorFolder:
     """The folder of one mirror."""
 
     folder: Path
@@ -122,12 +122,12 @@ def name_of(address: str) -> str:
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[Place]:
+def locked(folder: Path) -> Iterator[MirrorFolder]:
     """The place of a mirror, when nobody else uses it. Raises OSError where it cannot be had or locked."""
     descriptor = _held(folder, wait=True)
     assert descriptor is not None  # noqa: S101 - waited for
     try:
-        yield Place(folder)
+        yield MirrorFolder(folder)
     finally:
         os.close(descriptor)
 
@@ -173,7 +173,7 @@ def _removed(folder: Path) -> bool:
         if descriptor is None:
             return False
         try:
-            Place(folder).clear()
+            MirrorFolder(folder).clear()
             shutil.rmtree(folder)
         finally:
             os.close(descriptor)

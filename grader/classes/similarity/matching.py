@@ -13,10 +13,10 @@ from grader.classes.similarity.comparison import Request
 from grader.classes.similarity.fingerprints import (
     ENVIRONMENT,
     LIMITS,
+    CodeSource,
     Fingerprints,
     Marks,
     Numbers,
-    Place,
     Text,
     covered,
     leave_out,
@@ -88,9 +88,9 @@ class _Class:
 def read_all(request: Request) -> _Class:
     """Read submissions, starter code and tutorials, `request.jobs` at a time, each in a worker."""
     places = [
-        Place(),
-        *(Place(folder=folder, is_starter=True) for folder in request.starter),
-        *(Place(name=name, folder=folder) for name, folder in request.folders.items()),
+        CodeSource(),
+        *(CodeSource(folder=folder, is_starter=True) for folder in request.starter),
+        *(CodeSource(name=name, folder=folder) for name, folder in request.folders.items()),
     ]
     found, held = _Class(), 0
     for one in run_each(
