@@ -102,23 +102,23 @@ class Recorder:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def record_all(self, meanwhile: Callable[[], None]) -> None:
-        """The package with its build, then every scenario, side by side. `meanwhile` is called beside the build, in
+    def record_all(self, beside_build: Callable[[], None]) -> None:
+        """The package with its build, then every scenario, side by side. `beside_build` is called beside the build, in
         another thread."""
-        run_until_signal(self._record_all(meanwhile), self._stop)
+        run_until_signal(self._record_all(beside_build), self._stop)
 
     def record_again(self, scenarios: Iterable[str]) -> None:
         """These scenarios once more, one after the other, with no other run on the machine."""
         run_until_signal(self._record_alone(tuple(scenarios)), self._stop)
 
-    async def _record_all(self, meanwhile: Callable[[], None]) -> None:
+    async def _record_all(self, beside_build: Callable[[], None]) -> None:
         self._admission = Admission(shared_folder())
         names = [name for name in order_runs(self._rubric, self._rates) if name not in self._recorded]
         copy_recorded(self._recorded, self.recording.folder, self._progress)
         self._progress.step("build", "waiting", "", BUILD_EXPECTED_S)
         for name in names:
             self._progress.step(name, "waiting", "for the build", expected_s(self._rubric.scenarios[name]))
-        await run_together(self._record_package(), asyncio.to_thread(meanwhile))
+        await run_together(self._record_package(), asyncio.to_thread(beside_build))
         if self._place is None:
             for name in names:
                 self._progress.step(name, "skipped", self._not_run)

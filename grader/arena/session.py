@@ -183,7 +183,7 @@ class ArenaSession:
 
     def _config(self) -> dict[str, Any]:
         rosout = self._rosout_spec() if self._master else None
-        self.rosout_up = rosout is None  # then nobody need wait for it
+        self.rosout_up = rosout is None  # then no one need wait for it
         return {
             "master": self._master,
             "stage": self.place.stage(),

@@ -152,8 +152,8 @@ class StaticRecorder:
     def __exit__(self, *_: object) -> None:
         """Nothing was begun."""
 
-    def record_all(self, _meanwhile: Callable[[], None]) -> None:
-        """The package's files, and what was recorded before. There is no build to wait for meanwhile."""
+    def record_all(self, _import_later: Callable[[], None]) -> None:
+        """The package's files, and what was recorded before. There is no build to wait for."""
         copy_recorded(self._recorded, self.recording.folder, self._progress)
         self._write_package()
         for name in self._rubric.scenarios:

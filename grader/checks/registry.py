@@ -87,7 +87,7 @@ def collecting(source: str) -> Iterator[Collection]:
 def check(
     name: str, *, params: type[Record] = NoParams, messages_only: bool = False, heeds_losses: bool = False
 ) -> Callable[[Callable[..., Verdict]], Callable[..., Verdict]]:
-    """Register a function under a name. Raises ValueError for a name that is taken or a fact that nobody has."""
+    """Register a function under a name. Raises ValueError for a name that is taken or a fact that no one has."""
 
     def register(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
         own = _COLLECTION.get()

@@ -83,10 +83,10 @@ def _program(name: str) -> Row:
 def _probe(name: str, command: Sequence[str], *, drop: bool) -> Row:
     """Return whether namespaces of that kind can be made, by the user who needs them."""
     setpriv = find_host_program("setpriv") or "setpriv"
-    nobody = [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if drop else []
+    unprivileged = [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if drop else []
     try:
         done = subprocess.run(
-            [*nobody, *command],
+            [*unprivileged, *command],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             check=False,

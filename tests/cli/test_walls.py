@@ -91,7 +91,7 @@ def test_what_holds_memory_where_no_group_can_be_made(monkeypatch, user: int, co
     row = host_support._limits_of_trees()
     assert (row.state, row.fix) == ("limited", fix)
     assert "looked at twice a second" in row.detail
-    assert "children that nobody waited for is not counted" in row.detail
+    assert "children that were not waited for is not counted" in row.detail
 
 
 def test_what_holds_memory_where_groups_can_be_made(monkeypatch) -> None:

@@ -129,7 +129,7 @@ def numbers_in(text: str) -> frozenset[int]:
 def places_of(
     run: Run, probes: Sequence[Probe], lines: Sequence[Line], template: str
 ) -> list[tuple[int, ...]] | None:
-    """Return for each probe where it was printed; None where so many numbers are printed that nobody can tell.
+    """Return for each probe where it was printed; None where so many numbers are printed that no one can tell.
 
     Places follow each other as the lines do; `line_finder` gives a place's line.
     """

@@ -54,7 +54,7 @@ def check_address(text: str, *, insecure: bool = False) -> str:
         raise UsageError(
             f"--cluster {text}: this scheduler asks for no certificate: "
             "all who reach its port can run programs as its user",
-            hint="use tls:// (docs/how-to/cluster.md says how); where nobody else is in that network, "
+            hint="use tls:// (docs/how-to/cluster.md says how); if no one else is in that network, "
             "add --cluster-insecure",
         )
     try:
@@ -251,7 +251,7 @@ class Recruits:
             while True:
                 self._take_in(*self._answers.get_nowait())
 
-    def nobody(self, patience_s: float, goes_on: str) -> HostError:
+    def none_fit(self, patience_s: float, goes_on: str) -> HostError:
         """Return the error that no worker can grade."""
         left_out = "; ".join(self._left_out.values())
         what = f"no worker that can grade ({left_out})" if left_out else "no worker"

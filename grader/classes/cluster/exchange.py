@@ -79,7 +79,7 @@ class Exchange:
             if "://" in self.url:
                 files.makedirs(root, exist_ok=True)
             elif not make_folder(Path(root)):
-                raise FileExistsError("somebody else has just made it")
+                raise FileExistsError("another program has just made it")
 
     def remove(self) -> None:
         """Delete the folder and everything in it."""
@@ -229,5 +229,5 @@ class _Measured:
 
 
 def _refuse(parcel: Parcel, why: str) -> HostError:
-    hint = "check whether somebody else writes into the exchange"
+    hint = "check whether another program writes into the exchange"
     return HostError(f"{parcel.name} cannot be unpacked: {why}", hint=hint)

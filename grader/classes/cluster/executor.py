@@ -248,7 +248,7 @@ class _Tasks:
         if self._recruits.fit:
             self._idle_since_s = now_s
         elif now_s - self._idle_since_s > self._patience_s * (ANSWERING if self._recruits.asked else 1):
-            raise self._recruits.nobody(self._patience_s, GOES_ON)
+            raise self._recruits.none_fit(self._patience_s, GOES_ON)
 
     def _scheduler_lost(self) -> HostError:
         message = f"the connection to the scheduler at {self._recruits.address} is lost"

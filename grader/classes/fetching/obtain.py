@@ -161,7 +161,7 @@ def _served(task: Task, room: Path) -> Source:
 
 
 def _through_mirror(task: Task, room: Path) -> Obtained:
-    """A mirror that seems to be damaged is made anew."""
+    """A mirror that seems to be damaged is made again."""
     with ExitStack() as stack:
         place = _place(task.source, room, stack)
         kept = place.state() is not None
@@ -224,7 +224,7 @@ def _chosen(
 
 
 def branch_of(listing: Listing, ref: str | None, wanted: Wanted) -> str | None:
-    """The branch whose commits are looked at; None where somebody chose a tag or a commit."""
+    """The branch whose commits are looked at; None where someone chose a tag or a commit."""
     refs = listing.refs
     if ref is None or ref == "HEAD":
         name = (listing.head if wanted.refspec == "HEAD" else wanted.refspec) or "HEAD"

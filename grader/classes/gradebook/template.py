@@ -44,7 +44,7 @@ class _Work:
 def fill_template(
     template: Path, platform: Platform, marks: Sequence[Mark], wanted: Sequence[Wanted], *, named: bool
 ) -> tuple[bytes, list[str]]:
-    """The export with the points of whoever is found in it, every other byte as it was; and remarks.
+    """Return the export with the points of the students found in it, every other byte as it was; and remarks.
 
     Raises UsageError where the file is none of this platform's exports, or where it is not clear which column is ours.
     """
@@ -159,7 +159,7 @@ def _fill(work: _Work, record: Record, mark: Mark) -> None:
 def _left(
     work: _Work, students: Sequence[Record], theirs: Sequence[Identity], taken: set[int]
 ) -> Iterator[str]:
-    """Whoever is in the export only."""
+    """Yield a remark for each student who is in the export only."""
     for place, (record, identity) in enumerate(zip(students, theirs, strict=True)):
         fields = _fields(record, work)
         named = [fields[name] for name, kind in work.known.items() if kind != "section" and fields.get(name)]

@@ -118,7 +118,7 @@ class _Reading:
 
 
 def _given(value: object) -> object:
-    """Without what was left empty, as in a form that somebody has begun to fill in."""
+    """Without what was left empty, as in a form that someone has begun to fill in."""
     if not isinstance(value, dict):
         return value
     return {

@@ -30,7 +30,7 @@ Stamp = tuple[int, int, int] | None
 @dataclass(frozen=True, kw_only=True)
 class Item:
     """One submission in the list. `key` names its folder and stands in addresses, `kinds` are the filters that show it,
-    `open` counts the criteria that nobody has decided, by status."""
+    `open` counts the criteria that no one has decided, by status."""
 
     key: str
     entry: Entry

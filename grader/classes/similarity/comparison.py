@@ -44,7 +44,7 @@ def compare(
 ) -> Similarity:
     """Return which submissions are nearly the same. `folders` are their folders of results, by id.
 
-    What is in `starter` (folders, archives, single files) is nobody's own. Two of one group (`groups` by id) are not
+    What is in `starter` (folders, archives, single files) is no one's own. Two of one group (`groups` by id) are not
     named. `threshold` is the share (0 to 1) of the one's own code that is in the other, `jobs` how many are read side
     by side.
 

@@ -1,4 +1,4 @@
-"""What submissions have in common: which fingerprints are nobody's own, and for two submissions what they share."""
+"""What submissions have in common: which fingerprints are no one's own, and for two submissions what they share."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ STARTER_NOTES = 20
 LARGE_CLUSTER = 6
 NO_PROGRAM = "holds no program in Python or C++"
 COMMON_FROM = 6
-"""Submissions a class must have before what most of them share counts as nobody's own."""
+"""Submissions a class must have before what most of them share counts as no one's own."""
 MATRIX_COLUMNS = 4096
 CANDIDATES_MAX = 20_000
 NEAR = 0.25
@@ -172,7 +172,7 @@ def _notes(request: Request, count: int, found: Sequence[Sequence[str]], *, cut:
 
 @dataclass(frozen=True, kw_only=True)
 class Own:
-    """One file without what is nobody's own: `prints` and `signs` mark what is left of the text's."""
+    """One file without what is no one's own: `prints` and `signs` mark what is left of the text's."""
 
     text: Text
     prints: Marks

@@ -305,7 +305,7 @@ def missing_module(script: Script) -> list[Edit]:
 
 @operator("asks-for-input", each=each_script)
 def asks_for_input(script: Script) -> list[Edit]:
-    """Waits for somebody to press Enter before it makes its node.
+    """Waits for someone to press Enter before it makes its node.
 
     Fits every Python script that makes a node.
     """
