@@ -41,7 +41,7 @@ from grader.rubric.load import needs_ros
 PATIENCE_S = 60.0
 EXCHANGE = ".grader-exchange"
 TOKEN_BYTES = 6
-LOOK_S, POLL_S = 1.0, 0.05
+LOOK_S = 1.0
 RETRIES = 2
 LOSSES = 3
 ANSWERING = 3  # times as long is waited while a worker has still to say who it is
@@ -149,6 +149,7 @@ class _Tasks:
         waiting = iter(jobs)
         try:
             while True:
+                self._recruits.changed.clear()
                 yield from self._look()
                 more = self._submit(waiting, begun)
                 if not (more or self._running or self._back):
@@ -161,7 +162,7 @@ class _Tasks:
                     if outcome is not None:
                         yield outcome
                 if not done:
-                    time.sleep(POLL_S)
+                    self._recruits.changed.wait(LOOK_S)
         finally:
             self._stop()
 
@@ -192,6 +193,7 @@ class _Tasks:
             workers=list(task.workers),
             allow_other_workers=False,
         )
+        task.future.add_done_callback(lambda _: self._recruits.changed.set())
         self._count += 1
         self._running.append(task)
 
