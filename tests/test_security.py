@@ -10,13 +10,12 @@ import pytest
 
 from grader import files
 from grader.arena import build, scenario_inputs, static_recorder, workspace
-from grader.arena.limits import SUBMISSION_MESSAGE_BYTES
-from grader.arena.limits import Limits as RunLimits
+from grader.arena.limits import SUBMISSION_MESSAGE_BYTES, RunLimits
 from grader.arena.ros_env import DUMP_BYTES, NAMES_MAX, VALUE_BYTES
 from grader.checks.support import text
 from grader.evidence import container, decode, definitions, memory_budget
 from grader.intake import archive, git, gitdir
-from grader.intake.limits import Limits as IntakeLimits
+from grader.intake.limits import RunLimits as IntakeLimits
 from grader.package import cmake, cmake_parse, launch, launch_loader, python, reading
 
 KB, MB, RUN = 1 << 10, 1 << 20, RunLimits()

@@ -32,7 +32,7 @@ WEAKER = (
     "no control group of this process can be written, so memory, sockets' buffers and files in memory are looked at "
     "twice a second, and of what the kernel keeps for pipes and other descriptors only their number is bounded"
 )
-WEAKER_CPU = "CPU time of children that nobody waited for is not counted"
+WEAKER_CPU = "CPU time of children that were not waited for is not counted"
 
 
 class Cgroup(Record):
@@ -155,7 +155,7 @@ def _below(mount: list[str], path: str) -> Path:
 def _sweep(folder: Path) -> None:
     """Remove what a killed arena left: its groups are empty, and too old to be just made."""
     for group in folder.glob("grader-*"):
-        with suppress(OSError):  # somebody's processes are in it, or it is gone
+        with suppress(OSError):  # someone's processes are in it, or it is gone
             if time.time() - group.stat().st_mtime > ABANDONED_S:
                 group.rmdir()
 
@@ -173,7 +173,7 @@ def _usable(folder: Path, key: str) -> bool:
     except OSError:
         return False
     finally:
-        with suppress(OSError):  # an empty group of ours: it hurts nobody if it stays
+        with suppress(OSError):  # an empty group of ours: it hurts no one if it stays
             trial.rmdir()
     return True
 

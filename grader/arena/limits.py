@@ -10,7 +10,7 @@ SUBMISSION_MESSAGE_BYTES = 160 << 20
 LEAST_RUN_BYTES = 8 << 20
 
 
-class Limits(Record):
+class RunLimits(Record):
     """Memory, processes, tasks (threads count), CPU seconds, output, `home_bytes` (what its home may hold besides the
     workspace's own files) and the number of files in each folder are of one process tree; messages and bytes of one
     channel, or of one run (`run_bytes`, `channels`); so is what the buffers of its sockets hold (`socket_bytes`)."""

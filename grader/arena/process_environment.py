@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from grader.arena.limits import Limits
+from grader.arena.limits import RunLimits
 from grader.arena.ros_env import SYSTEM_PATH, RosInstallation
 from grader.arena.sandbox import Sandbox, Word, copy_of, scratch, system_call_filter
 from grader.arena.sandbox_files import (
@@ -73,13 +73,13 @@ OWN_VARIABLES = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class ProcessEnvironment:
     """`folder` is this submission's own, `env` what the built workspace's `setup.bash` adds."""
 
     folder: Path
     ros: RosInstallation
     sandbox: Sandbox
-    limits: Limits
+    limits: RunLimits
     workspace: Workspace
     package: str
     env: dict[str, str] = field(default_factory=dict)
@@ -125,7 +125,7 @@ class Place:
         """Where processes find the packages that stand in for missing ones."""
         return STANDINS if self.sandbox.bubblewrap else str(self.folder / "standins")
 
-    def from_source(self) -> Place:
+    def from_source(self) -> ProcessEnvironment:
         """Without a build: ROS still finds the package's sources."""
         path = f"{self.inside_workspace}/src:{self.ros.env.get('ROS_PACKAGE_PATH', '')}"
         return replace(self, env={"ROS_PACKAGE_PATH": path.rstrip(":")})
@@ -222,7 +222,7 @@ class Place:
         first = self.sandbox.first_words(self.limits) + HEAD
         return first + (before + TAKE + run if copy else TAKE + RUN)
 
-    def _limits(self, *, copy: bool) -> Limits:
+    def _limits(self, *, copy: bool) -> RunLimits:
         """A workspace of the size that was handed in has room beside what else may be written."""
         room = self.limits.home_bytes + (2 * self.workspace.copied_bytes if copy else 0)
         return self.limits.model_copy(update={"home_bytes": room})

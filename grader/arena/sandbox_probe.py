@@ -16,7 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from grader.arena.control_groups import find_cgroups
-from grader.arena.limits import Limits
+from grader.arena.limits import RunLimits
 from grader.arena.sandbox import NAMESPACES, NO_NESTING, WALLS, Sandbox, system_call_filter
 from grader.errors import HostError, SandboxMissing
 from grader.host_programs import HOST_ENV, find_host_program
@@ -77,7 +77,7 @@ def choose(mode: SandboxMode) -> Sandbox:
     if reason and mode == "require":
         raise SandboxMissing(f"no sandbox on this machine: {reason}", hint=INSTALL_HINT)
     can_drop = os.geteuid() == 0 and find_host_program("setpriv") is not None
-    uid = _nobodys_uid() if can_drop else None
+    uid = _unprivileged_uid() if can_drop else None
     nesting = not reason and _walls()[1]
     return Sandbox(bubblewrap=not reason, uid=uid, reason=reason, nesting=nesting, cgroups=find_cgroups())
 
@@ -91,7 +91,7 @@ def refused_limits() -> str:
     prlimit = find_host_program("prlimit")
     if prlimit is None:
         return ""
-    limits = Sandbox(bubblewrap=False, uid=None).rlimits(Limits())
+    limits = Sandbox(bubblewrap=False, uid=None).rlimits(RunLimits())
     return _said([*_drop(), prlimit, *limits, "--", "/bin/true"])
 
 
@@ -118,7 +118,7 @@ def _walls() -> tuple[str, bool]:
     return said, nesting and not said
 
 
-def _nobodys_uid() -> int:
+def _unprivileged_uid() -> int:
     """A user that no directory of users knows, where this machine has the whole range of them (a container may not)."""
     try:
         mapped = max(int(line.split()[0]) + int(line.split()[2]) for line in UID_MAP.read_text().splitlines())

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from grader.arena.admission import Admission, Leave
-from grader.arena.process_environment import Place
+from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.run_state import describe_wait, find_outcome, next_look_s
 from grader.arena.scenario_inputs import OVER, advertisement, call_services, make_shots, publication, settings
 from grader.arena.session import ArenaSession
@@ -42,7 +42,7 @@ UP_S, SETTLE_S = 5.0, 0.2
 BUILT_PROGRAMS_MAX = 20
 
 Spec: TypeAlias = dict[str, Any]
-"""What the arena needs to start a process (`Place.spec`)."""
+"""What the arena needs to start a process (`ProcessEnvironment.spec`)."""
 
 
 def expected_s(scenario: Scenario) -> float:
@@ -61,7 +61,7 @@ def expected_s(scenario: Scenario) -> float:
 async def run_scenario(
     name: str,
     scenario: Scenario,
-    place: Place,
+    place: ProcessEnvironment,
     *,
     path: Path,
     metadata: Mapping[str, str],
@@ -197,7 +197,7 @@ async def _look_at_connections(arena: ArenaSession) -> None:
     await arena.wait(lambda: not arena.live.running, GRAPH_EVERY_S)
 
 
-def process_specs(start: Start, place: Place) -> Iterator[Spec]:
+def process_specs(start: Start, place: ProcessEnvironment) -> Iterator[Spec]:
     """How `rosrun`, `roslaunch` or `rosparam` would start it; nothing for a file that is not in the package."""
     if start.launch is not None:
         yield place.spec(start.name, ["roslaunch", place.package, start.launch, *start.args])
@@ -216,7 +216,7 @@ def process_specs(start: Start, place: Place) -> Iterator[Spec]:
         yield from _script(start, place)
 
 
-def _script(start: Start, place: Place) -> Iterator[Spec]:
+def _script(start: Start, place: ProcessEnvironment) -> Iterator[Spec]:
     found = place.find_program(start.script or "")
     if found is not None:
         program, path = found

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from grader.arena.process_environment import Place
+from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.session import ArenaSession
 from grader.evidence.events import ActorEvent
 from grader.files import read_untrusted
@@ -328,11 +328,11 @@ def _answer(call: Call, value: object, detail: str) -> ActorEvent:
     )
 
 
-def _messages(place: Place) -> Callable[[str], str | None]:
+def _messages(place: ProcessEnvironment) -> Callable[[str], str | None]:
     return lambda type_: _type_text(type_, "msg", place)
 
 
-def _type_text(type_: str, kind: str, place: Place) -> str | None:
+def _type_text(type_: str, kind: str, place: ProcessEnvironment) -> str | None:
     """The text of `<package>/<kind>/<Name>.<kind>`: the student's own, ROS's, or a stand-in's."""
     package, _, name = type_.partition("/")
     own = place.workspace.repaired / package

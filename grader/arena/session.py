@@ -17,7 +17,7 @@ from typing_extensions import Self
 from grader.arena.admission import MEMINFO, read_numbers
 from grader.arena.arena_process import ArenaProcess
 from grader.arena.control_groups import remove_groups
-from grader.arena.process_environment import Place
+from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.run_state import RunState
 from grader.errors import ArenaError
@@ -56,7 +56,7 @@ class ArenaSession:
 
     def __init__(
         self,
-        place: Place,
+        place: ProcessEnvironment,
         writer: EvidenceWriter,
         *,
         master: bool = True,
@@ -183,7 +183,7 @@ class ArenaSession:
 
     def _config(self) -> dict[str, Any]:
         rosout = self._rosout_spec() if self._master else None
-        self.rosout_up = rosout is None  # then nobody need wait for it
+        self.rosout_up = rosout is None  # then no one need wait for it
         return {
             "master": self._master,
             "stage": self.place.stage(),

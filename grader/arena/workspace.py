@@ -292,7 +292,7 @@ def _members(
                     tell(_TOO_MANY)
                     return
                 yield tar, member
-                tar.members = []  # type: ignore[attr-defined] # nobody looks back
+                tar.members = []  # type: ignore[attr-defined] # no one looks back
     except _TooMuchError as error:
         tell(str(error))
     except _DAMAGED:

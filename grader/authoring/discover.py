@@ -128,7 +128,7 @@ def _is_node(path: Path) -> bool:
 
 
 def _holds_parameters(path: str) -> bool:
-    """By its folder: other YAML files are somebody else's, a CI's for instance."""
+    """By its folder: other YAML files are someone else's, a CI's for instance."""
     return {"config", "cfg", "param", "params", "yaml"} & set(PurePosixPath(path).parts[:-1]) != set()
 
 

@@ -141,7 +141,7 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
 
     Why it matters on a robot
         A number in a message has a fixed width. A program that counts past it dies, or goes on with a wrong
-        number, after the minutes or hours in which nobody tested it.
+        number, after the minutes or hours in which no one tested it.
 
     How it is measured
         The clock is run faster, so that a node with `rospy.Rate` comes around twice in seconds; one with

@@ -63,7 +63,7 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
         before it starts the node, and that the node runs.
 
     Why it matters on a robot
-        Nobody types `rosparam load` on a robot. A node that starts without its parameters runs with wrong
+        No one types `rosparam load` on a robot. A node that starts without its parameters runs with wrong
         ones, or dies.
 
     How it is measured

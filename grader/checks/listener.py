@@ -73,7 +73,7 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
     places = places_of(run, probes, lines, params.template)
     missing = [] if places is None else [p for p, found in zip(probes, places, strict=True) if not found]
     if places is None:
-        message = "it prints so many numbers that nobody can tell which of them it heard"
+        message = "it prints so many numbers that it cannot be told which of them it heard"
         verdict = failed(message, hint="print each number once, in the callback")
     elif missing:
         verdict = _other_words(probes, missing, lines, params) or not_printed(

@@ -113,7 +113,7 @@ def maintainer(package: PackageFacts) -> Verdict:
         which ends in `@todo.todo`.
 
     Why it matters on a robot
-        When a package breaks on somebody else's robot, the maintainer's address is whom they ask.
+        When a package breaks on someone else's robot, the maintainer's address is whom they ask.
 
     How it is measured
         By the `email` attribute of each `<maintainer>`. Any other address will do: it is not written to.

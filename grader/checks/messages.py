@@ -35,7 +35,7 @@ class MessageParams(Record):
 
 @check("message", params=MessageParams, messages_only=True, heeds_losses=True)
 def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
-    """Each message says what the handout asks, and tells the time.
+    """Each message says what the handout asks, and contains the time.
 
     What it checks
         That every message on the topic has the handout's words, and a time in seconds that grows from

@@ -53,7 +53,7 @@ def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -
 
     Why it matters on a robot
         What differs from robot to robot is kept in such files. A file that does not load stops the robot as it
-        starts, and a value under another name is one that nobody reads.
+        starts, and a value under another name is one that no one reads.
 
     How it is measured
         `rosparam load` loads the file as it was handed in; what it sets is compared by name. Values are free.

@@ -129,7 +129,7 @@ def judged_rhythm(run: Run, params: RateParams, channels: Sequence[Channel]) -> 
 
 
 def _measured(found: Rhythm, run: Run, params: RateParams) -> str:
-    """Return what came, and how late the machine was meanwhile."""
+    """Return what came, and how late the machine was during it."""
     seen = described(found, *params.bounds_ns)
     late = lateness(run, found.times_ns[0], found.until_ns, own=True) if found.gaps_ns else None
     return seen if late is None else f"{seen}, {late.described}"
@@ -244,7 +244,7 @@ def sleeps_explain(found: Rhythm, late: Lateness, params: RateParams) -> bool:
 
 
 def stalls_explain(found: Rhythm, late: Lateness, params: RateParams) -> bool:
-    """On a full machine a node that has work to do gets its turn late, though nobody who only sleeps is woken late.
+    """On a full machine a node that has work to do gets its turn late, though no one who only sleeps is woken late.
     With its few long gaps as long as they should be, its rate would be right."""
     stalls = [gap for gap in found.gaps_ns if gap > params.bounds_ns[1]]
     if not late.full or not 0 < len(stalls) <= max(1, STALLS_SHARE * len(found.gaps_ns)):

@@ -18,8 +18,7 @@ from grader.rubric.find import rubric_ids
 from grader.rubric.instructor import known_checks
 from grader.rubric.load import LoadedRubric, all_rubrics, load_rubric
 from grader.rubric.model import Criterion, Rubric
-from grader.suggest import did_you_mean
-from grader.wording import number
+from grader.wording import did_you_mean, number
 
 Line = tuple[str, int]
 """A paragraph and how far it is indented."""

@@ -18,7 +18,7 @@ from grader.intake.names import is_archive_name, listing, printable
 from grader.intake.open import is_recording
 from grader.rubric.load import LoadedRubric, find_rubric_for_package, load_rubric, packages_of_labs
 from grader.rubric.model import Criterion, Rubric, Scenario, Start, Until
-from grader.suggest import closest
+from grader.wording import closest
 
 ALIKE = 0.75
 """How alike a package's name and a lab's must be to suggest the lab."""

@@ -1,4 +1,4 @@
-"""Somebody else's repository as git may see it: its index, refs and objects, and none of its settings.
+"""Someone else's repository as git may see it: its index, refs and objects, and none of its settings.
 
 A repository's own settings, hooks and attributes can make git run programs; its links, `alternates` and `.git` files
 can lead to another student's work. So git is given a folder of ours, in which only its data are linked.

@@ -22,7 +22,7 @@ _SHOWN_LETTERS = 120
 def safe_name(text: str) -> str:
     """Return `text` as a file's name: `[A-Za-z0-9._-]`, 1 to 100 characters, not hidden, never `.` or `..`.
 
-    Nor is it a device of Windows (`CON`, `nul.txt`), where somebody may look at the results. Accents are dropped.
+    Nor is it a device of Windows (`CON`, `nul.txt`), where someone may look at the results. Accents are dropped.
     Where letters had to be given up, or the name was too long, a short hash of the whole keeps two such names apart.
     """
     plain = unicodedata.normalize("NFKD", text.translate(_LETTERS))

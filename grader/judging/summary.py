@@ -101,7 +101,7 @@ def round_half_up(points: float, digits: int) -> float:
 def notes_of(runs: Mapping[str, Run]) -> tuple[Note, ...]:
     """The notes of all runs, in the order of the runs and of time; equal ones once, at most 20 of each kind a run.
 
-    What was left out is counted in a last note. Recordings of other tools have none: nobody watched.
+    What was left out is counted in a last note. Recordings of other tools have none: no one watched.
     """
     return tuple(
         note

@@ -241,7 +241,7 @@ class _Writer:
         )
 
     def _folded(self, title: str, rows: Iterable[str]) -> Iterator[str]:
-        """What is shown when somebody opens it. The empty lines make Markdown of what is inside."""
+        """What is shown when someone opens it. The empty lines make Markdown of what is inside."""
         inside = list(rows)
         if inside:
             yield from ("<details>", f"<summary>{title}</summary>", "", *inside, "</details>", "")

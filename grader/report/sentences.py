@@ -49,7 +49,7 @@ def _repair_words(repair: Repair, criteria: list[CriterionResult]) -> str:
 
 
 def late_words(result: GradingResult) -> tuple[str, ...]:
-    """Lines that say what being late cost, when it was handed in, and which commit counts; none where nobody asked."""
+    """Lines that say what being late cost, when it was handed in, and which commit counts; none where no one asked."""
     late, known = result.late, result.late or result.handed_in
     if known is None:
         return ()

@@ -56,7 +56,7 @@ class Param(Record):
 
     `file` is a YAML file of the student's, read as `rosparam load` would, each of its values replaced by one of the
     same type that the grader makes up for this run. Names of `also` that the file lacks get made-up values too.
-    `made_up` is the type of a value for `name` that nobody can guess.
+    `made_up` is the type of a value for `name` that no one can guess.
     """
 
     name: str | None = None

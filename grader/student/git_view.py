@@ -14,7 +14,7 @@ from pathlib import Path
 from grader.errors import SubmissionError, UsageError
 from grader.intake.git import Git, GitFailed, GitMissing, GitTimeout, Repository
 from grader.intake.gitdir import Unfit, git_folder, link_repository, repository_around
-from grader.intake.limits import Limits
+from grader.intake.limits import IntakeLimits
 from grader.intake.names import brief, printable
 from grader.intake.tree import is_file, read_file
 
@@ -146,7 +146,7 @@ def _staged_paths(view: View, package: Path) -> list[str]:
             f"git has nothing of the package in {printable(package.name)}",
             hint="git add its files, and commit",
         )
-    if len(paths) > Limits().package_files:
+    if len(paths) > IntakeLimits().package_files:
         raise SubmissionError(
             f"{len(paths)} files are staged", hint="take what was built or recorded out of the repository"
         )

@@ -85,7 +85,7 @@ class Screen:
         """Show that a run begins because these files were saved; none for the first run."""
 
     def restart(self) -> None:
-        """Show that a run was stopped because something was saved meanwhile."""
+        """Show that a run was stopped because something was saved during it."""
 
     def end(self, outcome: Outcome, saved: tuple[str, ...]) -> None:
         """Show a result."""
@@ -170,7 +170,7 @@ class Watch:
             return self._last.code
 
     def _run_once(self) -> bool:
-        """Grade and show the result; false where files were saved meanwhile, so that it no longer holds."""
+        """Grade and show the result; false if files were saved during it, so that it no longer holds."""
         snapshot = self._look()
         saved = self._names_to_show(snapshot)
         self._screen.begin(saved)
@@ -181,9 +181,9 @@ class Watch:
         except Stopped:
             self._saved |= self._saves.wait(0)
             return False
-        meanwhile = self._saves.wait(AGAIN_S if outcome.result.error is not None else 0)
-        if meanwhile and self._look() != snapshot:
-            self._saved |= meanwhile
+        saved_since = self._saves.wait(AGAIN_S if outcome.result.error is not None else 0)
+        if saved_since and self._look() != snapshot:
+            self._saved |= saved_since
             return False
         self._graded, self._last = snapshot, outcome
         self._screen.end(outcome, saved)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.limits import Limits
+from grader.arena.limits import RunLimits
 from grader.evidence.run import Channel, Run
 from grader.rubric.model import Probe, Scenario, Start, Until
 from tests.arena.support import SCRIPT, exit_of, make_place, printed, run
@@ -65,7 +65,7 @@ def beside_a_talker(
     *,
     window_s: float = 3.0,
     ends: bool = False,
-    limits: Limits | None = None,
+    limits: RunLimits | None = None,
     sandbox: str = "auto",
 ) -> Run:
     """Run an attack in one process beside an honest 10 Hz talker in another; one that `ends` is seen to its end."""
@@ -505,13 +505,13 @@ rospy.spin()
 
 
 def test_floods_of_messages(tmp_path: Path) -> None:
-    seen = beside_a_talker(tmp_path, FLOOD, limits=Limits(run_bytes=32 << 20))
+    seen = beside_a_talker(tmp_path, FLOOD, limits=RunLimits(run_bytes=32 << 20))
     assert_unharmed(seen)
     recorded = {c.topic: sum(len(m.data) for m in c.messages) for c in seen.channels}
     assert 1 << 20 < recorded["/large"] < 24 << 20
     assert sum(recorded.values()) < 32 << 20
     (small,) = seen.student_channels("/small")
-    assert 180 <= len(small.messages) <= Limits().channel_messages
+    assert 180 <= len(small.messages) <= RunLimits().channel_messages
     closed = {e.topic: e.dropped for _, e in seen.recorder if e.event == "closed"}
     assert closed["/small"] > 100_000
     assert closed["/chatter"] == 0

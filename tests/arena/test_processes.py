@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.limits import Limits
+from grader.arena.limits import RunLimits
 from grader.arena.sandbox_probe import why_not
 from tests.arena.support import exit_of, printed, run_script
 
@@ -124,7 +124,7 @@ def test_nothing_of_the_arena_is_inherited(tmp_path: Path, sandbox: str) -> None
 @needs_sandbox
 def test_memory_is_limited(tmp_path: Path) -> None:
     code = "import time\nblocks = []\nwhile True:\n    blocks.append(bytearray(20 << 20))\n    time.sleep(0.02)\n"
-    run = run_script(tmp_path, code, limit_s=20, limits=Limits(memory_bytes=200 << 20))
+    run = run_script(tmp_path, code, limit_s=20, limits=RunLimits(memory_bytes=200 << 20))
     assert exit_of(run).stopped_by == "KILL"
     assert any("MB of memory" in e.detail for _, e in run.actors)
 
@@ -132,7 +132,7 @@ def test_memory_is_limited(tmp_path: Path) -> None:
 @pytest.mark.parametrize("sandbox", SANDBOXES)
 def test_output_is_limited(tmp_path: Path, sandbox: str) -> None:
     code = "while True: print('y' * 100)\n"
-    run = run_script(tmp_path, code, limit_s=1, limits=Limits(output_lines=500), sandbox=sandbox)
+    run = run_script(tmp_path, code, limit_s=1, limits=RunLimits(output_lines=500), sandbox=sandbox)
     lines = printed(run)
     assert len(lines) == 501
     assert "left out" in lines[-1]

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from grader.arena.limits import Limits
+from grader.arena.limits import RunLimits
 from grader.checks.build import _first_error
 from grader.checks.support.console_output import console_log, printed_lines, printed_times
 from grader.checks.support.exit_causes import _refused_name, tracebacks
@@ -34,7 +34,7 @@ def bounded(cpu_s: float = CPU_S) -> Iterator[None]:
 def lines_of(part: str) -> list[str]:
     """As many lines as the arena takes, each as long as it takes them."""
     line = (part * LINE_CHARS)[:LINE_CHARS]
-    return [line] * (Limits().output_bytes // LINE_CHARS)
+    return [line] * (RunLimits().output_bytes // LINE_CHARS)
 
 
 def run_of(lines: list[str], stream: str = "stderr") -> Run:
@@ -106,7 +106,7 @@ def test_names_that_ros_refused(part: str) -> None:
 @pytest.mark.parametrize("line", ['  File "a", line 1', "Traceback (most recent call last):", " ", "a: b"])
 def test_tracebacks_of_as_many_lines_as_there_may_be(line: str) -> None:
     with bounded():
-        tracebacks([line] * Limits().output_lines)
+        tracebacks([line] * RunLimits().output_lines)
 
 
 def test_a_syntax_error_without_a_heading_is_found_all_the_same() -> None:

@@ -200,7 +200,7 @@ def test_inspect_says_what_is_wrong_with_a_file(content, tmp_path, capsys):
 
 @pytest.mark.parametrize(("state", "code"), [("ok", 0), ("limited", 0), ("missing", 3)])
 def test_doctor_tells_by_its_exit_code(state, code, capsys, monkeypatch):
-    row = Row(name="ROS 1", state=state, detail="x\x1b", mend="apt-get install ros")
+    row = Row(name="ROS 1", state=state, detail="x\x1b", fix="apt-get install ros")
     monkeypatch.setattr("grader.cli.doctor.diagnose", lambda: (row,))
     assert run(["doctor"]) == code
     out = capsys.readouterr().out
@@ -215,7 +215,7 @@ def test_diagnosis_without_ros_names_the_command_that_mends_it(monkeypatch):
     monkeypatch.setattr(doctor, "find_ros", lambda: None)
     rows = {row.name: row for row in doctor.diagnose()}
     assert rows["ROS 1"].state == "missing"
-    assert "apt-get install" in rows["ROS 1"].mend
+    assert "apt-get install" in rows["ROS 1"].fix
     assert {"Python", "git", "sandbox", "memory", "disk", "host name", "encoding"} <= set(rows)
 
 

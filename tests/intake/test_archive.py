@@ -13,7 +13,7 @@ import zipfile
 import pytest
 
 from grader.errors import SubmissionError
-from grader.intake.limits import Limits
+from grader.intake.limits import IntakeLimits
 from tests.intake.samples import (
     NODE,
     lab_tar,
@@ -238,8 +238,8 @@ def test_a_later_entry_replaces_an_earlier_one(tmp_path):
 @pytest.mark.parametrize(
     ("limits", "says"),
     [
-        (Limits(entries=2), "more than 2 files"),
-        (Limits(total_bytes=1 << 20), "larger than 1 MiB"),
+        (IntakeLimits(entries=2), "more than 2 files"),
+        (IntakeLimits(total_bytes=1 << 20), "larger than 1 MiB"),
     ],
 )
 @pytest.mark.parametrize("kind", ["zip", "tar.gz"])

@@ -12,7 +12,7 @@ from hashlib import sha1
 import pytest
 
 from grader.errors import SubmissionError, UsageError
-from grader.intake.limits import Limits
+from grader.intake.limits import IntakeLimits
 from grader.intake.source import parse_source
 from tests.intake.samples import NODE, commit, git, lab, manifest, opened, repository, write
 
@@ -279,7 +279,7 @@ def test_a_tree_that_holds_itself_over_and_over(leaf, tmp_path, monkeypatch):
         entries = (b"40000 %d\0%s" % (number, bytes.fromhex(name)) for number in range(10))
         name = add_object(repo, b"tree", b"".join(entries))
     with_tree_entry(repo, b"40000", b"a", name)
-    message = refused(f"{repo}@main", tmp_path, limits=Limits(entries=5000))
+    message = refused(f"{repo}@main", tmp_path, limits=IntakeLimits(entries=5000))
     assert "more than 5000 files" in message if leaf else "no end within 2 s" in message
 
 
@@ -297,7 +297,7 @@ def test_a_giant_in_a_commit_is_left_out(tmp_path):
     names = ("giant", "[a]*? b\\c", "!d", "lab1/data.bin")
     files = dict.fromkeys(names, bytes(2 << 20))
     repo = repository(tmp_path / "student", lab() | files)
-    submission = opened(f"{repo}@main", tmp_path, limits=Limits(file_bytes=1 << 20))
+    submission = opened(f"{repo}@main", tmp_path, limits=IntakeLimits(file_bytes=1 << 20))
     assert not any((submission.root / name).exists() for name in names)
     assert set(submission.package.executable) == {"CMakeLists.txt", "package.xml", "src/node.py"}
     assert submission.package.mode_source == "git"

@@ -14,7 +14,7 @@ import pytest
 
 from grader.errors import PackageNotFound, SubmissionError
 from grader.intake import open_recorded, open_recording, open_submission
-from grader.intake.limits import Limits
+from grader.intake.limits import IntakeLimits
 from grader.intake.source import identify, parse_source
 from tests.intake.samples import commit, git, lab, opened, repository, write
 
@@ -259,8 +259,8 @@ def test_line_ends_come_as_they_are_stored(tmp_path):
 
 
 def test_too_many_files_are_refused_before_they_are_written(repo, tmp_path):
-    assert "more than 2 files" in refused(repo.as_uri(), tmp_path, limits=Limits(entries=2)).message
-    assert "larger than" in refused(repo.as_uri(), tmp_path, limits=Limits(total_bytes=10)).message
+    assert "more than 2 files" in refused(repo.as_uri(), tmp_path, limits=IntakeLimits(entries=2)).message
+    assert "larger than" in refused(repo.as_uri(), tmp_path, limits=IntakeLimits(total_bytes=10)).message
 
 
 @pytest.mark.parametrize(

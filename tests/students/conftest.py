@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.model.result import Standing
+from grader.model.result import GitStatus
 from grader.student.git_status import advise, read_environment
 
 MANIFEST = """<package format="2"><name>{name}</name><version>0.0.1</version><description>d</description>
@@ -69,7 +69,7 @@ class Clone:
         self.git("add", "-A")
         self.git("commit", "-q", "-m", "Work")
 
-    def standing(self, base: Path, *, here: Path | None = None, **environment: str) -> Standing:
+    def standing(self, base: Path, *, here: Path | None = None, **environment: str) -> GitStatus:
         """What the student is told."""
         return advise(self.package, base / "asked", read_environment(environment, here or self.package))
 

@@ -1,4 +1,4 @@
-"""One publisher's TCPROS connection: cuts the stream into messages and hands on those for which there is room."""
+"""One publisher's TCPROS connection: cuts the stream into messages and passes on those for which there is room."""
 
 from bounded_sockets import receive, receive_into
 from wire import LENGTH
@@ -46,7 +46,7 @@ class Connection:
         self._held_bytes = 0
 
     def watch(self):
-        """Read on, as far as the run has not ended meanwhile."""
+        """Read on, unless the run has ended since."""
         if not self._watched and not self._closed and not self._paused:
             self._watched = True
             self._recorder.loop.add_reader(self.sock, self._look)

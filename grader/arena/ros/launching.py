@@ -30,7 +30,7 @@ class Launched:
 
 
 def launch(spec, stage, groups):
-    """Start what `spec` says (grader/arena/process_environment.py, `Place.spec`). Raises OSError."""
+    """Start what `spec` says (grader/arena/process_environment.py, `ProcessEnvironment.spec`). Raises OSError."""
     with contextlib.ExitStack() as ours, contextlib.ExitStack() as theirs:
         lifeline, far = socket.socketpair()
         ours.callback(lifeline.close)

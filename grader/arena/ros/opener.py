@@ -1,6 +1,6 @@
 """What `firefox` and its like do where the grader runs them (`open.sh`): tell the arena's master what to open.
 
-Prints nothing and always succeeds: without a master there is nobody to tell. A real program of the same name takes
+Prints nothing and always succeeds: without a master there is no one to tell. A real program of the same name takes
 over where there is a screen.
 """
 

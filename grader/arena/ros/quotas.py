@@ -42,7 +42,7 @@ class Budget:
         self._lock = threading.Lock()
 
     def open(self, key, process):
-        """The account of a channel, made anew where there is room for one more; else None. `key` is all that makes it
+        """The account of a channel, made again where there is room for one more; else None. `key` is all that makes it
         what it is, its definition too."""
         with self._lock:
             if key not in self._channels:

@@ -181,7 +181,7 @@ class Recorder:
 
         def work():
             latching = False
-            with contextlib.suppress(ProtocolError):  # then nobody knows
+            with contextlib.suppress(ProtocolError):  # then no one knows
                 sock, header = self._subscribe(
                     self._caller_id + KNOCK, connection.topic, connection.port, LATCHING_S
                 )

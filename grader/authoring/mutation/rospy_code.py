@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 from grader.authoring.mutation.python_script import Function, Script
-from grader.authoring.mutation.solution import Place, Solution
+from grader.authoring.mutation.solution import CodePlace, Solution
 
 LOGS = frozenset({"logdebug", "loginfo", "logwarn", "logerr", "logfatal"})
 STREAMS = frozenset({"stdout", "stderr"})
@@ -109,34 +109,34 @@ def _function(script: Script, node: ast.AST | None) -> Function | ast.Lambda | N
     return next((f for f in script.of(ast.FunctionDef) if f.name == last_name(node)), None)
 
 
-def script_place(script: Script, node: ast.AST | None = None, **at: str) -> Place:
+def script_place(script: Script, node: ast.AST | None = None, **at: str) -> CodePlace:
     """Return a place in the script, in the line of `node`, or else of the first edit."""
-    return Place(path=script.path, at={"script": script.path, **at}, line=getattr(node, "lineno", None))
+    return CodePlace(path=script.path, at={"script": script.path, **at}, line=getattr(node, "lineno", None))
 
 
-def each_script(solution: Solution) -> Iterator[tuple[Place, Script]]:
+def each_script(solution: Solution) -> Iterator[tuple[CodePlace, Script]]:
     """Find the scripts."""
     return ((script_place(script), script) for script in solution.scripts)
 
 
-def each_publisher(solution: Solution) -> Iterator[tuple[Place, Script, Endpoint]]:
+def each_publisher(solution: Solution) -> Iterator[tuple[CodePlace, Script, Endpoint]]:
     """Find the publishers."""
     return _each_endpoint(solution, publishers)
 
 
-def each_subscriber(solution: Solution) -> Iterator[tuple[Place, Script, Endpoint]]:
+def each_subscriber(solution: Solution) -> Iterator[tuple[CodePlace, Script, Endpoint]]:
     """Find the subscribers."""
     return _each_endpoint(solution, subscribers)
 
 
-def each_endpoint(solution: Solution) -> Iterator[tuple[Place, Script, Endpoint]]:
+def each_endpoint(solution: Solution) -> Iterator[tuple[CodePlace, Script, Endpoint]]:
     """Find the publishers and subscribers."""
     return _each_endpoint(solution, lambda script: [*publishers(script), *subscribers(script)])
 
 
 def _each_endpoint(
     solution: Solution, find: Callable[[Script], list[Endpoint]]
-) -> Iterator[tuple[Place, Script, Endpoint]]:
+) -> Iterator[tuple[CodePlace, Script, Endpoint]]:
     for script in solution.scripts:
         for endpoint in find(script):
             yield script_place(script, endpoint.call, topic=endpoint.topic), script, endpoint

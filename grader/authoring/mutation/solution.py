@@ -40,7 +40,7 @@ Change = Sequence[Edit] | bytes | Tree | None
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class CodePlace:
     """A place that an operator may change. `at` tells it from the others; without `line`, the first edit does.
 
     Positions in an XML file count bytes, those in any other file characters: `xml` is the file's document.

@@ -140,7 +140,7 @@ def _blanked(match: re.Match[str]) -> str:
 def places_of(
     run: Run, probes: Sequence[Probe], lines: Sequence[Line], template: str
 ) -> list[tuple[int, ...]] | None:
-    """Return for each probe where it was printed; None where so many numbers are printed that nobody can tell.
+    """Return for each probe where it was printed; None where so many numbers are printed that no one can tell.
 
     Places are offsets in all that was printed; `line_finder` gives a place's line.
     """

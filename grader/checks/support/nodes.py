@@ -19,7 +19,7 @@ TypeName = Annotated[str, Field(pattern=r"^[A-Za-z]\w*/[A-Za-z]\w*$")]
 
 
 def nodes_of(run: Run, process: str) -> tuple[str, ...]:
-    """The nodes of one process, or the student's all where `process` is empty or nobody noted whose they are."""
+    """The nodes of one process, or the student's all where `process` is empty or no one noted whose they are."""
     return run.student_nodes(process) if process and are_noted(run) else run.student_nodes()
 
 

@@ -1,4 +1,4 @@
-"""Where mirrors are kept: in a folder of the grader's user that nobody else can enter, each used by one at a time.
+"""Where mirrors are kept: in a folder of the grader's user that no one else can enter, each used by one at a time.
 
 `<cache>/grader/repositories/<sum of the address>/` holds `lock`, `mirror.git` and `state.json`. The state is written
 when the mirror is complete, and its time of change says when the mirror was used last. `failure.json` is there where
@@ -46,7 +46,7 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Place:
+class MirrorFolder:
     """The folder of one mirror."""
 
     folder: Path
@@ -87,7 +87,7 @@ class Place:
             return None
 
     def failed(self, failure: Failure) -> None:
-        """Tell whoever comes next, so that not all of them wait for a server that does not answer."""
+        """Tell the next process, so that not all of them wait for a server that does not answer."""
         with suppress(OSError):
             (self.folder / "failure.json").write_text(json.dumps(asdict(failure)), encoding="utf-8")
 
@@ -122,12 +122,12 @@ def name_of(address: str) -> str:
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[Place]:
-    """The place of a mirror, when nobody else uses it. Raises OSError where it cannot be had or locked."""
+def locked(folder: Path) -> Iterator[MirrorFolder]:
+    """The place of a mirror, when no one else uses it. Raises OSError where it cannot be had or locked."""
     descriptor = _held(folder, wait=True)
     assert descriptor is not None  # noqa: S101 - waited for
     try:
-        yield Place(folder)
+        yield MirrorFolder(folder)
     finally:
         os.close(descriptor)
 
@@ -173,7 +173,7 @@ def _removed(folder: Path) -> bool:
         if descriptor is None:
             return False
         try:
-            Place(folder).clear()
+            MirrorFolder(folder).clear()
             shutil.rmtree(folder)
         finally:
             os.close(descriptor)
@@ -187,7 +187,7 @@ def _held(folder: Path, *, wait: bool) -> int | None:
         with suppress(FileNotFoundError):
             folder.mkdir(mode=0o700, exist_ok=True)
             if not _is_own(folder):
-                raise PermissionError(f"{folder} is somebody else's")
+                raise PermissionError(f"{folder} belongs to another user")
             descriptor = open_lock(folder / "lock")
             try:
                 if wait:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from grader.classes.fetching.cache import cache_folder, locked, tidy_now_and_then
-from grader.classes.fetching.mirror import Errand, GivenUp, Patience, bring_up_to_date, place_name
+from grader.classes.fetching.mirror import FetchRequest, GivenUp, Patience, bring_up_to_date, place_name
 from grader.classes.fetching.obtain import source_of
 from grader.errors import GraderError
 from grader.files import temporary_folder
@@ -80,10 +80,10 @@ class Prefetch:
         if folder is None:
             return None
         tidy_now_and_then(folder)
-        errand = Errand(source=source, since=self._since, patience=self._patience)
+        request = FetchRequest(source=source, since=self._since, patience=self._patience)
         try:
             with locked(folder / place_name(source)) as place:
-                bring_up_to_date(place, errand, room)
+                bring_up_to_date(place, request, room)
         except (GraderError, GitFailed, GivenUp, OSError):
             return False
         return True

@@ -52,7 +52,7 @@ def _alone(path: Path) -> Iterator[None]:
     except OSError as error:
         raise unwritable(path, error) from error
     try:
-        with suppress(OSError):  # a file system without locks: whoever shares it has to know what they do
+        with suppress(OSError):  # a file system without locks: its users must not write at the same time
             _wait(descriptor, path)
         yield
     finally:

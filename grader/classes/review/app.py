@@ -45,7 +45,7 @@ from grader.wording import number
 
 
 class _Pages(Flask):
-    """Flask with our templates' rules: nobody's text becomes markup, and what hides or steers is written out."""
+    """Flask with our templates' rules: no one's text becomes markup, and what hides or steers is written out."""
 
     jinja_options = {  # noqa: RUF012 - as Flask has it
         "finalize": environment().finalize,
@@ -58,7 +58,7 @@ class _Pages(Flask):
 def create_app(review: ReviewSession, *, port: int, token: str, author: str) -> Flask:
     """The application for `review`, to be reached at 127.0.0.1 and that port by those who know the token.
 
-    `author` stands beside decisions until somebody says another name in the page.
+    `author` stands beside decisions until someone says another name in the page.
     """
     app = _Pages(__name__, static_folder=None)
     app.extensions["review"] = review

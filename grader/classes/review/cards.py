@@ -21,7 +21,7 @@ MANUAL = "manual"
 
 @dataclass(frozen=True, kw_only=True)
 class Draft:
-    """What a form was sent with and what became of it. In a `conflict` somebody else decided meanwhile; `error` says
+    """What a form was sent with and what became of it. In a `conflict` someone else has decided since; `error` says
     what is wrong with what was sent, `saved` when it was written."""
 
     points: str = ""

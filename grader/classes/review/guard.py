@@ -27,7 +27,7 @@ FRAMED = (
     "sandbox allow-scripts; default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; "
     "form-action 'none'; base-uri 'none'; frame-ancestors 'self'"
 )
-"""Of a student's report, whatever it says of itself: it reaches nothing, asks nobody, and has an origin of its own."""
+"""Of a student's report, whatever it says of itself: it reaches nothing, asks no one, and has an origin of its own."""
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -38,7 +38,7 @@ HEADERS = {
 
 
 def guard(app: Flask, *, port: int, token: str) -> None:
-    """Let nobody in but who came with the token. All other requests are answered 403, whatever they ask for."""
+    """Let no one in but who came with the token. All other requests are answered 403, whatever they ask for."""
     app.config.update(
         SECRET_KEY=secrets.token_bytes(32),
         SESSION_COOKIE_NAME=f"grader-review-{port}",  # cookies do not tell ports apart

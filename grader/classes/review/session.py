@@ -65,7 +65,7 @@ class ReviewSession:
         self._books_behind = False
 
     def start(self) -> None:
-        """Begin to follow; what was decided while nobody reviewed is looked at first."""
+        """Begin to follow; what was decided while no one reviewed is looked at first."""
         self.background.start()
         self.background.changed()
 
@@ -203,7 +203,7 @@ class ReviewSession:
         write_run(self.path, written.run.model_copy(update={"ended_at": run.ended_at}))
 
     def _catch_up(self) -> None:
-        """Find what was decided, or settled, while nobody reviewed or just before a review was killed."""
+        """Find what was decided, or settled, while no one reviewed or just before a review was killed."""
         batch = self.submissions.batch()
         behind = set(self._all_behind(self.overrides()))
         written = stamp_of(self.path / GRADEBOOK)
@@ -236,10 +236,10 @@ LOCK = ".review.lock"
 
 
 class Conflict(Exception):
-    """Somebody else decided meanwhile: `now` is what stands there, None for nothing."""
+    """Someone else has decided since: `now` is what stands there, None for nothing."""
 
     def __init__(self, now: Override | None) -> None:
-        super().__init__("decided meanwhile")
+        super().__init__("someone else has decided since")
         self.now = now
 
 
@@ -268,7 +268,7 @@ def reviewing(path: Path) -> Iterator[None]:
     except OSError as error:
         raise unwritable(path / LOCK, error) from error
     try:
-        with suppress(OSError):  # a file system without locks: whoever shares it has to know what they do
+        with suppress(OSError):  # a file system without locks: its users must not write at the same time
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield
     finally:

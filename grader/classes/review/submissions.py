@@ -30,7 +30,7 @@ Stamp = tuple[int, int, int] | None
 @dataclass(frozen=True, kw_only=True)
 class Item:
     """One submission in the list. `key` names its folder and stands in addresses, `kinds` are the filters that show it,
-    `open` counts the criteria that nobody has decided, by status."""
+    `open` counts the criteria that no one has decided, by status."""
 
     key: str
     entry: Entry
@@ -172,7 +172,7 @@ WORDS_CHARS = 100
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class Navigation:
     """`shown` are the submissions that the filter `kind` and the words `q` show, `counts` how many each filter has.
 
     `before` and `after` are the keys of the neighbours of the submission one is at, empty where there is none; it need
@@ -195,7 +195,7 @@ class Place:
         return {name: value for name, value in given.items() if value}
 
 
-def place_of(items: Sequence[Item], asked: Mapping[str, str], *, at: str = "") -> Place:
+def place_of(items: Sequence[Item], asked: Mapping[str, str], *, at: str = "") -> Navigation:
     """The place that an address or a form asks for; what it asks for and is not known is left out."""
     kind = asked.get("show", ALL)
     kind = kind if kind in FILTERS else ALL
@@ -205,7 +205,7 @@ def place_of(items: Sequence[Item], asked: Mapping[str, str], *, at: str = "") -
     ahead = {item.key for item in items[:here]} if here > 0 else set()
     left = [item.key for item in shown if item.key in ahead]
     right = [item.key for item in shown if item.key not in ahead and item.key != at]
-    return Place(
+    return Navigation(
         kind=kind,
         q=q,
         shown=shown,

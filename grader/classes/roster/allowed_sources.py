@@ -111,7 +111,7 @@ def _address_fault(source: str) -> str:
 
 
 def whole_source(source: str, base: Path) -> str:
-    """The same for whoever stands in another folder: a path becomes absolute."""
+    """Return the same source for a process in another folder: a path becomes absolute."""
     if _ADDRESS.match(source) and not _is_there(source, base):
         return source
     return str(base.absolute() / os.path.expanduser(source))  # noqa: PTH111 - Path.expanduser raises without a home

@@ -106,7 +106,7 @@ def doctor(*, as_json: JsonFlag = False) -> ExitCode:
         from grader.cli.output import say_json
     rows = machine.diagnose()
     if as_json:
-        say_json([row.model_dump() for row in rows])
+        say_json([row.model_dump(by_alias=True) for row in rows])
     else:
         machine.print_rows(rows, sys.stdout)
     return ExitCode.NOT_GRADED if any(row.state == "missing" for row in rows) else ExitCode.PASSED

@@ -204,7 +204,7 @@ class Names:
         self._sources.update(set(_words(entry.source, entry.ref or "")))
 
     def told(self) -> frozenset[str]:
-        """The words that could tell somebody: of sources not those that most have (`home`, `submissions`)."""
+        """The words that could tell someone: of sources not those that most have (`home`, `submissions`)."""
         most = max(1, self._count // 2)
         return frozenset(self._own).union(word for word, times in self._sources.items() if times <= most)
 

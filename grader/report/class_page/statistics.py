@@ -280,7 +280,7 @@ def _cells(lines: Sequence[Line], row: int, columns: Sequence[Sequence[int]], st
 
 
 def _shade(letters: Sequence[str]) -> str:
-    """`q0` where nobody lost anything, to `q5` where all did."""
+    """`q0` where no one lost anything, to `q5` where all did."""
     lost = sum(letter in "afb" for letter in letters)
     return f"q{-(-5 * lost // len(letters))}"
 

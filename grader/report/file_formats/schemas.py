@@ -83,7 +83,8 @@ def _field_docstrings(record: type[Record]) -> dict[str, str]:
         for node, text in pairwise(definition.body):
             match node, text:
                 case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
-                    texts[name.removesuffix("_")] = inspect.cleandoc(words).replace("\n", " ")
+                    key = record.model_fields[name].serialization_alias or name.removesuffix("_")
+                    texts[key] = inspect.cleandoc(words).replace("\n", " ")
     return texts
 
 

@@ -21,7 +21,7 @@ Place = tuple[float, float, float]
 
 
 def graph_plot(figure: GraphFigure, name: str) -> Markup | None:
-    """The drawing; None for one that nobody could read: then the list beside it says all."""
+    """The drawing; None for one that no one could read: then the list beside it says all."""
     vertices = [f"n{node}" for node in figure.nodes] + [f"t{topic}" for topic in figure.topics]
     if not vertices or len(vertices) > MOST or not figure.edges:
         return None

@@ -1,4 +1,4 @@
-"""What every page shares: templates in which nobody's text becomes markup, the look, and what a page may load."""
+"""What every page shares: templates in which no one's text becomes markup, the look, and what a page may load."""
 
 from __future__ import annotations
 
