@@ -6,9 +6,10 @@ import math
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 import yaml
+from yaml.composer import Composer
 
 from grader.errors import RubricError
 
@@ -129,9 +130,20 @@ def _read(path: Path, name: str, form: Form) -> bytes:
 
 
 def _compose(text: str, raw: bytes, name: str, form: Form) -> Source:
-    loader: yaml.SafeLoader | None = None
     try:
-        loader = yaml.SafeLoader(text)
+        if LIBYAML is not None and "\t" not in text:  # where libyaml allows tabs that PyYAML does not
+            return _read_with(LIBYAML, text, raw, name, form)
+    except yaml.YAMLError:
+        pass  # PyYAML's own scanner says what is wrong, in the same words on every machine
+    try:
+        return _read_with(yaml.SafeLoader, text, raw, name, form)
+    except yaml.YAMLError as error:
+        raise RubricError([_yaml_fault(error, text, name)]) from error
+
+
+def _read_with(kind: type[yaml.SafeLoader], text: str, raw: bytes, name: str, form: Form) -> Source:
+    loader = kind(text)
+    try:
         node = loader.get_single_node()
         if node is None and form.may_be_empty:
             return Source(name=name, raw=raw, data={}, lines={})
@@ -139,14 +151,27 @@ def _compose(text: str, raw: bytes, name: str, form: Form) -> Source:
             raise RubricError([f"{name}:1: the file is empty"])
         reader = _Reader(loader, form)
         data = reader.read(node, ())
-    except yaml.YAMLError as error:
-        raise RubricError([_yaml_fault(error, text, name)]) from error
     except RecursionError as error:
         raise RubricError([f"{name}:1: is nested too deeply"]) from error
     finally:
-        if loader is not None:
-            loader.dispose()
+        loader.dispose()
     return Source(name=name, raw=raw, data=data, lines=reader.lines, faults=reader.faults)
+
+
+def _libyaml_loader() -> type[yaml.SafeLoader] | None:
+    """Return a loader that scans with libyaml and composes in Python, whose stack has a limit; None without it."""
+    if not yaml.__with_libyaml__:
+        return None
+
+    class Loader(Composer, yaml.CSafeLoader):
+        def __init__(self, text: str) -> None:
+            yaml.CSafeLoader.__init__(self, text)
+            Composer.__init__(self)
+
+    return cast("type[yaml.SafeLoader]", Loader)
+
+
+LIBYAML = _libyaml_loader()
 
 
 def _yaml_fault(error: yaml.YAMLError, text: str, name: str) -> str:

@@ -81,6 +81,7 @@ def test_a_cluster_with_certificates_needs_no_flag(tmp_path: Path) -> None:
     assert sorted(verdicts(out)) == NAMES[:2]
 
 
+@pytest.mark.full
 def test_workers_that_differ_are_named_and_left_out(place: Cluster, tmp_path: Path) -> None:
     place.worker(preload="older")
     place.worker(preload="without")
