@@ -217,7 +217,9 @@ def _wrong(count: Count, found: Wrong, params: StepParams) -> Verdict | None:
 
 def _flooded(skips: int, params: StepParams) -> Verdict:
     message = f"{params.topic} is flooded, so its publisher drops most values: {plural(skips, 'skip')}"
-    return unjudged(message, hint="first make the loop sleep, then look at the counter again")
+    return unjudged(
+        message, hint=f"first publish at {significant(params.rate_hz)} Hz, then look at the counter again"
+    )
 
 
 def _usual_fault(usual: float) -> str:

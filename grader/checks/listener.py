@@ -170,7 +170,8 @@ def _types_differ(run: Run, topic: str) -> Verdict | None:
     if asked is None:
         return None
     message = f"{asked.actor} subscribes to {topic} with {asked.type}, so that nothing arrives"
-    return failed(message, hint=f"give rospy.Subscriber('{topic}', …) the type that the publisher uses")
+    wanted = f"{asked.value}, the type" if isinstance(asked.value, str) else "the type"
+    return failed(message, hint=f"give rospy.Subscriber('{topic}', …) {wanted} that the handout asks for")
 
 
 def _some_numbers(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]) -> Verdict | None:

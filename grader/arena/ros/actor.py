@@ -171,7 +171,8 @@ class Actor:
         if key in self._other_types or len(self._other_types) >= OTHER_TYPES_MAX:
             return
         self._other_types.add(key)
-        note = {"actor": who, "topic": topic.name, "type": type_, "detail": "asks for another type"}
+        note = {"actor": who, "topic": topic.name, "type": type_, "value": topic.type}
+        note["detail"] = "asks for another type"
         self._wire.event("/grader/actor", dict(note, action="note"))
 
 
