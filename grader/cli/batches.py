@@ -8,7 +8,7 @@ from pathlib import Path
 
 from grader.classes.batch.job import Executor, LocalExecutor
 from grader.classes.batch.run import BatchOptions
-from grader.classes.roster import Local
+from grader.classes.roster import Local, Roster
 from grader.classes.roster.entries import parse_time
 from grader.cli.output import say_beside
 from grader.errors import ExitCode, UsageError
@@ -62,6 +62,12 @@ def allowed_folders(folders: Sequence[Path], *, remote_only: bool) -> Local:
         if not folder.is_dir():
             raise UsageError(f"--allow-local {folder}: there is no such folder", hint="give a folder")
     return Local(folders=tuple(folder.absolute() for folder in folders), remote_only=remote_only)
+
+
+def with_package(roster: Roster, package: str) -> Roster:
+    """Return the roster with `package` in every row that names none."""
+    entries = (e if e.package else e.model_copy(update={"package": package}) for e in roster.entries)
+    return roster.model_copy(update={"entries": tuple(entries)})
 
 
 def executor(options: BatchOptions, exchange: str | None) -> Executor:

@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from grader.checks import Check
 from grader.errors import RubricError, UsageError
@@ -130,6 +130,19 @@ def started(rubric: Rubric) -> Rubric:
     """The rubric without the scenarios for which nothing is run."""
     scenarios = {name: s for name, s in rubric.scenarios.items() if s.recording is None}
     return rubric.model_copy(update={"scenarios": scenarios})
+
+
+def files_of(rubric: Rubric) -> frozenset[str]:
+    """Return the names of the scripts, launch files and other files that the rubric asks for, without folders."""
+    paths = [
+        path for s in rubric.scenarios.values() for p in s.start for path in (p.script, p.launch, p.load)
+    ]
+    for criterion in rubric.criteria:
+        given = criterion.parameters
+        scripts = given.get("scripts")
+        paths += [given.get("path"), given.get("file"), given.get("launch")]
+        paths += scripts if isinstance(scripts, list | tuple) else []
+    return frozenset(PurePosixPath(path).name for path in paths if isinstance(path, str))
 
 
 def needs_package(loaded: LoadedRubric) -> bool:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from grader.cli.declare import STUDENTS, Argument, Flag, Option, command, loading
-from grader.cli.options import RUBRIC, STATIC, JsonFlag, SandboxOption
+from grader.cli.options import RUBRIC, STATIC, JsonFlag, PackageOption, SandboxOption
 from grader.errors import ExitCode, UsageError
 
 
@@ -14,6 +14,7 @@ def check(
     *,
     path: Annotated[str, Argument("PATH", "your package's folder (default: this folder)")] = ".",
     rubric: Annotated[str | None, RUBRIC] = None,
+    package: PackageOption = None,
     static: Annotated[bool, STATIC] = False,
     staged: Annotated[
         bool,
@@ -45,7 +46,7 @@ def check(
         from grader.cli.select_rubric import choose_all, only
         from grader.files import check_writable
         from grader.rubric.load import needs_ros
-    chosen = choose_all(Path(path), rubric)
+    chosen = choose_all(Path(path), rubric, package or "")
     if watch or as_json:
         only(chosen)
     if watch and not Path(chosen[0].source).is_dir():
@@ -57,6 +58,7 @@ def check(
     options = pipeline.GradeOptions(
         sandbox=sandbox,
         submission_id=None,
+        package=package or "",
         static_only=static,
         keep_hidden=False,
         files=watch or out is not None,
