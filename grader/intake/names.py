@@ -9,6 +9,7 @@ import unicodedata
 from grader.wording import first_few
 
 MAX_NAME = 100
+LONGEST_PACKAGE_NAME = 255
 _LETTERS = str.maketrans(
     {"ß": "ss", "æ": "ae", "Æ": "AE", "ø": "o", "Ø": "O", "œ": "oe", "Œ": "OE", "ł": "l", "Ł": "L"}
     | {"đ": "d", "Đ": "D", "ð": "d", "þ": "th", "\N{LATIN SMALL LETTER DOTLESS I}": "i"}
@@ -59,6 +60,11 @@ def encodable(text: str) -> bool:
 def archive_stem(name: str) -> str:
     """Return a file's name without the ending that makes it an archive: `lab1.tar.gz` is `lab1`."""
     return _ARCHIVE_SUFFIX.sub("", name)
+
+
+def is_package_name(text: str) -> bool:
+    """Return whether `text` could stand between `<name>` and `</name>`, however wrong the name is."""
+    return 0 < len(text) <= LONGEST_PACKAGE_NAME and encodable(text) and text.isprintable()
 
 
 def is_archive_name(name: str) -> bool:

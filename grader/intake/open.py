@@ -16,17 +16,10 @@ from typing import TypeVar
 
 from grader.errors import GraderError, OutputError, SubmissionError
 from grader.intake.archive import unpack
+from grader.intake.choose import Choice, Wanted, choose, not_found
 from grader.intake.content import Content, package_content, remarks
 from grader.intake.file_modes import Modes, archive_modes, folder_modes, right_in_git, uploaded_modes
-from grader.intake.find import (
-    Candidate,
-    Choice,
-    choose,
-    enclosing_package,
-    find_candidates,
-    linked_candidate,
-    not_found,
-)
+from grader.intake.find import Candidate, enclosing_package, find_candidates, linked_candidate
 from grader.intake.git import Git, Repository
 from grader.intake.gitdir import Repositories
 from grader.intake.limits import IntakeLimits
@@ -76,7 +69,7 @@ class Located:
 def open_submission(
     source: str | Source,
     *,
-    package: str,
+    package: str | Wanted,
     workdir: Path,
     submission_id: str | None = None,
     git_timeout_s: float = 120.0,
@@ -97,7 +90,8 @@ def open_submission(
             git = Git(base / "git-home", timeout_s=git_timeout_s)
             limits = limits or IntakeLimits()
             opened = open_source(parsed, git, base, limits)
-            located = locate(opened, package)
+            wanted = Wanted(name=package) if isinstance(package, str) else package
+            located = locate(opened, wanted)
             submission = describe(located, git, limits)
         except OSError as error:
             raise unreadable(parsed.given, error) from error
@@ -204,7 +198,7 @@ def open_source(source: Source, git: Git, base: Path, limits: IntakeLimits) -> O
     )
 
 
-def locate(opened: Opened, wanted: str) -> Located:
+def locate(opened: Opened, wanted: Wanted) -> Located:
     """Return the lab's package in what was opened. A folder inside the package (`lab1/src`) stands for the package.
 
     Raises PackageNotFound, or SubmissionError for an empty folder.
@@ -224,11 +218,14 @@ def locate(opened: Opened, wanted: str) -> Located:
     raise not_found(opened.root, candidates, wanted, opened.git_links)
 
 
-def _locate(opened: Opened, wanted: str) -> Located | None:
+def _locate(opened: Opened, wanted: Wanted) -> Located | None:
     candidates = find_candidates(opened.root, leave_out=opened.leave_out)
     choice = choose(candidates, wanted)
-    if choice is None and (linked := linked_candidate(opened.root, wanted)):
-        choice = Choice(package=linked, hints=(f"{wanted} is a link, followed to {printable(linked.path)}",))
+    name = wanted.asked or wanted.name
+    if choice is None and (linked := linked_candidate(opened.root, name)):
+        choice = Choice(
+            package=linked, hints=(f"{printable(name)} is a link, followed to {printable(linked.path)}",)
+        )
     return Located(opened=opened, candidates=candidates, choice=choice) if choice else None
 
 

@@ -25,6 +25,7 @@ from grader.errors import ExitCode, GraderError, SubmissionError, UsageError
 from grader.faults import error_result
 from grader.files import temporary_folder
 from grader.intake import open_submission
+from grader.intake.choose import Wanted
 from grader.intake.source import identify
 from grader.model.package import SourceFile
 from grader.model.progress import Progress
@@ -317,7 +318,11 @@ def watch(grading: Grading, screen: Screen, *, without: Path | None = None) -> E
     """Grade again at each save until Ctrl-C; see `Watch.run`. `without` is a folder of our own results."""
     return Watch(
         Path(grading.source),
-        look=lambda: take_snapshot(grading.source, grading.rubric.rubric.package, without=without),
+        look=lambda: take_snapshot(
+            grading.source,
+            pipeline.wanted_package(grading.rubric.rubric, grading.options.package),
+            without=without,
+        ),
         grade=grading,
         saves=Saves(without),
         screen=screen,
@@ -337,7 +342,7 @@ def changed_files(before: Snapshot, after: Snapshot) -> tuple[str, ...]:
     return tuple(sorted(changed, key=lambda path: (path.startswith("../"), path)))
 
 
-def take_snapshot(source: str, package: str, *, without: Path | None = None) -> Snapshot:
+def take_snapshot(source: str, package: str | Wanted, *, without: Path | None = None) -> Snapshot:
     """Return the package as `grader check SOURCE` sees it now, without what is in the folder `without`.
 
     Raises SubmissionError where there is no such package or a file cannot be read, OSError where one vanishes.

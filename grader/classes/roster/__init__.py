@@ -35,9 +35,10 @@ path is a table; `exports.py` recognises those of GitHub Classroom."""
 def read_roster(path: Path, local: Local = OWN_FOLDER) -> Roster:
     """Every submission that the roster names, and every fault that it has, in the order of lines.
 
-    `path` is a CSV file with the columns `id,source[,ref][,name][,group][,submitted_at][,extension_days]`, an export of
-    GitHub Classroom (CSV) or of a GitLab group (the JSON of its projects), or a folder with a submission in each of its
-    entries. `local` says which paths of this machine it may name: any other is a fault, and nothing there is opened.
+    `path` is a CSV file with the columns `id,source[,ref][,package][,name][,group][,submitted_at][,extension_days]`, an
+    export of GitHub Classroom (CSV) or of a GitLab group (the JSON of its projects), or a folder with a submission
+    in each of its entries. `local` says which paths of this machine it may name: any other is a fault, and nothing
+    there is opened.
     Raises UsageError where it is none of these, or names no submission at all.
     """
     read = next((read for fits, read in SOURCES if fits(path)), _from_table)
