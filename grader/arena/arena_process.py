@@ -60,7 +60,7 @@ class ArenaProcess:
                 data = data[os.write(self._commands, data) :]
 
     def last_words(self) -> str:
-        """The last line that it wrote to stderr."""
+        """Return the last line that it wrote to stderr."""
         return (self._errors.decode(errors="replace").strip().splitlines() or [""])[-1]
 
     async def end(self) -> None:

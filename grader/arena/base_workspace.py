@@ -95,7 +95,7 @@ def provide_base(mode: SandboxMode) -> None:
 
 
 def has_base(place: ProcessEnvironment) -> bool:
-    """Hand this place the base that fits it, if there is one."""
+    """Give this place the base that fits it, if there is one."""
     kept = read_kept(_file_name(place)) if place.sandbox.bubblewrap else None
     if kept is None:
         return False
@@ -106,7 +106,7 @@ def has_base(place: ProcessEnvironment) -> bool:
 
 
 def base_spec(place: ProcessEnvironment) -> dict[str, Any]:
-    """The process that makes one: in a sandbox as the build's, with nothing of a submission's in it."""
+    """Return the process that makes one: in a sandbox as the build's, with nothing of a submission's in it."""
     argv = ["/bin/bash", "-c", SCRIPT, "bash", *catkin_make(place)]
     bare = replace(place, env={})
     return bare.spec(NAME, argv, role="grader", copy=False, as_handed_in=True, collect=BASE)

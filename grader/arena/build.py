@@ -133,7 +133,7 @@ def _target(place: ProcessEnvironment, name: str) -> str:
 
 
 async def _with_setup(place: ProcessEnvironment, arena: ArenaSession) -> ProcessEnvironment:
-    """The environment that `source devel/setup.bash` gives."""
+    """Return the environment that `source devel/setup.bash` gives."""
     script = f'source "$1/devel/setup.bash" && {{ {DUMP} }} >' + _target(place, ENVIRONMENT)
     argv = ["/bin/bash", "-c", script, "bash", place.inside_workspace]
     room = DUMP_BYTES + 1

@@ -82,13 +82,13 @@ def describe() -> str:
 
 
 def has_memory() -> bool:
-    """Whether groups of version 2 can hold memory on this machine at all."""
+    """Return whether groups of version 2 can hold memory on this machine at all."""
     there = [Path(mount[4], "cgroup.controllers") for mount in _mounts() if _type(mount) == "cgroup2"]
     return any("memory" in path.read_text().split() for path in there if path.is_file())
 
 
 def own_group() -> str:
-    """The name of this process's group of version 2; empty where there is none."""
+    """Return the name of this process's group of version 2; empty where there is none."""
     return next((path for _, names, path in _memberships() if names == ""), "")
 
 
@@ -141,7 +141,7 @@ def _memberships() -> list[list[str]]:
 
 
 def _type(mount: list[str]) -> str:
-    """The file system of a line of mountinfo (man 5 proc_pid_mountinfo): the first field after the dash."""
+    """Return the file system of a line of mountinfo (man 5 proc_pid_mountinfo): the first field after the dash."""
     return mount[mount.index("-") + 1] if "-" in mount else ""
 
 
@@ -217,7 +217,7 @@ def _lacks_memory(group: Path) -> bool:
 
 
 def _belongs_to_the_grader(group: Path) -> bool:
-    """Whether no other program manages it, and no other program's processes are in it."""
+    """Return whether no other program manages it, and no other program's processes are in it."""
     free = not SYSTEMD.exists() or SCOPES.fullmatch(group.name) is not None
     return (free or _handed_over(group)) and _all_ours(group, _processes(group))
 

@@ -158,7 +158,7 @@ def _rooms() -> Iterator[tuple[int, int, Path]]:
 
 
 def tasks_of(uid: int) -> int:
-    """How many tasks (threads count) this user has, as far as /proc shows them."""
+    """Return how many tasks (threads count) this user has, as far as /proc shows them."""
     found = 0
     for folder in PROC.glob("[0-9]*"):
         with suppress(OSError):  # it has ended

@@ -41,7 +41,7 @@ class RunLimits(Record):
     channels: int = 300
 
     def shared_by(self, runs: int) -> Self:
-        """The limits of each of so many runs of one submission: together they record no more than one may."""
+        """Return the limits of each of so many runs of one submission: together they record no more than one may."""
         run_bytes = max(LEAST_RUN_BYTES, min(self.run_bytes, SUBMISSION_MESSAGE_BYTES // max(1, runs)))
         return self.model_copy(
             update={"run_bytes": run_bytes, "channel_bytes": min(self.channel_bytes, run_bytes)}

@@ -169,7 +169,7 @@ class ProcessEnvironment:
         return next((p.relative_to(package).as_posix() for p in others if p.is_file()), None)
 
     def arena_env(self) -> dict[str, str]:
-        """The managed roscore's environment: ROS and nothing of the shell's."""
+        """Return the managed roscore's environment: ROS and nothing of the shell's."""
         return {"LANG": "C.UTF-8", "ROS_IP": LOOPBACK, **self.ros.env, "PATH": _path(self.ros, "")}
 
     def spec(
@@ -217,7 +217,7 @@ class ProcessEnvironment:
         }
 
     def _words(self, *, copy: bool, build: bool) -> str:
-        """The script of the first shell. Nothing of the submission is in it."""
+        """Return the script of the first shell. Nothing of the submission is in it."""
         before, run = (BUILD_COPY, BUILD_RUN) if build else (COPY, RUN)
         first = self.sandbox.first_words(self.limits) + HEAD
         return first + (before + TAKE + run if copy else TAKE + RUN)

@@ -207,7 +207,7 @@ class Recorder:
         )
 
     def _scripts(self) -> list[str]:
-        """The paths, in this package, of the scripts that the scenarios start."""
+        """Return the paths, in this package, of the scripts that the scenarios start."""
         paths = [
             f.path for f in sorted(self.recording.facts.files, key=lambda f: (f.path.count("/"), f.path))
         ]

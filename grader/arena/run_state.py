@@ -146,7 +146,7 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
 
 
 def _waits(until: Until) -> bool:
-    """Whether anything ends the run before its limit."""
+    """Return whether anything ends the run before its limit."""
     lasting = (until.window_s, until.alive_s, until.quiet_s)
     seen = (until.messages, until.connected, until.heard, until.nodes, until.opened, until.ended)
     return any(seconds is not None for seconds in lasting) or any(seen)
@@ -168,7 +168,7 @@ def describe_wait(live: RunState, until: Until) -> str:
 
 
 def next_look_s(live: RunState, until: Until, now_s: float) -> float:
-    """How long nothing can change by time alone."""
+    """Return how long nothing can change by time alone."""
     looks = [live.started_s + until.limit_s, live.started_s + until.first_message_s]
     looks += [live.last_start_s + until.first_message_s]
     for seen in live.topics.values():
@@ -217,7 +217,7 @@ def _talks_elsewhere(live: RunState, until: Until, now_s: float) -> bool:
 
 
 def _rates_are_clear(live: RunState, topics: tuple[str, ...]) -> bool:
-    """Whether each topic is there to show a rate, and its rate is known well enough."""
+    """Return whether each topic is there to show a rate, and its rate is known well enough."""
     return bool(topics) and all(
         topic in live.rates
         and all(bounds.decided_by(live.arrivals_ns[topic]) for bounds in live.rates[topic])
@@ -256,7 +256,7 @@ def _heard(live: RunState, until: Until, now_s: float) -> bool:
 
 
 def _is_starting(live: RunState, until: Until, now_s: float) -> bool:
-    """Whether a process may yet become a node: on a busy machine, its imports alone can take many seconds."""
+    """Return whether a process may yet become a node: on a busy machine, its imports alone can take many seconds."""
     return bool(live.running - live.registered) and now_s <= live.last_start_s + until.first_message_s
 
 

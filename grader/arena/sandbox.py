@@ -81,7 +81,7 @@ class Sandbox(Record):
         return f"bubblewrap, {who}; memory held by {self.cgroups.label}{calls}"
 
     def outer(self, limits: RunLimits) -> list[str]:
-        """The programs of this machine that come first: they take rights away and set limits."""
+        """Return the programs of this machine that come first: they take rights away and set limits."""
         drop = [f"--reuid={self.uid}", f"--regid={self.uid}", "--clear-groups"] if self.uid else []
         drop += (
             [] if self.bubblewrap else ["--no-new-privs"]
@@ -142,7 +142,7 @@ def _program(name: str) -> str:
 
 
 def _system(ros: RosInstallation) -> list[Word]:
-    """The system's programs, and not the grader: where it lies among them, its folder is empty."""
+    """Return the system's programs, and not the grader: where it lies among them, its folder is empty."""
     argv: list[Word] = ["--ro-bind", "/usr", "/usr"]
     shown = [Path("/usr")]
     for name in ("bin", "sbin", "lib", "lib32", "lib64", "libx32"):

@@ -127,7 +127,7 @@ def copy_standins(folder: Path, ros: RosInstallation) -> None:
 
 
 def with_standins(env: Mapping[str, str], copied: Path, inside: str) -> dict[str, str]:
-    """The environment in which ROS finds the stand-ins after everything else. `copied` is the folder that
+    """Return the environment in which ROS finds the stand-ins after everything else. `copied` is the folder that
     `copy_standins` wrote, `inside` where processes see it."""
     packages = sorted(p.name for p in (copied / SHARE).iterdir())
     if not packages:

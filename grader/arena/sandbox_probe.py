@@ -61,7 +61,7 @@ UNKNOWN_HINT = (
 
 
 def choose(mode: SandboxMode) -> Sandbox:
-    """The sandbox to use: `require` raises SandboxMissing where there is none, `auto` goes without and says so.
+    """Return the sandbox to use: `require` raises SandboxMissing where there is none, `auto` goes without and says so.
 
     Raises SandboxMissing where it cannot be known whether there is one, and HostError where the limits that were
     inherited are too short, or those of students' processes cannot be set: every one would fail.
@@ -138,13 +138,13 @@ def _refusal(*more: str) -> str:
 
 
 def _drop() -> list[str]:
-    """The words by which root becomes another user."""
+    """Return the words by which root becomes another user."""
     setpriv = find_host_program("setpriv") if os.geteuid() == 0 else None
     return [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if setpriv else []
 
 
 def _said(command: list[str]) -> str:
-    """The last line that a command of this machine printed where it failed; empty where it did not fail."""
+    """Return the last line that a command of this machine printed where it failed; empty where it did not fail."""
     try:
         done = subprocess.run(
             command,

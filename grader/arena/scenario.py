@@ -198,7 +198,7 @@ async def _look_at_connections(arena: ArenaSession) -> None:
 
 
 def process_specs(start: Start, place: ProcessEnvironment) -> Iterator[Spec]:
-    """How `rosrun`, `roslaunch` or `rosparam` would start it; nothing for a file that is not in the package."""
+    """Return how `rosrun`, `roslaunch` or `rosparam` would start it; nothing for a file that is not in the package."""
     if start.launch is not None:
         yield place.spec(start.name, ["roslaunch", place.package, start.launch, *start.args])
     elif start.load is not None:

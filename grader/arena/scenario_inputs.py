@@ -90,7 +90,7 @@ def _before(shot: Shot, following: Shot) -> Shot:
 
 
 def advertisement(probe: Probe) -> dict[str, Any]:
-    """The fields of the arena's command `advertise`."""
+    """Return the fields of the arena's command `advertise`."""
     from grader.evidence.decode import definition, md5sum  # noqa: PLC0415 - numpy, which not every run needs
 
     return {
@@ -103,7 +103,7 @@ def advertisement(probe: Probe) -> dict[str, Any]:
 
 
 def publication(shot: Shot) -> dict[str, Any]:
-    """The fields of the arena's command `publish`."""
+    """Return the fields of the arena's command `publish`."""
     from grader.evidence.decode import encode  # noqa: PLC0415 - as above
 
     record = {
@@ -118,7 +118,7 @@ def publication(shot: Shot) -> dict[str, Any]:
 
 
 def fields_of(value: object) -> Mapping[str, Any]:
-    """A message by its fields; a bare value is the field `data`."""
+    """Return a message by its fields; a bare value is the field `data`."""
     return value if isinstance(value, Mapping) else {"data": value}
 
 
@@ -351,7 +351,7 @@ def _messages(place: ProcessEnvironment) -> Callable[[str], str | None]:
 
 
 def _type_text(type_: str, kind: str, place: ProcessEnvironment) -> str | None:
-    """The text of `<package>/<kind>/<Name>.<kind>`: the student's own, ROS's, or a stand-in's."""
+    """Return the text of `<package>/<kind>/<Name>.<kind>`: the student's own, ROS's, or a stand-in's."""
     package, _, name = type_.partition("/")
     own = place.workspace.repaired / package
     for folder in (own, *(Path(p) / package for p in place.share_folders)):

@@ -114,7 +114,7 @@ class ArenaSession:
             raise ArenaError(f"the managed roscore did not start: {self._why()}", hint="grader doctor")
 
     def send(self, **command: Any) -> None:  # noqa: ANN401 - JSON
-        """Hand the arena one command (grader/arena/ros/__main__.py has a method for each)."""
+        """Send the arena one command (grader/arena/ros/__main__.py has a method for each)."""
         self._process.send(command)
 
     def start(self, spec: dict[str, Any]) -> None:

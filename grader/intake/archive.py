@@ -306,7 +306,7 @@ def _unpack_entry(
 
 
 def _entry_name(info: zipfile.ZipInfo) -> str:
-    """The entry's name with `/`: old tools of Windows write `\\`, and many write UTF-8 without saying so."""
+    """Return the entry's name with `/`: old tools of Windows write `\\`, and many write UTF-8 without saying so."""
     name = info.filename
     if not info.flag_bits & UTF8_NAME:
         try:

@@ -99,7 +99,7 @@ def _odd(paths: Iterable[str]) -> list[str]:
 
 
 def _with_folders(paths: Iterable[str]) -> set[str]:
-    """The paths, and those of all folders on the way to them."""
+    """Return the paths, and those of all folders on the way to them."""
     found: set[str] = set()
     for path in paths:
         while path and path not in found:

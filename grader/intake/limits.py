@@ -78,7 +78,7 @@ class Meter:
             above = above.rpartition("/")[0]
 
     def has_room(self, path: str, size_bytes: int) -> bool:
-        """Whether a file is taken: not one that is too large, nor one more picture where there are too many."""
+        """Return whether a file is taken: not one that is too large, nor one more picture where there are too many."""
         if size_bytes > self._limits.largest_bytes(path):
             return False
         suffix = PurePosixPath(path).suffix.lower()

@@ -53,7 +53,7 @@ def brief(text: str) -> str:
 
 
 def encodable(text: str) -> bool:
-    """Whether `text` is UTF-8; a file's name on Linux need not be."""
+    """Return whether `text` is UTF-8; a file's name on Linux need not be."""
     return not any("\ud800" <= char <= "\udfff" for char in text)
 
 

@@ -303,7 +303,7 @@ def _package(
 
 
 def is_recording(path: Path) -> bool:
-    """Whether a file is a recording by its name or its first bytes; a damaged one is one too.
+    """Return whether a file is a recording by its name or its first bytes; a damaged one is one too.
 
     Raises OSError where it cannot be read.
     """

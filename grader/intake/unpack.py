@@ -153,7 +153,7 @@ class Unpacker:
         return not Path(os.path.realpath(place)).is_relative_to(self._root.resolve())
 
     def _free(self, path: str) -> Path:
-        """The place for an entry; a later entry of the same name replaces the one before."""
+        """Return the place for an entry; a later entry of the same name replaces the one before."""
         target = self._root / path
         target.parent.mkdir(parents=True, exist_ok=True)
         target.unlink(missing_ok=True)

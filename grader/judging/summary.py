@@ -59,7 +59,7 @@ def passed(rubric: Rubric, result: GradingResult) -> bool:
 
 
 def criteria_text(results: Sequence[CriterionResult], *, ascii_only: bool = False) -> str:
-    """The criteria as canonical JSON in the rubric's order: the same from `grader grade` and `grader judge`."""
+    """Return the criteria as canonical JSON in the rubric's order: the same from `grader grade` and `grader judge`."""
     return json_text(_criteria(results), ascii_only=ascii_only)
 
 

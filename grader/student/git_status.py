@@ -351,12 +351,12 @@ def _is_executable(path: Path) -> bool:
 
 
 def _is_hidden(tag: str) -> bool:
-    """Whether git leaves the file as it is in the index, whatever is on the disk."""
+    """Return whether git leaves the file as it is in the index, whatever is on the disk."""
     return tag.islower() or tag == "S"
 
 
 def _is_own(path: str) -> bool:
-    """Whether a person wrote the file, rather than a build, an editor or another program."""
+    """Return whether a person wrote the file, rather than a build, an editor or another program."""
     *folders, name = path.split("/")
     made = any(f in BUILD_SPACES or f.startswith((".", "__")) or f == "venv" for f in folders)
     return not (made or name.startswith(".") or name.endswith(LEFTOVERS))
@@ -426,7 +426,7 @@ def _default_branch(name: str, refs: Mapping[str, str]) -> str | None:
 
 
 def _has_head(view: View) -> bool:
-    """Whether the commit here is on some branch of the server."""
+    """Return whether the commit here is on some branch of the server."""
     try:
         return bool(view.run("for-each-ref", "--count=1", "--contains=HEAD", TRACKING).strip())
     except GitTimeout:

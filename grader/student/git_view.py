@@ -73,7 +73,7 @@ def _parse(listed: bytes) -> dict[str, str]:
 
 
 def _user_settings(git: Git) -> dict[str, str]:
-    """The settings of the user and of the machine."""
+    """Return the settings of the user and of the machine."""
     try:
         said = git.run("config", "--list", "--show-scope", "-z", cwd=git.home, remote=True)
     except (GitMissing, GitTimeout):
@@ -124,7 +124,7 @@ def write_staged(package: Path, base: Path, *, index: str = "") -> Path:
 
 
 def _open_index(top: Path, base: Path, index: str) -> View:
-    """The repository with the index that git names, if that lies where git puts one."""
+    """Return the repository with the index that git names, if that lies where git puts one."""
     git = Git(base / "home", timeout_s=SECONDS)
     view = open_view(top, base / "view", git)
     own = git_folder(top, top, git).resolve()
@@ -137,7 +137,7 @@ def _open_index(top: Path, base: Path, index: str) -> View:
 
 
 def _staged_paths(view: View, package: Path) -> list[str]:
-    """The package's staged files, relative to its folder, without pointers to other repositories."""
+    """Return the package's staged files, relative to its folder, without pointers to other repositories."""
     said = view.run("ls-files", "--stage", "-z", cwd=package)
     pairs = (record.partition(b"\t") for record in said.split(b"\0") if record)
     paths = [os.fsdecode(path) for meta, _, path in pairs if not meta.startswith(b"160000")]

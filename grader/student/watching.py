@@ -230,7 +230,7 @@ class Watch:
             self._saves.wait(GONE_S / 10)
 
     def _names_to_show(self, snapshot: Snapshot | None) -> tuple[str, ...]:
-        """The files that differ from the last graded ones; else those that were saved."""
+        """Return the files that differ from the last graded ones; else those that were saved."""
         changed = changed_files(self._graded, snapshot) if snapshot and self._graded else ()
         return changed or self._relative(self._saved)
 
@@ -330,7 +330,7 @@ def watch(grading: Grading, screen: Screen, *, without: Path | None = None) -> E
 
 
 def is_ignored(path: str) -> bool:
-    """Whether a path relative to the package's folder is a leftover of a build, an editor, git or the grader."""
+    """Return whether a path relative to the package's folder is a leftover of a build, an editor, git or the grader."""
     parts = PurePosixPath(path).parts
     return any(part in IGNORED_FOLDERS for part in parts) or bool(parts and IGNORED_NAMES.search(parts[-1]))
 

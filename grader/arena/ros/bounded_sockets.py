@@ -156,7 +156,7 @@ class Pace:
         self._lock = threading.Lock()
 
     def wait_s(self, count):
-        """How long these calls have to wait (s)."""
+        """Return how long these calls have to wait (s)."""
         now_s = time.monotonic()
         with self._lock:
             self._next_s = max(self._next_s, now_s - self._at_once / self._per_s) + count / self._per_s

@@ -150,7 +150,7 @@ class Connection:
         self._looked_ns = time_ns
 
     def _take(self, data, ends, time_ns):
-        """Hand on whole messages in one piece, or, where there is not room for all, one by one."""
+        """Pass on whole messages in one piece, or, where there is not room for all, one by one."""
         if self._has_room(ends[-1] - LENGTH.size * len(ends), len(ends)):
             self._hand_on([data[: ends[-1]]], len(ends), time_ns)
             return
@@ -207,7 +207,7 @@ class Connection:
             self._rests()
 
     def open(self, *, latching):
-        """Hand on what was held; the channel is made where it is not there from an earlier connection."""
+        """Pass on what was held; the channel is made where it is not there from an earlier connection."""
         if self._opened or self._account is None:
             return
         self._opened = True

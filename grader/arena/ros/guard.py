@@ -91,7 +91,7 @@ class Rules:
         return ""
 
     def too_much(self, method, args, caller):
-        """Whether a registration is one more than its process may have."""
+        """Return whether a registration is one more than its process may have."""
         return method in REGISTER and not self._names.take(caller.process, (method, *map(str, args)))
 
     def _no_name(self, args):

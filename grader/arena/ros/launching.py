@@ -75,7 +75,7 @@ def _go_first(pid):
 
 
 def _words(spec, fds):
-    """How many variables there are, the variables, and what is to be run: `place.HEAD` reads it."""
+    """Return how many variables there are, the variables, and what is to be run: `place.HEAD` reads it."""
     variables = ["{}={}".format(name, value) for name, value in spec["env"].items()]
     argv = [_filled_in(word, fds) for word in spec["argv"]] if spec["collect"] else spec["argv"]
     return _joined([str(len(variables)), *variables, *argv])

@@ -15,7 +15,7 @@ PATIENCE_S = 2.0
 
 
 def tell(uri, program, arguments):
-    """Whether the master at `uri` took note."""
+    """Return whether the master at `uri` took note."""
     socket.setdefaulttimeout(PATIENCE_S)
     try:
         xmlrpc.client.ServerProxy(uri).noteOpened("/" + program, program, arguments)

@@ -57,7 +57,7 @@ class Budget:
             return self._channels[key]
 
     def take(self, account, size, messages):
-        """Whether so many more messages, of so many bytes together, are recorded."""
+        """Return whether so many more messages, of so many bytes together, are recorded."""
         size += MESSAGE_BYTES * messages
         with self._lock:
             total = account.messages + messages
@@ -207,7 +207,7 @@ def weight(value, most):
 
 
 def depth(value, most):
-    """How many maps and lists are one inside the other; counting ends past `most`."""
+    """Return how many maps and lists are one inside the other; counting ends past `most`."""
     level, inside = 0, [value]
     while level <= most:
         inside = list(itertools.chain.from_iterable(_items(item) for item in inside))

@@ -177,7 +177,7 @@ class Recorder:
         return sock, header
 
     def ask_latching(self, connection):
-        """Whether the publisher latches: rospy knows it only once its constructor is through."""
+        """Return whether the publisher latches: rospy knows it only once its constructor is through."""
 
         def work():
             latching = False

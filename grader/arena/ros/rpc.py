@@ -171,7 +171,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         self._send(code, b"")
 
     def _gone(self):
-        """Whether the other side has ended, perhaps in the middle of a call."""
+        """Return whether the other side has ended, perhaps in the middle of a call."""
         try:
             return not self.connection.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
         except BlockingIOError:
@@ -197,7 +197,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
                 self._reply(result)
 
     def _size(self):
-        """How long the body says it is."""
+        """Return how long the body says it is."""
         if self.path not in ("/", "/RPC2"):
             raise Refused(NOT_KNOWN_CODE, "a request for {}".format(shown(self.path)))
         if self.headers.get("Content-Encoding", "identity").lower() != "identity":

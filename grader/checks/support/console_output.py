@@ -119,7 +119,7 @@ def _without_anonymous(word: re.Match[str]) -> str:
 
 
 def numbers_in(text: str) -> frozenset[int]:
-    """A line's whole numbers: `12` is not in `127` and not in `3.12`. A `-` after a letter may be a dash."""
+    """Return a line's whole numbers: `12` is not in `127` and not in `3.12`. A `-` after a letter may be a dash."""
     return frozenset(n for dashes in (False, True) for _, n in _numbers(text, dashes=dashes))
 
 
@@ -256,7 +256,7 @@ def _texts_of(run: Run, topic: str, nodes: Collection[str]) -> Iterator[tuple[in
 
 
 def printed_times(run: Run, process: str, texts: Collection[str], template: str) -> Counter[str]:
-    """How many times a process printed each text: by the stream, stdout, stderr or /rosout, that shows it most.
+    """Return how many times a process printed each text: by the stream, stdout, stderr or /rosout, that shows it most.
 
     Of a flood of texts, some that seem to have been printed are enough to look at.
     """

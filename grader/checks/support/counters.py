@@ -183,7 +183,7 @@ def _count(channel: Channel, until_ns: int | None) -> Count | None:
 
 
 def _number(value: object) -> float | None:
-    """A number; text is none, even if it is written in digits."""
+    """Return a number; text is none, even if it is written in digits."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return value
     return None

@@ -46,7 +46,7 @@ def wanted_names(names: Iterable[str], anonymous: Anonymous) -> str:
 
 
 def wrong_name(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous) -> str:
-    """How the names of the nodes differ from those that are wanted: in themselves, or in their ending alone."""
+    """Return how the names of the nodes differ from those that are wanted: in themselves, or in their ending alone."""
     there = tuple(nodes)
     if {base_name(n) for n in there}.isdisjoint(_bases(names)):
         return f"the node is named {join_words(there)}, not {join_words(_bases(names), 'or')}"

@@ -175,7 +175,7 @@ def is_printed(value: object, lines: Sequence[Line]) -> bool:
 
 
 def explain_failure(package: PackageFacts, run: Run) -> Ending | None:
-    """An error that ended the node, or its last traceback."""
+    """Return an error that ended the node, or its last traceback."""
     ended = early_end(run)
     if ended is not None and ended.end is not None and ended.end.exit_code != 0:
         end: Ending | None = explain_end(ended, run, package)

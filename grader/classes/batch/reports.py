@@ -80,7 +80,7 @@ def write_one(folder: Path, rubric: LoadedRubric) -> GradingResult:
 
 
 def has_result(folder: Path) -> bool:
-    """Whether `folder` holds a submission's results."""
+    """Return whether `folder` holds a submission's results."""
     return (folder / RESULT).is_file()
 
 

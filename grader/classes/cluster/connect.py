@@ -178,7 +178,7 @@ def _not_interrupted() -> Iterator[None]:
 
 
 def is_encrypted(address: str) -> bool:
-    """Whether the scheduler or worker at `address` asks for a certificate."""
+    """Return whether the scheduler or worker at `address` asks for a certificate."""
     return address.partition("://")[0] in ENCRYPTED
 
 
@@ -314,5 +314,5 @@ def why_not(answer: Mapping[str, str] | BaseException, needs: Needs) -> str:
 
 
 def _has_no_grader(error: BaseException) -> bool:
-    """Whether that is why a worker or scheduler could not answer. Dask sends some errors as their text."""
+    """Return whether that is why a worker or scheduler could not answer. Dask sends some errors as their text."""
     return isinstance(error, ImportError) or "ModuleNotFoundError" in str(error)

@@ -59,7 +59,7 @@ class Report(Record):
 
 
 def is_machines(outcome: Outcome) -> bool:
-    """Whether it is an error that is not the submission's."""
+    """Return whether it is an error that is not the submission's."""
     return outcome.status == "error" and outcome.kind not in BLAME_SUBMISSION
 
 
@@ -114,7 +114,7 @@ class Exchange:
             files.pipe_file(f"{root}/{HELLO}", word.encode())
 
     def answers(self, word: str) -> bool:
-        """Whether the client's word is there, and a file can be written beside it."""
+        """Return whether the client's word is there, and a file can be written beside it."""
         with self._open("written") as (files, root):
             if not files.exists(f"{root}/{HELLO}") or files.cat_file(f"{root}/{HELLO}") != word.encode():
                 return False

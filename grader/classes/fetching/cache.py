@@ -74,7 +74,7 @@ class MirrorFolder:
         (self.folder / "failure.json").unlink(missing_ok=True)
 
     def failure(self) -> Failure | None:
-        """The last one, where nothing went well since."""
+        """Return the last failure, if nothing went well since."""
         try:
             data = json.loads((self.folder / "failure.json").read_bytes())
             return Failure(
@@ -104,7 +104,7 @@ class MirrorFolder:
 
 
 def cache_folder() -> Path | None:
-    """The folder for all mirrors; None where it cannot be had for this user alone."""
+    """Return the folder for all mirrors; None where it cannot be had for this user alone."""
     named = Path(os.environ.get("XDG_CACHE_HOME", ""))
     base = named if named.is_absolute() else Path(os.path.expanduser("~"), ".cache")  # noqa: PTH111 - never raises
     if not base.is_absolute():
@@ -167,7 +167,7 @@ def _used_and_size(folder: Path) -> tuple[float, int]:
 
 
 def _removed(folder: Path) -> bool:
-    """Whether it is gone. What is in use stays."""
+    """Return whether it is gone. What is in use stays."""
     with suppress(OSError):
         descriptor = _held(folder, wait=False)
         if descriptor is None:
@@ -204,7 +204,7 @@ def _held(folder: Path, *, wait: bool) -> int | None:
 
 
 def _is_own(folder: Path) -> bool:
-    """Whether that folder, made where it is missing, belongs to this user and is closed to everybody else."""
+    """Return whether that folder, made where it is missing, belongs to this user and is closed to everybody else."""
     folder.mkdir(mode=0o700, exist_ok=True)
     descriptor = os.open(folder, _FOLDER)
     try:

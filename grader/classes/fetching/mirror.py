@@ -126,7 +126,7 @@ class Mirror:
         (into / "FETCH_HEAD").unlink(missing_ok=True)
 
     def is_cut_off(self) -> bool:
-        """Whether history ends where its owner's clone does."""
+        """Return whether history ends where its owner's clone does."""
         return (self.path / "shallow").is_file()
 
     def _begin(self, folder: Path, *, sha256: bool) -> None:
@@ -163,7 +163,7 @@ class Mirror:
 
 
 def _is_unknown(failure: GitFailed) -> bool:
-    """Whether the server says that it does not have the commit, or does not give it."""
+    """Return whether the server says that it does not have the commit, or does not give it."""
     signs = (
         "not our ref",
         "no such remote ref",
@@ -246,7 +246,7 @@ def git_in(room: Path) -> Git:
 
 
 def place_name(source: Source) -> str:
-    """The name of the mirror for a remote source."""
+    """Return the name of the mirror for a remote source."""
     return name_of(split_address(source.url)[0])
 
 

@@ -44,7 +44,7 @@ class Prefetch:
             self._threads.append(thread)
 
     def wait(self, timeout_s: float | None = None) -> bool:
-        """Whether all entries were looked at within that time."""
+        """Return whether all entries were looked at within that time."""
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         for thread in self._threads:
             thread.join(None if deadline is None else max(0.0, deadline - time.monotonic()))
@@ -74,7 +74,7 @@ class Prefetch:
                 self.failed += good is False
 
     def _fetch(self, entry: Entry, room: Path) -> bool | None:
-        """Whether the mirror is up to date; None where none is needed, or none can be kept."""
+        """Return whether the mirror is up to date; None where none is needed, or none can be kept."""
         source = source_of(entry)
         folder = cache_folder() if source.remote else None
         if folder is None:

@@ -283,7 +283,7 @@ class Sheet:
         return text
 
     def to_bytes(self) -> bytes:
-        """The whole file."""
+        """Return the whole file."""
         text = "".join(self.delimiter.join(record.cells) + record.end for record in self.records)
         return self.mark + text.encode(self.encoding)
 

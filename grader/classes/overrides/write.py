@@ -241,7 +241,7 @@ class Splice(NamedTuple):
 
 
 def spliced(text: str, splices: Iterable[Splice]) -> str:
-    """The text with all of these made; they do not overlap."""
+    """Return the text with all of these made; they do not overlap."""
     for start, end, piece in sorted(splices, reverse=True):
         text = text[:start] + piece + text[end:]
     return text

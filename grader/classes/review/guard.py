@@ -76,7 +76,7 @@ def _enter(token: str) -> AnyResponse:
 
 
 def _check_form() -> None:
-    """Whether a request that changes something comes from a page of ours."""
+    """Return whether a request that changes something comes from a page of ours."""
     origin = request.headers.get("Origin")
     if origin is not None and origin != f"http://{request.headers['Host'].lower()}":
         raise Forbidden("This form does not belong to this page.")
@@ -112,7 +112,7 @@ def open_report(folder: Path, name: str) -> BinaryIO | None:
 
 
 def open_evidence(folder: Path, name: str) -> BinaryIO | None:
-    """A file of the evidence; None where there is none, or it is no file."""
+    """Return a file of the evidence; None where there is none, or it is no file."""
     return _open(folder, (EVIDENCE,), name) if NAME.fullmatch(name) else None
 
 

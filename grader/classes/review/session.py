@@ -107,7 +107,7 @@ class ReviewSession:
         return waits
 
     def result(self, item: Item, overrides: Overrides) -> GradingResult | None:
-        """A submission's result as it counts with these overrides; None where it has none."""
+        """Return a submission's result as it counts with these overrides; None where it has none."""
         result = read_result(self.path / item.key) if item.gradable else None
         if (
             result is None
@@ -124,7 +124,7 @@ class ReviewSession:
         return self.background.trouble or "its report follows in a moment" if pending else ""
 
     def batch_runs(self) -> bool:
-        """Whether a batch works in the folder just now."""
+        """Return whether a batch works in the folder just now."""
         if self.submissions.batch().run.state != "running" or self._writing.locked():
             return False
         try:
@@ -226,7 +226,7 @@ class ReviewSession:
 
     @staticmethod
     def _behind(item: Item, result: GradingResult, overrides: Overrides) -> bool:
-        """Whether a result says something else than `overrides.yaml`."""
+        """Return whether a result says something else than `overrides.yaml`."""
         known = {criterion.id for criterion in result.criteria}
         given = {k: v for k, v in overrides.get(item.entry.id, {}).items() if k in known}
         return given != {o.criterion: plain(o) for o in result.overrides}
@@ -254,7 +254,7 @@ def plain(override: Override) -> Override:
 
 
 def alike(one: Override | None, other: Override | None) -> bool:
-    """Whether both say the same, whenever it was said."""
+    """Return whether both say the same, whenever it was said."""
     if one is None or other is None:
         return one is other
     return one.model_copy(update={"date": None}) == other.model_copy(update={"date": None})

@@ -56,7 +56,7 @@ class Item:
         )
 
     def fits(self, kind: str, words: str) -> bool:
-        """Whether a filter shows it and its id, name or group has these words."""
+        """Return whether a filter shows it and its id, name or group has these words."""
         entry = self.entry
         return kind in self.kinds and words.casefold() in f"{entry.id} {entry.name} {entry.group}".casefold()
 
@@ -71,7 +71,7 @@ class Submissions:
         self._items: dict[str, tuple[object, Item]] = {}
 
     def batch(self) -> BatchFolder:
-        """The batch's folder as `run.json` says now. Raises UsageError where that cannot be read."""
+        """Return the batch's folder as `run.json` says now. Raises UsageError where that cannot be read."""
         stamp = stamp_of(self.path / RUN)
         with self._lock:
             if self._run is None or self._run[0] != stamp:
@@ -83,12 +83,12 @@ class Submissions:
         return tuple(self._item(batch) for batch in _each(self.batch()))
 
     def item(self, key: str) -> Item | None:
-        """The submission of that folder; None where the class has none."""
+        """Return the submission of that folder; None where the class has none."""
         found = self._one(key)
         return self._item(found) if found else None
 
     def row(self, key: str) -> Row | None:
-        """The same with its result; one of status `error` stands for a result that is not there."""
+        """Return the same with its result; one of status `error` stands for a result that is not there."""
         found = self._one(key)
         return next(found.rows()) if found else None
 
@@ -196,7 +196,7 @@ class Navigation:
 
 
 def place_of(items: Sequence[Item], asked: Mapping[str, str], *, at: str = "") -> Navigation:
-    """The place that an address or a form asks for; what it asks for and is not known is left out."""
+    """Return the place that an address or a form asks for; what it asks for and is not known is left out."""
     kind = asked.get("show", ALL)
     kind = kind if kind in FILTERS else ALL
     q = asked.get("q", "").strip()[:WORDS_CHARS]

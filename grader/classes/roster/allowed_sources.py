@@ -128,7 +128,7 @@ def _shown(source: str) -> str:
 
 
 def _is_there(source: str, base: Path) -> bool:
-    """Whether a path is, with or without the `@ref` behind it."""
+    """Return whether a path is, with or without the `@ref` behind it."""
     ends = [len(source), *(at.start() for at in re.finditer("@", source))]
     home = [os.path.expanduser(source[:end]) for end in ends[:20] if end]  # noqa: PTH111 - as above
     return any(os.path.lexists(base / path) for path in home)

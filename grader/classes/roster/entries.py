@@ -120,7 +120,7 @@ def id_faults(submission_id: str) -> Iterator[str]:
 
 
 def columns_of(entries: Iterable[Entry | None]) -> tuple[str, ...]:
-    """The names of all further columns, in the order in which they turn up."""
+    """Return the names of all further columns, in the order in which they turn up."""
     return tuple(dict.fromkeys(name for entry in entries if entry for name in entry.extra))
 
 
@@ -206,7 +206,7 @@ def time_fault(text: str) -> str:
 
 
 def parse_days(text: str) -> float | None:
-    """A number of days from 0 to ten years, with a point or a comma. None for what is none."""
+    """Return a number of days from 0 to ten years, with a point or a comma. None for what is none."""
     days = float(text.replace(",", ".")) if _DAYS.fullmatch(text) else None
     return days if days is not None and days <= EXTENSION_DAYS_MAX else None
 

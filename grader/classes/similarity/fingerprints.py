@@ -212,7 +212,7 @@ def _lexer(language: Language) -> Lexer:
 
 
 def _removed(offsets: Numbers, size: int) -> Numbers:
-    """How many characters are left out before each sign: `filter_code` notes it where it leaves some out."""
+    """Return how many characters are left out before each sign: `filter_code` notes it where it leaves some out."""
     rows = offsets[1:][offsets[1:, 0] >= 0]
     if not len(rows):
         return np.zeros(size, dtype=np.int64)

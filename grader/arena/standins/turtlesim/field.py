@@ -253,7 +253,7 @@ class Pace:
         self._owed_s = 0.0
 
     def due(self, clock_s, wall_s):
-        """How many steps are due now."""
+        """Return how many steps are due now."""
         if self._last_s is None:
             self._last_s, self._moved_s = clock_s, wall_s
         passed_s = clock_s - self._last_s
