@@ -18,8 +18,8 @@ COUNT = 60
 ON_PHONES = pytest.param(PHONE, marks=pytest.mark.full)
 SIZES = pytest.mark.parametrize("size", [DESKTOP, ON_PHONES], ids=["desktop", "phone"])
 LOOKS = [
-    pytest.param(DESKTOP, False, id="light-desktop"),
     pytest.param(PHONE, True, id="dark-phone"),
+    pytest.param(DESKTOP, False, id="light-desktop", marks=pytest.mark.full),
     pytest.param(DESKTOP, True, id="dark-desktop", marks=pytest.mark.full),
     pytest.param(PHONE, False, id="light-phone", marks=pytest.mark.full),
 ]
@@ -108,6 +108,7 @@ def test_every_column_sorts_both_ways(visit, written) -> None:
         assert sorted(ids(page)) == sorted(by_id())
 
 
+@pytest.mark.full
 def test_it_filters_by_text_status_and_lost_criterion(visit, written) -> None:
     page, all_of_them = visit(written), by_id()
     one = next(iter(all_of_them))

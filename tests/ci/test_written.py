@@ -116,6 +116,7 @@ def test_the_reporter_finds_the_result_by_its_id():
 BLOCK = re.compile(r"^```yaml\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("page", "schema"), [("github", "github-workflows"), ("gitlab", "gitlab-ci")])
 def test_what_the_pages_print_is_what_the_systems_read(tmp_path, page, schema):
     """Whole files by their schema; parts of one are YAML at least."""

@@ -274,6 +274,7 @@ def test_the_cache_of_the_arena_tidies_its_own_files_only(server):
     assert len(server.mirrors()) == 1
 
 
+@pytest.mark.full
 def test_mirrors_are_fetched_ahead(server, monkeypatch):
     for name in ("a", "b", "c"):
         server.new(name)

@@ -44,6 +44,7 @@ def test_the_first_line_of_the_version_is_the_grader_s(installed: Installed, tmp
     assert lines[2].startswith("ROS 1 ")
 
 
+@pytest.mark.full
 def test_the_labs_are_those_of_the_repository(installed: Installed, tmp_path):
     labs = json.loads(installed("labs", "--json", cwd=tmp_path))
     assert {lab["id"] for lab in labs} == {path.stem for path in (ROOT / "rubrics").glob("*.yaml")}
@@ -62,6 +63,7 @@ def test_a_student_s_fault_is_found(installed: Installed, package: Path):
     assert "package.xml" in out
 
 
+@pytest.mark.full
 def test_evidence_is_judged(installed: Installed, tmp_path):
     out = installed("judge", RECORDING, "--rubric", LAB, cwd=tmp_path)
     assert {one["status"] for one in json.loads(out)} == {"pass"}
