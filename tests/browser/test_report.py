@@ -189,6 +189,7 @@ def test_texts_of_others_stay_texts(visit, axe, validate, tmp_path, size) -> Non
     assert axe(page) == []
 
 
+@pytest.mark.full
 @pytest.mark.ros
 def test_a_real_grading_shows_what_was_recorded(visit, axe, validate, tmp_path) -> None:
     source = faulty_package(LAB, "counter-resets-to-1")
