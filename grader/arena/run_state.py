@@ -13,7 +13,7 @@ from grader.rubric.model import Until
 
 Outcome = tuple[str, str]
 ARRIVALS_MAX = 2000
-HEARD_S = 2.0
+HEARD_S, HEARD_LOST_S_MAX = 2.0, 6.0
 CONNECTED_S = 1.0
 """So long after the last probe and the last line, a value that is not printed will not be."""
 FULL, OTHERS_MOST = 0.9, 0.75
@@ -286,7 +286,7 @@ def _quiet(live: RunState, until: Until, now_s: float) -> bool:
 def _heard(live: RunState, until: Until, now_s: float) -> bool:
     if not until.heard or not live.unheard:
         return True
-    return now_s > max(live.last_line_s, live.last_sent_s) + HEARD_S
+    return now_s > max(live.last_line_s, live.last_sent_s) + HEARD_S + min(live.lost_s, HEARD_LOST_S_MAX)
 
 
 def _is_starting(live: RunState, until: Until, now_s: float) -> bool:

@@ -89,6 +89,15 @@ def test_a_process_that_is_no_node_yet_is_waited_for(
     assert find_outcome(live, until, 2.1 + until.first_message_s) is not None
 
 
+def test_what_is_sent_has_longer_to_be_printed_where_others_fill_the_machine() -> None:
+    live, until = _live(), Until(heard=True)
+    live.sent("word", 1.0)
+    assert find_outcome(live, until, 3.1) == ("complete", "")
+    live.lost_s = 4.0
+    assert find_outcome(live, until, 6.9) is None
+    assert find_outcome(live, until, 7.1) == ("complete", "")
+
+
 def test_the_last_process_is_watched_for_half_as_long_as_the_first() -> None:
     live, until = RunState(running={"first", "second"}, last_start_s=1.0), Until(alive_s=8)
     live.graph(["/first"], {"/first": "first"}, 2.0)
