@@ -45,11 +45,11 @@ test-pure: setup ## the tests that need no ROS
 	@$(BIN)/python -m pytest -m "not ros and not full" -n 2 --dist loadfile
 
 test-ros: setup ## the tests that run real nodes
-	@$(BIN)/python -m pytest -m "ros and not full" -n 3 --dist loadfile
+	@$(BIN)/python -m pytest -m "ros and not full" -n 3 --dist loadfile --no-loadscope-reorder
 
 test-all: lint docs setup ## everything: slow tests, every fixture, every attack
 	@$(BIN)/python -m pytest -m "not ros" -n 2
-	@$(BIN)/python -m pytest -m ros -n 3 --dist loadfile
+	@$(BIN)/python -m pytest -m ros -n 3 --dist loadfile --no-loadscope-reorder
 
 stress: setup ## the reference solution and every fixture, TIMES times each
 	@$(BIN)/python -m tests.stress --times $(TIMES)

@@ -28,7 +28,7 @@ UNFOLLOWED_HZ = 15.0
 SUBSCRIBE_S = 6.0
 REGISTERED_S = 1.0
 HEARD_SETTLE_S = 0.3
-GRAPH_EVERY_S = 0.25
+GRAPH_EVERY_S, GRAPH_S = 0.25, 5.0
 STARTING_S = 1.5
 EXPECTED_HZ = 10.0
 
@@ -184,7 +184,7 @@ def _does_not_follow(scenario: Scenario, arena: ArenaSession, now_s: float) -> b
     """A node that sleeps by the wall's clock stays at its own rate, however fast `/clock` runs."""
     for topic in scenario.until.messages:
         seen = arena.live.topics[topic]
-        seen_s = now_s - seen.first_s
+        seen_s = now_s - seen.first_s - arena.live.lost_s
         if seen.count and seen_s > UNFOLLOWED_S:
             return seen.count / seen_s < UNFOLLOWED_HZ
     return False
@@ -193,7 +193,7 @@ def _does_not_follow(scenario: Scenario, arena: ArenaSession, now_s: float) -> b
 async def _look_at_connections(arena: ArenaSession) -> None:
     looks = arena.live.graphs
     arena.send(do="graph")
-    await arena.wait(lambda: arena.live.graphs > looks or not arena.live.running, 5.0)
+    await arena.wait(lambda: arena.live.graphs > looks or not arena.live.running, GRAPH_S)
     await arena.wait(lambda: not arena.live.running, GRAPH_EVERY_S)
 
 
@@ -269,7 +269,7 @@ async def stop(starts: tuple[Start, ...], arena: ArenaSession, *, warped: bool) 
     if arena.live.running:
         looks = arena.live.graphs
         arena.send(do="graph")
-        await arena.wait(lambda: arena.live.graphs > looks, 2.0)
+        await arena.wait(lambda: arena.live.graphs > looks, GRAPH_S)
     launched = {start.name for start in starts if start.launch is not None}
     for names in (arena.live.running, arena.live.helpers):
         stops = [

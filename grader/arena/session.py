@@ -145,13 +145,14 @@ class ArenaSession:
         return self._answers.pop(number)
 
     async def wait(self, condition: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until the condition holds; False when it does not in time. Raises ArenaError if the arena dies."""
-        deadline = time.monotonic() + timeout_s
+        """Wait until the condition holds; False when it does not in time. Time that others took of a full machine does
+        not count. Raises ArenaError if the arena dies."""
+        deadline = time.monotonic() - self.live.lost_s + timeout_s
         while True:
             self._raise_failure()
             if condition():
                 return True
-            left = deadline - time.monotonic()
+            left = deadline - (time.monotonic() - self.live.lost_s)
             if left <= 0:
                 return False
             self._changed.clear()
@@ -253,6 +254,7 @@ class ArenaSession:
             self._exited(record)
         elif topic == "/grader/host":
             self._on_lateness(record["p95_ms"])
+            self.live.machine(record["busy"], record["own_busy"], time.monotonic())
         elif topic == "/grader/param" and not is_grader_node(record["caller_id"]):
             self.live.active(time.monotonic())
         elif topic == "/grader/actor" and record["action"] == "limit":

@@ -195,6 +195,7 @@ def test_texts_of_others_stay_texts(visit, validate, tmp_path, size) -> None:
     assert validate(path) == []
 
 
+@pytest.mark.full
 @pytest.mark.ros
 def test_a_real_grading_shows_what_was_recorded(visit, axe, validate, tmp_path) -> None:
     source = faulty_package(LAB, "counter-resets-to-1")

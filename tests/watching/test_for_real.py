@@ -162,6 +162,7 @@ def test_an_archive_is_not_watched(package) -> None:
     assert command.ended() == 2
 
 
+@pytest.mark.full
 @pytest.mark.ros
 def test_a_saved_launch_file_is_graded_again_and_again(package, tmp_path) -> None:
     out = tmp_path / "results"

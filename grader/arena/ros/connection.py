@@ -8,7 +8,7 @@ READ_BYTES = 1 << 16
 LARGE_BYTES, LARGE_READ_BYTES = 1 << 14, 1 << 19
 """Longer messages are read into their own place, in pieces of so much."""
 HELD_BYTES_MAX = 16 << 20
-LATCHING_S = 1.5
+LATCHING_S = 6.0
 REST_S = 0.01
 BUSY_NS, BUSY_MESSAGES, BUSY_LOOKS = 250000, 4, 16
 BREATH_S = 0.001

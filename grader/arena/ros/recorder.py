@@ -26,7 +26,7 @@ HOLD_S = 1.0
 CONNECT_S = 10.0
 RETRY_S = 0.05
 KNOCK = "_knock"
-LATCHING_S = 1.0
+LATCHING_S = 5.0
 PENDING_BYTES_MAX = 32 << 20
 """Of messages that are not yet here as a whole, all together."""
 LAST_READS_S = 0.5
