@@ -149,6 +149,8 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     )
     if live.ended and not live.running:
         return "complete" if until.ended and all(enough) else "ended", ""
+    if _is_starting(live, until, now_s) and now_s - live.started_s <= until.limit_s:
+        return None
     if _waits(until):
         if all(enough):
             return "complete", ""
@@ -232,8 +234,6 @@ def _window(live: RunState, until: Until, now_s: float) -> bool:
         return True
     if len(seen) == len(topics):
         return now_s >= max(s.first_s for s in seen) + until.window_s
-    if _is_starting(live, until, now_s):
-        return False
     return now_s >= max(s.first_s for s in seen) + max(until.window_s, until.silent_s)
 
 
@@ -264,9 +264,7 @@ def _connected(live: RunState, until: Until, now_s: float) -> bool:
 
 def _nodes(live: RunState, until: Until, now_s: float) -> bool:
     """Everything that is there or not there: nodes, programs asked to open something, processes that ended."""
-    alive = until.alive_s is None or (
-        now_s >= _lived_s(live, until.alive_s) and not _is_starting(live, until, now_s)
-    )
+    alive = until.alive_s is None or now_s >= _lived_s(live, until.alive_s)
     up = len(live.nodes) >= until.nodes and set(until.opened) <= live.opened
     return alive and up and set(until.ended) <= live.ended
 
@@ -277,10 +275,7 @@ def _lived_s(live: RunState, alive_s: float) -> float:
 
 
 def _quiet(live: RunState, until: Until, now_s: float) -> bool:
-    if until.quiet_s is None:
-        return True
-    quiet = live.activity_s > 0 and now_s >= live.activity_s + until.quiet_s
-    return quiet and not _is_starting(live, until, now_s)
+    return until.quiet_s is None or (live.activity_s > 0 and now_s >= live.activity_s + until.quiet_s)
 
 
 def _heard(live: RunState, until: Until, now_s: float) -> bool:
@@ -295,8 +290,6 @@ def _is_starting(live: RunState, until: Until, now_s: float) -> bool:
 
 
 def _silent(live: RunState, until: Until, now_s: float) -> str:
-    if _is_starting(live, until, now_s):
-        return ""
     waited = (*until.topics, *until.messages)
     seen = _talking(live)
     if waited and not seen:
