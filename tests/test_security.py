@@ -178,6 +178,29 @@ def _is_there(name: str) -> bool:
     return (ROOT / name).exists()
 
 
+@pytest.mark.parametrize(
+    "row", [row for row in ROWS if "`test" in row[-1]], ids=lambda row: row[0].replace("/", "-")[:40]
+)
+def test_make_test_looks_at_every_promise(row: list[str]) -> None:
+    """Of each row, a test without the marker `full`, or a kind of attacks: one of each runs."""
+    names = re.findall("`(tests?[_/][^`]+)`", row[-1])
+    assert any(_is_quick(name) for name in names), names
+
+
+def _is_quick(name: str) -> bool:
+    if not name.startswith("test_") and not name.endswith(".py"):
+        return True  # a folder
+    paths = ROOT.glob("tests/**/test_*.py") if name.startswith("test_") else [ROOT / name]
+    wanted = f"def {name}(" if name.startswith("test_") else "\ndef test_"
+    texts = (path.read_text(encoding="utf-8") for path in paths)
+    return any(
+        "@pytest.mark.full" not in block.rpartition("\n\n\n")[2].splitlines()
+        for text in texts
+        if not re.search(r"^pytestmark.*mark\.full", text, re.MULTILINE)
+        for block in text.split(wanted)[:-1]
+    )
+
+
 def test_every_kind_of_attack_is_named() -> None:
     kinds = {path.name.split("-")[0] for path in (ROOT / "tests/hostile/attacks").iterdir()}
     named = set(re.findall(r"`([a-z]+)-\*`", TEXT))

@@ -60,6 +60,7 @@ def refused(source, tmp_path, **fields):
     return caught.value
 
 
+@pytest.mark.full
 def test_every_way_to_name_a_repository_gives_the_same(repo, tmp_path):
     bare = bare_copy(repo)
     sources = [repo, f"{repo}@main", f"{repo}/.git", bare, f"{bare}@main", f"file://{repo}", bare.as_uri()]
@@ -90,7 +91,9 @@ def test_every_way_to_name_a_repository_gives_the_same(repo, tmp_path):
         ("MIDDLE:12", "middle"),
     ],
 )
-@pytest.mark.parametrize("form", ["{repo}@{ref}", "file://{repo}@{ref}"])
+@pytest.mark.parametrize(
+    "form", [pytest.param("{repo}@{ref}", marks=pytest.mark.full), "file://{repo}@{ref}"]
+)
 def test_refs(repo, history, tmp_path, *, form, ref, which):
     name, _, digits = ref.partition(":")
     if name.lower() in history:
@@ -162,6 +165,7 @@ def test_a_default_branch_that_is_not_there(repo, history, tmp_path):
     assert "default branch does not exist" in refused(bare, tmp_path).message
 
 
+@pytest.mark.full
 def test_a_repository_with_sha256(tmp_path):
     folder = write(tmp_path / "new", lab())
     git(folder, "init", "-q", "--object-format=sha256", "--initial-branch=main")
