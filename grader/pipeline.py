@@ -37,7 +37,7 @@ from grader.intake.source import Source
 from grader.judging import judge
 from grader.judging.early import judge_files
 from grader.judging.judge import judge_all_runs
-from grader.judging.other_runs import REPAIRS
+from grader.judging.other_runs import REPAIRS, was_built
 from grader.judging.summary import notes_of, overall_status, total_points
 from grader.model.figure import Figures
 from grader.model.package import PackageFacts
@@ -270,7 +270,7 @@ def record_other_runs(
 
     judged = judge_all_runs(rubric.rubric, runs, rubric.checks)
     repairs, scenarios = copies.choose_repairs(
-        submission, recorder.recording.facts, rubric.rubric, judged.criteria
+        submission, recorder.recording.facts, rubric.rubric, judged.criteria, built=was_built(runs)
     )
     doubtful = sorted(judged.doubtful - set(scenarios))
     if doubtful:

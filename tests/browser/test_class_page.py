@@ -77,6 +77,7 @@ def test_all_submissions_are_there_in_the_rosters_order_with_links(shown) -> Non
     assert shown.locator("#shown").inner_text() == f"{COUNT} submissions"
 
 
+@pytest.mark.full
 @SIZES
 def test_it_sorts_by_click_and_by_key(visit, written, size) -> None:
     page = visit(written, size=size)
@@ -136,6 +137,7 @@ def test_the_heat_map_has_a_cell_for_each_criterion_and_submission(shown) -> Non
     assert shown.locator(".heat-names li").count() == len(CRITERIA)
 
 
+@pytest.mark.full
 @SIZES
 def test_the_heat_map_tells_each_cell_by_pointer_and_key(visit, written, size) -> None:
     page, all_of_them = visit(written, size=size), by_id()

@@ -88,6 +88,7 @@ def test_help_imports_nothing_heavy():
     assert set(HEAVY) & set(done.stderr.split()) == set()
 
 
+@pytest.mark.full
 def test_an_encoding_without_signs_gets_plain_ones(tmp_path):
     command = [
         sys.executable,
