@@ -49,15 +49,16 @@ def print_explanation(name: str, rubric: str | None) -> None:
         (r, c) for r in loaded for c in r.rubric.criteria if c.id == criterion and c.visibility == "visible"
     ]
     known = loaded[0].checks if rubric is not None else known_checks(Path(), {})
-    checks = {name: known[name]} if not slash and name in known else {}
-    if not found and not checks:
+    told = {name} if not slash and name in known else set[str]()
+    if not found and not told:
         raise _unknown(name, loaded, known)
+    for check in tuple(told):
+        _print(_check_lines(known[check]))
     for each, item in found:
         _print(_criterion_lines(each.rubric, item))
-        if item.check in each.checks:
-            checks.setdefault(item.check, each.checks[item.check])
-    for check in checks.values():
-        _print(_check_lines(check))
+        if item.check in each.checks and item.check not in told:
+            told.add(item.check)
+            _print(_check_lines(each.checks[item.check]))
 
 
 def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]) -> UsageError:
