@@ -139,7 +139,9 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     `silent`: what was waited for stopped coming, or never came though the nodes were up.
     """
     until = _patient(live, until)
+    starting = _is_starting(live, until, now_s)
     enough = (
+        not starting,
         _window(live, until, now_s),
         _messages(live, until),
         _connected(live, until, now_s),
@@ -149,14 +151,12 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     )
     if live.ended and not live.running:
         return "complete" if until.ended and all(enough) else "ended", ""
-    if _is_starting(live, until, now_s) and now_s - live.started_s <= until.limit_s:
-        return None
     if _waits(until):
         if all(enough):
             return "complete", ""
     elif now_s - live.started_s > until.limit_s:
         return "complete", f"watched for {until.limit_s:g} s"
-    silent = _silent(live, until, now_s)
+    silent = "" if starting else _silent(live, until, now_s)
     if silent:
         return "silent", silent
     if now_s - live.started_s > until.limit_s:
