@@ -13,8 +13,10 @@ from grader.rubric.model import Until
 Outcome = tuple[str, str]
 ARRIVALS_MAX = 2000
 HEARD_S = 2.0
-CONNECTED_S = 1.0
 """So long after the last probe and the last line, a value that is not printed will not be."""
+HEARD_AT_MOST_S = 8.0
+"""So long after the last probe and the last value that was heard, whatever else is printed."""
+CONNECTED_S = 1.0
 
 
 @dataclass
@@ -39,6 +41,7 @@ class RunState:
     nodes: set[str] = field(default_factory=set)
     helper_nodes: set[str] = field(default_factory=set)
     registered: set[str] = field(default_factory=set)
+    registered_s: float = 0.0
     last_start_s: float = 0.0
     first_node_s: float = 0.0
     services: set[str] = field(default_factory=set)
@@ -49,6 +52,7 @@ class RunState:
     connected_s: dict[str, float] = field(default_factory=dict)
     unheard: dict[str, re.Pattern[str]] = field(default_factory=dict)
     last_sent_s: float = 0.0
+    last_heard_s: float = 0.0
     graph_changed_s: float = 0.0
     graph_picture: object = None
     graphs: int = 0
@@ -94,6 +98,8 @@ class RunState:
         picture = nodes if picture is None else picture
         if picture != self.graph_picture:
             self.graph_changed_s, self.graph_picture = now_s, picture
+        if set(processes.values()) - self.registered:
+            self.registered_s = now_s
         self.registered |= set(processes.values())
         self.helper_nodes |= {n for n in nodes if processes.get(n) in self.helpers}
         own = {n for n in nodes if n not in self.helper_nodes}
@@ -114,7 +120,10 @@ class RunState:
     def printed(self, line: str, now_s: float) -> None:
         self.last_line_s = now_s
         self.active(now_s)
-        self.unheard = {value: word for value, word in self.unheard.items() if not word.search(line)}
+        unheard = {value: word for value, word in self.unheard.items() if not word.search(line)}
+        if len(unheard) < len(self.unheard):
+            self.last_heard_s = now_s
+        self.unheard = unheard
 
 
 def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
@@ -179,8 +188,9 @@ def next_look_s(live: RunState, until: Until, now_s: float) -> float:
         ]
     looks += [live.graph_changed_s + max(until.silent_s, until.first_message_s)]
     looks += [max(live.last_line_s, live.last_sent_s) + HEARD_S]
+    looks += [max(live.last_sent_s, live.last_heard_s) + HEARD_AT_MOST_S]
     looks += [live.activity_s + (until.quiet_s or 0), live.news_s + until.silent_s]
-    looks += [live.first_node_s + (until.alive_s or 0)]
+    looks += [live.first_node_s + (until.alive_s or 0), live.registered_s + (until.alive_s or 0) / 2]
     ahead = [look - now_s for look in looks if look > now_s]
     return min([*ahead, 1.0]) + 0.001
 
@@ -237,9 +247,18 @@ def _connected(live: RunState, until: Until, now_s: float) -> bool:
 
 def _nodes(live: RunState, until: Until, now_s: float) -> bool:
     """Everything that is there or not there: nodes, programs asked to open something, processes that ended."""
-    alive = until.alive_s is None or (bool(live.nodes) and now_s >= live.first_node_s + until.alive_s)
+    alive = until.alive_s is None or _lived(live, until, now_s)
     up = len(live.nodes) >= until.nodes and set(until.opened) <= live.opened
     return alive and up and set(until.ended) <= live.ended
+
+
+def _lived(live: RunState, until: Until, now_s: float) -> bool:
+    """Whether nodes have been there for `alive_s`, and the last of the processes for half of that: on a busy machine,
+    one that waits for another may come late."""
+    if not live.nodes or _is_starting(live, until, now_s):
+        return False
+    alive_s = until.alive_s or 0
+    return now_s >= max(live.first_node_s + alive_s, live.registered_s + alive_s / 2)
 
 
 def _quiet(live: RunState, until: Until, now_s: float) -> bool:
@@ -252,7 +271,8 @@ def _quiet(live: RunState, until: Until, now_s: float) -> bool:
 def _heard(live: RunState, until: Until, now_s: float) -> bool:
     if not until.heard or not live.unheard:
         return True
-    return now_s > max(live.last_line_s, live.last_sent_s) + HEARD_S
+    news_s = max(live.last_sent_s, live.last_heard_s)
+    return now_s > min(max(live.last_line_s, news_s) + HEARD_S, news_s + HEARD_AT_MOST_S)
 
 
 def _is_starting(live: RunState, until: Until, now_s: float) -> bool:
@@ -283,7 +303,7 @@ def _silent(live: RunState, until: Until, now_s: float) -> str:
 
 def _standstill(live: RunState, until: Until, now_s: float) -> str:
     """Nothing happens any more, though more nodes, programs or ends were waited for."""
-    growing_up = live.nodes and now_s < live.first_node_s + (until.alive_s or 0)
+    growing_up = live.nodes and until.alive_s is not None and not _lived(live, until, now_s)
     if growing_up or _nodes(live, until, now_s):
         return ""
     patience_s = until.silent_s if live.nodes else max(until.silent_s, until.first_message_s)

@@ -36,12 +36,14 @@ def print_explanation(name: str, rubric: str | None) -> None:
     ]
     known = loaded[0].checks if rubric is not None else known_checks(Path(), {})
     is_check = not slash and name in known
-    if is_check:
-        _print(_check_lines(known[name]))
-    for each, item in found:
-        _print(_criterion_lines(each, item))
     if not found and not is_check:
         raise _unknown(name, loaded, known)
+    checks = {name: known[name]} if is_check else {}
+    for each, item in found:
+        _print(_criterion_lines(each, item))
+        checks |= {item.check: each.checks[item.check]} if item.check in each.checks else {}
+    for check in checks.values():
+        _print(_check_lines(check))
 
 
 def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]) -> UsageError:
@@ -54,7 +56,7 @@ def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]
 
 
 def _criterion_lines(loaded: LoadedRubric, criterion: Criterion) -> Iterator[Line]:
-    rubric, checks = loaded.rubric, loaded.checks
+    rubric = loaded.rubric
     yield f"{rubric.id}/{criterion.id}: {criterion.title}", 0
     points = f"{number(criterion.points)} of {number(rubric.max_points)} points"
     yield f"{points}, judged by the check {criterion.check}", 2
@@ -63,8 +65,6 @@ def _criterion_lines(loaded: LoadedRubric, criterion: Criterion) -> Iterator[Lin
     if criterion.reproduce:
         yield f"see it yourself: {criterion.reproduce}", 2
     yield "", 0
-    if criterion.check in checks:
-        yield from _check_lines(checks[criterion.check])
 
 
 def _check_lines(check: Check) -> Iterator[Line]:

@@ -103,7 +103,8 @@ class Until(Record):
     another). `messages`: so many
     messages on each topic. `connected`: a student's publisher and a student's subscriber are connected over
     the topic, for a second. `heard`: every probe's value was printed. `nodes`: so many nodes of the student's have
-    registered. `alive_s`: that long after the student's first node registered. `opened`: these programs (`firefox`)
+    registered. `alive_s`: that long after the student's first node registered,
+    and half as long after the last process did. `opened`: these programs (`firefox`)
     were asked to open something. `ended`: these processes have ended. `quiet_s`: for so long, nothing was printed,
     published, registered or set, and something was before.
     A run gives up when no message came within `first_message_s`, when all that is waited for has been silent for
