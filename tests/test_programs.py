@@ -16,7 +16,6 @@ import pytest
 
 GRADER = Path(__file__).resolve().parent.parent / "grader"
 INSIDE = {
-    "arena/ros/opener.py": "runs behind the wall, as the program that a student's launch file names",
     "arena/ros/calibration.py": "a copy of the arena, which starts nothing",
     "arena/ros/__main__.py": "a copy of the template, which becomes an arena",
 }

@@ -19,6 +19,8 @@ CONNECTED_S = 1.0
 FULL, OTHERS_MOST = 0.9, 0.75
 """Shares of the processors' time: a machine is full from the one, and others count up to the other (then all takes four
 times as long)."""
+HEARD_AT_MOST_S = 8.0
+"""So long after the last probe and the last value that was heard, whatever else is printed."""
 
 
 @dataclass
@@ -55,6 +57,7 @@ class RunState:
     connected_s: dict[str, float] = field(default_factory=dict)
     unheard: dict[str, re.Pattern[str]] = field(default_factory=dict)
     last_sent_s: float = 0.0
+    last_heard_s: float = 0.0
     graph_changed_s: float = 0.0
     graph_picture: object = None
     graphs: int = 0
@@ -130,7 +133,10 @@ class RunState:
     def printed(self, line: str, now_s: float) -> None:
         self.last_line_s = now_s
         self.active(now_s)
-        self.unheard = {value: word for value, word in self.unheard.items() if not word.search(line)}
+        unheard = {value: word for value, word in self.unheard.items() if not word.search(line)}
+        if len(unheard) < len(self.unheard):
+            self.last_heard_s = now_s
+        self.unheard = unheard
 
 
 def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
@@ -208,6 +214,7 @@ def next_look_s(live: RunState, until: Until, now_s: float) -> float:
         ]
     looks += [live.graph_changed_s + max(until.silent_s, until.first_message_s)]
     looks += [max(live.last_line_s, live.last_sent_s) + HEARD_S]
+    looks += [max(live.last_sent_s, live.last_heard_s) + HEARD_AT_MOST_S]
     looks += [live.activity_s + (until.quiet_s or 0), live.news_s + until.silent_s]
     looks += [_lived_s(live, until.alive_s or 0)]
     ahead = [look - now_s for look in looks if look > now_s]
@@ -281,7 +288,9 @@ def _quiet(live: RunState, until: Until, now_s: float) -> bool:
 def _heard(live: RunState, until: Until, now_s: float) -> bool:
     if not until.heard or not live.unheard:
         return True
-    return now_s > max(live.last_line_s, live.last_sent_s) + HEARD_S + min(live.lost_s, HEARD_LOST_S_MAX)
+    lost_s = min(live.lost_s, HEARD_LOST_S_MAX)
+    news_s = max(live.last_sent_s, live.last_heard_s)
+    return now_s > min(max(live.last_line_s, news_s) + HEARD_S, news_s + HEARD_AT_MOST_S) + lost_s
 
 
 def _is_starting(live: RunState, until: Until, now_s: float) -> bool:

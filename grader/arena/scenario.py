@@ -7,6 +7,7 @@ import time
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -77,7 +78,8 @@ async def run_scenario(
     """
     admission = admission or Admission(None)
     warp = scenario.warp if scenario.clock == "warped" else 1.0
-    starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place)]
+    numbers = count()
+    starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place, numbers)]
     with EvidenceWriter(path, scenario=name, clock=scenario.clock, warp=warp, metadata=metadata) as writer:
         session = ArenaSession(place, writer, last_run=last_run, on_lateness=admission.note_lateness)
         if not any(spec["role"] == "student" for _, spec in starts):
@@ -197,8 +199,11 @@ async def _look_at_connections(arena: ArenaSession) -> None:
     await arena.wait(lambda: not arena.live.running, GRAPH_EVERY_S)
 
 
-def process_specs(start: Start, place: ProcessEnvironment) -> Iterator[Spec]:
-    """Return how `rosrun`, `roslaunch` or `rosparam` would start it; nothing for a file that is not in the package."""
+def process_specs(start: Start, place: ProcessEnvironment, numbers: Iterator[int]) -> Iterator[Spec]:
+    """Return how `rosrun`, `roslaunch` or `rosparam` would start it; nothing for a file that is not in the package.
+
+    `numbers` are those of the run's processes.
+    """
     if start.launch is not None:
         yield place.spec(start.name, ["roslaunch", place.package, start.launch, *start.args])
     elif start.load is not None:
@@ -211,17 +216,19 @@ def process_specs(start: Start, place: ProcessEnvironment) -> Iterator[Spec]:
         yield replace(place, env={}).spec(start.name, argv, role="grader", copy=False)
     elif start.built:
         for program in sorted(place.built.compiled)[:BUILT_PROGRAMS_MAX]:
-            yield place.spec(f"{start.name}/{program}", [f"{place.devel_programs}/{program}", *start.args])
+            argv = [f"{place.devel_programs}/{program}", *start.args]
+            yield place.spec(f"{start.name}/{program}", argv, number=next(numbers))
     else:
-        yield from _script(start, place)
+        yield from _script(start, place, numbers)
 
 
-def _script(start: Start, place: ProcessEnvironment) -> Iterator[Spec]:
+def _script(start: Start, place: ProcessEnvironment, numbers: Iterator[int]) -> Iterator[Spec]:
     found = place.find_program(start.script or "")
     if found is not None:
         program, path = found
         repairs = list(place.workspace.repairs.get(path, ()))
-        yield place.spec(start.name, [program, *start.args], script=path, repairs=repairs)
+        argv = [program, *start.args]
+        yield place.spec(start.name, argv, script=path, repairs=repairs, number=next(numbers))
 
 
 def set_params(params: tuple[Param, ...], arena: ArenaSession) -> None:

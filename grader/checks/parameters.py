@@ -32,7 +32,16 @@ from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Citation, FileCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import (
+    Citation,
+    FileCitation,
+    Verdict,
+    failed,
+    inconclusive,
+    partial,
+    passed,
+    unjudged,
+)
 from grader.wording import join_words, plural
 
 EXACT = 1e-9
@@ -204,8 +213,9 @@ def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadP
 
     How it is measured
         The parameters have values that the grader makes up for this run. Each has to be on stdout, on stderr or
-        on /rosout; a number has to stand for itself (`12` is not in `127`). Where the student's file has another name
-        in a parameter's place (`First` for `first`), which is judged elsewhere, the value of that one will do.
+        on /rosout; a number has to stand for itself (`12` is not in `127`). Each value earns its
+        share. Where the student's file has another name in a parameter's place (`First` for `first`), which is judged
+        elsewhere, the value of that one will do.
 
     How to fix
         `rospy.get_param('/details/name/first')`, or `rospy.get_param('details')` for a map of them all, then
@@ -255,11 +265,19 @@ def _not_printed(
     if (hard := next(copied, None)) is not None:
         message = f"{hard} is printed as {params.file} has it, not as the parameter server has it"
         hint = f"read it with rospy.get_param('{hard}'), and not from the file or the script"
-        return failed(message, hint=hint)
+        return _share_printed(params, missing, message, hint)
     texts = [line.text.strip() for line in lines if line.text.strip()]
     seen = f"; it prints {shown(texts[-1])!r}" if texts else "; it prints nothing at all"
     message = f"{names} {_are(missing)} not printed with the values on the server{seen}"
-    return failed(message, hint=f"rospy.loginfo(rospy.get_param('{missing[0]}'))")
+    return _share_printed(params, missing, message, f"rospy.loginfo(rospy.get_param('{missing[0]}'))")
+
+
+def _share_printed(params: ParamsReadParams, missing: Sequence[str], message: str, hint: str) -> Verdict:
+    """Return what is earned by those that are printed."""
+    printed = len(params.names) - len(missing)
+    if not printed:
+        return failed(message, hint=hint)
+    return partial(printed / len(params.names), f"{message}; {printed} of {len(params.names)} are", hint=hint)
 
 
 def _in_file(build: Run, file: str, name: str) -> list[str]:

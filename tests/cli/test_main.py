@@ -163,6 +163,13 @@ def test_a_criterion_is_explained_with_its_check(capsys, tmp_path):
     assert CHECKS["rate"].title in out
 
 
+def test_a_check_and_a_criterion_of_one_name_are_explained_once(capsys):
+    assert run(["explain", "counter-wrap"]) == 0
+    out = capsys.readouterr().out
+    assert "leeds-comp3631-lab1/counter-wrap" in out
+    assert out.count("What it checks") == 1
+
+
 def test_explain_has_a_suggestion(capsys):
     assert run(["explain", "raet"]) == 2
     assert 'there is no check or criterion "raet" (did you mean "rate"?)' in capsys.readouterr().err
