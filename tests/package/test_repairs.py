@@ -468,6 +468,19 @@ def test_a_linked_folder_is_not_entered(tmp_path: Path, outside: Path) -> None:
     assert snapshot(outside) == before
 
 
+def test_windows_opens_nothing_relative_to_a_folder(tmp_path: Path, outside: Path, monkeypatch) -> None:
+    monkeypatch.setattr("grader.package.repairs.editing.HAS_DIR_FD", False)
+    before = snapshot(outside)
+    changed = SCRIPT.replace("numeric_chatter", "numeric_chater")
+    folder = package(tmp_path, {TALKER: None, "src/talkr.py": changed})
+    assert [repair.kind for repair in repair_all(folder)] == ["file-name", "topic-name"]
+    assert (folder / "src" / "talker.py").read_text() == SCRIPT
+    (folder / "scripts").symlink_to(outside)
+    with pytest.raises((OSError, NotRepairable)):
+        apply_repair(folder, misspelt("scripts/secret.py"))
+    assert snapshot(outside) == before
+
+
 def test_a_script_with_a_name_elsewhere_changes_here_alone(tmp_path: Path, outside: Path) -> None:
     before = snapshot(outside)
     folder = package(tmp_path, {TALKER: None})
