@@ -1,4 +1,4 @@
-"""Whether `rosrun` can run a script as it was handed in."""
+"""Whether `rosrun` can run a script as it was handed in, and Python can parse it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from grader.checks.build import CATKIN_MAKE
 from grader.checks.registry import check
+from grader.checks.support.exit_causes import CAUSES, SYNTAX
 from grader.checks.support.scripts import (
     PYTHON,
     add_hint,
@@ -20,7 +21,7 @@ from grader.checks.support.scripts import (
 )
 from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
-from grader.model.package import PackageFacts, SourceFile
+from grader.model.package import Fault, PackageFacts, SourceFile
 from grader.model.record import Record
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words
@@ -28,6 +29,8 @@ from grader.wording import join_words
 RIGHT_SHEBANG = "#!/usr/bin/env python3"
 # a script without its first line is run by the shell, which knows no `import`
 TELLING = ("Couldn't find", "import: command not found", "No such file or directory")
+UNPARSED = (*SYNTAX, "ValueError")
+"""What Python says of a file that it cannot parse; other faults are of the reading."""
 C_SOURCES = {".c", ".cc", ".cpp", ".cxx", ".h", ".hpp"}
 
 
@@ -51,7 +54,7 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
     What it checks
         That the script is there, has its executable bit, and begins with a `#!` line which names an
         interpreter that exists. An executable wrapper that the build makes of it (`catkin_install_python`)
-        does as well.
+        does as well. A Python script must also parse: no line of it may be a syntax error.
 
     Why it matters on a robot
         `rosrun` and `roslaunch` only find files that may be executed, and the `#!` line is all that tells
@@ -60,12 +63,14 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
     How it is measured
         The bit comes from git's tree for a repository, from the archive's entries or from the disk. The
         first line is read as the kernel reads it: a line that ends in CR LF, a byte order mark or a blank
-        line in front of it break it. A script in another folder counts, with a hint.
+        line in front of it break it. A script in another folder counts, with a hint. ROS's own Python parses the
+        file without running it, and says which line it does not understand.
 
     How to fix
         `chmod +x <file>`, then `git update-index --chmod=+x <file>` and push; write `#!/usr/bin/env
         python3` as the very first line; `dos2unix <file>` for a file from Windows. `ls -lF` shows
-        executable files with a `*`.
+        executable files with a `*`. `python3 -m py_compile <file>` shows a syntax error: fix that line, or
+        the one above it.
     """
     found = find_script(package, params.path)
     verdict = _missing(package, params.path) if found is None else _judged(package, build, found, params)
@@ -77,7 +82,10 @@ def _judged(package: PackageFacts, build: Run, found: SourceFile, params: Execut
     obstacles = [*_shebang_obstacles(found), *_mode_obstacles(found, remarks)]
     moved = f"the handout puts it at {params.path}; move it there" if found.path != params.path else ""
     hint = moved or "; ".join(remarks)
-    if found.executable and not obstacles:
+    fault = _syntax_fault(found)
+    if fault is not None:
+        verdict = _unparsed(found, fault, [] if has_wrapper(package, build, found.path) else obstacles)
+    elif found.executable and not obstacles:
         verdict = passed(f"{found.path} is executable and names {_interpreter(found)}", hint=hint)
     elif has_wrapper(package, build, found.path):
         advice = f" (without it: {obstacles[0].why})" if obstacles else ""
@@ -90,8 +98,40 @@ def _judged(package: PackageFacts, build: Run, found: SourceFile, params: Execut
         verdict = inconclusive(
             message, hint="hand in a git repository or a .tar.gz, which keep the executable bit"
         )
-    line = FileCitation(file=found.path, line=1)
-    return verdict.about(measured=f"{found.path}: {_mode(found)}, {_first_line(found)}", citations=(line,))
+    measured = verdict.measured or f"{found.path}: {_mode(found)}, {_first_line(found)}"
+    return verdict.about(measured=measured, citations=verdict.citations or (_cite_shebang(found),))
+
+
+def _syntax_fault(file: SourceFile) -> Fault | None:
+    """Return why Python cannot parse the script; None for one that an old Python, which is there, is to run."""
+    old = file.shebang is not None and file.shebang.found and file.shebang.interpreter.startswith("python2")
+    fault = file.python_fault
+    return fault if fault is not None and fault.kind in UNPARSED and not old else None
+
+
+def _unparsed(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -> Verdict:
+    where = f"line {fault.line}" if fault.line else "cannot be parsed"
+    others = f"; besides, it {' and '.join(o.why for o in obstacles)}" if obstacles else ""
+    fixes = [
+        CAUSES.get(fault.kind, ("", "save the file as plain UTF-8 text"))[1],
+        *(o.fix for o in obstacles),
+    ]
+    source = f", {where}: {shown(fault.source.strip())}" if fault.source.strip() else ""
+    return failed(
+        f"{file.path} {where}: {fault.kind}: {fault.cause or fault.message}{others}",
+        measured=f"{file.path}: {_mode(file)}, {_first_line(file)}{source}",
+        hint="; ".join(fixes),
+        citations=(fault.place, *((_cite_shebang(file),) if obstacles else ())),
+    )
+
+
+def _cite_shebang(file: SourceFile) -> FileCitation:
+    """The first line, and in it the interpreter that does not exist."""
+    text = f"#!{file.shebang.text}" if file.shebang else ""
+    if file.shebang is None or file.shebang.found is not False or file.shebang.interpreter not in text:
+        return FileCitation(file=file.path, line=1)
+    column = text.rindex(file.shebang.interpreter) + 1
+    return FileCitation(file=file.path, line=1, column=column, source=text)
 
 
 def has_wrapper(package: PackageFacts, build: Run, path: str) -> bool:

@@ -192,7 +192,7 @@ def _unreadable(fault: Fault | None) -> Verdict:
         f"{fault.file}{line} cannot be read: {fault.cause or fault.message}",
         measured=fault.message,
         hint="open the file at that line and close or correct the element",
-        citations=(FileCitation(file=fault.file, line=fault.line),),
+        citations=(fault.place,),
     )
 
 

@@ -32,7 +32,8 @@ UNBUILT = Run(
 def judge_files(
     rubric: Rubric, package: PackageFacts, checks: Mapping[str, Check] = CHECKS
 ) -> tuple[EarlyVerdict, ...]:
-    """Return the criteria that need no run, as far as the files decide them, in the rubric's order.
+    """Return the criteria that need no run, as far as the files decide them, in the rubric's order; with them those
+    of a launch file that nothing can read.
 
     What needs the build, or a criterion that is not decided yet, is left out. A verdict is final where nothing that
     the build makes more precise was looked at for it.
@@ -57,10 +58,14 @@ class _Judging:
     def judge(self, name: str) -> None:
         criterion = self._criteria[name]
         check = self._checks.get(criterion.check)
-        if check is None or not FROM_FILES.issuperset(check.facts):
+        if check is None:
             return
         asked: set[str] = set()
-        verdict = verdict_of(criterion, self._facts(asked), self._checks)
+        facts = self._facts(asked)
+        from_files = FROM_FILES.issuperset(check.facts)
+        if not from_files and not facts.unreadable_launch(criterion.scenario or ""):
+            return
+        verdict = verdict_of(criterion, facts, self._checks)
         final = not asked
         if verdict.unjudged:
             if not self.results.keys() >= set(criterion.requires):

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from grader.checks.all_runs import Evidence
 from grader.checks.build import run_hint
 from grader.checks.registry import Check
+from grader.checks.support.launch import read_launch
 from grader.checks.support.scripts import find_script
 from grader.evidence.events import RECORDING_MISSING, RECORDING_PROBLEM
 from grader.evidence.run import Run
@@ -72,6 +73,8 @@ class Facts:
         run = self.runs.get(scenario)
         if run is None and self._lacks_files(scenario):
             return self._nothing_started(scenario)
+        if run is None and (unreadable := self.unreadable_launch(scenario)):
+            return unreadable
         if run is None:
             recorded = self.runs.get(PACKAGE_RUN)
             reason = recorded.metadata.get(NOT_RUN, "") if recorded else ""
@@ -90,6 +93,16 @@ class Facts:
                 message, hint="`grader doctor` shows what this machine lacks; then grade again"
             )
         return run
+
+    def unreadable_launch(self, scenario: str) -> Verdict | None:
+        """Return why roslaunch cannot read what the scenario launches: that shows without a run."""
+        known = self.rubric.scenarios.get(scenario)
+        if known is None or self.package is None or known.recording is not None:
+            return None
+        faulty = {PurePosixPath(f.path).name for f in self.package.launch_files if f.fault is not None}
+        read = (read_launch(self.package, s.launch) for s in known.start if s.launch in faulty)
+        found = next((one for one in read if isinstance(one, Verdict)), None)
+        return found.model_copy(update={"unjudged": True}) if found else None
 
     def _lacks_files(self, scenario: str) -> bool:
         """Return whether the package has none of the files that the scenario starts: then there was nothing to run."""

@@ -124,13 +124,17 @@ class ConsoleFigure(Record):
 
 
 class CodeFigure(Record):
-    """Lines of a file from `first_line` (counted from 1) on, with the `marked` ones."""
+    """Lines of a file from `first_line` (counted from 1) on, with the `marked` ones.
+
+    `columns` are places in these, counted from 1, by line.
+    """
 
     kind: Literal["code"] = "code"
     file: str
     first_line: int
     lines: tuple[str, ...]
     marked: tuple[int, ...]
+    columns: dict[int, int] = Field(default={})
 
 
 class PathFigure(Record):

@@ -9,13 +9,14 @@ from typing import Literal
 
 from grader.model.record import Record
 from grader.model.submission import ModeSource
+from grader.model.verdict import FileCitation
 
 
 class Fault(Record):
     """Why a file cannot be read as what it should be.
 
     `kind` is the parser's own word (`XMLSyntaxError`, `TabError`). `cause` says the same in a student's
-    words, empty where the message says enough.
+    words, empty where the message says enough. `source` is the text of the line where the column is known.
     """
 
     file: str
@@ -24,6 +25,12 @@ class Fault(Record):
     kind: str
     message: str
     cause: str = ""
+    source: str = ""
+
+    @property
+    def place(self) -> FileCitation:
+        """The line, with its column where it is known."""
+        return FileCitation(file=self.file, line=self.line, column=self.column, source=self.source)
 
 
 class Dependency(Record):

@@ -41,6 +41,10 @@ class FileCitation(Record):
     """A file of the submission, from the package's root."""
     line: int | None = None
     """Counted from 1; null for the whole file."""
+    column: int | None = None
+    """The place in the line, counted from 1; null for the whole line."""
+    source: str = ""
+    """The line's text where there is a column, as far as it is short; else empty."""
 
 
 class EvidenceCitation(Record):

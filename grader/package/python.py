@@ -29,7 +29,7 @@ _TYPOGRAPHIC = (
     ("\u201c\u201d\u201e\u201f\u2033\u00ab\u00bb", "quote", '"'),
     ("\u2010\u2011\u2012\u2013\u2014\u2015\u2212", "dash", "-"),
 )
-TEXT_CHARS_MAX = 300
+TEXT_CHARS_MAX = SOURCE_CHARS_MAX = 300
 _COPIED = "copied from a PDF or a web page"
 
 # On any message: the faulty line itself tells.
@@ -145,13 +145,17 @@ def _entry(line: bytes | str) -> _RawEntry | None:
 def _fault(file: str, raw: _RawFault) -> Fault:
     cause = cause_of(raw.message, raw.text, column=raw.column, opened=raw.opened, mixed=raw.mixed)
     kind = printable(raw.kind[:MESSAGE_CHARS_MAX])
+    column = raw.column if raw.line and raw.column and 0 < raw.column <= len(raw.text) + 1 else None
+    if kind in {"TabError", "IndentationError"} and raw.text.strip():
+        column = len(raw.text) - len(raw.text.lstrip()) + 1  # Python points at the end of the line
     return Fault(
         file=file,
         line=raw.line,
-        column=raw.column if raw.column and raw.column > 0 else None,
+        column=column,
         kind=kind,
         message=printable(raw.message[:MESSAGE_CHARS_MAX]) or kind,
         cause=printable(cause),
+        source=printable(raw.text[:SOURCE_CHARS_MAX]) if column else "",
     )
 
 

@@ -116,14 +116,17 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
         r", line \d+, column \d+$", "", said[:_MESSAGE_CHARS_MAX] + said[_MESSAGE_CHARS_MAX:][-40:]
     ).strip()
     # the error's own log holds what went wrong with other files before, too
+    text = _line(data, line)
+    known = 0 < column <= len(text) + 1
     log = [str(entry.message)[:_MESSAGE_CHARS_MAX] for entry in islice(parser.error_log, _MESSAGES)]
     return Fault(
         file=file,
         line=line or None,
-        column=column or None,
+        column=column if known else None,
         kind="XMLSyntaxError",
         message=message[:_MESSAGE_CHARS_MAX],
-        cause=cause_of(message, log, _line(data, line), root=root)[:_MESSAGE_CHARS_MAX],
+        cause=cause_of(message, log, text, root=root)[:_MESSAGE_CHARS_MAX],
+        source=text.rstrip("\r") if known else "",
     )
 
 

@@ -23,8 +23,8 @@ from grader.report.sentences import (
     visible_words,
     without_sandbox,
 )
-from grader.report.text import line, markdown, markdown_code
-from grader.report.view import Loss, arrange, not_graded, places, points_of
+from grader.report.text import line, markdown, markdown_block, markdown_code
+from grader.report.view import Loss, arrange, not_graded, places, pointed_at, points_of
 from grader.rubric.model import Rubric
 from grader.wording import number
 
@@ -171,6 +171,8 @@ class _Writer:
         yield from (f"### {self._code(criterion.id)}: {points_of(criterion)}, {criterion.status.value}", "")
         details = [*self._details(criterion), *self._blocked(loss)]
         yield from (*(details or [self._text(criterion.title)]), "")
+        for pair in pointed_at(criterion):
+            yield from (markdown_block(pair), "")
 
     def _details(self, criterion: CriterionResult) -> Iterator[str]:
         rows = {"Measured": criterion.measured, "Expected": criterion.expected, "Hint": criterion.hint}

@@ -25,7 +25,7 @@ from grader.report.sentences import (
     without_sandbox,
 )
 from grader.report.text import line, uncommanded
-from grader.report.view import Loss, arrange, not_graded, places, points_of
+from grader.report.view import Loss, arrange, not_graded, places, pointed_at, points_of
 from grader.rubric.model import Rubric
 from grader.wording import number
 
@@ -167,7 +167,9 @@ class Terminal:
         rows.append(("where", ", ".join(places(c))))
         rows.append(("also", ", ".join(f"{a.id} {points_of(a)}" for a in loss.alike)))
         rows.append(("blocks", ", ".join(f"{b.id} {points_of(b)}" for b in loss.blocked)))
-        return Group(head, Padding(self._rows(rows), (0, 0, 0, 4)))
+        source = [Text(self._encoded(row)) for pair in pointed_at(c) for row in pair]
+        code = [Padding(Group(*source), (0, 0, 0, 4))] if source else []
+        return Group(head, Padding(self._rows(rows), (0, 0, 0, 4)), *code)
 
     def _advice(self, criterion: CriterionResult) -> RenderableType:
         head = self._line(criterion, criterion.message or criterion.title)
@@ -226,7 +228,9 @@ class Terminal:
 
     def _show(self, text: str, limit: int = LIMIT) -> str:
         """Harmless, of bounded length, and in characters that the terminal's encoding has."""
-        text = line(text, limit)
+        return self._encoded(line(text, limit))
+
+    def _encoded(self, text: str) -> str:
         return text.encode(self.console.encoding, "backslashreplace").decode(self.console.encoding)
 
 

@@ -3,7 +3,7 @@
 | place | function |
 |---|---|
 | terminal, XML, a log | `line` (one line of bounded length), `visible` (`lines=True` keeps line ends) |
-| Markdown | `markdown`, `markdown_code` |
+| Markdown | `markdown`, `markdown_code`, `markdown_block` |
 | HTML | `html` for text and quoted attributes, `html_address` for `href` |
 | CSV | `csv_text` for whole tables |
 | JSON | `json_text` |
@@ -30,6 +30,7 @@ __all__ = [
     "json_text",
     "line",
     "markdown",
+    "markdown_block",
     "markdown_code",
     "text_limit",
     "uncommanded",
@@ -97,10 +98,21 @@ def markdown_code(text: str, *, cell: bool = False) -> str:
     return _code(visible(text), cell=cell)
 
 
+def markdown_block(lines: Iterable[str]) -> str:
+    """A block of code that shows these lines as they are."""
+    rows = [visible(row) for row in lines]
+    fence = "`" * max(3, 1 + _longest_run("".join(rows)))
+    return "\n".join((fence, *rows, fence))
+
+
+def _longest_run(text: str) -> int:
+    return max((len(run) for run in re.findall("`+", text)), default=0)
+
+
 def _code(text: str, *, cell: bool) -> str:
     if not text.strip():
         return ""
-    fence = "`" * (1 + max((len(run) for run in re.findall("`+", text)), default=0))
+    fence = "`" * (1 + _longest_run(text))
     pad = " " if text[0] in "` " or text[-1] in "` " else ""
     return f"{fence}{pad}{text.replace('|', chr(92) + '|') if cell else text}{pad}{fence}"
 

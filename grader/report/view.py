@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from unicodedata import east_asian_width
 
 from grader.errors import PackageNotFound, SubmissionError
 from grader.judging.settle import lateness
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
 from grader.rubric.model import Rubric
-from grader.untrusted_text import CITATIONS_MAX, clip
+from grader.untrusted_text import CITATIONS_MAX, clip, visible
 from grader.wording import number
 
 PLACE_CHARS = 300
+SOURCE_CHARS = 60
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,6 +118,32 @@ def points_of(criterion: CriterionResult) -> str:
 def places(criterion: CriterionResult) -> list[str]:
     """Where it was seen: `src/talker.py:17`, `real.mcap /chatter, 6.0 s`; the first twenty."""
     return [clip(_place(citation), PLACE_CHARS) for citation in criterion.citations[:CITATIONS_MAX]]
+
+
+def pointed_at(criterion: CriterionResult) -> list[tuple[str, str]]:
+    """Each line of a file in which a column is named, below its number, and the line with the caret below it:
+    `12 | print "hello"` and `   |       ^`."""
+    cited = [c for c in criterion.citations[:CITATIONS_MAX] if isinstance(c, FileCitation)]
+    found = []
+    for citation in cited:
+        if citation.line is not None and (place := caret(citation)):
+            number = str(citation.line)
+            text, below = place
+            found.append((f"{number} | {text}", f"{' ' * len(number)} | {below}"))
+    return found
+
+
+def caret(citation: FileCitation) -> tuple[str, str] | None:
+    """Return the visible text of the cited line, of `SOURCE_CHARS` around its column, and a caret for the line below;
+    None where there is no column."""
+    if citation.column is None or not citation.source.strip():
+        return None
+    before = citation.source[: max(citation.column, 1) - 1]
+    first = max(0, len(before) - SOURCE_CHARS // 2)
+    left = "…" if first else ""
+    text = left + visible(citation.source[first : first + SOURCE_CHARS].rstrip())
+    wide = sum(east_asian_width(c) in "WF" for c in before[first:])
+    return text, " " * (len(left + visible(before[first:])) + wide) + "^"
 
 
 def _place(citation: Citation) -> str:

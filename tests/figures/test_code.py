@@ -78,3 +78,15 @@ def test_everything_is_bounded() -> None:
     assert 1 < len(figures) <= FIGURES_MAX
     assert all(len(f.lines) <= LINES_MAX + 6 for f in figures)
     assert all(len(line) <= 300 for f in figures for line in f.lines)
+
+
+def test_a_column_is_kept_where_its_line_is_shown() -> None:
+    cited = [
+        FileCitation(file="src/talker.py", line=2, column=3, source="line 2"),
+        FileCitation(file="src/talker.py", line=3, column=10**6),
+        FileCitation(file="src/talker.py", line=999, column=3),
+    ]
+    build = runs_of({})["package"]
+    object.__setattr__(build, "attachments", {"src/talker.py": TEXT.encode()})
+    (figure,) = code_figures(build, cited)
+    assert figure.columns == {2: 3}

@@ -10,6 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from grader.model.verdict import FileCitation
+from grader.report.text import markdown_block
+from grader.report.view import caret
 from grader.untrusted_text import (
     HIDDEN_CATEGORIES,
     clip,
@@ -147,3 +150,36 @@ def test_of_citations_only_the_first_are_kept():
     data = clipped({"citations": [{"file": "x" * 999}] * 50, "other": ["y" * 9] * 50}, 4)
     assert data["citations"] == [{"file": "x" * 120 + "… (879 more characters)"}] * 20
     assert data["other"] == ["yyyy… (5 more characters)"] * 50
+
+
+@pytest.mark.parametrize(
+    ("source", "column", "text", "below"),
+    [
+        ("        print text", 9, "        print text", "        ^"),
+        ("\tcounter += 1", 2, "\\tcounter += 1", "  ^"),
+        ("x = 语(", 6, "x = 语(", "      ^"),
+        ("for i in x", 11, "for i in x", "          ^"),
+        ("a" * 100 + "`" + "b" * 100, 101, "…" + "a" * 30 + "`" + "b" * 29, " " * 31 + "^"),
+    ],
+)
+def test_a_caret_stands_below_the_column(source, column, text, below):
+    assert caret(FileCitation(file="talker.py", line=3, column=column, source=source)) == (text, below)
+
+
+@given(TEXTS, st.integers(-2, 400))
+def test_a_caret_shows_nothing_that_steers(source, column):
+    shown = caret(FileCitation(file="talker.py", line=3, column=column, source=source))
+    assert shown is None or not any(STEERING.search(row) or "\n" in row for row in shown)
+
+
+def test_there_is_no_caret_without_a_column():
+    assert caret(FileCitation(file="talker.py", line=3, source="x = 1")) is None
+    assert caret(FileCitation(file="talker.py", line=3, column=3)) is None
+
+
+@given(TEXTS)
+def test_no_text_leaves_a_block_of_code(text):
+    first, *rows, last = markdown_block(("before", text)).split("\n")
+    assert rows == ["before", visible(text)]
+    assert first == last
+    assert first not in "".join(rows)

@@ -199,8 +199,9 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     slip = next((known for said, known in SLIPS.items() if said in found.message), None)
     cause, hint = slip or CAUSES.get(found.kind, ("", "fix the line that is named"))
     source = package.file(place.file) if place and found.kind in SYNTAX else None
-    if source is not None and source.python_fault is not None:
+    if place is not None and source is not None and source.python_fault is not None:
         cause = source.python_fault.cause or cause
+        place = source.python_fault.place if source.python_fault.line == place.line else place
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(found.text)}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else ())

@@ -104,7 +104,7 @@ def _unreadable(package: PackageFacts, file: LaunchFile | None, launch: str) -> 
     line = f", line {file.fault.line}" if file.fault.line else ""
     message = f"{file.path}{line} is not well-formed: {file.fault.cause or file.fault.message}"
     hint = "close every element, and begin with <launch> and end with </launch>"
-    return failed(message, hint=hint, citations=(FileCitation(file=file.path, line=file.fault.line),))
+    return failed(message, hint=hint, citations=(file.fault.place,))
 
 
 def not_run(run: Run) -> Verdict | None:
@@ -322,9 +322,10 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
         return Absence(f"it died: {end.cause}", end.hint, of_script=True, citations=end.citations)
     if script is not None and script.python_fault is not None:
         fault = script.python_fault
-        place = (FileCitation(file=script.path, line=fault.line),)
         hint = CAUSES.get(fault.kind, ("", "fix that line"))[1]
-        return Absence(f"it died: {fault.kind}: {fault.message}", hint, of_script=True, citations=place)
+        return Absence(
+            f"it died: {fault.kind}: {fault.message}", hint, of_script=True, citations=(fault.place,)
+        )
     hint = 'write output="screen" into the <node>, and read what it prints last'
     return Absence(f"it died with exit code {code}", hint, of_script=True)
 

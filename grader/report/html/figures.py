@@ -195,10 +195,15 @@ def _code(figure: CodeFigure, name: str) -> Drawn:
         title=f"{figure.file}, line {marked}" if marked else figure.file,
         points=len(figure.lines),
         rows=[
-            (number, text, number in figure.marked)
+            (number, text, number in figure.marked, _before(text, figure.columns.get(number)))
             for number, text in enumerate(figure.lines, start=figure.first_line)
         ],
     )
+
+
+def _before(text: str, column: int | None) -> str | None:
+    """What stands before the caret; None where there is none."""
+    return None if column is None or column < 1 else text[: column - 1]
 
 
 def _path(figure: PathFigure, name: str) -> Drawn:
