@@ -5,6 +5,7 @@ from __future__ import annotations
 import posixpath
 import re
 from collections.abc import Callable, Sequence
+from difflib import get_close_matches
 from typing import NamedTuple
 
 from grader.checks.support.scripts import path_in_package
@@ -13,6 +14,8 @@ from grader.installable import install_hint, known_packages
 from grader.model.package import PackageFacts
 from grader.model.verdict import FileCitation
 
+ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
+ONE_EDIT = 0.88
 FIRST_ERROR_HINT = "run catkin_make in a fresh clone and fix the first error that it prints"
 _CMAKE_ERROR = re.compile(
     r"^CMake Error(?: at (?P<file>[^:()]+):(?P<line>\d+) \((?P<call>\w+)\))?:?\s*(?P<text>.*)"
@@ -125,7 +128,7 @@ def _missing_package(found: re.Match[str], _package: PackageFacts, lines: Sequen
             install_hint(name, lines),
             of_machine=True,
         )
-    near = near_names(name, known_packages())
+    near = get_close_matches(name, (*ALWAYS_THERE, *known_packages()), 1, ONE_EDIT)
     meant = f"write {near[0]}" if near else "correct its name or remove it"
     hint = (
         f"{meant} in find_package(…) and in package.xml; a package of your own must be pushed with this one"
