@@ -31,18 +31,18 @@ TOGETHER = {
     "eyantra-ros-basics": (
         "chatter-own-package+cmake-no-catkin-package+hello-print+load-yaml-find+turtlesim-colour-unread+web-chromium",
         "config-nesting+hello-ends+manifest-roscpp-missing+param-clobbers",
-        "cpp-crashes+hello-not-executable+param-hard-coded",
+        "cpp-crashes+hello-not-executable",
         "ok-param-one-line+param-crlf",
     ),
     "leeds-comp3631-lab1": (
-        "counter-every-second-loop+listener-no-spin+cmake-no-catkin-package+launch-malformed+talker-crlf",
+        "counter-every-second-loop+cmake-no-catkin-package+launch-malformed+talker-crlf",
         "talker-asks-input+listener-bom+manifest-malformed",
         "chatter-capital+counter-int16-never-resets+ok-no-dependencies+ok-talker-name-other+build-missing-source",
         "ok-cmake-by-variables+ok-listener-print+rate-11hz+counter-starts-at-1",
     ),
     "mcr2-basic-comms": (
         "talker-missing+listener-name+manifest-no-buildtool+cmake-no-catkin-package",
-        "chatter-other-topic+listener-ends+launch-no-name+build-unknown-component",
+        "chatter-other-topic+launch-no-name+build-unknown-component",
         "rate-sleep-without-brackets+listener-not-executable",
         "message-constant-time+launch-namespace-apart",
         "ok-launch-terminals+talker-anonymous",
@@ -61,8 +61,8 @@ TOGETHER = {
         "ok-drives-slower",
     ),
     "york-ele00118m-lab7": (
-        "sender-missing+receiver-colon-missing+manifest-dependency-build-only",
-        "data-float+receiver-no-spin+cmake-no-catkin-package",
+        "sender-missing+manifest-dependency-build-only",
+        "data-float+cmake-no-catkin-package",
         "rate-2hz+receiver-crlf",
         "sender-name-other+maintainer-todo+build-missing-source",
         "message-constant+ok-deep-workspace",

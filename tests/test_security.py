@@ -15,7 +15,7 @@ from grader.arena.ros_env import DUMP_BYTES, NAMES_MAX, VALUE_BYTES
 from grader.checks.support import text
 from grader.evidence import container, decode, definitions, memory_budget
 from grader.intake import archive, git, gitdir
-from grader.intake.limits import RunLimits as IntakeLimits
+from grader.intake.limits import IntakeLimits
 from grader.package import cmake, cmake_parse, launch, launch_loader, python, reading
 
 KB, MB, RUN = 1 << 10, 1 << 20, RunLimits()

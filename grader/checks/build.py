@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import NoParams, check
+from grader.checks.support.build_errors import FIRST_ERROR_HINT, explain_error_of_build, first_error
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.processes import Life, lives
-from grader.checks.support.scripts import cmake_calls, path_in_package, paths_by_name
+from grader.checks.support.scripts import cmake_calls, paths_by_name
 from grader.checks.support.text import bare, near_names, shown
 from grader.checks.support.topics import cite
 from grader.evidence.run import Run
@@ -40,13 +40,6 @@ INSTALL_ROS = (
     "install ROS 1 with `make setup`, or `apt-get install python3-rospy python3-roslaunch rosbash catkin`, "
     "and grade again"
 )
-_CMAKE_ERROR = re.compile(
-    r"^CMake Error(?: at (?P<file>[^:()]+):(?P<line>\d+) \((?P<call>\w+)\))?:?\s*(?P<text>.*)"
-)
-_COMPILER_ERROR = re.compile(r"^(?P<file>[^:\s][^:]*):(?P<line>\d+):(?:\d+:)? (?:fatal )?error: (?P<text>.*)")
-_OTHER_ERROR = re.compile(
-    r"(?P<text>.*(?:\b[Ee]rror:|Error\(s\)|undefined reference|No rule to make|[A-Za-z]Error:|\*\*\*).*)"
-)
 
 
 def run_hint(reason: str) -> str:
@@ -60,15 +53,6 @@ class BuildParams(Record):
     """`scripts` have to be there to run after the build, paths as the handout gives them."""
 
     scripts: tuple[str, ...] = ()
-
-
-class BuildError(NamedTuple):
-    """The first error that the build printed; `kind` is `cmake`, `compiler` or `other`."""
-
-    kind: str
-    text: str
-    file: str
-    line: int | None
 
 
 @check("build", params=BuildParams, run_anyway=True)
@@ -133,14 +117,18 @@ def _stopped_build(build: Run, took: str) -> Verdict:
 
 
 def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> Verdict:
-    error = _first_error([c.line for _, c in build.console if c.process == CATKIN_MAKE])
-    place = _place(error, package)
+    lines = [c.line for _, c in build.console if c.process == CATKIN_MAKE]
+    error = first_error(lines, package)
+    told = explain_error_of_build(error, package, lines) if error else None
+    place = error.place if error else None
+    line = f"{place.file}:{place.line}: " if error and place and error.kind == "cmake" else ""
     explained = package.manifest is None or (error is not None and error.kind == "cmake")
-    return (unjudged if explained else failed)(
-        f"catkin_make failed: {error.text}" if error else "catkin_make failed without naming an error",
+    verdict = inconclusive if told and told.of_machine else unjudged if explained else failed
+    return verdict(
+        f"catkin_make failed: {line}{told.why}" if told else "catkin_make failed without naming an error",
         expected=EXPECTED,
         measured=f"exit code {exit_code}",
-        hint="run catkin_make in a fresh clone and fix the first error that it prints",
+        hint=told.hint if told else FIRST_ERROR_HINT,
         citations=(place or cite(build, "/grader/console"),),
     )
 
@@ -159,37 +147,6 @@ def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | No
         measured=f"rosrun finds no {join_words((PurePosixPath(s).name for s in lost), 'or')}",
         hint=f"add {join_words(lost)} to the package, then git add, commit and push",
     )
-
-
-def _first_error(lines: Sequence[str]) -> BuildError | None:
-    """Return the first line that fits: a compiler's error comes before make's summary of it."""
-    for index, line in enumerate(lines):
-        if match := _CMAKE_ERROR.match(line):
-            place = f"{match['file']}:{match['line']}: " if match["file"] else ""
-            text = f"{place}{match['text'] or _paragraph(lines[index + 1 :])}"
-            number = int(match["line"]) if match["line"] else None
-            return BuildError("cmake", shown(text), match["file"] or "", number)
-        if match := _COMPILER_ERROR.match(line):
-            text = f"{match['file'].rpartition('/')[2]}:{match['line']}: {match['text']}"
-            return BuildError("compiler", shown(text), match["file"], int(match["line"]))
-    other = next((m["text"] for m in map(_OTHER_ERROR.match, lines) if m), None)
-    return BuildError("other", shown(other), "", None) if other else None
-
-
-def _paragraph(lines: Sequence[str]) -> str:
-    """The text of a CMake error: the first paragraph after its heading, and the one that its colon announces."""
-    words: list[str] = []
-    for line in lines:
-        if words and not line.strip() and not words[-1].endswith(":"):
-            break
-        words += line.split()
-    return " ".join(words)
-
-
-def _place(error: BuildError | None, package: PackageFacts) -> FileCitation | None:
-    """Return the error's place if it lies in the package."""
-    path = path_in_package(package, error.file) if error is not None and error.file else None
-    return FileCitation(file=path, line=error.line) if error is not None and path else None
 
 
 class Broken(NamedTuple):

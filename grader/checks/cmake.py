@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from grader.checks.registry import check
+from grader.checks.support.build_errors import misspelt_cmake_lists
 from grader.checks.support.scripts import PYTHON, Installed, copies_of, installed, is_bin, names_script
 from grader.checks.support.text import near_names, shown
 from grader.model.package import CMakeCall, CMakeFacts, Fault, PackageFacts
@@ -52,6 +53,10 @@ def cmake(package: PackageFacts, params: CMakeParams) -> Verdict:
     facts = package.cmake
     if facts is None:
         hint = f"create one with project({wanted}), find_package(catkin REQUIRED) and catkin_package()"
+        if slip := misspelt_cmake_lists(package):
+            hint, cited = f"git mv {slip} CMakeLists.txt", (FileCitation(file=slip),)
+            message = f"the file is called {slip}, and CMake looks for CMakeLists.txt"
+            return failed(message, expected=expected, measured=slip, hint=hint, citations=cited)
         return failed("there is no CMakeLists.txt", expected=expected, measured="no file", hint=hint)
     wrong = list(_wrong(facts, names))
     named = [c for c in facts.calls if c.name in {"project", "find_package", "catkin_package"}]

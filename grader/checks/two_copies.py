@@ -145,7 +145,7 @@ def _not_both_alive(package: PackageFacts, run: Run, trio: Trio) -> Verdict | No
     cited = end.citations or (cite(run, "/grader/process", one.start_ns, one.end_ns),)
     if len(gone) > 1:
         message = f"both copies ended by themselves: {end.cause}"
-        return unjudged(message, hint=end.hint, citations=cited)
+        return (inconclusive if end.of_machine else unjudged)(message, hint=end.hint, citations=cited)
     message = (
         f"the {word} copy ended by itself after {ended_after(one)}, while the other lived on: {end.cause}"
     )

@@ -54,8 +54,8 @@ def judge_all_runs(
     uses: dict[str, Repaired] = {}
     if repaired:
         on_copy = judge_runs(rubric, {**first, **repaired}, checks)
-        repairs, built = repairs_of(rubric, repaired), was_built(first)
-        verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs, built=built)
+        repairs, build_repaired = repairs_of(rubric, repaired), not was_built(first) and was_built(repaired)
+        verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs, built=not build_repaired)
     results = (result_of(c, verdicts[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
     return Judgement(tuple(results), doubtful)
 

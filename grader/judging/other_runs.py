@@ -112,7 +112,7 @@ def judged_on_copy(
 def concerns(repair: Repair, criterion: Criterion, rubric: Rubric, verdict: Verdict, *, built: bool) -> bool:
     """Return whether the criterion may depend on what was repaired: its files cite it, or its run uses the file.
 
-    `built` is whether the package was built without the repair.
+    `built` is whether the package was built without the repair, or not even with it.
     """
     if criterion.scenario is not None:
         return is_used_by(rubric.scenarios[criterion.scenario], repair, rubric, built=built)

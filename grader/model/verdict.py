@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from enum import Enum
 
+from pydantic import Field
+
 from grader.model.record import Record
 
 
@@ -41,10 +43,10 @@ class FileCitation(Record):
     """A file of the submission, from the package's root."""
     line: int | None = None
     """Counted from 1; null for the whole file."""
-    column: int | None = None
-    """The place in the line, counted from 1; null for the whole line."""
-    source: str = ""
-    """The line's text where there is a column, as far as it is short; else empty."""
+    column: int | None = Field(default=None, exclude_if=lambda value: value is None)
+    """The place in the line, counted from 1. Only there if it is known."""
+    source: str = Field(default="", exclude_if=lambda value: not value)
+    """The line's text. Only there if there is a column and the line is short."""
 
 
 class EvidenceCitation(Record):

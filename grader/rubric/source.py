@@ -131,6 +131,7 @@ def _read(path: Path, name: str, form: Form) -> bytes:
 
 
 def _compose(text: str, raw: bytes, name: str, form: Form) -> Source:
+    loader: yaml.SafeLoader | None = None
     try:
         loader, node = _load_nodes(text)
         if node is None and form.may_be_empty:
@@ -139,10 +140,13 @@ def _compose(text: str, raw: bytes, name: str, form: Form) -> Source:
             raise RubricError([f"{name}:1: the file is empty"])
         reader = _Reader(loader, form)
         data = reader.read(node, ())
+    except yaml.YAMLError as error:
+        raise RubricError([_yaml_fault(error, text, name)]) from error
     except RecursionError as error:
         raise RubricError([f"{name}:1: is nested too deeply"]) from error
     finally:
-        loader.dispose()
+        if loader is not None:
+            loader.dispose()
     return Source(name=name, raw=raw, data=data, lines=reader.lines, faults=reader.faults)
 
 

@@ -115,7 +115,7 @@ def test_texts(sent: list[str]) -> None:
 )
 def test_a_template_s_own_words(sent: list[str], words: str) -> None:
     lines = [words.format(text) for text in sent]
-    expected = Status.PASS if "heard" in words.lower() else Status.FAIL
+    expected = Status.PASS if "heard" in words.lower() else Status.PARTIAL
     assert status("/chatter", sent, lines, template="I heard {value}") is expected
     swapped = [words.format(text.swapcase()) for text in sent]
     assert status("/chatter", sent, swapped, template="I heard {value}") is Status.FAIL

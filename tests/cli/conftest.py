@@ -24,6 +24,7 @@ LOADED = "grader.cli.checking"
 class GradeOptions:
     sandbox: str
     submission_id: str | None = None
+    package: str = ""
     static_only: bool = False
     keep_hidden: bool = True
     files: bool = True

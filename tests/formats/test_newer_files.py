@@ -173,7 +173,7 @@ def test_further_keys_of_a_result_are_passed_over(tmp_path: Path) -> None:
     data["later"] = {"deep": [1]}
     for criterion in data["criteria"]:
         criterion["colour"] = "green"
-        criterion["citations"] = [{"file": "a.py", "line": 3, "column": 7}]
+        criterion["citations"] = [{"file": "a.py", "line": 3, "page": 7}]
     data["timing"]["queue_s"] = 1.5
     (tmp_path / "result.json").write_text(json.dumps(data))
     read = load_result(tmp_path)

@@ -40,7 +40,6 @@ LOADED = (
         "cli/parser",
         "cli/reports",
         "cli/select_rubric",
-        "suggest",
     ),
     *(
         "classes/overrides",

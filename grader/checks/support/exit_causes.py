@@ -11,8 +11,9 @@ from grader.checks.support.processes import Life, early_end, lives
 from grader.checks.support.scripts import path_in_package
 from grader.checks.support.text import shown
 from grader.evidence.run import Run
+from grader.installable import install_hint, known_packages
 from grader.model.package import PackageFacts
-from grader.model.verdict import FileCitation, Verdict
+from grader.model.verdict import FileCitation, Verdict, inconclusive
 from grader.wording import seconds
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
@@ -54,6 +55,7 @@ SLIPS = {
 _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
+_NO_MODULE = re.compile(r"No module named '(\w+)'$")
 HEADING = "Traceback (most recent call last):"
 _FRAME = re.compile(r'^\s+File "([^"]+)", line (\d+)')
 _LAST = re.compile(r"^([A-Za-z_][\w.]*)(?:: ?(.*))?$")
@@ -131,9 +133,13 @@ class Ending(NamedTuple):
     process: str = ""
     by_itself: bool = False
     """Whether it came to its end as a script that has nothing more to do."""
+    of_machine: bool = False
+    """The grading machine lacks what it needs."""
 
     def verdict(self, kind: Callable[..., Verdict], message: str, measured: str = "") -> Verdict:
-        """Return a verdict of this kind (`failed`, `unjudged`) with the ending's hint and citations."""
+        """Return a verdict of this kind (`failed`, `unjudged`) with the ending's hint and citations, or
+        `inconclusive` where the machine is at fault."""
+        kind = inconclusive if self.of_machine else kind
         return kind(message, measured=measured, hint=self.hint, citations=self.citations)
 
 
@@ -198,6 +204,10 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     place = _place(found, package)
     slip = next((known for said, known in SLIPS.items() if said in found.message), None)
     cause, hint = slip or CAUSES.get(found.kind, ("", "fix the line that is named"))
+    if lacking := _lacking(found, package):
+        where = f" ({place.file}, line {place.line})" if place else ""
+        cause = f"{shown(found.text)}{where}: this grading machine lacks {lacking}"
+        return Ending(cause, install_hint(lacking), (place,) if place else (), of_machine=True)
     source = package.file(place.file) if place and found.kind in SYNTAX else None
     if place is not None and source is not None and source.python_fault is not None:
         cause = source.python_fault.cause or cause
@@ -205,6 +215,14 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(found.text)}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else ())
+
+
+def _lacking(found: Traceback, package: PackageFacts) -> str:
+    """Return the module that exists and that this machine lacks; "" for a name that is the student's own affair."""
+    match = _NO_MODULE.search(found.message) if found.kind == "ModuleNotFoundError" else None
+    name = match[1] if match else ""
+    own = {package.name, *(f.path.rpartition("/")[2].removesuffix(".py") for f in package.files)}
+    return name if name in known_packages() and name not in own else ""
 
 
 def process_tracebacks(

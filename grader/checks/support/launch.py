@@ -230,10 +230,11 @@ class Absence(NamedTuple):
     hint: str
     of_script: bool = False
     citations: tuple[FileCitation, ...] = ()
+    of_machine: bool = False
 
     def verdict(self, message: str) -> Verdict:
-        """Return the verdict: nothing to judge in the launch file where the script is at fault."""
-        kind = unjudged if self.of_script else failed
+        """Return the verdict: nothing to judge in the launch file where the script or the machine is at fault."""
+        kind = inconclusive if self.of_machine else unjudged if self.of_script else failed
         return kind(message, hint=self.hint, citations=self.citations)
 
 
@@ -319,7 +320,7 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
     ]
     if found:
         end = explain_traceback(found[-1], package)
-        return Absence(f"it died: {end.cause}", end.hint, of_script=True, citations=end.citations)
+        return Absence(f"it died: {end.cause}", end.hint, True, end.citations, end.of_machine)
     if script is not None and script.python_fault is not None:
         fault = script.python_fault
         hint = CAUSES.get(fault.kind, ("", "fix that line"))[1]

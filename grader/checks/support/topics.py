@@ -65,7 +65,7 @@ def no_node(package: PackageFacts, run: Run, what: str) -> Verdict | None:
     if ended := early_end(run):
         end = explain_end(ended, run, package)
         message = f"{what}: {ended.name} ended before ({end.cause})"
-        return unjudged(message, measured="ended", hint=end.hint, citations=end.citations)
+        return end.verdict(unjudged, message, measured="ended")
     if not run.student_nodes():
         hint = "call rospy.init_node(…), and run the node"
         return unjudged(f"{what}: no node was registered", measured="no node", hint=hint)

@@ -1,0 +1,229 @@
+"""The first error that a build printed, at the student's own line and in a student's words."""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from collections.abc import Callable, Sequence
+from difflib import get_close_matches
+from typing import NamedTuple
+
+from grader.checks.support.scripts import path_in_package
+from grader.checks.support.text import near_names, shown
+from grader.installable import install_hint, known_packages
+from grader.model.package import PackageFacts
+from grader.model.verdict import FileCitation
+
+ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
+ONE_EDIT = 0.88
+FIRST_ERROR_HINT = "run catkin_make in a fresh clone and fix the first error that it prints"
+_CMAKE_ERROR = re.compile(
+    r"^CMake Error(?: at (?P<file>[^:()]+):(?P<line>\d+) \((?P<call>\w+)\))?:?\s*(?P<text>.*)"
+)
+_COMPILER_ERROR = re.compile(r"^(?P<file>[^:\s][^:]*):(?P<line>\d+):(?:\d+:)? (?:fatal )?error: (?P<text>.*)")
+_OTHER_ERROR = re.compile(
+    r"(?P<text>.*(?:\b[Ee]rror:|Error\(s\)|undefined reference|No rule to make|[A-Za-z]Error:|\*\*\*).*)"
+)
+_CALLER = re.compile(r"^\s+(?P<file>[^:()]+):(?P<line>\d+) \(\w+\)$")
+CALL_STACK = "Call Stack (most recent call first):"
+CALLERS_MAX = 40
+SYSTEM = ("/usr/", "/opt/")
+
+
+class BuildError(NamedTuple):
+    """The first error that the build printed; `kind` is `cmake`, `compiler` or `other`.
+
+    `place` is the line of the package's own that it comes from.
+    """
+
+    kind: str
+    text: str
+    place: FileCitation | None
+
+
+class Explained(NamedTuple):
+    """The error in a student's words, and what to do; `of_machine`: the grading machine lacks something."""
+
+    why: str
+    hint: str
+    of_machine: bool = False
+
+
+def first_error(lines: Sequence[str], package: PackageFacts) -> BuildError | None:
+    """Return the first line that fits: a compiler's error comes before make's summary of it."""
+    for index, line in enumerate(lines):
+        if match := _CMAKE_ERROR.match(line):
+            below = lines[index + 1 :]
+            called = [(match["file"] or "", int(match["line"] or 0)), *_callers(below)]
+            places = (_own_line(package, file, number) for file, number in called)
+            text = match["text"] or _paragraph(below)
+            place = next(filter(None, places), None)
+            named = place is None and match["file"] and not match["file"].startswith(SYSTEM)
+            text = f"{match['file']}:{match['line']}: {text}" if named else text
+            return BuildError("cmake", shown(text), place)
+        if match := _COMPILER_ERROR.match(line):
+            place = _own_line(package, match["file"], int(match["line"]))
+            name = (
+                ""
+                if match["file"].startswith(SYSTEM)
+                else f"{posixpath.basename(match['file'])}:{match['line']}: "
+            )
+            return BuildError("compiler", shown(name + match["text"]), place)
+    other = next((m["text"] for m in map(_OTHER_ERROR.match, lines) if m), None)
+    return BuildError("other", shown(other), None) if other else None
+
+
+def explain_error_of_build(error: BuildError, package: PackageFacts, lines: Sequence[str]) -> Explained:
+    """Return the error in a student's words, else as it was printed."""
+    for pattern, explain in _EXPLAINED:
+        if found := re.search(pattern, error.text):
+            return explain(found, package, lines)
+    return Explained(error.text, FIRST_ERROR_HINT)
+
+
+def _callers(lines: Sequence[str]) -> list[tuple[str, int]]:
+    """The call stack below an error, the innermost call first."""
+    end = next((i for i, line in enumerate(lines[:CALLERS_MAX]) if line.startswith("CMake ")), CALLERS_MAX)
+    begin = next((i for i, line in enumerate(lines[:end]) if line.startswith(CALL_STACK)), end)
+    found = (_CALLER.match(line) for line in lines[begin + 1 : end])
+    return [(match["file"], int(match["line"])) for match in found if match]
+
+
+def _own_line(package: PackageFacts, file: str, line: int) -> FileCitation | None:
+    """The line if it lies in the package. A bare `CMakeLists.txt` is the workspace's own."""
+    outside = not line or "/" not in file or file.startswith(SYSTEM)
+    path = None if outside else path_in_package(package, file)
+    folder = posixpath.basename(posixpath.dirname(file))
+    of_another = path == "CMakeLists.txt" and folder not in _folders(package)
+    return FileCitation(file=path, line=line) if path and not of_another else None
+
+
+def _folders(package: PackageFacts) -> set[str]:
+    """The names that the package's folder may have in the build's workspace."""
+    manifest = {package.manifest.name} if package.manifest else set()
+    return {package.name, posixpath.basename(package.path), *manifest}
+
+
+def _paragraph(lines: Sequence[str]) -> str:
+    """The text of a CMake error: the first paragraph after its heading, and the one that its colon announces."""
+    words: list[str] = []
+    for line in lines:
+        ends = bool(words) and not line.strip() and not _goes_on(words)
+        if ends or line.startswith((CALL_STACK, "CMake ")):
+            break
+        words += line.split()
+    return " ".join(words)
+
+
+def _goes_on(words: Sequence[str]) -> bool:
+    """CMake sets a path apart by blank lines in the middle of this sentence."""
+    return words[-1].endswith(":") or (words[:3] == ["The", "source", "directory"] and words[-1][-1] != ".")
+
+
+def _missing_package(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
+    name = found[1]
+    if name in known_packages():
+        return Explained(
+            f"it needs the package {name}, which this grading machine lacks",
+            install_hint(name, lines),
+            of_machine=True,
+        )
+    near = get_close_matches(name, (*ALWAYS_THERE, *known_packages()), 1, ONE_EDIT)
+    meant = f"write {near[0]}" if near else "correct its name or remove it"
+    hint = (
+        f"{meant} in find_package(…) and in package.xml; a package of your own must be pushed with this one"
+    )
+    return Explained(f"find_package(…) names {name}, and there is no package of that name", hint)
+
+
+def _missing_folder(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    call, folder = found[1], posixpath.basename(found[2].rstrip("/"))
+    why = f"{call}(…) needs the folder {folder}/, which is not in the package"
+    return Explained(why, f"put your .{folder} files into {folder}/ and push them, or take {call}(…) out")
+
+
+def _missing_message(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    path = _below(found[1], package)
+    return _missing_file(path, package, f"add_{found[2]}_files(…) names {path}")
+
+
+def _missing_script(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    path = _below(found[1], package)
+    return _missing_file(path, package, f"catkin_install_python(…) names {path}")
+
+
+def _missing_file(path: str, package: PackageFacts, words: str) -> Explained:
+    near = near_names(path, (f.path for f in package.files))
+    seen = f"; there is {near[0]}" if near else ""
+    hint = f"write {near[0]} there" if near else f"add {path} and push it, or take it out of that call"
+    return Explained(f"{words}, which is not in the package{seen}", hint)
+
+
+def _below(path: str, package: PackageFacts) -> str:
+    """An absolute path in the build's workspace, from the package's folder."""
+    folders = "|".join(re.escape(name) for name in _folders(package) if name)
+    return re.sub(rf"^/.*/src/(?:.*/)?(?:{folders})/", "", path, count=1) if folders else path
+
+
+def _no_cmake_lists(_found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    name = misspelt_cmake_lists(package)
+    if not name:
+        return Explained(
+            "the package has no CMakeLists.txt", "add the CMakeLists.txt that catkin_create_pkg writes"
+        )
+    why = f"the file is called {name}, and CMake looks for CMakeLists.txt"
+    return Explained(why, f"git mv {name} CMakeLists.txt")
+
+
+def misspelt_cmake_lists(package: PackageFacts) -> str:
+    """Return the file that is called almost `CMakeLists.txt`, "" where there is none."""
+    names = [f.path for f in package.files if "/" not in f.path]
+    slips = ("cmakelists.txt", "cmakelist.txt", "cmakelists")
+    return next((n for n in names if n.casefold() in slips and n != "CMakeLists.txt"), "")
+
+
+def _missing_dependency(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    why = f"add_dependencies({found[2]} {found[1]}) names the target {found[1]}, which does not exist"
+    hint = "write add_dependencies(<program> ${${PROJECT_NAME}_EXPORTED_TARGETS} ${catkin_EXPORTED_TARGETS})"
+    return Explained(why, f"{hint}; messages of your own need generate_messages(…) above it")
+
+
+def _missing_target(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    name = found[1]
+    why = f"it speaks of the target {name}, which no add_executable(…) or add_library(…) above it makes"
+    return Explained(why, f"take that line out, or make {name} above it")
+
+
+def _depends(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    why = f"DEPENDS in catkin_package(…) names {found[1]}, which is no library that find_package(…) found"
+    return Explained(why, f"take {found[1]} out of DEPENDS; ROS packages stand behind CATKIN_DEPENDS")
+
+
+def _header_race(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
+    text = f"{found[1]}/{found[2]}.h does not exist when the program is compiled"
+    made = {f"{folder}/{found[2]}.{folder}" for folder in ("msg", "srv")}
+    if found[1] != package.name or not made & {f.path for f in package.files}:
+        if found[1] in known_packages():
+            return _missing_package(found, package, lines)
+        return Explained(f"{text}: there is no such header", "check the #include and find_package(…)")
+    why = f"{text}: nothing makes it wait for its message, so with -j it fails in some runs and not in others"
+    return Explained(
+        why, "add_dependencies(<program> ${${PROJECT_NAME}_EXPORTED_TARGETS}) below add_executable(…)"
+    )
+
+
+_EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str]], Explained]], ...] = (
+    (r'Could not find a package configuration file provided by "([\w-]+)"', _missing_package),
+    (r"(add_\w+_files)\(\) directory not found: (\S+)", _missing_folder),
+    (
+        r"Assertion failed: file '([^']+)' does not exist\. Message: (message|service|action)",
+        _missing_message,
+    ),
+    (r"catkin_install_python\(\) called with non-existing file '([^']+)'", _missing_script),
+    (r"does not contain a CMakeLists\.txt", _no_cmake_lists),
+    (r'dependency target "([^"]+)" of target "([^"]+)" does not exist', _missing_dependency),
+    (r'dependencies to non-existent target "([^"]+)"', _missing_target),
+    (r'link libraries for target "([^"]+)" which is not built', _missing_target),
+    (r"catkin_package\(\) DEPENDS on (?:the catkin package )?'([^']+)'", _depends),
+    (r"(\w+)/(\w+)\.h: No such file or directory", _header_race),
+)
