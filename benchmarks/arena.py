@@ -14,8 +14,8 @@ from mcap.reader import make_reader
 
 from benchmarks.figures import NotMeasured
 from benchmarks.machine import Meter
-from grader.arena.limits import Limits
-from grader.arena.process_environment import Place
+from grader.arena.limits import RunLimits
+from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.scenario import process_specs
 from grader.arena.session import ArenaSession
 from grader.evidence.writer import EvidenceWriter
@@ -26,7 +26,7 @@ PUBLISHER = Path(__file__).parent / "publisher.py"
 SCRIPT = "src/publisher.py"
 PREFIX = "/load/"
 LOOK_S, LAST_S, START_S = 0.1, 5.0, 20.0
-WIDE = Limits(
+WIDE = RunLimits(
     channel_messages=1 << 30, channel_bytes=1 << 40, run_bytes=1 << 46, output_lines=1 << 20, cpu_s=3600
 )
 """So that a flood is recorded as far as the recorder keeps up with it, not cut at a student's limits."""
@@ -74,7 +74,9 @@ def record(load: Load, path: Path) -> tuple[Taken, int]:
         return asyncio.run(_record(load, specs, place, path))
 
 
-async def _record(load: Load, specs: Sequence[dict[str, Any]], place: Place, path: Path) -> tuple[Taken, int]:
+async def _record(
+    load: Load, specs: Sequence[dict[str, Any]], place: ProcessEnvironment, path: Path
+) -> tuple[Taken, int]:
     meter = Meter()
     with EvidenceWriter(path, scenario="load", clock="real", warp=1.0, metadata={}) as writer:
         offset_ns = time.time_ns() - time.monotonic_ns()

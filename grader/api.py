@@ -89,7 +89,7 @@ def grade(
     `keep_hidden`, hidden criteria are left out of the files; the returned result has them all.
 
     It takes as long as the rubric's scenarios (usually half a minute). Where an event loop runs, as in a notebook, the
-    loop waits meanwhile; `await asyncio.to_thread(grade, …)` lets it go on. Ctrl-C ends the runs in order and raises
+    loop waits until then; `await asyncio.to_thread(grade, …)` lets it go on. Ctrl-C ends the runs in order and raises
     KeyboardInterrupt. `progress` is called, from any thread, with a step (`intake`, `build`, a scenario's name), its
     state and a detail; an exception from it ends the runs in order and is raised from here.
 

@@ -1,4 +1,4 @@
-"""Files: written whole or not at all, read with care where somebody else wrote them, locked, and temporary folders.
+"""Files: written whole or not at all, read with care where someone else wrote them, locked, and temporary folders.
 
 Each temporary folder holds a file that its grader keeps locked: if the lock is free, that grader was killed, and the
 next one removes the folder.
@@ -110,7 +110,7 @@ def new_file(path: Path, *, public: bool = False) -> BinaryIO:
 def make_folder(folder: Path, *, public: bool = False) -> bool:
     """Make a folder and its missing parents, private to their owner unless `public`, and return whether it is new.
 
-    A folder that was there keeps its mode, which somebody has chosen. Raises OSError."""
+    A folder that was there keeps its mode, which someone has chosen. Raises OSError."""
     try:
         folder.mkdir(0o777 if public else FOLDER)
     except FileNotFoundError:
@@ -272,7 +272,7 @@ def sweep(place: Path) -> None:
 
 
 def _sweep(folder: Path) -> None:
-    with suppress(OSError):  # another grader sweeps here too, or it is somebody else's
+    with suppress(OSError):  # another grader sweeps here too, or it is someone else's
         if folder.lstat().st_uid != user_id():
             return
         if not any(folder.iterdir()):

@@ -32,11 +32,12 @@ from grader.evidence.run import Run, console_log
 from grader.faults import NOTHING_RUN, GradingContext, classify_errors
 from grader.files import make_folder, temporary_folder
 from grader.intake import open_recorded, open_recording, open_submission
+from grader.intake.choose import Wanted
 from grader.intake.source import Source
 from grader.judging import judge
 from grader.judging.early import judge_files
 from grader.judging.judge import judge_all_runs
-from grader.judging.other_runs import REPAIRS
+from grader.judging.other_runs import REPAIRS, was_built
 from grader.judging.summary import notes_of, overall_status, total_points
 from grader.model.figure import Figures
 from grader.model.package import PackageFacts
@@ -57,7 +58,7 @@ from grader.portable import wait_for_children
 from grader.report.files import write_reports
 from grader.report.view import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
-from grader.rubric.load import LoadedRubric, needs_package, needs_ros, started
+from grader.rubric.load import LoadedRubric, files_of, needs_package, needs_ros, started
 from grader.rubric.rates import rates_of
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ if TYPE_CHECKING:
     from grader.arena.recording import Recorder
     from grader.arena.static_recorder import Recording, StaticRecorder
     from grader.model.sandbox_mode import SandboxMode
+    from grader.rubric.model import Rubric
 
 LATER = ("grader.evidence.decode", "grader.evidence.reader")
 """Slow to import, and needed by no verdict that the files alone decide: imported while the build runs. The arena is
@@ -82,6 +84,8 @@ class GradeOptions:
     `static_only` judges the files alone. Without `keep_hidden`, the reports leave hidden criteria out. Without `files`,
     only the result is wanted: neither evidence nor reports stay in the output folder.
 
+    `package` is the name of the package to grade in place of the lab's, or "".
+
     `tidy` first finishes what killed graders left beside the submission's folder; a batch does that once for all.
     `find_earlier` is called when the submission is open: a result that it returns stays, and nothing is run. `settle`
     turns the automatic result into the one that counts: overrides and deadlines. `reused` is evidence by scenario that
@@ -91,6 +95,7 @@ class GradeOptions:
 
     sandbox: SandboxMode = "auto"
     submission_id: str | None = None
+    package: str = ""
     static_only: bool = False
     keep_hidden: bool = True
     tidy: bool = True
@@ -193,12 +198,17 @@ def open_source(
         submission: Submission | RecordedSubmission | None
         submission = open_recording(source, submission_id=submission_id)
         if submission is None and needs_package(rubric):
-            package = rubric.rubric.package
+            package = wanted_package(rubric.rubric, options.package)
             submission = open_submission(source, package=package, workdir=folder, submission_id=submission_id)
         elif submission is None:
             submission = open_recorded(source, workdir=folder, submission_id=submission_id)
         progress.step("intake", "done", submission.id)
         yield submission
+
+
+def wanted_package(rubric: Rubric, asked: str) -> Wanted:
+    """Return what the intake has to look for: the lab's package, or the one that was `asked` for."""
+    return Wanted(name=rubric.package, files=files_of(rubric), asked=asked)
 
 
 def submission_info(submission: Submission | RecordedSubmission) -> SubmissionInfo:
@@ -260,7 +270,7 @@ def record_other_runs(
 
     judged = judge_all_runs(rubric.rubric, runs, rubric.checks)
     repairs, scenarios = copies.choose_repairs(
-        submission, recorder.recording.facts, rubric.rubric, judged.criteria
+        submission, recorder.recording.facts, rubric.rubric, judged.criteria, built=was_built(runs)
     )
     doubtful = sorted(judged.doubtful - set(scenarios))
     if doubtful:

@@ -29,11 +29,17 @@ DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark",
 
 
 def choose_repairs(
-    submission: Submission, facts: PackageFacts, rubric: Rubric, criteria: Sequence[CriterionResult]
+    submission: Submission,
+    facts: PackageFacts,
+    rubric: Rubric,
+    criteria: Sequence[CriterionResult],
+    *,
+    built: bool,
 ) -> tuple[tuple[Repair, ...], tuple[str, ...]]:
     """Return the repairs to try together, and the scenarios to run with them: those that lost a mark.
 
-    Both are empty where nothing was lost in a run, or no mechanical repair could be the reason.
+    Both are empty where nothing was lost in a run, or no mechanical repair could be the reason. `built` is whether the
+    package was built as it is.
     """
     lost = {c.scenario for c in criteria if c.status.is_lost and c.scenario is not None}
     if not lost:
@@ -42,7 +48,9 @@ def choose_repairs(
     counting = [one for one in found if rubric.share_of(one.kind) > 0]
     chosen = [one for one in counting if one.kind not in DONE_BEFORE_RUNS][:REPAIRS_MAX]
     scenarios = {
-        name for name in lost if any(is_used_by(rubric.scenarios[name], one, rubric) for one in chosen)
+        name
+        for name in lost
+        if any(is_used_by(rubric.scenarios[name], one, rubric, built=built) for one in chosen)
     }
     before = [one for one in counting if one.kind in DONE_BEFORE_RUNS]
     return ((*before, *chosen), tuple(sorted(scenarios))) if scenarios else ((), ())

@@ -13,7 +13,7 @@ from grader.evidence.memory_budget import LESS
 from grader.evidence.reader import SUFFIXES, load_evidence
 from grader.evidence.writer import EvidenceWriter
 from grader.files import unwritable
-from grader.intake import Limits, find_recordings, safe_name
+from grader.intake import IntakeLimits, find_recordings, safe_name
 from grader.model.progress import Progress
 from grader.model.submission import RecordedSubmission, Submission
 from grader.rubric.model import Rubric
@@ -80,7 +80,7 @@ def _suffix(path: Path) -> str:
 
 def _copy(path: Path, target: Path) -> Path:
     """Copy it, and check the copy: so what is judged is what was checked."""
-    limit_bytes = Limits().recording_bytes
+    limit_bytes = IntakeLimits().recording_bytes
     if path.stat().st_size > limit_bytes:
         raise EvidenceError(f"{path}: larger than {limit_bytes >> 20} MiB", hint=LESS)
     try:

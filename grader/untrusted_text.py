@@ -32,7 +32,7 @@ _COMMAND_AT_START = re.compile(r"^((?:[^\S\n]|\x1b\[[0-9;]*m)*):(?=:)", re.MULTI
 
 
 def steers(character: str) -> bool:
-    """Whether it is no sign that can be seen: a control, format, private, unassigned or invisible character."""
+    """Return whether it is no sign that can be seen: a control, format, private, unassigned or invisible character."""
     return unicodedata.category(character) in HIDDEN_CATEGORIES or ord(character) in INVISIBLE
 
 
@@ -65,7 +65,7 @@ def line(text: str, limit: int) -> str:
 
 
 def text_limit(criteria: int, most: int) -> int:
-    """How long one text of a report may be, so that a report of many criteria does not grow without end."""
+    """Return how long one text of a report may be, so that a report of many criteria does not grow without end."""
     return max(200, min(most, CRITERIA_CHARS // (TEXTS_EACH * max(criteria, 1))))
 
 

@@ -1,10 +1,11 @@
-"""How numbers, counts and lists are written in every text that the grader shows.
+"""How numbers, counts, lists and "did you mean" are written in every text that the grader shows.
 
 Pure functions that every room may use. Nothing is escaped here: `untrusted_text` does that.
 """
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable, Sequence
 
 LISTED_MAX = 6
@@ -52,3 +53,16 @@ def first_few(names: Sequence[str], most: int) -> str:
 def shorten(text: str, chars_max: int) -> str:
     """Return `text`, or its beginning with an ellipsis, at most so many characters."""
     return text if len(text) <= chars_max else text[: chars_max - 1] + "…"
+
+
+def closest(word: str, candidates: Iterable[str], *, cutoff: float = 0.6) -> str:
+    """Return the candidate most like `word`, ignoring case, or "" if none reaches the `cutoff` (0 to 1)."""
+    known = {candidate.lower(): candidate for candidate in candidates}
+    near = difflib.get_close_matches(word.lower(), known, n=1, cutoff=cutoff)
+    return known[near[0]] if near else ""
+
+
+def did_you_mean(word: str, candidates: Iterable[str]) -> str:
+    """Return ` (did you mean "rate"?)` for the end of a message, or ""."""
+    near = closest(word, candidates)
+    return f' (did you mean "{near}"?)' if near else ""

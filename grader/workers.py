@@ -56,7 +56,7 @@ class WorkerEnded(Exception):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limits:
+class WorkerLimits:
     """What a worker may take; None sets no limit.
 
     `memory_bytes` is address space beside what is mapped when the first job begins. `cpu_s` and `wall_s` are for each
@@ -75,8 +75,8 @@ class Worker:
     `env` is added to this process's environment. `stopped`: it was told to stop, and does no more jobs.
     """
 
-    def __init__(self, limits: Limits | None = None, env: Mapping[str, str] | None = None) -> None:
-        self._limits, self._env = limits or Limits(), dict(env or {})
+    def __init__(self, limits: WorkerLimits | None = None, env: Mapping[str, str] | None = None) -> None:
+        self._limits, self._env = limits or WorkerLimits(), dict(env or {})
         self._process: subprocess.Popen[bytes] | None = None
         self.stopped = False
         self._lock = threading.Lock()
@@ -171,7 +171,7 @@ def run_each(
     *,
     ended: Callable[[Job, WorkerEnded], Result],
     begun: Callable[[Job], None] = lambda _: None,
-    limits: Limits | None = None,
+    limits: WorkerLimits | None = None,
     env: Mapping[str, str] | None = None,
 ) -> Iterator[Result]:
     """Yield each job's result as it comes, with up to `count` workers at a time.
@@ -297,7 +297,7 @@ def main() -> None:
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
     if hasattr(select, "poll"):  # not on Windows, where only an idle worker hears of its parent's end
         threading.Thread(target=_leave_with_parent, args=(jobs.fileno(),), daemon=True).start()
-    limits: Limits | None = None
+    limits: WorkerLimits | None = None
     with suppress(EOFError, BrokenPipeError, KeyboardInterrupt):
         while not _State.stopped:
             _wait_for_job(jobs.fileno(), limits)
@@ -326,7 +326,7 @@ def _answer(function: Callable[[Any], object], job: object) -> bytes:
         return json.dumps({"raised": type(error).__name__, "message": message, "hint": hint}).encode()
 
 
-def _limit(limits: Limits, *, is_first: bool) -> None:
+def _limit(limits: WorkerLimits, *, is_first: bool) -> None:
     if limits.memory_bytes is None and limits.cpu_s is None:
         return
     import resource  # noqa: PLC0415 - not on Windows
@@ -351,7 +351,7 @@ def _mapped_bytes(page_bytes: int) -> int:
         return 0
 
 
-def _wait_for_job(descriptor: int, limits: Limits | None) -> None:
+def _wait_for_job(descriptor: int, limits: WorkerLimits | None) -> None:
     if limits is None or limits.idle_s is None:
         return
     poll = select.poll()

@@ -1,6 +1,9 @@
-"""The longest file begins first: the others run beside it (`--dist loadfile`). Examples of properties have no
-deadline: on a machine that is shared, how long one takes says nothing. All gradings take turns with each other, and
-their locks lie where no test looks for what is left."""
+"""The longest files begin first, and the others run beside them (`--dist loadfile --no-loadscope-reorder`).
+
+Examples of properties have no deadline: on a machine that is shared, how long one takes says nothing. All gradings take
+turns with each other, and their locks lie where no test looks for what is left. Where only tests with ROS are asked for
+(`-m "ros …"`), files without any are not imported: they are most of all.
+"""
 
 from __future__ import annotations
 
@@ -12,16 +15,27 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-settings.register_profile("grader", deadline=None)
-settings.load_profile("grader")
-LONGEST = "test_fixtures.py"
+settings.register_profile("all", deadline=None)
+settings.register_profile("quick", deadline=None, max_examples=20)
+LONGEST = ("test_fixtures.py", "test_attacks.py", "test_platforms.py", "test_faults.py")
 LOCKS = Path(tempfile.gettempdir(), f"ros-lab-grader-tests-{os.geteuid()}")
 LOCKS.mkdir(mode=0o700, exist_ok=True)
 os.environ["XDG_RUNTIME_DIR"] = str(LOCKS)
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Properties get fewer examples where the marker `full` is left out, as in `make test`."""
+    settings.load_profile("quick" if "not full" in config.option.markexpr else "all")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """None where others decide."""
+    only_ros = config.option.markexpr.split()[:1] == ["ros"] and collection_path.suffix == ".py"
+    return True if only_ros and "mark.ros" not in collection_path.read_text(encoding="utf-8") else None
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: item.path.name != LONGEST)
+    items.sort(key=lambda item: LONGEST.index(item.path.name) if item.path.name in LONGEST else len(LONGEST))
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ import pytest
 
 from grader.arena import inherited_limits, sandbox_probe
 from grader.arena.inherited_limits import MB, NEEDS, group, limits, make_room, tasks_of
-from grader.arena.limits import Limits
+from grader.arena.limits import RunLimits
 from grader.errors import ExitCode, HostError
 from grader.model.result import GradingResult
 from tests import ordinary
@@ -118,7 +118,7 @@ def test_limits_that_may_be_raised_cost_nothing(open_path: Path, soft: str) -> N
 
 def test_a_run_needs_what_its_processes_may_have() -> None:
     needs = {need.option: need.run for need in NEEDS}
-    most = Limits()
+    most = RunLimits()
     assert needs["nproc"] > most.tasks == inherited_limits.TASKS
     assert (needs["nofile"], needs["as"]) == (most.open_files, most.address_space_bytes)
     assert needs["fsize"] > max(most.file_bytes, most.built_bytes, most.run_bytes)

@@ -14,12 +14,11 @@ GRADER = Path(__file__).resolve().parent.parent / "grader"
 ROS_SIDE = GRADER / "arena" / "ros"
 
 # Who may import whom, beside itself. `rubric.model` holds records only: whoever may see records may see it.
-BASE = {"model", "errors", "portable", "suggest", "untrusted_text", "wording"}
+BASE = {"model", "errors", "portable", "untrusted_text", "wording"}
 ALLOWED = {
     "__init__": {"api", "errors", "model", "rubric"},
     "model": set[str](),
     "errors": set[str](),
-    "suggest": set[str](),
     "untrusted_text": set[str](),
     "wording": set[str](),
     "installable": set[str](),

@@ -123,7 +123,7 @@ def test_git_in_a_students_folder_finds_nothing_of_his(tmp_path, monkeypatch) ->
     monkeypatch.setenv("PAGER", "./git")
     monkeypatch.chdir(student)
     for remote in (False, True):
-        said = Git(tmp_path / "home", timeout_s=20).run("--version", cwd=student, remote=remote)
+        said = Git(tmp_path / "home", timeout_s=120).run("--version", cwd=student, remote=remote)
         told = dict(line.split("=", 1) for line in (tmp_path / "env").read_text().splitlines() if "=" in line)
         assert said.startswith(b"git version")
         assert not (student / "taken").exists()

@@ -10,13 +10,12 @@ import pytest
 
 from grader import files
 from grader.arena import build, scenario_inputs, static_recorder, workspace
-from grader.arena.limits import SUBMISSION_MESSAGE_BYTES
-from grader.arena.limits import Limits as RunLimits
+from grader.arena.limits import SUBMISSION_MESSAGE_BYTES, RunLimits
 from grader.arena.ros_env import DUMP_BYTES, NAMES_MAX, VALUE_BYTES
 from grader.checks.support import text
 from grader.evidence import container, decode, definitions, memory_budget
 from grader.intake import archive, git, gitdir
-from grader.intake.limits import Limits as IntakeLimits
+from grader.intake.limits import RunLimits as IntakeLimits
 from grader.package import cmake, cmake_parse, launch, launch_loader, python, reading
 
 KB, MB, RUN = 1 << 10, 1 << 20, RunLimits()
@@ -176,6 +175,29 @@ def _is_there(name: str) -> bool:
     if name.endswith("-*"):
         return any((ROOT / "tests/hostile/attacks").glob(name))
     return (ROOT / name).exists()
+
+
+@pytest.mark.parametrize(
+    "row", [row for row in ROWS if "`test" in row[-1]], ids=lambda row: row[0].replace("/", "-")[:40]
+)
+def test_make_test_looks_at_every_promise(row: list[str]) -> None:
+    """Of each row, a test without the marker `full`, or a kind of attacks: one of each runs."""
+    names = re.findall("`(tests?[_/][^`]+)`", row[-1])
+    assert any(_is_quick(name) for name in names), names
+
+
+def _is_quick(name: str) -> bool:
+    if not name.startswith("test_") and not name.endswith(".py"):
+        return True  # a folder
+    paths = ROOT.glob("tests/**/test_*.py") if name.startswith("test_") else [ROOT / name]
+    wanted = f"def {name}(" if name.startswith("test_") else "\ndef test_"
+    texts = (path.read_text(encoding="utf-8") for path in paths)
+    return any(
+        "@pytest.mark.full" not in block.rpartition("\n\n\n")[2].splitlines()
+        for text in texts
+        if not re.search(r"^pytestmark.*mark\.full", text, re.MULTILINE)
+        for block in text.split(wanted)[:-1]
+    )
 
 
 def test_every_kind_of_attack_is_named() -> None:

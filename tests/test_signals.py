@@ -59,6 +59,7 @@ def test_a_grader_whose_parent_hears_nothing_grades_in_a_sandbox(open_path: Path
     assert result.environment.sandbox.startswith("bubblewrap")
 
 
+@pytest.mark.full
 @needs_sandbox
 def test_the_doctor_finds_the_sandbox_then_too() -> None:
     done = deaf("doctor", "--json")

@@ -178,7 +178,7 @@ class Admission:
                 note(self._folder / "lateness", late_ms)
 
     def _free(self) -> FileLock | bool:
-        """A place to start, locked; False where all that are allowed now are taken."""
+        """Return a place to start, locked; False where all that are allowed now are taken."""
         if self._folder is None:
             return True
         for number in range(self._allowed(self._folder)):
@@ -194,7 +194,7 @@ class Admission:
 
 
 def _has_room(runs: FileLock) -> bool:
-    """Whether a run that shares this lock finds memory, or no other run shares it. It is held if so."""
+    """Return whether a run that shares this lock finds memory, or no other run shares it. It is held if so."""
     if not runs.take(shared=True):
         return False
     return available_bytes() > RUN_BYTES or (runs.take() and runs.take(shared=True))

@@ -60,7 +60,7 @@ class ArenaProcess:
                 data = data[os.write(self._commands, data) :]
 
     def last_words(self) -> str:
-        """The last line that it wrote to stderr."""
+        """Return the last line that it wrote to stderr."""
         return (self._errors.decode(errors="replace").strip().splitlines() or [""])[-1]
 
     async def end(self) -> None:
@@ -135,7 +135,7 @@ class Template:
 
     def forget(self, pid: int) -> None:
         """That arena has ended, or was killed: wait for it. Only from then on its id may be another process's."""
-        with suppress(OSError):  # a template that has ended left it to somebody who waits for all
+        with suppress(OSError):  # a template that has ended left it to someone who waits for all
             self._ask(b"e" + struct.pack("<i", pid))
 
     def close(self) -> None:
@@ -189,7 +189,7 @@ def template_of(argv: Sequence[str], env: Mapping[str, str]) -> Template:
 def start_arena(
     argv: Sequence[str], env: Mapping[str, str], descriptors: Sequence[int]
 ) -> tuple[Template, int, float]:
-    """Start an arena; a template that has ended is made anew, once. Raises ArenaError."""
+    """Start an arena; a template that has ended is made again, once. Raises ArenaError."""
     template = template_of(argv, env)
     try:
         return template, *template.start(descriptors)

@@ -21,8 +21,8 @@ from typing import Any
 
 from grader import __version__
 from grader.arena.asynchronous import run_until_signal
-from grader.arena.limits import Limits
-from grader.arena.process_environment import BASE, Place
+from grader.arena.limits import RunLimits
+from grader.arena.process_environment import BASE, ProcessEnvironment
 from grader.arena.ros_env import find_ros
 from grader.arena.sandbox import temporary_base
 from grader.arena.sandbox_files import ANSWERS, INSIDE_WORKSPACE, QUESTIONS, prepare
@@ -86,16 +86,16 @@ def provide_base(mode: SandboxMode) -> None:
         inner.mkdir()
         inner.chmod(0o711)
         prepare(inner, ros)
-        place = Place(
-            folder=inner, ros=ros, sandbox=sandbox, limits=Limits(), workspace=_empty(inner), package=""
+        place = ProcessEnvironment(
+            folder=inner, ros=ros, sandbox=sandbox, limits=RunLimits(), workspace=_empty(inner), package=""
         )
         if not has_base(place):
             with suppress(ArenaError):
                 run_until_signal(_make(place))
 
 
-def has_base(place: Place) -> bool:
-    """Hand this place the base that fits it, if there is one."""
+def has_base(place: ProcessEnvironment) -> bool:
+    """Give this place the base that fits it, if there is one."""
     kept = read_kept(_file_name(place)) if place.sandbox.bubblewrap else None
     if kept is None:
         return False
@@ -105,28 +105,28 @@ def has_base(place: Place) -> bool:
     return True
 
 
-def base_spec(place: Place) -> dict[str, Any]:
-    """The process that makes one: in a sandbox as the build's, with nothing of a submission's in it."""
+def base_spec(place: ProcessEnvironment) -> dict[str, Any]:
+    """Return the process that makes one: in a sandbox as the build's, with nothing of a submission's in it."""
     argv = ["/bin/bash", "-c", SCRIPT, "bash", *catkin_make(place)]
     bare = replace(place, env={})
     return bare.spec(NAME, argv, role="grader", copy=False, as_handed_in=True, collect=BASE)
 
 
-def keep_base(place: Place, exit_code: int | None) -> None:
+def keep_base(place: ProcessEnvironment, exit_code: int | None) -> None:
     """Keep what that process handed over, if it came to its end."""
     if exit_code == 0 and place.base.is_file():
         keep(_file_name(place), place.base.read_bytes())
         _hand_answers(place)
 
 
-def catkin_make(place: Place) -> list[str]:
+def catkin_make(place: ProcessEnvironment) -> list[str]:
     return [
         "catkin_make", "-C", place.inside_workspace, "-j2", "--no-color", "--cmake-args",
         f"-DPYTHON_EXECUTABLE={place.ros.python}",
     ]  # fmt: skip
 
 
-def _hand_answers(place: Place) -> None:
+def _hand_answers(place: ProcessEnvironment) -> None:
     """To the programs that stand before the real ones (`ros/known.sh`)."""
     for question in QUESTIONS:
         answer = read_member(place.base, f"{ANSWERS}/{question}", ANSWER_BYTES)
@@ -136,7 +136,7 @@ def _hand_answers(place: Place) -> None:
             path.chmod(0o644)
 
 
-async def _make(place: Place) -> None:
+async def _make(place: ProcessEnvironment) -> None:
     with EvidenceWriter(
         place.folder / "base.mcap", scenario="base", clock="real", warp=1.0, metadata={}
     ) as writer:
@@ -154,7 +154,7 @@ def _empty(folder: Path) -> Workspace:
     return Workspace(built=nothing, repaired=nothing, large=nothing, kept=kept, folder="", repairs={})
 
 
-def _file_name(place: Place) -> str:
+def _file_name(place: ProcessEnvironment) -> str:
     """Another one for whatever else CMake could find: another machine, other programs, another ROS."""
     spec = base_spec(place)
     known = {
@@ -168,7 +168,7 @@ def _file_name(place: Place) -> str:
     return f"workspace-{hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()[:32]}.tar"
 
 
-def _looks(place: Place) -> Iterator[tuple[str, int, int, int]]:
+def _looks(place: ProcessEnvironment) -> Iterator[tuple[str, int, int, int]]:
     """The files and folders in which a change of the machine shows."""
     path = place.ros.env["PATH"]
     programs = [shutil.which(name, path=path) for name in PROGRAMS]

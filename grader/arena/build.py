@@ -13,7 +13,7 @@ from typing import Any
 
 from grader.arena.base_workspace import NAME as BASE_NAME
 from grader.arena.base_workspace import base_spec, catkin_make, has_base, keep_base
-from grader.arena.process_environment import ARCHIVE, Place
+from grader.arena.process_environment import ARCHIVE, ProcessEnvironment
 from grader.arena.ros_env import DUMP_BYTES, excess_of, keep_ros_variables, parse_env
 from grader.arena.session import ArenaSession
 from grader.arena.static_recorder import RunCost
@@ -49,13 +49,13 @@ class BuildOutcome(RunCost):
 
 
 async def build(
-    place: Place,
+    place: ProcessEnvironment,
     writer: EvidenceWriter,
     python_files: Iterable[str],
     answers: Iterable[str],
     *,
     last_run: bool = False,
-) -> tuple[Place, BuildOutcome]:
+) -> tuple[ProcessEnvironment, BuildOutcome]:
     """Run `catkin_make`, then `rosrun` on each script of `answers` as handed in; what they print is evidence.
     `python_files` are compiled by ROS's own Python, and not run.
 
@@ -100,7 +100,7 @@ async def build(
     )
 
 
-def _catkin_make(place: Place) -> list[str]:
+def _catkin_make(place: ProcessEnvironment) -> list[str]:
     """With a trace of every `CMakeLists.txt` and of the package's own `.cmake` files; those in its folder are picked
     from it."""
     package = place.workspace.repaired / place.workspace.folder
@@ -119,7 +119,7 @@ def _note_excess(writer: EvidenceWriter, *found: str) -> None:
         writer.event("/grader/actor", time.time_ns(), event)
 
 
-def _syntax_spec(place: Place) -> dict[str, Any]:
+def _syntax_spec(place: ProcessEnvironment) -> dict[str, Any]:
     """ROS's own Python compiles every script of the package, and runs none."""
     script = 'python3 -I "$1/grader-syntax.py" "$2" < "$1/python-files.json" >' + _target(place, SYNTAX)
     argv = ["/bin/bash", "-c", script, "bash", place.shims, place.package_folder]
@@ -127,13 +127,13 @@ def _syntax_spec(place: Place) -> dict[str, Any]:
     return place.spec("syntax", argv, role="grader", as_handed_in=True, collect=SYNTAX, collect_bytes=room)
 
 
-def _target(place: Place, name: str) -> str:
+def _target(place: ProcessEnvironment, name: str) -> str:
     """Where a shell's output goes, to be kept under that name."""
     return "&{collect}" if place.sandbox.bubblewrap else shlex.quote(f"{place.output}/{name}")
 
 
-async def _with_setup(place: Place, arena: ArenaSession) -> Place:
-    """The environment that `source devel/setup.bash` gives."""
+async def _with_setup(place: ProcessEnvironment, arena: ArenaSession) -> ProcessEnvironment:
+    """Return the environment that `source devel/setup.bash` gives."""
     script = f'source "$1/devel/setup.bash" && {{ {DUMP} }} >' + _target(place, ENVIRONMENT)
     argv = ["/bin/bash", "-c", script, "bash", place.inside_workspace]
     room = DUMP_BYTES + 1
@@ -153,7 +153,7 @@ async def _with_setup(place: Place, arena: ArenaSession) -> Place:
     return replace(place, env=keep_ros_variables(parse_env(dump)))
 
 
-async def _answer(place: Place, arena: ArenaSession, script: str) -> None:
+async def _answer(place: ProcessEnvironment, arena: ArenaSession, script: str) -> None:
     """What `rosrun` says to a script that is not as it should be, on the package as handed in."""
     file = Path(script).name
     name = f"rosrun {file}"
@@ -162,7 +162,7 @@ async def _answer(place: Place, arena: ArenaSession, script: str) -> None:
         await arena.interrupt(name, int_s=1.0, term_s=1.0)
 
 
-def _trace(place: Place) -> tuple[Path | None, str]:
+def _trace(place: ProcessEnvironment) -> tuple[Path | None, str]:
     """The trace that CMake left, as far as the package's files bear it out: the build could write into it. And what of
     it was too much to be read, in words, or ""."""
     if place.sandbox.bubblewrap:
@@ -178,7 +178,7 @@ def _trace(place: Place) -> tuple[Path | None, str]:
     return _written(place, TRACE, written.trace), too_large or written.too_much
 
 
-def _kept(place: Place, name: str) -> Path | None:
+def _kept(place: ProcessEnvironment, name: str) -> Path | None:
     """What a step handed over under that name; without a sandbox, a copy of the file that it left."""
     kept = place.workspace.kept / name
     if place.sandbox.bubblewrap:
@@ -187,7 +187,7 @@ def _kept(place: Place, name: str) -> Path | None:
     return None if data is None else _written(place, name, data)
 
 
-def _written(place: Place, name: str, data: bytes) -> Path:
+def _written(place: ProcessEnvironment, name: str, data: bytes) -> Path:
     path = place.workspace.kept / name
     path.write_bytes(data)
     return path

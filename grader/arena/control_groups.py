@@ -32,7 +32,7 @@ WEAKER = (
     "no control group of this process can be written, so memory, sockets' buffers and files in memory are looked at "
     "twice a second, and of what the kernel keeps for pipes and other descriptors only their number is bounded"
 )
-WEAKER_CPU = "CPU time of children that nobody waited for is not counted"
+WEAKER_CPU = "CPU time of children that were not waited for is not counted"
 
 
 class Cgroup(Record):
@@ -82,13 +82,13 @@ def describe() -> str:
 
 
 def has_memory() -> bool:
-    """Whether groups of version 2 can hold memory on this machine at all."""
+    """Return whether groups of version 2 can hold memory on this machine at all."""
     there = [Path(mount[4], "cgroup.controllers") for mount in _mounts() if _type(mount) == "cgroup2"]
     return any("memory" in path.read_text().split() for path in there if path.is_file())
 
 
 def own_group() -> str:
-    """The name of this process's group of version 2; empty where there is none."""
+    """Return the name of this process's group of version 2; empty where there is none."""
     return next((path for _, names, path in _memberships() if names == ""), "")
 
 
@@ -141,7 +141,7 @@ def _memberships() -> list[list[str]]:
 
 
 def _type(mount: list[str]) -> str:
-    """The file system of a line of mountinfo (man 5 proc_pid_mountinfo): the first field after the dash."""
+    """Return the file system of a line of mountinfo (man 5 proc_pid_mountinfo): the first field after the dash."""
     return mount[mount.index("-") + 1] if "-" in mount else ""
 
 
@@ -155,7 +155,7 @@ def _below(mount: list[str], path: str) -> Path:
 def _sweep(folder: Path) -> None:
     """Remove what a killed arena left: its groups are empty, and too old to be just made."""
     for group in folder.glob("grader-*"):
-        with suppress(OSError):  # somebody's processes are in it, or it is gone
+        with suppress(OSError):  # someone's processes are in it, or it is gone
             if time.time() - group.stat().st_mtime > ABANDONED_S:
                 group.rmdir()
 
@@ -173,7 +173,7 @@ def _usable(folder: Path, key: str) -> bool:
     except OSError:
         return False
     finally:
-        with suppress(OSError):  # an empty group of ours: it hurts nobody if it stays
+        with suppress(OSError):  # an empty group of ours: it hurts no one if it stays
             trial.rmdir()
     return True
 
@@ -217,7 +217,7 @@ def _lacks_memory(group: Path) -> bool:
 
 
 def _belongs_to_the_grader(group: Path) -> bool:
-    """Whether no other program manages it, and no other program's processes are in it."""
+    """Return whether no other program manages it, and no other program's processes are in it."""
     free = not SYSTEMD.exists() or SCOPES.fullmatch(group.name) is not None
     return (free or _handed_over(group)) and _all_ours(group, _processes(group))
 

@@ -158,11 +158,11 @@ def _rooms() -> Iterator[tuple[int, int, Path]]:
 
 
 def tasks_of(uid: int) -> int:
-    """How many tasks (threads count) this user has, as far as /proc shows them."""
+    """Return how many tasks (threads count) this user has, as far as /proc shows them."""
     found = 0
     for folder in PROC.glob("[0-9]*"):
         with suppress(OSError):  # it has ended
-            if folder.stat().st_uid in {uid, 0}:  # root's, where nobody may look into it
+            if folder.stat().st_uid in {uid, 0}:  # root's, where no one may look into it
                 status = STATUS.search((folder / "status").read_bytes())
                 found += int(status[2]) if status and int(status[1]) == uid else 0
     return found

@@ -10,7 +10,7 @@ SUBMISSION_MESSAGE_BYTES = 160 << 20
 LEAST_RUN_BYTES = 8 << 20
 
 
-class Limits(Record):
+class RunLimits(Record):
     """Memory, processes, tasks (threads count), CPU seconds, output, `home_bytes` (what its home may hold besides the
     workspace's own files) and the number of files in each folder are of one process tree; messages and bytes of one
     channel, or of one run (`run_bytes`, `channels`); so is what the buffers of its sockets hold (`socket_bytes`)."""
@@ -41,7 +41,7 @@ class Limits(Record):
     channels: int = 300
 
     def shared_by(self, runs: int) -> Self:
-        """The limits of each of so many runs of one submission: together they record no more than one may."""
+        """Return the limits of each of so many runs of one submission: together they record no more than one may."""
         run_bytes = max(LEAST_RUN_BYTES, min(self.run_bytes, SUBMISSION_MESSAGE_BYTES // max(1, runs)))
         return self.model_copy(
             update={"run_bytes": run_bytes, "channel_bytes": min(self.channel_bytes, run_bytes)}

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from grader.arena.limits import Limits
+from grader.arena.limits import RunLimits
 from grader.arena.ros_env import SYSTEM_PATH, RosInstallation
 from grader.arena.sandbox import Sandbox, Word, copy_of, scratch, system_call_filter
 from grader.arena.sandbox_files import (
@@ -41,6 +41,9 @@ its variables and arguments (`ros/launching.py`)."""
 TAKE = 'export -- "${words[@]:1:words[0]}"; set -- "${words[@]:1+words[0]}"; unset words; '
 """From here on what is the package's holds: until then, every program runs as it does anywhere."""
 RUN = 'cd "$HOME" && exec "$@"'
+RUN_AS_NUMBER = 'cd "$HOME" && trap : INT TERM && { for ((n = 1; n < %d; n++)); do (:); done; "$@"; exit; }'
+"""In its sandbox, every process tree counts its processes from 1. So that those of one run that are named after their
+number have different ones, each but the first is run as a later child of its shell, which waits for it."""
 COPY = (
     f"mkdir {INSIDE_WORKSPACE} && cp -R --preserve=mode,links {SOURCES} {INSIDE_WORKSPACE}/"
     f" && {{ [ ! -e {BUILT} ] || tar -xpf {BUILT} -C {INSIDE_WORKSPACE} devel 2>/dev/null || true; }} || exit 125; "
@@ -58,6 +61,8 @@ BUILD_RUN = (
 """What the build made is handed over through a pipe, whatever came of it. The base workspace is as old as the build."""
 ARCHIVE = "built.tar"
 BASE = "base.tar"
+NO_DISPLAY = ":99"
+"""There is no screen behind it. A script that asks for `$DISPLAY` before it opens a page finds one, as on a desktop."""
 STAGE = "stage"
 """The folder over which the arena mounts what sandboxes see (`Stage` in `ros/namespaces.py`)."""
 OUTPUT_FILES = 1_000
@@ -73,13 +78,13 @@ OWN_VARIABLES = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class ProcessEnvironment:
     """`folder` is this submission's own, `env` what the built workspace's `setup.bash` adds."""
 
     folder: Path
     ros: RosInstallation
     sandbox: Sandbox
-    limits: Limits
+    limits: RunLimits
     workspace: Workspace
     package: str
     env: dict[str, str] = field(default_factory=dict)
@@ -125,7 +130,7 @@ class Place:
         """Where processes find the packages that stand in for missing ones."""
         return STANDINS if self.sandbox.bubblewrap else str(self.folder / "standins")
 
-    def from_source(self) -> Place:
+    def from_source(self) -> ProcessEnvironment:
         """Without a build: ROS still finds the package's sources."""
         path = f"{self.inside_workspace}/src:{self.ros.env.get('ROS_PACKAGE_PATH', '')}"
         return replace(self, env={"ROS_PACKAGE_PATH": path.rstrip(":")})
@@ -169,7 +174,7 @@ class Place:
         return next((p.relative_to(package).as_posix() for p in others if p.is_file()), None)
 
     def arena_env(self) -> dict[str, str]:
-        """The managed roscore's environment: ROS and nothing of the shell's."""
+        """Return the managed roscore's environment: ROS and nothing of the shell's."""
         return {"LANG": "C.UTF-8", "ROS_IP": LOOPBACK, **self.ros.env, "PATH": _path(self.ros, "")}
 
     def spec(
@@ -183,10 +188,12 @@ class Place:
         collect: str | None = None,
         collect_bytes: int | None = None,
         build: bool = False,
+        number: int = 0,
         **more: Any,  # noqa: ANN401 - fields of the spec
     ) -> dict[str, Any]:
         """What the arena needs to start a process. With `copy` it gets a workspace of its own: the sources with the
-        repairs, or `as_handed_in`, and what the build made. `build` is the build itself. What the process writes to
+        repairs, or `as_handed_in`, and what the build made. `build` is the build itself, `number` says how many others
+        the run starts before it. What the process writes to
         `{collect}`, `collect_bytes` at most, becomes the file of that name in `workspace.kept`."""
         boxed = self.sandbox.bubblewrap
         limits = self._limits(copy=copy)
@@ -207,7 +214,12 @@ class Place:
                 net=role != "grader" or not as_handed_in,
             ),
             "filter": base64.b64encode(filtered).decode() if filtered else None,
-            "shell": ["/bin/bash", "-c", self._words(copy=copy and boxed, build=build), "bash"],
+            "shell": [
+                "/bin/bash",
+                "-c",
+                self._words(copy=copy and boxed, build=build, number=number if boxed else 0),
+                "bash",
+            ],
             "collect": {"file": kept, "bytes": collect_bytes or self.limits.built_bytes}
             if kept and boxed
             else None,
@@ -216,13 +228,13 @@ class Place:
             **more,
         }
 
-    def _words(self, *, copy: bool, build: bool) -> str:
-        """The script of the first shell. Nothing of the submission is in it."""
-        before, run = (BUILD_COPY, BUILD_RUN) if build else (COPY, RUN)
+    def _words(self, *, copy: bool, build: bool, number: int) -> str:
+        """Return the script of the first shell. Nothing of the submission is in it."""
+        before, run = (BUILD_COPY, BUILD_RUN) if build else (COPY, RUN_AS_NUMBER % number if number else RUN)
         first = self.sandbox.first_words(self.limits) + HEAD
         return first + (before + TAKE + run if copy else TAKE + RUN)
 
-    def _limits(self, *, copy: bool) -> Limits:
+    def _limits(self, *, copy: bool) -> RunLimits:
         """A workspace of the size that was handed in has room beside what else may be written."""
         room = self.limits.home_bytes + (2 * self.workspace.copied_bytes if copy else 0)
         return self.limits.model_copy(update={"home_bytes": room})
@@ -269,6 +281,7 @@ class Place:
             "SHELL": "/bin/bash",
             "TERM": "dumb",
             "USER": "student",
+            "DISPLAY": NO_DISPLAY,
         }
         if LIBSTDBUF.exists():
             base |= {"LD_PRELOAD": str(LIBSTDBUF), "_STDBUF_O": "L", "_STDBUF_E": "L"}

@@ -19,8 +19,8 @@ from typing_extensions import Self
 from grader.arena.admission import Admission, shared_folder
 from grader.arena.asynchronous import Stop, run_together, run_until_signal
 from grader.arena.build import BUILD_EXPECTED_S, build
-from grader.arena.limits import Limits
-from grader.arena.process_environment import Place
+from grader.arena.limits import RunLimits
+from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.ros_env import INSTALL_HINT, find_ros
 from grader.arena.sandbox import temporary_base
 from grader.arena.sandbox_files import prepare
@@ -85,13 +85,13 @@ class Recorder:
         self._rates = rates or {}
         self._rubric = rubric
         self._progress = progress
-        self._limits = Limits().shared_by(len(rubric.scenarios))
+        self._limits = RunLimits().shared_by(len(rubric.scenarios))
         ros = find_ros()
         if ros is None:
             raise RosMissing(NO_ROS, hint=INSTALL_HINT)
         self._ros, self._sandbox, self._not_run = ros, choose(mode), ""
         self.recording = Recording(folder=folder, facts=facts, ros=ros, sandbox=self._sandbox)
-        self._place: Place | None = None
+        self._place: ProcessEnvironment | None = None
         self._stack = ExitStack()
         self._admission = Admission(None)
         self._runs: Counter[str] = Counter()
@@ -105,10 +105,10 @@ class Recorder:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def record_all(self, meanwhile: Callable[[], None]) -> None:
-        """The package with its build, then every scenario, side by side. `meanwhile` is called beside the build, in
+    def record_all(self, beside_build: Callable[[], None]) -> None:
+        """The package with its build, then every scenario, side by side. `beside_build` is called beside the build, in
         another thread."""
-        run_until_signal(self._record_all(meanwhile), self._stop)
+        run_until_signal(self._record_all(beside_build), self._stop)
 
     def record_again(self, scenarios: Iterable[str]) -> None:
         """These scenarios once more, one after the other, with no other run on the machine."""
@@ -121,14 +121,14 @@ class Recorder:
             runs = [self._record_scenario(self._place, name, folder=folder) for name in scenarios]
             run_until_signal(run_together(*runs), self._stop)
 
-    async def _record_all(self, meanwhile: Callable[[], None]) -> None:
+    async def _record_all(self, beside_build: Callable[[], None]) -> None:
         self._admission = Admission(shared_folder())
         names = [name for name in order_runs(self._rubric, self._rates) if name not in self._recorded]
         copy_recorded(self._recorded, self.recording.folder, self._progress)
         self._progress.step("build", "waiting", "", BUILD_EXPECTED_S)
         for name in names:
             self._progress.step(name, "waiting", "for the build", expected_s(self._rubric.scenarios[name]))
-        await run_together(self._record_package(), asyncio.to_thread(meanwhile))
+        await run_together(self._record_package(), asyncio.to_thread(beside_build))
         if self._place is None:
             for name in names:
                 self._progress.step(name, "skipped", self._not_run)
@@ -160,7 +160,7 @@ class Recorder:
                 writer.event("/grader/actor", time.time_ns(), event)
         recording.files.append(path)
 
-    async def _build(self, place: Place, writer: EvidenceWriter, *, last: bool) -> None:
+    async def _build(self, place: ProcessEnvironment, writer: EvidenceWriter, *, last: bool) -> None:
         self._progress.step("build", "waiting", WAITING, BUILD_EXPECTED_S)
         recording = self.recording
         faulty = [script for script in self._scripts() if _needs_answer(recording.facts, script)]
@@ -188,7 +188,7 @@ class Recorder:
         )
         self._progress.step("build", *(("done", "") if outcome.ok else ("failed", "catkin_make failed")))
 
-    def _make_place(self, folder: Path) -> Place:
+    def _make_place(self, folder: Path) -> ProcessEnvironment:
         folder.mkdir()
         folder.chmod(0o711)
         with _readable_by_all():
@@ -197,7 +197,7 @@ class Recorder:
                 folder, self._submission, self.recording.facts, self._scripts(), self._sandbox
             )
         named = self.recording.facts.manifest or self._submission.package
-        return Place(
+        return ProcessEnvironment(
             folder=folder,
             ros=self._ros,
             sandbox=self._sandbox,
@@ -207,7 +207,7 @@ class Recorder:
         )
 
     def _scripts(self) -> list[str]:
-        """The paths, in this package, of the scripts that the scenarios start."""
+        """Return the paths, in this package, of the scripts that the scenarios start."""
         paths = [
             f.path for f in sorted(self.recording.facts.files, key=lambda f: (f.path.count("/"), f.path))
         ]
@@ -219,7 +219,7 @@ class Recorder:
         return [match for match in matches if match is not None]
 
     async def _record_scenario(
-        self, place: Place, name: str, *, alone: bool = False, folder: Path | None = None
+        self, place: ProcessEnvironment, name: str, *, alone: bool = False, folder: Path | None = None
     ) -> None:
         scenario, shown = self._rubric.scenarios[name], ""
 

@@ -47,12 +47,12 @@ class RosInstallation(Record):
         return f"{self.distro} ({self.where})"
 
     def program(self, name: str) -> str | None:
-        """The path of one of ROS's programs, or None."""
+        """Return the path of one of ROS's programs, or None."""
         return shutil.which(name, path=self.env["PATH"])
 
 
 def find_ros() -> RosInstallation | None:
-    """The ROS 1 to use, or None. `$GRADER_ROS_SETUP` names a `setup.bash`, or `none`."""
+    """Return the ROS 1 to use, or None. `$GRADER_ROS_SETUP` names a `setup.bash`, or `none`."""
     return _find(os.environ.get("GRADER_ROS_SETUP", ""), os.environ.get("CONDA_PREFIX", ""))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
@@ -12,9 +13,14 @@ from grader.rubric.model import Until
 
 Outcome = tuple[str, str]
 ARRIVALS_MAX = 2000
-HEARD_S = 2.0
+HEARD_S, HEARD_LOST_S_MAX = 2.0, 6.0
 CONNECTED_S = 1.0
 """So long after the last probe and the last line, a value that is not printed will not be."""
+FULL, OTHERS_MOST = 0.9, 0.75
+"""Shares of the processors' time: a machine is full from the one, and others count up to the other (then all takes four
+times as long)."""
+HEARD_AT_MOST_S = 8.0
+"""So long after the last probe and the last value that was heard, whatever else is printed."""
 
 
 @dataclass
@@ -29,7 +35,8 @@ class TopicSeen:
 @dataclass
 class RunState:
     """The state that conditions look at. `running` and `ended` are the student's processes, `helpers` the grader's own
-    programs that run beside them, `registered` the processes of which a node has registered."""
+    programs that run beside them, `registered` the processes of which a node has registered. `lost_s` is what others
+    took of the run's time while they filled the machine: so much longer a node is waited for."""
 
     started_s: float = 0.0
     topics: dict[str, TopicSeen] = field(default_factory=lambda: defaultdict(TopicSeen))
@@ -39,6 +46,7 @@ class RunState:
     nodes: set[str] = field(default_factory=set)
     helper_nodes: set[str] = field(default_factory=set)
     registered: set[str] = field(default_factory=set)
+    registered_s: float = 0.0
     last_start_s: float = 0.0
     first_node_s: float = 0.0
     services: set[str] = field(default_factory=set)
@@ -49,10 +57,13 @@ class RunState:
     connected_s: dict[str, float] = field(default_factory=dict)
     unheard: dict[str, re.Pattern[str]] = field(default_factory=dict)
     last_sent_s: float = 0.0
+    last_heard_s: float = 0.0
     graph_changed_s: float = 0.0
     graph_picture: object = None
     graphs: int = 0
     last_line_s: float = 0.0
+    measured_s: float = 0.0
+    lost_s: float = 0.0
     rates: dict[str, list[RateBounds]] = field(default_factory=lambda: defaultdict(list))
     arrivals_ns: dict[str, list[int]] = field(default_factory=dict)
 
@@ -79,6 +90,12 @@ class RunState:
         if active:
             self.activity_s = now_s
 
+    def machine(self, busy: float, own: float, now_s: float) -> None:
+        """So busy was the machine since this was last told, `own` of it with the run's own processes."""
+        if self.measured_s and busy >= FULL:
+            self.lost_s += (now_s - self.measured_s) * min(busy - own, OTHERS_MOST)
+        self.measured_s = now_s
+
     def active(self, now_s: float) -> None:
         """Something of the student's happened, besides messages."""
         self.activity_s = self.news_s = now_s
@@ -94,6 +111,8 @@ class RunState:
         picture = nodes if picture is None else picture
         if picture != self.graph_picture:
             self.graph_changed_s, self.graph_picture = now_s, picture
+        if set(processes.values()) & self.running - self.registered:
+            self.registered_s = now_s
         self.registered |= set(processes.values())
         self.helper_nodes |= {n for n in nodes if processes.get(n) in self.helpers}
         own = {n for n in nodes if n not in self.helper_nodes}
@@ -114,7 +133,10 @@ class RunState:
     def printed(self, line: str, now_s: float) -> None:
         self.last_line_s = now_s
         self.active(now_s)
-        self.unheard = {value: word for value, word in self.unheard.items() if not word.search(line)}
+        unheard = {value: word for value, word in self.unheard.items() if not word.search(line)}
+        if len(unheard) < len(self.unheard):
+            self.last_heard_s = now_s
+        self.unheard = unheard
 
 
 def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
@@ -122,7 +144,10 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
 
     `silent`: what was waited for stopped coming, or never came though the nodes were up.
     """
+    until = _patient(live, until)
+    starting = _is_starting(live, until, now_s)
     enough = (
+        not starting,
         _window(live, until, now_s),
         _messages(live, until),
         _connected(live, until, now_s),
@@ -137,7 +162,7 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
             return "complete", ""
     elif now_s - live.started_s > until.limit_s:
         return "complete", f"watched for {until.limit_s:g} s"
-    silent = _silent(live, until, now_s)
+    silent = "" if starting else _silent(live, until, now_s)
     if silent:
         return "silent", silent
     if now_s - live.started_s > until.limit_s:
@@ -145,8 +170,17 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     return None
 
 
+def _patient(live: RunState, until: Until) -> Until:
+    """The same, with more patience for processes to which others left little of the machine."""
+    more_s = round(live.lost_s)
+    if not more_s:
+        return until
+    limit_s = until.limit_s + more_s if _waits(until) else until.limit_s
+    return until.model_copy(update={"first_message_s": until.first_message_s + more_s, "limit_s": limit_s})
+
+
 def _waits(until: Until) -> bool:
-    """Whether anything ends the run before its limit."""
+    """Return whether anything ends the run before its limit."""
     lasting = (until.window_s, until.alive_s, until.quiet_s)
     seen = (until.messages, until.connected, until.heard, until.nodes, until.opened, until.ended)
     return any(seconds is not None for seconds in lasting) or any(seen)
@@ -168,7 +202,8 @@ def describe_wait(live: RunState, until: Until) -> str:
 
 
 def next_look_s(live: RunState, until: Until, now_s: float) -> float:
-    """How long nothing can change by time alone."""
+    """Return how long nothing can change by time alone."""
+    until = _patient(live, until)
     looks = [live.started_s + until.limit_s, live.started_s + until.first_message_s]
     looks += [live.last_start_s + until.first_message_s]
     for seen in live.topics.values():
@@ -179,8 +214,9 @@ def next_look_s(live: RunState, until: Until, now_s: float) -> float:
         ]
     looks += [live.graph_changed_s + max(until.silent_s, until.first_message_s)]
     looks += [max(live.last_line_s, live.last_sent_s) + HEARD_S]
+    looks += [max(live.last_sent_s, live.last_heard_s) + HEARD_AT_MOST_S]
     looks += [live.activity_s + (until.quiet_s or 0), live.news_s + until.silent_s]
-    looks += [live.first_node_s + (until.alive_s or 0)]
+    looks += [_lived_s(live, until.alive_s or 0)]
     ahead = [look - now_s for look in looks if look > now_s]
     return min([*ahead, 1.0]) + 0.001
 
@@ -205,8 +241,6 @@ def _window(live: RunState, until: Until, now_s: float) -> bool:
         return True
     if len(seen) == len(topics):
         return now_s >= max(s.first_s for s in seen) + until.window_s
-    if _is_starting(live, until, now_s):
-        return False
     return now_s >= max(s.first_s for s in seen) + max(until.window_s, until.silent_s)
 
 
@@ -217,7 +251,7 @@ def _talks_elsewhere(live: RunState, until: Until, now_s: float) -> bool:
 
 
 def _rates_are_clear(live: RunState, topics: tuple[str, ...]) -> bool:
-    """Whether each topic is there to show a rate, and its rate is known well enough."""
+    """Return whether each topic is there to show a rate, and its rate is known well enough."""
     return bool(topics) and all(
         topic in live.rates
         and all(bounds.decided_by(live.arrivals_ns[topic]) for bounds in live.rates[topic])
@@ -237,32 +271,34 @@ def _connected(live: RunState, until: Until, now_s: float) -> bool:
 
 def _nodes(live: RunState, until: Until, now_s: float) -> bool:
     """Everything that is there or not there: nodes, programs asked to open something, processes that ended."""
-    alive = until.alive_s is None or (bool(live.nodes) and now_s >= live.first_node_s + until.alive_s)
+    alive = until.alive_s is None or now_s >= _lived_s(live, until.alive_s)
     up = len(live.nodes) >= until.nodes and set(until.opened) <= live.opened
     return alive and up and set(until.ended) <= live.ended
 
 
+def _lived_s(live: RunState, alive_s: float) -> float:
+    """When the nodes have been up for so long, the last process's for half of it."""
+    return max(live.first_node_s + alive_s, live.registered_s + alive_s / 2) if live.nodes else math.inf
+
+
 def _quiet(live: RunState, until: Until, now_s: float) -> bool:
-    if until.quiet_s is None:
-        return True
-    quiet = live.activity_s > 0 and now_s >= live.activity_s + until.quiet_s
-    return quiet and not _is_starting(live, until, now_s)
+    return until.quiet_s is None or (live.activity_s > 0 and now_s >= live.activity_s + until.quiet_s)
 
 
 def _heard(live: RunState, until: Until, now_s: float) -> bool:
     if not until.heard or not live.unheard:
         return True
-    return now_s > max(live.last_line_s, live.last_sent_s) + HEARD_S
+    lost_s = min(live.lost_s, HEARD_LOST_S_MAX)
+    news_s = max(live.last_sent_s, live.last_heard_s)
+    return now_s > min(max(live.last_line_s, news_s) + HEARD_S, news_s + HEARD_AT_MOST_S) + lost_s
 
 
 def _is_starting(live: RunState, until: Until, now_s: float) -> bool:
-    """Whether a process may yet become a node: on a busy machine, its imports alone can take many seconds."""
+    """Return whether a process may yet become a node: on a busy machine, its imports alone can take many seconds."""
     return bool(live.running - live.registered) and now_s <= live.last_start_s + until.first_message_s
 
 
 def _silent(live: RunState, until: Until, now_s: float) -> str:
-    if _is_starting(live, until, now_s):
-        return ""
     waited = (*until.topics, *until.messages)
     seen = _talking(live)
     if waited and not seen:
@@ -283,7 +319,7 @@ def _silent(live: RunState, until: Until, now_s: float) -> str:
 
 def _standstill(live: RunState, until: Until, now_s: float) -> str:
     """Nothing happens any more, though more nodes, programs or ends were waited for."""
-    growing_up = live.nodes and now_s < live.first_node_s + (until.alive_s or 0)
+    growing_up = live.nodes and now_s < _lived_s(live, until.alive_s or 0)
     if growing_up or _nodes(live, until, now_s):
         return ""
     patience_s = until.silent_s if live.nodes else max(until.silent_s, until.first_message_s)

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from grader.arena.control_groups import Cgroups
-from grader.arena.limits import Limits
+from grader.arena.limits import RunLimits
 from grader.arena.ros_env import RosInstallation
 from grader.arena.sandbox_files import HOME, SHIMS, STANDINS
 from grader.errors import HostError
@@ -80,8 +80,8 @@ class Sandbox(Record):
         calls = "" if system_call_filter() else "; system calls not filtered on this processor"
         return f"bubblewrap, {who}; memory held by {self.cgroups.label}{calls}"
 
-    def outer(self, limits: Limits) -> list[str]:
-        """The programs of this machine that come first: they take rights away and set limits."""
+    def outer(self, limits: RunLimits) -> list[str]:
+        """Return the programs of this machine that come first: they take rights away and set limits."""
         drop = [f"--reuid={self.uid}", f"--regid={self.uid}", "--clear-groups"] if self.uid else []
         drop += (
             [] if self.bubblewrap else ["--no-new-privs"]
@@ -90,7 +90,7 @@ class Sandbox(Record):
         return [*become, _program("prlimit"), *self.rlimits(limits), "--"]
 
     def wall(
-        self, *, ros: RosInstallation, place: Path, limits: Limits, binds: Sequence[Word], net: bool
+        self, *, ros: RosInstallation, place: Path, limits: RunLimits, binds: Sequence[Word], net: bool
     ) -> list[Word] | None:
         """bubblewrap's arguments, or None without it. `place` is the run's own folder (`sandbox_files.prepare`),
         `binds` are more arguments. Only memory of fixed size can be written: the scratches, and what `binds` give."""
@@ -112,7 +112,7 @@ class Sandbox(Record):
             "--clearenv", *(word for pair in FIRST_ENV.items() for word in ("--setenv", *pair)),
         ]  # fmt: skip
 
-    def first_words(self, limits: Limits) -> str:
+    def first_words(self, limits: RunLimits) -> str:
         """What a process tree's shell does before anything else: the number of its tasks, where it is counted apart."""
         return f"ulimit -u {limits.tasks}; " if self._counts_apart() else ""
 
@@ -120,7 +120,7 @@ class Sandbox(Record):
         """Otherwise all trees of one user share a number, and one of them can leave the others none."""
         return self.bubblewrap and _counts_by_namespace()
 
-    def rlimits(self, limits: Limits) -> Iterator[str]:
+    def rlimits(self, limits: RunLimits) -> Iterator[str]:
         """The arguments of prlimit."""
         yield f"--fsize={limits.file_bytes}"
         yield f"--nofile={limits.open_files}"
@@ -142,7 +142,7 @@ def _program(name: str) -> str:
 
 
 def _system(ros: RosInstallation) -> list[Word]:
-    """The system's programs, and not the grader: where it lies among them, its folder is empty."""
+    """Return the system's programs, and not the grader: where it lies among them, its folder is empty."""
     argv: list[Word] = ["--ro-bind", "/usr", "/usr"]
     shown = [Path("/usr")]
     for name in ("bin", "sbin", "lib", "lib32", "lib64", "libx32"):

@@ -31,6 +31,20 @@ BROWSERS = (
     "brave-browser", "chromium", "chromium-browser", "firefox", "firefox-esr", "google-chrome", "google-chrome-stable",
     "opera", "sensible-browser", "www-browser", "x-www-browser", "xdg-open",
 )  # fmt: skip
+ASKING = (
+    "curl",
+    "fping",
+    "host",
+    "nslookup",
+    "notify-send",
+    "ping",
+    "wget",
+    "wmctrl",
+    "xdpyinfo",
+    "xrandr",
+    "xset",
+)
+"""What scripts ask whether there is a network or a screen, before they open a page."""
 ANSWERS = "grader-known"
 QUESTIONS = (
     "lsb_release -si", "lsb_release -sd", "lsb_release -sr", "lsb_release -sc", "rosversion roslaunch", "rosversion -d",
@@ -49,8 +63,8 @@ CMAKE = "cmake"
 
 def prepare(place: Path, ros: RosInstallation) -> None:
     """Write what every sandbox binds: `etc/` with one user in it, `bin/` with `python` as ROS means it, stand-ins
-    for terminals, which launch files name as their `launch-prefix`, and for browsers, and `standins/` with the
-    packages that this ROS lacks."""
+    for terminals, which launch files name as their `launch-prefix`, for browsers, and for what is asked before a page
+    is opened, and `standins/` with the packages that this ROS lacks."""
     etc, shims = place / "etc", place / "bin"
     for folder in (etc, shims, place / "home"):
         folder.mkdir(parents=True)
@@ -62,6 +76,7 @@ def prepare(place: Path, ros: RosInstallation) -> None:
     shutil.copyfile(ROS_SIDE / "syntax.py", shims / "grader-syntax.py")
     _program(shims, "terminal.sh", "grader-terminal", TERMINALS)
     _program(shims, "open.sh", "grader-open", BROWSERS)
+    _program(shims, "answers.sh", "grader-reachable", ASKING)
     shutil.copyfile(ROS_SIDE / "opener.py", shims / "grader-open.py")
     _quicker(shims, ros)
     copy_standins(place / "standins", ros)
@@ -127,7 +142,7 @@ def copy_standins(folder: Path, ros: RosInstallation) -> None:
 
 
 def with_standins(env: Mapping[str, str], copied: Path, inside: str) -> dict[str, str]:
-    """The environment in which ROS finds the stand-ins after everything else. `copied` is the folder that
+    """Return the environment in which ROS finds the stand-ins after everything else. `copied` is the folder that
     `copy_standins` wrote, `inside` where processes see it."""
     packages = sorted(p.name for p in (copied / SHARE).iterdir())
     if not packages:

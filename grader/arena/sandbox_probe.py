@@ -16,7 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from grader.arena.control_groups import find_cgroups
-from grader.arena.limits import Limits
+from grader.arena.limits import RunLimits
 from grader.arena.sandbox import NAMESPACES, NO_NESTING, WALLS, Sandbox, system_call_filter
 from grader.errors import HostError, SandboxMissing
 from grader.host_programs import HOST_ENV, find_host_program
@@ -61,7 +61,7 @@ UNKNOWN_HINT = (
 
 
 def choose(mode: SandboxMode) -> Sandbox:
-    """The sandbox to use: `require` raises SandboxMissing where there is none, `auto` goes without and says so.
+    """Return the sandbox to use: `require` raises SandboxMissing where there is none, `auto` goes without and says so.
 
     Raises SandboxMissing where it cannot be known whether there is one, and HostError where the limits that were
     inherited are too short, or those of students' processes cannot be set: every one would fail.
@@ -77,7 +77,7 @@ def choose(mode: SandboxMode) -> Sandbox:
     if reason and mode == "require":
         raise SandboxMissing(f"no sandbox on this machine: {reason}", hint=INSTALL_HINT)
     can_drop = os.geteuid() == 0 and find_host_program("setpriv") is not None
-    uid = _nobodys_uid() if can_drop else None
+    uid = _unprivileged_uid() if can_drop else None
     nesting = not reason and _walls()[1]
     return Sandbox(bubblewrap=not reason, uid=uid, reason=reason, nesting=nesting, cgroups=find_cgroups())
 
@@ -91,7 +91,7 @@ def refused_limits() -> str:
     prlimit = find_host_program("prlimit")
     if prlimit is None:
         return ""
-    limits = Sandbox(bubblewrap=False, uid=None).rlimits(Limits())
+    limits = Sandbox(bubblewrap=False, uid=None).rlimits(RunLimits())
     return _said([*_drop(), prlimit, *limits, "--", "/bin/true"])
 
 
@@ -118,7 +118,7 @@ def _walls() -> tuple[str, bool]:
     return said, nesting and not said
 
 
-def _nobodys_uid() -> int:
+def _unprivileged_uid() -> int:
     """A user that no directory of users knows, where this machine has the whole range of them (a container may not)."""
     try:
         mapped = max(int(line.split()[0]) + int(line.split()[2]) for line in UID_MAP.read_text().splitlines())
@@ -138,13 +138,13 @@ def _refusal(*more: str) -> str:
 
 
 def _drop() -> list[str]:
-    """The words by which root becomes another user."""
+    """Return the words by which root becomes another user."""
     setpriv = find_host_program("setpriv") if os.geteuid() == 0 else None
     return [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if setpriv else []
 
 
 def _said(command: list[str]) -> str:
-    """The last line that a command of this machine printed where it failed; empty where it did not fail."""
+    """Return the last line that a command of this machine printed where it failed; empty where it did not fail."""
     try:
         done = subprocess.run(
             command,

@@ -7,11 +7,12 @@ import time
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from grader.arena.admission import Admission, Leave
-from grader.arena.process_environment import Place
+from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.run_state import describe_wait, find_outcome, next_look_s
 from grader.arena.scenario_inputs import OVER, advertisement, call_services, make_shots, publication, settings
 from grader.arena.session import ArenaSession
@@ -28,7 +29,7 @@ UNFOLLOWED_HZ = 15.0
 SUBSCRIBE_S = 6.0
 REGISTERED_S = 1.0
 HEARD_SETTLE_S = 0.3
-GRAPH_EVERY_S = 0.25
+GRAPH_EVERY_S, GRAPH_S = 0.25, 5.0
 STARTING_S = 1.5
 EXPECTED_HZ = 10.0
 
@@ -42,7 +43,7 @@ UP_S, SETTLE_S = 5.0, 0.2
 BUILT_PROGRAMS_MAX = 20
 
 Spec: TypeAlias = dict[str, Any]
-"""What the arena needs to start a process (`Place.spec`)."""
+"""What the arena needs to start a process (`ProcessEnvironment.spec`)."""
 
 
 def expected_s(scenario: Scenario) -> float:
@@ -61,7 +62,7 @@ def expected_s(scenario: Scenario) -> float:
 async def run_scenario(
     name: str,
     scenario: Scenario,
-    place: Place,
+    place: ProcessEnvironment,
     *,
     path: Path,
     metadata: Mapping[str, str],
@@ -77,7 +78,8 @@ async def run_scenario(
     """
     admission = admission or Admission(None)
     warp = scenario.warp if scenario.clock == "warped" else 1.0
-    starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place)]
+    numbers = count()
+    starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place, numbers)]
     with EvidenceWriter(path, scenario=name, clock=scenario.clock, warp=warp, metadata=metadata) as writer:
         session = ArenaSession(place, writer, last_run=last_run, on_lateness=admission.note_lateness)
         if not any(spec["role"] == "student" for _, spec in starts):
@@ -184,7 +186,7 @@ def _does_not_follow(scenario: Scenario, arena: ArenaSession, now_s: float) -> b
     """A node that sleeps by the wall's clock stays at its own rate, however fast `/clock` runs."""
     for topic in scenario.until.messages:
         seen = arena.live.topics[topic]
-        seen_s = now_s - seen.first_s
+        seen_s = now_s - seen.first_s - arena.live.lost_s
         if seen.count and seen_s > UNFOLLOWED_S:
             return seen.count / seen_s < UNFOLLOWED_HZ
     return False
@@ -193,12 +195,15 @@ def _does_not_follow(scenario: Scenario, arena: ArenaSession, now_s: float) -> b
 async def _look_at_connections(arena: ArenaSession) -> None:
     looks = arena.live.graphs
     arena.send(do="graph")
-    await arena.wait(lambda: arena.live.graphs > looks or not arena.live.running, 5.0)
+    await arena.wait(lambda: arena.live.graphs > looks or not arena.live.running, GRAPH_S)
     await arena.wait(lambda: not arena.live.running, GRAPH_EVERY_S)
 
 
-def process_specs(start: Start, place: Place) -> Iterator[Spec]:
-    """How `rosrun`, `roslaunch` or `rosparam` would start it; nothing for a file that is not in the package."""
+def process_specs(start: Start, place: ProcessEnvironment, numbers: Iterator[int]) -> Iterator[Spec]:
+    """Return how `rosrun`, `roslaunch` or `rosparam` would start it; nothing for a file that is not in the package.
+
+    `numbers` are those of the run's processes.
+    """
     if start.launch is not None:
         yield place.spec(start.name, ["roslaunch", place.package, start.launch, *start.args])
     elif start.load is not None:
@@ -211,17 +216,19 @@ def process_specs(start: Start, place: Place) -> Iterator[Spec]:
         yield replace(place, env={}).spec(start.name, argv, role="grader", copy=False)
     elif start.built:
         for program in sorted(place.built.compiled)[:BUILT_PROGRAMS_MAX]:
-            yield place.spec(f"{start.name}/{program}", [f"{place.devel_programs}/{program}", *start.args])
+            argv = [f"{place.devel_programs}/{program}", *start.args]
+            yield place.spec(f"{start.name}/{program}", argv, number=next(numbers))
     else:
-        yield from _script(start, place)
+        yield from _script(start, place, numbers)
 
 
-def _script(start: Start, place: Place) -> Iterator[Spec]:
+def _script(start: Start, place: ProcessEnvironment, numbers: Iterator[int]) -> Iterator[Spec]:
     found = place.find_program(start.script or "")
     if found is not None:
         program, path = found
         repairs = list(place.workspace.repairs.get(path, ()))
-        yield place.spec(start.name, [program, *start.args], script=path, repairs=repairs)
+        argv = [program, *start.args]
+        yield place.spec(start.name, argv, script=path, repairs=repairs, number=next(numbers))
 
 
 def set_params(params: tuple[Param, ...], arena: ArenaSession) -> None:
@@ -269,7 +276,7 @@ async def stop(starts: tuple[Start, ...], arena: ArenaSession, *, warped: bool) 
     if arena.live.running:
         looks = arena.live.graphs
         arena.send(do="graph")
-        await arena.wait(lambda: arena.live.graphs > looks, 2.0)
+        await arena.wait(lambda: arena.live.graphs > looks, GRAPH_S)
     launched = {start.name for start in starts if start.launch is not None}
     for names in (arena.live.running, arena.live.helpers):
         stops = [

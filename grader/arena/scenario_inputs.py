@@ -7,19 +7,24 @@ import math
 import random
 import string
 from collections.abc import Callable, Iterator, Mapping
-from itertools import pairwise, zip_longest
+from itertools import cycle, pairwise, zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
 
-from grader.arena.process_environment import Place
+from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.session import ArenaSession
 from grader.evidence.events import ActorEvent
 from grader.files import read_untrusted
 from grader.rubric.model import Call, Param, Probe, Scenario
 
-PROBE_LETTERS = 6
+PROBE_SHAPES = (
+    "aaaaaa aaaaaa", "aaaaa aaaaa 5555555.55", "aaaa, aaaaaaa, aaaa and aaa", "aaaaaaa: aaaaa, aaaaaaa: 5555",
+    "aaaaaaaaa aaaaaaa aaa aaaaaaaa aaaaaa aaaaa aaaaaaaa", "aaaaaaaaaaaa",
+)  # fmt: skip
+"""Long and short, with numbers as a lab's own texts, with commas and colons: a text that is cut anywhere is noticed. No
+number is one that a lab counts."""
 TEXTS_FOR_ONE_TWICE = 4
 PAUSE_BEFORE_SAME = 3
 RANGES = {
@@ -36,6 +41,8 @@ VALUES_MAX = 5_000
 DEPTH_MAX = 20
 ALIASES_MAX = 20
 WORD_LETTERS = 9
+LEAST_LETTERS = 5
+TEXT_CHARS_MAX = 2_000
 NOT_IN_FILE = "not in the file"
 OVER = TOO_LARGE, TOO_MUCH = "too large", "too much in it"
 """How the remark on a file ends that is more than is read."""
@@ -83,7 +90,7 @@ def _before(shot: Shot, following: Shot) -> Shot:
 
 
 def advertisement(probe: Probe) -> dict[str, Any]:
-    """The fields of the arena's command `advertise`."""
+    """Return the fields of the arena's command `advertise`."""
     from grader.evidence.decode import definition, md5sum  # noqa: PLC0415 - numpy, which not every run needs
 
     return {
@@ -96,7 +103,7 @@ def advertisement(probe: Probe) -> dict[str, Any]:
 
 
 def publication(shot: Shot) -> dict[str, Any]:
-    """The fields of the arena's command `publish`."""
+    """Return the fields of the arena's command `publish`."""
     from grader.evidence.decode import encode  # noqa: PLC0415 - as above
 
     record = {
@@ -111,13 +118,14 @@ def publication(shot: Shot) -> dict[str, Any]:
 
 
 def fields_of(value: object) -> Mapping[str, Any]:
-    """A message by its fields; a bare value is the field `data`."""
+    """Return a message by its fields; a bare value is the field `data`."""
     return value if isinstance(value, Mapping) else {"data": value}
 
 
 def _values(probe: Probe) -> Iterator[Any]:
     twice = probe.text >= TEXTS_FOR_ONE_TWICE
-    values: list[str | int] = [_two_words() for _ in range(probe.text - twice)]
+    shapes = cycle(_random.sample(PROBE_SHAPES, len(PROBE_SHAPES)))
+    values: list[str | int] = [_made_up_text(next(shapes)) for _ in range(probe.text - twice)]
     if probe.integers or probe.among:
         low, high = RANGES[probe.type]
         values += [*_integers(probe, low, high), *probe.among]
@@ -145,13 +153,6 @@ def _integers(probe: Probe, low: int, high: int) -> Iterator[int]:
             value = _random.randint(low, high)
         taken.add(value)
         yield value
-
-
-def _two_words() -> str:
-    """Two words of letters, large and small: never to be taken for a number of another probe."""
-    return " ".join(
-        "".join(_random.choice(string.ascii_letters) for _ in range(PROBE_LETTERS)) for _ in range(2)
-    )
 
 
 class Setting(NamedTuple):
@@ -182,7 +183,7 @@ def settings(
 
 
 def made_up(like: object) -> Any:  # noqa: ANN401 - of the type that it stands for
-    """Return a value of the same type that cannot be guessed; digits stay digits."""
+    """Return a value of the same type and shape that cannot be guessed."""
     if isinstance(like, bool) or like is None:
         return like
     if isinstance(like, int):
@@ -194,7 +195,24 @@ def made_up(like: object) -> Any:  # noqa: ANN401 - of the type that it stands f
     text = str(like)
     if text.strip().isdigit():
         return _digits(max(len(text), 5))
-    return "".join(_random.choice(string.ascii_letters) for _ in range(WORD_LETTERS))
+    return _made_up_text(text[:TEXT_CHARS_MAX])
+
+
+def _made_up_text(like: str) -> str:
+    """Return a text of the same shape, which a program may take apart in the same way: letters for letters, digits for
+    digits, and the rest as it is. One of few letters gets more of them."""
+    count = sum(c.isalnum() for c in like)
+    text = "".join(_like_letter(c) for c in like)
+    more = "".join(_like_letter("a") for _ in range(LEAST_LETTERS - count if count else WORD_LETTERS))
+    return text.rstrip() + more if more else text
+
+
+def _like_letter(letter: str) -> str:
+    if letter.isdigit():
+        return _random.choice("123456789")
+    if letter.isalpha():
+        return _random.choice(string.ascii_uppercase if letter.isupper() else string.ascii_lowercase)
+    return letter
 
 
 def _digits(count: int) -> str:
@@ -328,12 +346,12 @@ def _answer(call: Call, value: object, detail: str) -> ActorEvent:
     )
 
 
-def _messages(place: Place) -> Callable[[str], str | None]:
+def _messages(place: ProcessEnvironment) -> Callable[[str], str | None]:
     return lambda type_: _type_text(type_, "msg", place)
 
 
-def _type_text(type_: str, kind: str, place: Place) -> str | None:
-    """The text of `<package>/<kind>/<Name>.<kind>`: the student's own, ROS's, or a stand-in's."""
+def _type_text(type_: str, kind: str, place: ProcessEnvironment) -> str | None:
+    """Return the text of `<package>/<kind>/<Name>.<kind>`: the student's own, ROS's, or a stand-in's."""
     package, _, name = type_.partition("/")
     own = place.workspace.repaired / package
     for folder in (own, *(Path(p) / package for p in place.share_folders)):

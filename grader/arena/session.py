@@ -17,7 +17,7 @@ from typing_extensions import Self
 from grader.arena.admission import MEMINFO, read_numbers
 from grader.arena.arena_process import ArenaProcess
 from grader.arena.control_groups import remove_groups
-from grader.arena.process_environment import Place
+from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.run_state import RunState
 from grader.errors import ArenaError
@@ -56,7 +56,7 @@ class ArenaSession:
 
     def __init__(
         self,
-        place: Place,
+        place: ProcessEnvironment,
         writer: EvidenceWriter,
         *,
         master: bool = True,
@@ -114,7 +114,7 @@ class ArenaSession:
             raise ArenaError(f"the managed roscore did not start: {self._why()}", hint="grader doctor")
 
     def send(self, **command: Any) -> None:  # noqa: ANN401 - JSON
-        """Hand the arena one command (grader/arena/ros/__main__.py has a method for each)."""
+        """Send the arena one command (grader/arena/ros/__main__.py has a method for each)."""
         self._process.send(command)
 
     def start(self, spec: dict[str, Any]) -> None:
@@ -145,13 +145,14 @@ class ArenaSession:
         return self._answers.pop(number)
 
     async def wait(self, condition: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until the condition holds; False when it does not in time. Raises ArenaError if the arena dies."""
-        deadline = time.monotonic() + timeout_s
+        """Wait until the condition holds; False when it does not in time. Time that others took of a full machine does
+        not count. Raises ArenaError if the arena dies."""
+        deadline = time.monotonic() - self.live.lost_s + timeout_s
         while True:
             self._raise_failure()
             if condition():
                 return True
-            left = deadline - time.monotonic()
+            left = deadline - (time.monotonic() - self.live.lost_s)
             if left <= 0:
                 return False
             self._changed.clear()
@@ -183,7 +184,7 @@ class ArenaSession:
 
     def _config(self) -> dict[str, Any]:
         rosout = self._rosout_spec() if self._master else None
-        self.rosout_up = rosout is None  # then nobody need wait for it
+        self.rosout_up = rosout is None  # then no one need wait for it
         return {
             "master": self._master,
             "stage": self.place.stage(),
@@ -253,6 +254,7 @@ class ArenaSession:
             self._exited(record)
         elif topic == "/grader/host":
             self._on_lateness(record["p95_ms"])
+            self.live.machine(record["busy"], record["own_busy"], time.monotonic())
         elif topic == "/grader/param" and not is_grader_node(record["caller_id"]):
             self.live.active(time.monotonic())
         elif topic == "/grader/actor" and record["action"] == "limit":

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from typing_extensions import Self
 
 from grader import __version__
-from grader.arena.limits import Limits
+from grader.arena.limits import RunLimits
 from grader.arena.ros_env import RosInstallation, find_ros
 from grader.evidence.events import ActorEvent
 from grader.evidence.writer import EvidenceWriter
@@ -66,7 +66,7 @@ class Recording:
         self.student_cpu_s += cost.student_cpu_s
 
 
-def metadata(submission: Submission, recording: Recording, limits: Limits) -> dict[str, str]:
+def metadata(submission: Submission, recording: Recording, limits: RunLimits) -> dict[str, str]:
     """What every file of evidence says of where it comes from."""
     return {
         "submission.id": submission.id,
@@ -152,8 +152,8 @@ class StaticRecorder:
     def __exit__(self, *_: object) -> None:
         """Nothing was begun."""
 
-    def record_all(self, _meanwhile: Callable[[], None]) -> None:
-        """The package's files, and what was recorded before. There is no build to wait for meanwhile."""
+    def record_all(self, _import_later: Callable[[], None]) -> None:
+        """The package's files, and what was recorded before. There is no build to wait for."""
         copy_recorded(self._recorded, self.recording.folder, self._progress)
         self._write_package()
         for name in self._rubric.scenarios:
@@ -169,7 +169,7 @@ class StaticRecorder:
     def _write_package(self) -> None:
         recording = self.recording
         path = recording.folder / f"{PACKAGE}.mcap"
-        limits = Limits().shared_by(len(self._rubric.scenarios))
+        limits = RunLimits().shared_by(len(self._rubric.scenarios))
         about = {**metadata(self._submission, recording, limits), "not_run": self._reason}
         with EvidenceWriter(path, scenario=PACKAGE, clock="real", warp=1.0, metadata=about) as writer:
             write_files(writer, self._submission.package.folder, recording.facts)

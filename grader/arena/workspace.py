@@ -265,7 +265,7 @@ def read_folder(devel: Path, package: str) -> Built:
 
 
 def read_member(archive: Path, name: str, limit_bytes: int) -> bytes | None:
-    """The content of one regular file of the archive, cut at the limit, or None."""
+    """Return the content of one regular file of the archive, cut at the limit, or None."""
     for tar, member in _members(archive):
         if member.name == name and member.isreg():
             return _content(tar, member, limit_bytes)
@@ -273,7 +273,7 @@ def read_member(archive: Path, name: str, limit_bytes: int) -> bytes | None:
 
 
 def _content(tar: tarfile.TarFile, member: tarfile.TarInfo, limit_bytes: int) -> bytes | None:
-    """A member's bytes, cut at the limit; None where the archive ends before they do."""
+    """Return a member's bytes, cut at the limit; None where the archive ends before they do."""
     try:
         content = tar.extractfile(member)
         return None if content is None else content.read(limit_bytes)
@@ -292,7 +292,7 @@ def _members(
                     tell(_TOO_MANY)
                     return
                 yield tar, member
-                tar.members = []  # type: ignore[attr-defined] # nobody looks back
+                tar.members = []  # type: ignore[attr-defined] # no one looks back
     except _TooMuchError as error:
         tell(str(error))
     except _DAMAGED:

@@ -105,7 +105,7 @@ def probe_for(topic: str, kind: str) -> Probe | None:
 
 
 def only_runs(package: str, scenarios: Mapping[str, Scenario]) -> LoadedRubric:
-    """A rubric for recording."""
+    """Return a rubric for recording."""
     first = next(iter(scenarios), None)
     criterion = Criterion.model_validate(
         {"id": "recorded", "title": "Recorded", "points": 0, "check": "none", "scenario": first}
@@ -116,7 +116,7 @@ def only_runs(package: str, scenarios: Mapping[str, Scenario]) -> LoadedRubric:
 
 
 def _is_node(path: Path) -> bool:
-    """Whether the file calls `init_node`; it is read, not run."""
+    """Return whether the file calls `init_node`; it is read, not run."""
     if path.stat().st_size > SOURCE_BYTES_MAX:
         return False
     try:
@@ -128,7 +128,7 @@ def _is_node(path: Path) -> bool:
 
 
 def _holds_parameters(path: str) -> bool:
-    """By its folder: other YAML files are somebody else's, a CI's for instance."""
+    """By its folder: other YAML files are someone else's, a CI's for instance."""
     return {"config", "cfg", "param", "params", "yaml"} & set(PurePosixPath(path).parts[:-1]) != set()
 
 

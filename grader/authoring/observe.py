@@ -115,7 +115,7 @@ def _topic(channel: Channel) -> Topic:
 
 
 def nice_rate(times_ns: Sequence[int]) -> float | None:
-    """The rate in Hz as an author would write it; None for what is not periodic."""
+    """Return the rate in Hz as an author would write it; None for what is not periodic."""
     stats = rate_stats(times_ns)
     if stats.mean_hz is None or stats.count < MESSAGES_MIN:
         return None

@@ -135,7 +135,7 @@ class Proposal(Sheet):
             self.add(f"{name}-reads", f"{file} shows the parameters", "params-read", names, **needs)
 
     def _with_params(self, scenario: Entry) -> Entry:
-        """The scenario, with the package's own parameters set before it starts."""
+        """Return the scenario, with the package's own parameters set before it starts."""
         params = {"params": [{"file": path} for path in self._parts.configs]} if self._parts.configs else {}
         return {"title": scenario["title"], **params, **scenario}
 

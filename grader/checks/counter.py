@@ -141,7 +141,7 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
 
     Why it matters on a robot
         A number in a message has a fixed width. A program that counts past it dies, or goes on with a wrong
-        number, after the minutes or hours in which nobody tested it.
+        number, after the minutes or hours in which no one tested it.
 
     How it is measured
         The clock is run faster, so that a node with `rospy.Rate` comes around twice in seconds; one with
@@ -217,7 +217,9 @@ def _wrong(count: Count, found: Wrong, params: StepParams) -> Verdict | None:
 
 def _flooded(skips: int, params: StepParams) -> Verdict:
     message = f"{params.topic} is flooded, so its publisher drops most values: {plural(skips, 'skip')}"
-    return unjudged(message, hint="first make the loop sleep, then look at the counter again")
+    return unjudged(
+        message, hint=f"first publish at {significant(params.rate_hz)} Hz, then look at the counter again"
+    )
 
 
 def _usual_fault(usual: float) -> str:

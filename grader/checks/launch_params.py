@@ -28,6 +28,7 @@ from grader.checks.support.parameters import (
     absolute_name,
     describe_missing,
     is_printed,
+    name_in_its_place,
     params_on_server,
     without_system_params,
 )
@@ -63,7 +64,7 @@ def launch_loads(package: PackageFacts, run: Run, params: LaunchLoadsParams) -> 
         before it starts the node, and that the node runs.
 
     Why it matters on a robot
-        Nobody types `rosparam load` on a robot. A node that starts without its parameters runs with wrong
+        No one types `rosparam load` on a robot. A node that starts without its parameters runs with wrong
         ones, or dies.
 
     How it is measured
@@ -100,7 +101,9 @@ def _judged(package: PackageFacts, file: LaunchFile, run: Run, params: LaunchLoa
     start_ns = min((t for t, event in run.graph if set(up) & set(event.nodes)), default=run.end_ns)
     before = params_on_server(run, until_ns=start_ns, by=lambda caller: caller not in up)
     missing = [name for name in map(absolute_name, params.names) if name not in before]
-    if missing and not _read_where_loaded(file, run, params, before):
+    if missing and not (
+        _read_where_loaded(file, run, params, before) or _read_by_other_names(run, params, before)
+    ):
         return _not_loaded(package, file, run, params, missing)
     if not (
         any(_is_of(load, params) for load in file.loads)
@@ -122,6 +125,14 @@ def _read_where_loaded(
         for load in file.loads
         if _is_of(load, params)
     )
+
+
+def _read_by_other_names(run: Run, params: LaunchLoadsParams, before: Mapping[str, Any]) -> bool:
+    """The file has other names, and the node reads these: it prints all of their values."""
+    lines = [line for line in printed_lines(run) if not SUMMARY.match(line.text)]
+    names = [absolute_name(name) for name in params.names]
+    there = [name if name in before else name_in_its_place(name, before, names) for name in names]
+    return all(name is not None and is_printed(before[name], lines) for name in there)
 
 
 def _moved(load: LaunchLoad, params: LaunchLoadsParams) -> list[str]:

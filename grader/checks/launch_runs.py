@@ -182,7 +182,7 @@ def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Ve
 
     Why it matters on a robot
         The launch file's names are those that all other tools and files go by. A node that comes up under
-        another one, or in another namespace, is there and talks to nobody.
+        another one, or in another namespace, is there and talks to no one.
 
     How it is measured
         `roslaunch` runs the file; names come from the master, connections from both nodes and the kernel.

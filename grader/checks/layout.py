@@ -48,7 +48,7 @@ def layout(package: PackageFacts, params: LayoutParams) -> Verdict:
         names, and that each script lies in the folder where the handout puts it, or below that.
 
     Why it matters on a robot
-        People and programs find things in a package by the customs of its folders; whoever repairs the
+        People and programs find things in a package by the customs of its folders; anyone who repairs the
         robot at night does not want to search.
 
     How it is measured

@@ -22,13 +22,15 @@ from grader.checks.support.topics import cite, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, partial, passed, unjudged
 from grader.wording import join_words, plural, significant
 
 HAND_IN = "add the script to the package, and push it"
 CALLBACK_HINT = (
     "print data.data in the callback, without a condition and nothing slow beside it; end with rospy.spin()"
 )
+OTHER_WORDS_SHARE = 0.5
+"""Of the points, for a message that is printed, but not in the handout's words."""
 
 
 class HearsParams(Record):
@@ -57,7 +59,8 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
         The grader publishes messages that it makes up for this run, one text twice running. Each has to be
         on stdout, on stderr or on /rosout, at its time or later. Other words on the line do not matter; a
         number has to stand for itself (`12` is not in `127`). Where the lab gives the line's own words (`I
-        heard …`), they have to stand before the message, in capitals or not.
+        heard …`), they have to stand before the message, in capitals or not; a message that is printed with other words
+        earns half of its share.
 
     How to fix
         Subscribe with `rospy.Subscriber('<topic>', <Type>, callback)`, print `data.data` in the callback
@@ -73,7 +76,7 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
     places = places_of(run, probes, lines, params.template)
     missing = [] if places is None else [p for p, found in zip(probes, places, strict=True) if not found]
     if places is None:
-        message = "it prints so many numbers that nobody can tell which of them it heard"
+        message = "it prints so many numbers that it cannot be told which of them it heard"
         verdict = failed(message, hint="print each number once, in the callback")
     elif missing:
         verdict = _other_words(probes, missing, lines, params) or not_printed(
@@ -96,7 +99,8 @@ def hears(package: PackageFacts, run: Run, params: HearsParams) -> Verdict:
 def _other_words(
     probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line], params: HearsParams
 ) -> Verdict | None:
-    """All that is missing is printed, with other words around it; None where something is not there at all."""
+    """All that is missing is printed, with other words around it: half of its points. None where something is not
+    there at all."""
     if params.template == VALUE or not all(text_places(missing, lines, VALUE)):
         return None
     said = [line.text for line in lines if _squeezed(missing[0].value) in _squeezed(line.text)]
@@ -105,11 +109,12 @@ def _other_words(
     message = f"{_how_many(missing, probes)} printed, but not as '{wanted}'{seen}"
     blank = params.template.removesuffix(VALUE).endswith(" ")
     glued = params.template.replace(f" {VALUE}", VALUE)
+    hint = f"print '{wanted}', with the handout's own words"
     if any(f'data: "{missing[0].value}"' in line for line in said):
-        return failed(message, hint="print data.data, which is the text: data is the whole message around it")
-    if blank and said and all(text_places(missing, lines, glued)):
-        return failed(message, hint=f"put a space between the words and the message: '{wanted}'")
-    return failed(message, hint=f"print '{wanted}', with the handout's own words")
+        hint = "print data.data, which is the text: data is the whole message around it"
+    elif blank and said and all(text_places(missing, lines, glued)):
+        hint = f"put a space between the words and the message: '{wanted}'"
+    return partial(1 - (1 - OTHER_WORDS_SHARE) * len(missing) / len(probes), message, hint=hint)
 
 
 def _how_many(missing: Sequence[Probe], probes: Sequence[Probe]) -> str:
@@ -170,7 +175,8 @@ def _types_differ(run: Run, topic: str) -> Verdict | None:
     if asked is None:
         return None
     message = f"{asked.actor} subscribes to {topic} with {asked.type}, so that nothing arrives"
-    return failed(message, hint=f"give rospy.Subscriber('{topic}', …) the type that the publisher uses")
+    wanted = f"{asked.value}, the type" if isinstance(asked.value, str) else "the type"
+    return failed(message, hint=f"give rospy.Subscriber('{topic}', …) {wanted} that the handout asks for")
 
 
 def _some_numbers(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequence[Line]) -> Verdict | None:

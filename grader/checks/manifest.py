@@ -11,6 +11,7 @@ from grader.wording import join_words
 
 RUNTIME_KINDS = ("depend", "exec_depend", "run_depend")
 BUILD_TOOL_KINDS = ("buildtool_depend", "build_depend", "depend")
+PLACES_SHOWN = 6
 LEFT_AS_MADE = "@todo.todo"
 
 
@@ -62,7 +63,7 @@ def _judged(package: PackageFacts, params: ManifestParams) -> Verdict:
     if found.name != params.name:
         slip = " (a slip of the name)" if near_names(params.name, [found.name]) else ""
         message = f"{found.file} names the package {found.name!r}, the handout calls it {params.name!r}{slip}"
-        hint = "; ".join([f"write <name>{params.name}</name> in {found.file}", *package.general_hints()])
+        hint = "; ".join([_rename(package, found, params.name), *package.general_hints()])
         return failed(message, measured=f"name {found.name}", hint=hint, citations=place)
     if not _builds_with_catkin(found):
         measured = f"build tool {found.build_type or 'none'}, no dependency on catkin"
@@ -113,7 +114,7 @@ def maintainer(package: PackageFacts) -> Verdict:
         which ends in `@todo.todo`.
 
     Why it matters on a robot
-        When a package breaks on somebody else's robot, the maintainer's address is whom they ask.
+        When a package breaks on someone else's robot, the maintainer's address is whom they ask.
 
     How it is measured
         By the `email` attribute of each `<maintainer>`. Any other address will do: it is not written to.
@@ -141,6 +142,20 @@ def maintainer(package: PackageFacts) -> Verdict:
     else:
         verdict = passed(f"the maintainer is {measured}")
     return verdict.about(expected=expected, measured=measured, citations=cited)
+
+
+def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
+    """Return where to write the right name: all the places where the wrong one stands, as they have to agree."""
+    calls = package.cmake.calls if package.cmake else ()
+    places = [f"<name>{name}</name> in {found.file}"]
+    places += [
+        f"project({name}) in {c.file}, line {c.line}"
+        for c in calls
+        if c.name == "project" and c.args[:1] == (found.name,)
+    ]
+    nodes = [node for file in package.launch_files for node in file.nodes if node.pkg == found.name]
+    places += dict.fromkeys(f'pkg="{name}" in {node.file}, line {node.line}' for node in nodes)
+    return f"write {join_words(places[:PLACES_SHOWN])}" + (" and so on" if places[PLACES_SHOWN:] else "")
 
 
 def _declared(found: Manifest) -> str:

@@ -31,7 +31,7 @@ from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import join_words, plural, seconds
 
-LOOP = "loop with `while not rospy.is_shutdown():` and catch rospy.ROSInterruptException as talker.py does"
+LOOP = "loop with `while not rospy.is_shutdown():` and catch rospy.ROSInterruptException around it"
 
 
 class NodeLivesParams(Record):
@@ -76,7 +76,7 @@ def node_lives(package: PackageFacts, run: Run, params: NodeLivesParams) -> Verd
 
     How to fix
         Call `rospy.init_node(…)` once. Loop with `while not rospy.is_shutdown():`, sleep with `rospy.Rate`,
-        and catch `rospy.ROSInterruptException` around the call of your main function, as talker.py does.
+        and catch `rospy.ROSInterruptException` around the call of your main function.
     """
     named = f", named {wanted_names(params.names, params.anonymous)}" if params.names else ""
     expected = f"one node{named}, alive {params.min_s:g} s and more after its first message, ending on Ctrl-C"

@@ -11,24 +11,37 @@ from grader.checks.registry import check
 from grader.checks.support.console_output import printed_lines
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.parameters import (
+    Key,
     absolute_name,
     describe_missing,
     explain_failure,
     explain_yaml,
     is_printed,
+    name_in_its_place,
     params_given,
     params_on_server,
     without_system_params,
+    yaml_keys,
 )
 from grader.checks.support.processes import Life, first_interrupt_ns, life, lives, not_started
 from grader.checks.support.scripts import add_hint, find_script, paths_by_name
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite, no_node
 from grader.checks.support.values import differences, value_text
+from grader.evidence.events import ParamEvent
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Citation, FileCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import (
+    Citation,
+    FileCitation,
+    Verdict,
+    failed,
+    inconclusive,
+    partial,
+    passed,
+    unjudged,
+)
 from grader.wording import join_words, plural
 
 EXACT = 1e-9
@@ -44,7 +57,7 @@ class ParamsLoadedParams(Record):
 
 
 @check("params-loaded", params=ParamsLoadedParams)
-def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -> Verdict:
+def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoadedParams) -> Verdict:
     """The parameter file loads, and holds what the lab asks for.
 
     What it checks
@@ -53,7 +66,7 @@ def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -
 
     Why it matters on a robot
         What differs from robot to robot is kept in such files. A file that does not load stops the robot as it
-        starts, and a value under another name is one that nobody reads.
+        starts, and a value under another name is one that no one reads.
 
     How it is measured
         `rosparam load` loads the file as it was handed in; what it sets is compared by name. Values are free.
@@ -76,7 +89,7 @@ def params_loaded(package: PackageFacts, run: Run, params: ParamsLoadedParams) -
         moved = f"the handout puts it at {params.file}; move it there" if source.path != params.file else ""
         verdict = (
             _error(run, one, source.path)
-            or (_missing(found, missing, source.path) if missing else None)
+            or (_missing(found, missing, source.path, _keys_of(build, source.path)) if missing else None)
             or passed(f"{source.path} loads and sets {join_words(wanted)}", hint=moved)
         )
     measured = f"on the server: {join_words(found)}" if found else "nothing on the server"
@@ -89,8 +102,9 @@ def _no_file(package: PackageFacts, path: str) -> Verdict:
     name = PurePosixPath(path).name
     names = paths_by_name(package)
     yaml = [p for n, p in names.items() if n.endswith((".yaml", ".yml"))]
-    near = [names[n] for n in near_names(name, names)] or yaml
-    seen = f"; there is {join_words(near)}" if near else ""
+    near = [names[n] for n in near_names(name, names)]
+    there = near or yaml
+    seen = f"; there is {join_words(there)}" if there else ""
     hint = f"git mv {near[0]} {path}" if near else add_hint(path)
     return failed(f"{path} is not in the package{seen}", hint=hint)
 
@@ -110,10 +124,16 @@ def _error(run: Run, one: Life, path: str) -> Verdict | None:
     return failed(f"{path} does not load{said}", hint=hint)
 
 
-def _missing(found: dict[str, object], missing: list[str], path: str) -> Verdict:
+def _keys_of(build: Run, path: str) -> tuple[Key, ...]:
+    return yaml_keys(_text_of(build, path))
+
+
+def _missing(found: dict[str, object], missing: list[str], path: str, keys: tuple[Key, ...]) -> Verdict:
     if not found:
         return failed(f"{path} sets nothing at all", hint="write `details:` and its values below it")
     name = missing[0]
+    if twice := _given_twice(name, path, keys):
+        return twice
     if name in found:
         return failed(f"{name} has no value", hint=f"write a value after `{name.rpartition('/')[2]}:`")
     if slip := _in_its_place(found, name, path):
@@ -121,9 +141,38 @@ def _missing(found: dict[str, object], missing: list[str], path: str) -> Verdict
     more = f", and {len(missing) - 1} more names are missing" if len(missing) > 1 else ""
     above, _, last = name.rpartition("/")
     shallow = f"{above.rpartition('/')[0]}/{last}"
-    moved = f"indent {last} by two spaces more, so that it is below {above.rpartition('/')[2]}"
+    moved = _column(name, shallow, keys)
     hint = moved if shallow in found else f"write it so that rosparam list shows {name}, letter by letter"
     return failed(f"{path} loads, but {describe_missing(found, name)}{more}", hint=hint)
+
+
+def _given_twice(name: str, path: str, keys: tuple[Key, ...]) -> Verdict | None:
+    """A map that is begun a second time: YAML keeps only the last."""
+    lines: dict[str, list[int]] = {}
+    for key in keys:
+        lines.setdefault(key.path, []).append(key.line)
+    above = next((k for k, at in lines.items() if len(at) > 1 and f"{name}/".startswith(f"{k}/")), None)
+    if above is None:
+        return None
+    first, *_, second = lines[above]
+    last = above.rpartition("/")[2]
+    where = f"in line {first} and again in line {second}"
+    message = f"{path} has `{last}:` {where}, and only the last one counts: there is no {name}"
+    hint = f"delete line {second}, and put what stands below it under the `{last}:` of line {first}"
+    return failed(message, hint=hint, citations=(FileCitation(file=path, line=second),))
+
+
+def _column(name: str, shallow: str, keys: tuple[Key, ...]) -> str:
+    """How far to indent a name that stands one level too high: as far as its neighbours are."""
+    above, _, last = name.rpartition("/")
+    beside = next((key for key in keys if key.path.rpartition("/")[0] == above), None)
+    own = next((key for key in keys if key.path == shallow), None)
+    parent = above.rpartition("/")[2]
+    if beside is None:
+        return f"indent {last} by two spaces more than {parent}, below it"
+    where = f"in line {own.line} " if own else ""
+    neighbour = f"{beside.path.rpartition('/')[2]} in line {beside.line}"
+    return f"indent {last} {where}by {plural(beside.indent, 'space')}, as {neighbour}, so that it is below {parent}"
 
 
 def _in_its_place(found: dict[str, object], name: str, path: str) -> Verdict | None:
@@ -164,7 +213,9 @@ def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadP
 
     How it is measured
         The parameters have values that the grader makes up for this run. Each has to be on stdout, on stderr or
-        on /rosout; a number has to stand for itself (`12` is not in `127`).
+        on /rosout; a number has to stand for itself (`12` is not in `127`). Each value earns its
+        share. Where the student's file has another name in a parameter's place (`First` for `first`), which is judged
+        elsewhere, the value of that one will do.
 
     How to fix
         `rospy.get_param('/details/name/first')`, or `rospy.get_param('details')` for a map of them all, then
@@ -172,7 +223,16 @@ def params_read(package: PackageFacts, build: Run, run: Run, params: ParamsReadP
     """
     known = params_given(run)
     lines = printed_lines(run)
-    missing = [n for n in params.names if n not in known or not is_printed(known[n].value, lines)]
+    in_file = [name for name, one in known.items() if one.in_file]
+    missing = [
+        n
+        for n in params.names
+        if not any(
+            name in known and is_printed(known[name].value, lines)
+            for name in (n, name_in_its_place(n, in_file, params.names) if n not in in_file else None)
+            if name is not None
+        )
+    ]
     expected = f"the values of {join_words(params.names)} on the server are printed"
     verdict = (
         _not_printed(package, build, run, params, missing)
@@ -205,20 +265,32 @@ def _not_printed(
     if (hard := next(copied, None)) is not None:
         message = f"{hard} is printed as {params.file} has it, not as the parameter server has it"
         hint = f"read it with rospy.get_param('{hard}'), and not from the file or the script"
-        return failed(message, hint=hint)
+        return _share_printed(params, missing, message, hint)
     texts = [line.text.strip() for line in lines if line.text.strip()]
     seen = f"; it prints {shown(texts[-1])!r}" if texts else "; it prints nothing at all"
     message = f"{names} {_are(missing)} not printed with the values on the server{seen}"
-    return failed(message, hint=f"rospy.loginfo(rospy.get_param('{missing[0]}'))")
+    return _share_printed(params, missing, message, f"rospy.loginfo(rospy.get_param('{missing[0]}'))")
+
+
+def _share_printed(params: ParamsReadParams, missing: Sequence[str], message: str, hint: str) -> Verdict:
+    """Return what is earned by those that are printed."""
+    printed = len(params.names) - len(missing)
+    if not printed:
+        return failed(message, hint=hint)
+    return partial(printed / len(params.names), f"{message}; {printed} of {len(params.names)} are", hint=hint)
 
 
 def _in_file(build: Run, file: str, name: str) -> list[str]:
     """Return what stands behind the name's last part in the file as handed in."""
+    last = re.escape(name.rpartition("/")[2])
+    found = re.findall(rf"(?m)^\s*{last}\s*:\s*(.*?)\s*(?:\s#.*)?$", _text_of(build, file))
+    return [value.strip("'\"") for value in found if value.strip("'\"")]
+
+
+def _text_of(build: Run, file: str) -> str:
     base = PurePosixPath(file).name
     data = next((d for path, d in build.attachments.items() if PurePosixPath(path).name == base), b"")
-    last = re.escape(name.rpartition("/")[2])
-    found = re.findall(rf"(?m)^\s*{last}\s*:\s*(.*?)\s*(?:\s#.*)?$", data.decode("utf-8", "replace"))
-    return [value.strip("'\"") for value in found if value.strip("'\"")]
+    return data.decode("utf-8", "replace")
 
 
 def _are(names: Sequence[str]) -> str:
@@ -286,8 +358,7 @@ def _not_set(
     last = next((e for e in reversed(mine) if absolute_name(e.name) == params.name), None)
     hint = f"write rospy.set_param('{params.name}', {params.value!r})"
     if last is not None and params.name in after:
-        message = f"{params.name} is set to {shown(str(after[params.name]))}, not to {params.value}"
-        return failed(message, hint=hint)
+        return _set_to_another(mine, after[params.name], params)
     if params.name not in after and params.name in params_given(run):
         cause = _taken_away(run, params.name)
         return failed(f"{params.name} is no longer on the server{cause}", hint=hint)
@@ -299,6 +370,15 @@ def _not_set(
     others = dict.fromkeys(absolute_name(e.name) for e in mine)
     instead = f"; the node sets {join_words(others)}" if others else ""
     return failed(f"{params.name} is never set to {params.value}{instead}", hint=hint)
+
+
+def _set_to_another(mine: Sequence[ParamEvent], got: object, params: ParamsSetParams) -> Verdict:
+    now = shown(str(got))
+    if any(absolute_name(e.name) == params.name and _is_value(e.value, params.value) for e in mine):
+        message = f"{params.name} is set to {params.value}, and to {now} after that"
+        return failed(message, hint=f"take out the later line that sets {params.name} to {now}")
+    hint = f"write rospy.set_param('{params.name}', {params.value!r})"
+    return failed(f"{params.name} is set to {now}, not to {params.value}", hint=hint)
 
 
 def _clobbered(run: Run, after: dict[str, Any], params: ParamsSetParams) -> Verdict | None:

@@ -94,7 +94,7 @@ def check(
     heeds_losses: bool = False,
     run_anyway: bool = False,
 ) -> Callable[[Callable[..., Verdict]], Callable[..., Verdict]]:
-    """Register a function under a name. Raises ValueError for a name that is taken or a fact that nobody has."""
+    """Register a function under a name. Raises ValueError for a name that is taken or a fact that no one has."""
 
     def register(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
         own = _COLLECTION.get()

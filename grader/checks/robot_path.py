@@ -33,6 +33,7 @@ from grader.wording import join_words, significant
 
 LATE_MS = 25.0
 LATE_P95_MS = 5.0
+LATE_TURNS = 4
 """Each turn may be late: at 1.6 rad/s, 25 ms in each of four are 0.16 rad, and 0.3 m beside a line of 2 m."""
 ORIGIN = (0.0, 0.0)
 
@@ -128,10 +129,16 @@ def _judged(found: Track, run: Run, params: PathParams) -> Verdict:
         return unjudged("it never moves", measured=figures, hint=hint)
     words = what_is_wrong(taken, params.way, course, mirror=params.relative)
     verdict = failed(words.message, hint=words.hint, measured=figures)
-    if not followed(taken, params.way.points, 2 * params.tolerance_m).done:
+    nearly = followed(taken, params.way.points, 2 * params.tolerance_m)
+    if not nearly.done and not _strays_late(nearly, params.way):
         return verdict
     # a robot that only just strays may have strayed with a machine that was late itself
     return excused(verdict, run, run.start_ns, run.end_ns, _why_late)
+
+
+def _strays_late(course: Course, way: Way) -> bool:
+    """Behind turns enough for what each was late to add up."""
+    return course.strayed is not None and LATE_TURNS < course.reached < len(way.points)
 
 
 def _why_late(late: Lateness) -> str:

@@ -163,7 +163,7 @@ def _uncalled(
 
 
 def _not_there(package: PackageFacts, run: Run, params: ServiceAnswersParams) -> Verdict:
-    """What a service that is not there would answer, nobody knows: its own criterion says why it is not."""
+    """What a service that is not there would answer, no one knows: its own criterion says why it is not."""
     return not_offered(package, run, params.service).model_copy(update={"unjudged": True})
 
 
@@ -178,7 +178,7 @@ def _citation(one: Exchange | None, run: Run) -> EvidenceCitation:
 
 
 class Offer(NamedTuple):
-    """Who offers a service, and what it says of its type: empty where nobody could ask it."""
+    """Who offers a service, and what it says of its type: empty where no one could ask it."""
 
     node: str
     type: str

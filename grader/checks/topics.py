@@ -98,7 +98,7 @@ def only_topics(package: PackageFacts, run: Run, params: OnlyTopicsParams) -> Ve
         That the package's nodes publish on the topics of the handout and on no other one.
 
     Why it matters on a robot
-        A topic that nobody expects meets one of the same name sooner or later, and then two nodes drive the
+        A topic that no one expects meets one of the same name sooner or later, and then two nodes drive the
         same wheels.
 
     How it is measured

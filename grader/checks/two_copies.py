@@ -99,7 +99,7 @@ def _trio(package: PackageFacts, run: Run, params: CopiesParams) -> Trio | Verdi
         started = join_words(one.name for one in lives(run)) or "nothing"
         return _not_started(package, run, params).about(measured=f"started: {started}")
     if listener is None:
-        message = f"{params.listener} was not started, so nobody can tell whose messages arrive"
+        message = f"{params.listener} was not started, so it cannot be told whose messages arrive"
         return unjudged(message, measured="no listener", hint="add the listener's script, and push it")
     return Trio(first, second, listener, run.student_nodes(first.name), run.student_nodes(second.name))
 

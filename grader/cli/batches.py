@@ -88,6 +88,12 @@ def allowed_folders(folders: Sequence[Path], *, remote_only: bool) -> Local:
     return Local(folders=tuple(folder.absolute() for folder in folders), remote_only=remote_only)
 
 
+def with_package(roster: Roster, package: str) -> Roster:
+    """Return the roster with `package` in every row that names none."""
+    entries = (e if e.package else e.model_copy(update={"package": package}) for e in roster.entries)
+    return roster.model_copy(update={"entries": tuple(entries)})
+
+
 def executor(options: BatchOptions, exchange: str | None) -> Executor:
     """Return the processes of this machine, or the cluster. Raises UsageError."""
     if not options.cluster:

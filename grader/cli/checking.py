@@ -28,7 +28,7 @@ from grader.errors import ExitCode, UsageError
 from grader.files import check_writable, temporary_folder
 from grader.intake import safe_name
 from grader.model.progress import Progress, Silence
-from grader.model.result import GradingResult, Point, Standing
+from grader.model.result import GitStatus, GradingResult, Point
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
 from grader.report.view import hidden_ids, without_hidden
@@ -112,7 +112,7 @@ def check_package(chosen: Chosen, check: Check) -> ExitCode:
             result = pipeline.grade(source, chosen.rubric, folder, options, progress)
         shown = without_hidden(result, rubric)
         kept = folder / result.submission.id if check.out is not None else None
-        found = inquiry.result() if inquiry is not None else Standing()
+        found = inquiry.result() if inquiry is not None else GitStatus()
         if check.as_json:
             shown = shown.model_copy(update={"standing": found})
         hidden = len(hidden_ids(rubric))
@@ -166,11 +166,11 @@ class GitInquiry:
     def __init__(self, package: Path, base: Path) -> None:
         self._package, self._base = package, base
         self._environment = read_environment(os.environ, Path.cwd())
-        self._found = Standing()
+        self._found = GitStatus()
         self._thread = threading.Thread(target=self._ask, daemon=True)
         self._thread.start()
 
-    def result(self) -> Standing:
+    def result(self) -> GitStatus:
         """Return what git said; nothing if it does not answer in time."""
         self._thread.join(GIT_TIMEOUT_S)
         return self._found
@@ -179,7 +179,7 @@ class GitInquiry:
         self._found = advise(self._package, self._base, self._environment)
 
 
-def _print_git_status(found: Standing, check: Check) -> None:
+def _print_git_status(found: GitStatus, check: Check) -> None:
     """Print what git said below the report; to stderr if stdout is for a program."""
     if check.as_json:
         for point in found.points:
@@ -188,15 +188,15 @@ def _print_git_status(found: Standing, check: Check) -> None:
     points = tuple(point for point in found.points if point.text not in check.told)
     summary = found.summary if found.summary not in check.told else ""
     check.told.update({found.summary, *(point.text for point in points)})
-    print_standing(Standing(points=points, summary=summary), open_console(sys.stdout))
+    print_git_points(GitStatus(points=points, summary=summary), open_console(sys.stdout))
 
 
-def print_standing(found: Standing, console: Console) -> None:
+def print_git_points(found: GitStatus, console: Console) -> None:
     """Print how the package differs from what is pushed."""
     emit(console, _parts(found, console.encoding))
 
 
-def _parts(found: Standing, encoding: str) -> Iterator[RenderableType]:
+def _parts(found: GitStatus, encoding: str) -> Iterator[RenderableType]:
     if found.summary:
         yield Text(f"\n{_fitted(found.summary, encoding)}", "dim")
     differing = [point for point in found.points if not point.remark]
@@ -210,7 +210,7 @@ def _parts(found: Standing, encoding: str) -> Iterator[RenderableType]:
 
 def _point(point: Point, encoding: str) -> Iterator[RenderableType]:
     yield Padding(Text(_fitted(point.text, encoding)), (0, 0, 0, 2))
-    for command in filter(None, point.mend.split(" && ")):
+    for command in filter(None, point.fix.split(" && ")):
         yield Padding(Text(_fitted(command, encoding), "bold"), (0, 0, 0, 6))
 
 

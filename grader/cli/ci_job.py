@@ -80,7 +80,7 @@ def _graded(settings: Settings) -> Graded:
         warn_without_sandbox(settings.sandbox, rubric)
     clear(settings.out)
     options = pipeline.GradeOptions(
-        sandbox=settings.sandbox, submission_id=None, static_only=settings.static, keep_hidden=False
+        sandbox=settings.sandbox, package=settings.package, static_only=settings.static, keep_hidden=False
     )
     with temporary_folder("check") as folder:
         try:
@@ -99,7 +99,7 @@ def _graded(settings: Settings) -> Graded:
 
 def _chosen(settings: Settings) -> Chosen:
     try:
-        return only(choose_all(settings.path, settings.lab))
+        return only(choose_all(settings.path, settings.lab, settings.package))
     except RubricError:
         raise
     except UsageError as error:  # its hint is for people at a terminal

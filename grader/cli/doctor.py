@@ -73,29 +73,29 @@ def _programs() -> Iterator[Row]:
         if path:
             yield Row(name=name, state="ok", detail=path)
         else:
-            yield Row(name=name, state="missing", detail="not found", mend=f"apt-get install {package}")
+            yield Row(name=name, state="missing", detail="not found", fix=f"apt-get install {package}")
 
 
 def _git() -> Row:
     path = shutil.which("git")
-    mend = "" if path else "https://git-scm.com/downloads"
-    return Row(name="git", state="ok" if path else "limited", detail=path or "not found", mend=mend)
+    fix = "" if path else "https://git-scm.com/downloads"
+    return Row(name="git", state="ok" if path else "limited", detail=path or "not found", fix=fix)
 
 
 def _ros() -> Iterator[Row]:
     try:
         ros = find_ros()
     except RosMissing as error:
-        yield Row(name="ROS 1", state="missing", detail=error.message, mend=error.hint)
+        yield Row(name="ROS 1", state="missing", detail=error.message, fix=error.hint)
         return
     if ros is None:
-        yield Row(name="ROS 1", state="missing", detail="not found", mend=INSTALL_HINT)
+        yield Row(name="ROS 1", state="missing", detail="not found", fix=INSTALL_HINT)
         return
     yield Row(name="ROS 1", state="ok", detail=ros.label)
     for program in ROS_PROGRAMS:
         path = ros.program(program)
-        mend = "" if path else INSTALL_HINT
-        yield Row(name=program, state="ok" if path else "missing", detail=path or "not found", mend=mend)
+        fix = "" if path else INSTALL_HINT
+        yield Row(name=program, state="ok" if path else "missing", detail=path or "not found", fix=fix)
     yield from _modules(ros)
     yield _standins(ros)
 
@@ -115,14 +115,14 @@ def _modules(ros: RosInstallation) -> Iterator[Row]:
             timeout=20,
         )
     except (OSError, subprocess.SubprocessError) as error:
-        yield Row(name="ROS's Python", state="missing", detail=f"{ros.python}: {error}", mend=INSTALL_HINT)
+        yield Row(name="ROS's Python", state="missing", detail=f"{ros.python}: {error}", fix=INSTALL_HINT)
         return
     missing = done.stdout.split()
     yield Row(name="ROS's Python", state="ok", detail=ros.python)
     for module, package in ROS_MODULES.items():
         if module in missing:
-            mend = f"apt-get install {package}" if ros.kind == "debian" else INSTALL_HINT
-            yield Row(name=module, state="missing", detail=f"{ros.python} cannot import it", mend=mend)
+            fix = f"apt-get install {package}" if ros.kind == "debian" else INSTALL_HINT
+            yield Row(name=module, state="missing", detail=f"{ros.python} cannot import it", fix=fix)
         else:
             yield Row(name=module, state="ok", detail="found")
 
@@ -140,7 +140,7 @@ def _search_paths() -> Row:
         return Row(name="search paths", state="ok", detail="every entry is an absolute path")
     detail = f"{', '.join(odd)}: an entry means the current folder, so programs load files from there"
     fix = "write ${NAME:+$NAME:} before what you add, without an empty entry"
-    return Row(name="search paths", state="limited", detail=detail, mend=fix)
+    return Row(name="search paths", state="limited", detail=detail, fix=fix)
 
 
 def _user() -> Row:
@@ -192,8 +192,8 @@ def _hostname() -> Row:
         found = False
     if found:
         return Row(name="host name", state="ok", detail=f"{name} resolves")
-    mend = f"echo '127.0.1.1 {name}' >> /etc/hosts"
-    return Row(name="host name", state="limited", detail=f"{name} does not resolve", mend=mend)
+    fix = f"echo '127.0.1.1 {name}' >> /etc/hosts"
+    return Row(name="host name", state="limited", detail=f"{name} does not resolve", fix=fix)
 
 
 def _encoding() -> Row:
@@ -204,7 +204,7 @@ def _encoding() -> Row:
         name="encoding",
         state="limited",
         detail=f"{name}: reports use plain characters",
-        mend="export LC_ALL=C.UTF-8",
+        fix="export LC_ALL=C.UTF-8",
     )
 
 
@@ -216,8 +216,8 @@ def print_rows(rows: Sequence[Row], stream: IO[str]) -> None:
     grid.add_column(overflow="fold")
     for row in rows:
         grid.add_row(Text(row.state, STYLES[row.state]), Text(row.name), Text(visible(row.detail)))
-        if row.mend:
-            grid.add_row(Text(), Text("fix:", "bold"), Text(visible(row.mend), "bold"))
+        if row.fix:
+            grid.add_row(Text(), Text("fix:", "bold"), Text(visible(row.fix), "bold"))
     missing = sum(row.state == "missing" for row in rows)
     verdict = f"{missing} missing: grading is not fully possible here." if missing else "Ready to grade."
     emit(open_console(stream), [grid, Text(f"\n{verdict}")])

@@ -21,8 +21,7 @@ from grader.report.terminal import emit, open_console
 from grader.report.text import visible
 from grader.rubric.load import LoadedRubric, load_rubric
 from grader.rubric.model import NAME_PATTERN, Rubric
-from grader.suggest import did_you_mean
-from grader.wording import number
+from grader.wording import did_you_mean, number
 
 
 def print_labs(rubrics: Sequence[Rubric], stream: IO[str]) -> None:

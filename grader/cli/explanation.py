@@ -11,17 +11,31 @@ from rich.text import Text
 
 from grader.checks import HEADINGS, Check
 from grader.errors import UsageError
+from grader.model.repair import BY_HAND, RepairKind
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible
 from grader.rubric.find import rubric_ids
 from grader.rubric.instructor import known_checks
 from grader.rubric.load import LoadedRubric, all_rubrics, load_rubric
-from grader.rubric.model import Criterion
-from grader.suggest import did_you_mean
-from grader.wording import number
+from grader.rubric.model import Criterion, Rubric
+from grader.wording import did_you_mean, number
 
 Line = tuple[str, int]
 """A paragraph and how far it is indented."""
+
+SLIPS: tuple[tuple[tuple[str, ...], tuple[RepairKind, ...]], ...] = (
+    (("executable",), ("executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding", "file-name")),
+    (("build", "cmake"), ("build-line", "package-name", "manifest-line")),
+    (("manifest", "dependencies"), ("manifest-line", "package-name")),
+    (("launch", "opens"), ("launch-type", "package-name", "file-name", "executable-bit")),
+    (("param",), ("parameter-name", "python-syntax")),
+    (("node",), ("node-name", "python-syntax", "missing-import", "missing-call")),
+    (
+        ("topic", "rate", "message", "hears"),
+        ("topic-name", "python-syntax", "missing-import", "missing-call"),
+    ),
+)
+"""By what the name of a check begins with: the slips that often cost it."""
 
 
 def print_explanation(name: str, rubric: str | None) -> None:
@@ -35,13 +49,16 @@ def print_explanation(name: str, rubric: str | None) -> None:
         (r, c) for r in loaded for c in r.rubric.criteria if c.id == criterion and c.visibility == "visible"
     ]
     known = loaded[0].checks if rubric is not None else known_checks(Path(), {})
-    is_check = not slash and name in known
-    if is_check:
-        _print(_check_lines(known[name]))
-    for each, item in found:
-        _print(_criterion_lines(each, item))
-    if not found and not is_check:
+    told = {name} if not slash and name in known else set[str]()
+    if not found and not told:
         raise _unknown(name, loaded, known)
+    for check in tuple(told):
+        _print(_check_lines(known[check]))
+    for each, item in found:
+        _print(_criterion_lines(each.rubric, item))
+        if item.check in each.checks and item.check not in told:
+            told.add(item.check)
+            _print(_check_lines(each.checks[item.check]))
 
 
 def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]) -> UsageError:
@@ -53,8 +70,7 @@ def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]
     )
 
 
-def _criterion_lines(loaded: LoadedRubric, criterion: Criterion) -> Iterator[Line]:
-    rubric, checks = loaded.rubric, loaded.checks
+def _criterion_lines(rubric: Rubric, criterion: Criterion) -> Iterator[Line]:
     yield f"{rubric.id}/{criterion.id}: {criterion.title}", 0
     points = f"{number(criterion.points)} of {number(rubric.max_points)} points"
     yield f"{points}, judged by the check {criterion.check}", 2
@@ -63,8 +79,6 @@ def _criterion_lines(loaded: LoadedRubric, criterion: Criterion) -> Iterator[Lin
     if criterion.reproduce:
         yield f"see it yourself: {criterion.reproduce}", 2
     yield "", 0
-    if criterion.check in checks:
-        yield from _check_lines(checks[criterion.check])
 
 
 def _check_lines(check: Check) -> Iterator[Line]:
@@ -75,6 +89,12 @@ def _check_lines(check: Check) -> Iterator[Line]:
             yield heading, 0
             for paragraph in check.sections[heading].split("\n\n"):
                 yield paragraph, 2
+    slips = next((kinds for names, kinds in SLIPS if check.name.startswith(names)), ())
+    if slips:
+        yield "", 0
+        yield "Slips that cost it, and how to repair them by hand", 0
+        for kind in slips:
+            yield BY_HAND[kind], 2
     yield "", 0
 
 

@@ -9,7 +9,14 @@ from pathlib import Path
 
 from grader.errors import UsageError
 from grader.intake import find_packages
-from grader.intake.find import BUILD_SPACES, Candidate, enclosing_package, find_nearest, manifest_name
+from grader.intake.find import (
+    BUILD_SPACES,
+    WORKSPACE_MARKS,
+    Candidate,
+    enclosing_package,
+    find_nearest,
+    manifest_name,
+)
 from grader.intake.gitdir import repository_around
 from grader.intake.names import printable
 from grader.intake.tree import is_file, is_there
@@ -17,7 +24,6 @@ from grader.model.result import GradingResult
 from grader.model.verdict import FileCitation
 
 _MADE = BUILD_SPACES | {"logs"}
-_MARKS = (".catkin_workspace", ".catkin_tools", "src/CMakeLists.txt")
 _MADE_MARKS = ("CMakeCache.txt", ".catkin", "setup.sh", ".catkin_tools.yaml", ".built_by")
 
 
@@ -77,13 +83,13 @@ def _is_made(folder: Path) -> bool:
     """Return whether catkin or CMake made it: a package may have a folder of the same name."""
     if any(is_there(folder / mark) for mark in _MADE_MARKS):
         return True
-    return any(is_there(folder.parent / mark) for mark in _MARKS)
+    return any(is_there(folder.parent / mark) for mark in WORKSPACE_MARKS)
 
 
 def _beside(here: Path) -> Found | None:
     """Search the rest of the repository or workspace that the folder is part of."""
     repository = repository_around(here)
-    workspace = next((f for f in here.parents if any(is_there(f / mark) for mark in _MARKS)), None)
+    workspace = next((f for f in here.parents if any(is_there(f / mark) for mark in WORKSPACE_MARKS)), None)
     for root, what in ((workspace, "workspace"), (repository, "repository")):
         if root is not None and root not in (here, Path(root.anchor)):
             candidates, whole = find_nearest(root)

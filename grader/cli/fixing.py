@@ -25,6 +25,7 @@ from grader.model.repair import Repair
 from grader.package import read_package
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.editing import is_executable, naming_files, read_data
+from grader.portable import MODES_ON_DISK
 from grader.report.terminal import emit, open_console
 from grader.report.text import line
 
@@ -85,7 +86,7 @@ def _read(chosen: Chosen, work: Path) -> tuple[Path, PackageFacts]:
 def is_fixed(folder: Path, repair: Repair) -> bool:
     """Return whether `--fix` makes this repair: of Python, the indentation alone, and no bit that git alone lacks."""
     if repair.kind == "executable-bit":
-        return not is_executable(folder, repair.file)
+        return MODES_ON_DISK and not is_executable(folder, repair.file)
     lines = [[row.lstrip(" \t") for row in text.split("\n")] for text in (repair.before, repair.after)]
     tabs = repair.kind == "python-syntax" and "\t" in repair.before and lines[0] == lines[1]
     return tabs or repair.kind in FIXED

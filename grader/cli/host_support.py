@@ -12,6 +12,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Literal
 
+from pydantic import AliasChoices, Field
+
 from grader.arena.control_groups import describe, find_cgroups, has_memory
 from grader.arena.sandbox import NAMESPACES
 from grader.arena.sandbox_probe import ULIMIT_HINT, choose, refused_limits
@@ -56,7 +58,7 @@ class Row(Record):
     name: str
     state: Literal["ok", "limited", "missing"]
     detail: str
-    mend: str = ""
+    fix: str = Field(default="", validation_alias=AliasChoices("mend", "fix"), serialization_alias="mend")
 
 
 def sandbox_rows() -> Iterator[Row]:
@@ -74,17 +76,17 @@ def sandbox_rows() -> Iterator[Row]:
 def _program(name: str) -> Row:
     path, package = find_host_program(name), PROGRAMS[name]
     if path is None:
-        return Row(name=name, state="limited", detail="not found", mend=f"apt-get install {package}")
+        return Row(name=name, state="limited", detail="not found", fix=f"apt-get install {package}")
     return Row(name=name, state="ok", detail=path)
 
 
 def _probe(name: str, command: Sequence[str], *, drop: bool) -> Row:
     """Return whether namespaces of that kind can be made, by the user who needs them."""
     setpriv = find_host_program("setpriv") or "setpriv"
-    nobody = [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if drop else []
+    unprivileged = [setpriv, "--reuid=65534", "--regid=65534", "--clear-groups"] if drop else []
     try:
         done = subprocess.run(
-            [*nobody, *command],
+            [*unprivileged, *command],
             stdin=subprocess.DEVNULL,
             capture_output=True,
             check=False,
@@ -98,15 +100,15 @@ def _probe(name: str, command: Sequence[str], *, drop: bool) -> Row:
         reason = str(error)
     if not reason:
         return Row(name=name, state="ok", detail="namespaces can be made")
-    return Row(name=name, state="limited", detail=reason[:200], mend=_switch())
+    return Row(name=name, state="limited", detail=reason[:200], fix=_switch())
 
 
 def _switch() -> str:
     """Return the command that lifts the kernel's ban on it, if a setting forbids it."""
-    for name, (forbidding, mend) in SWITCHES.items():
+    for name, (forbidding, fix) in SWITCHES.items():
         path = SETTINGS / name
         if path.is_file() and path.read_text(errors="replace").strip() == forbidding:
-            return mend
+            return fix
     return CONTAINER
 
 
@@ -116,7 +118,7 @@ def _inherited() -> Iterator[Row]:
     for limit in (*limits(), *group()):
         detail = f"{limit.what}: {limit.found}; a run needs {limit.needed}"
         yield Row(
-            name=limit.name, state="missing" if limit.command else "ok", detail=detail, mend=limit.command
+            name=limit.name, state="missing" if limit.command else "ok", detail=detail, fix=limit.command
         )
 
 
@@ -125,7 +127,7 @@ def _limits_of_trees() -> Row:
         return Row(name="limits", state="ok", detail=describe())
     others = DELEGATE if has_memory() else OLD_GROUPS
     return Row(
-        name="limits", state="limited", detail=describe(), mend=ROOTS_GROUPS if user_id() == 0 else others
+        name="limits", state="limited", detail=describe(), fix=ROOTS_GROUPS if user_id() == 0 else others
     )
 
 
@@ -133,18 +135,18 @@ def _limits_of_processes() -> Row:
     refused = refused_limits()
     if not refused:
         return Row(name="ulimit", state="ok", detail="limits of students' processes can be set")
-    return Row(name="ulimit", state="missing", detail=refused, mend=ULIMIT_HINT)
+    return Row(name="ulimit", state="missing", detail=refused, fix=ULIMIT_HINT)
 
 
 def _chosen_sandbox() -> Row:
     try:
         sandbox = choose("auto")
     except HostError as error:
-        return Row(name="sandbox", state="missing", detail=error.message, mend=error.hint)
+        return Row(name="sandbox", state="missing", detail=error.message, fix=error.hint)
     if sandbox.bubblewrap:
         return Row(name="sandbox", state="ok", detail=f"--sandbox auto takes {sandbox.label}")
     detail = f"{without_sandbox(sandbox.label)} --sandbox require refuses."
-    return Row(name="sandbox", state="limited", detail=detail, mend="fix the rows above")
+    return Row(name="sandbox", state="limited", detail=detail, fix="fix the rows above")
 
 
 def warn_without_sandbox(mode: SandboxMode, rubric: LoadedRubric | None = None) -> None:
@@ -178,7 +180,7 @@ def platform_rows() -> Iterator[Row]:
     """Return what can and cannot be done on a system other than Linux."""
     yield Row(name=system(), state="ok", detail=f"can: {WITHOUT}")
     way = WAYS.get(system(), WAYS["macOS"])
-    yield Row(name="ROS 1", state="missing", detail=f"cannot: {LACKS}", mend=f"{way}; see {PAGE}")
+    yield Row(name="ROS 1", state="missing", detail=f"cannot: {LACKS}", fix=f"{way}; see {PAGE}")
 
 
 def require_room(*, gradings: int) -> None:

@@ -7,13 +7,26 @@ from collections.abc import Callable
 from typing import Annotated
 
 from grader.cli.declare import Flag, Option
+from grader.intake.names import brief, is_package_name
 from grader.model.sandbox_mode import SandboxMode
+
+
+def package_name(text: str) -> str:
+    """Parse a package's name, as it stands in some `package.xml`."""
+    if not is_package_name(text.strip()):
+        raise argparse.ArgumentTypeError(f"{brief(text)!r} cannot be a package's name")
+    return text.strip()
+
 
 RUBRIC = Option("--rubric", "ID|FILE", "a lab's id or a rubric's file; see grader labs")
 SandboxOption = Annotated[
     SandboxMode, Option("--sandbox", "", "run students' code in a sandbox: if possible, always, or never")
 ]
 JsonFlag = Annotated[bool, Flag("--json", "print JSON")]
+PackageOption = Annotated[
+    str | None,
+    Option("--package", "NAME", "grade this package, whatever the lab calls it", package_name),
+]
 STATIC = Flag("--static", "check the files only and run nothing")
 BATCH_FOLDER = "the --out of `grader batch`"
 

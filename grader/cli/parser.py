@@ -13,7 +13,7 @@ import grader.cli.commands  # noqa: F401 - fills COMMANDS
 from grader import __version__
 from grader.cli.declare import COMMANDS, EXIT_CODES, INSTRUCTORS, REST, STUDENTS, Command, add_arguments
 from grader.errors import UsageError
-from grader.suggest import did_you_mean
+from grader.wording import did_you_mean
 
 GROUPS = {
     "rubric": "Write, check and test rubrics",

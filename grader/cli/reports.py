@@ -20,7 +20,7 @@ from grader.model.verdict import FileCitation
 from grader.portable import cores
 from grader.report.class_page.gather import salt_in
 from grader.report.class_page.page import write_class_page
-from grader.report.forms import FORMS, Shown
+from grader.report.forms import FORMS, ReportInput
 from grader.report.sentences import missing_hidden
 from grader.report.terminal import open_console, print_report
 from grader.report.view import without_hidden
@@ -111,7 +111,7 @@ def write_form(
         print_report(shown, rubric.rubric, open_console(sys.stdout), hidden=hidden)
         return ExitCode.PASSED
     where = _prefix(result, prefix) if FORMS[form].cites_lines else ""
-    about = Shown(
+    about = ReportInput(
         result=shown,
         rubric=rubric.rubric,
         hidden=missing_hidden(shown, rubric.rubric),

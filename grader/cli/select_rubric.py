@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.cli.find_packages import Found, find, shown
@@ -18,7 +18,7 @@ from grader.intake.names import is_archive_name, listing, printable
 from grader.intake.open import is_recording
 from grader.rubric.load import LoadedRubric, find_rubric_for_package, load_rubric, packages_of_labs
 from grader.rubric.model import Criterion, Rubric, Scenario, Start, Until
-from grader.suggest import closest
+from grader.wording import closest
 
 ALIKE = 0.75
 """How alike a package's name and a lab's must be to suggest the lab."""
@@ -47,8 +47,9 @@ def only(chosen: Sequence[Chosen]) -> Chosen:
     return chosen[0]
 
 
-def choose_all(path: Path, rubric: str | None) -> tuple[Chosen, ...]:
-    """Return what to check at `path`: one package, or one for each lab that has a package there.
+def choose_all(path: Path, rubric: str | None, package: str = "") -> tuple[Chosen, ...]:
+    """Return what to check at `path`: one package, or one for each lab that has a package there. With `package`, that
+    of this name alone.
 
     Raises UsageError if that is unclear, RubricError for a faulty rubric.
     """
@@ -58,6 +59,9 @@ def choose_all(path: Path, rubric: str | None) -> tuple[Chosen, ...]:
             return (Chosen(rubric=load_rubric(rubric or ""), source=str(path)),)
         path = folder
     found = find(path)
+    if package:
+        named = tuple(c for c in found.candidates if c.name == package)
+        found = replace(found, candidates=named or found.candidates)
     if rubric is not None:
         return (_named(path, found, load_rubric(rubric)),)
     return tuple(_chosen(path, found, lab) for lab in labs_of(found))

@@ -58,7 +58,7 @@ class Decoder:
         return self._plan.bound.decoded(message_bytes) if self._plan is not None else 0
 
     def decode(self, data: bytes) -> Value:
-        """A dict of the message's fields: numbers, bool, str, bytes for `uint8[]`, lists, dicts; or None.
+        """Return a dict of the message's fields: numbers, bool, str, bytes for `uint8[]`, lists, dicts; or None.
 
         `time` and `duration` become `{"secs": …, "nsecs": …}`. None too for what would take more memory than
         a whole recording may.
@@ -157,7 +157,7 @@ def _made(type_: str, definition: str) -> _Plan | None:
 
 
 def encode(type: str, value: Mapping[str, Any]) -> bytes:  # noqa: A002 - ROS's own word
-    """The bytes of a message of one of ROS Noetic's own types; fields that `value` leaves out are zero.
+    """Return the bytes of a message of one of ROS Noetic's own types; fields that `value` leaves out are zero.
 
     Raises ValueError for a type or field that does not exist and for a value that does not fit.
     """
@@ -169,12 +169,12 @@ def encode(type: str, value: Mapping[str, Any]) -> bytes:  # noqa: A002 - ROS's 
 
 
 def definition(type: str) -> str:  # noqa: A002 - ROS's own word
-    """The full definition of one of ROS Noetic's own types. Raises ValueError for any other."""
+    """Return the full definition of one of ROS Noetic's own types. Raises ValueError for any other."""
     return _described(type)[0]
 
 
 def md5sum(type: str) -> str:  # noqa: A002 - ROS's own word
-    """The type's MD5 sum as ROS computes it. Raises ValueError for a type that is not ROS Noetic's own."""
+    """Return the type's MD5 sum as ROS computes it. Raises ValueError for a type that is not ROS Noetic's own."""
     return _described(type)[1]
 
 
@@ -281,7 +281,7 @@ class ServiceType:
 
 
 def _with_parts(type_: str, text: str, find_text: FindText) -> str:
-    """The text with a `MSG:` part for each type that it needs."""
+    """Return the text with a `MSG:` part for each type that it needs."""
     package = type_.partition("/")[0]
     parts: dict[str, str] = {}
     waiting = _needed(text, package)
@@ -298,7 +298,7 @@ def _with_parts(type_: str, text: str, find_text: FindText) -> str:
 
 
 def _text_of(name: str, find_text: FindText) -> str:
-    """The type's own text, without the parts that come behind it in a full definition."""
+    """Return the type's own text, without the parts that come behind it in a full definition."""
     found = find_text(name)
     return found if found is not None else definition(name).partition(_RULE)[0]
 

@@ -79,7 +79,7 @@ Types = dict[str, tuple[Field, ...]]
 
 
 def parse(type_: str, definition: str) -> Types:
-    """The fields of each type that `definition` (full text with `MSG:` parts) needs, the message's own first.
+    """Return the fields of each type that `definition` (full text with `MSG:` parts) needs, the message's own first.
 
     Raises DefinitionError for everything that is not plainly a sound definition.
     """
@@ -104,7 +104,7 @@ def alias(type_: str) -> str:
 
 
 def canonical(types: Types) -> str:
-    """The same definitions in names of ours, the message's own first and without its `MSG:` line."""
+    """Return the same definitions in names of ours, the message's own first and without its `MSG:` line."""
     parts = ["".join(f"{field.line}\n" for field in fields) for fields in types.values()]
     headings = [f"MSG: {PACKAGE}/{alias(name)}\n" for name in types]
     separator = "=" * 80 + "\n"

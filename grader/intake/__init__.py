@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from grader.intake.credentials import without_password
     from grader.intake.find import enclosing_package, find_packages
-    from grader.intake.limits import Limits
+    from grader.intake.limits import IntakeLimits
     from grader.intake.names import safe_name
     from grader.intake.open import find_recordings, open_recorded, open_recording, open_submission, unreadable
     from grader.intake.source import Source, parse_source
 
 __all__ = [
-    "Limits",
+    "IntakeLimits",
     "Source",
     "enclosing_package",
     "find_packages",
@@ -38,7 +38,7 @@ __all__ = [
 _PLACES = {
     "credentials": ("without_password",),
     "find": ("enclosing_package", "find_packages"),
-    "limits": ("Limits",),
+    "limits": ("IntakeLimits",),
     "names": ("safe_name",),
     "open": ("find_recordings", "open_recorded", "open_recording", "open_submission", "unreadable"),
     "source": ("Source", "parse_source"),

@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import IO, Any, cast
 
 from grader.errors import SubmissionError
-from grader.intake.limits import Limits, too_much
+from grader.intake.limits import IntakeLimits, too_much
 from grader.intake.names import brief, is_archive_name
 from grader.intake.tree import file_digest
 from grader.intake.unpack import Unpacker
@@ -73,7 +73,7 @@ class Unpacked:
     hints: tuple[str, ...]
 
 
-def unpack(path: Path, into: Path, limits: Limits) -> Unpacked:
+def unpack(path: Path, into: Path, limits: IntakeLimits) -> Unpacked:
     """Unpack the archive at `path` into the new folder `into`, in a child process.
 
     Raises SubmissionError for what is no archive, is damaged, has a password, is too large or reaches out, OSError for
@@ -114,14 +114,14 @@ def _parse(answer: Answer) -> dict[str, Any] | None:
 def unpack_here(path: str, into: str, limits: dict[str, int]) -> Iterator[dict[str, Any]]:
     """Unpack the archive and yield one record for `unpack`: what was unpacked, or why it was not."""
     try:
-        yield _unpack(Path(path), Path(into), Limits(**limits))
+        yield _unpack(Path(path), Path(into), IntakeLimits(**limits))
     except SubmissionError as error:
         yield {"refused": (error.message, error.hint)}
     except OSError as error:
         yield {"errno": error.errno, "strerror": error.strerror, "filename": str(error.filename or "")}
 
 
-def _unpack(path: Path, into: Path, limits: Limits) -> dict[str, Any]:
+def _unpack(path: Path, into: Path, limits: IntakeLimits) -> dict[str, Any]:
     name = brief(path.name)
     with path.open("rb") as stream:
         head = stream.read(tarfile.BLOCKSIZE)
@@ -192,7 +192,7 @@ def _damaged(name: str, error: Exception) -> SubmissionError:
     )
 
 
-def _unpack_tar(path: Path, unpacker: Unpacker, name: str, limits: Limits) -> None:
+def _unpack_tar(path: Path, unpacker: Unpacker, name: str, limits: IntakeLimits) -> None:
     """Raises tarfile.TarError for a tar that is cut off."""
     with path.open("rb") as packed:
         opener = _opener(packed.read(8))
@@ -264,7 +264,7 @@ def _unpack_member(archive: tarfile.TarFile, member: tarfile.TarInfo, unpacker: 
         unpacker.refuse(f"the entry '{brief(path)}' is a device or a pipe")
 
 
-def _unpack_zip(path: Path, unpacker: Unpacker, name: str, limits: Limits) -> None:
+def _unpack_zip(path: Path, unpacker: Unpacker, name: str, limits: IntakeLimits) -> None:
     """Zip files as Windows, macOS, Linux, GitHub and Python write them."""
     with zipfile.ZipFile(path) as archive:
         by_git = GIT_COMMENT.fullmatch(archive.comment) is not None
@@ -306,7 +306,7 @@ def _unpack_entry(
 
 
 def _entry_name(info: zipfile.ZipInfo) -> str:
-    """The entry's name with `/`: old tools of Windows write `\\`, and many write UTF-8 without saying so."""
+    """Return the entry's name with `/`: old tools of Windows write `\\`, and many write UTF-8 without saying so."""
     name = info.filename
     if not info.flag_bits & UTF8_NAME:
         try:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from grader.errors import SubmissionError
-from grader.intake.limits import NO_CODE, Limits, too_much
+from grader.intake.limits import NO_CODE, IntakeLimits, too_much
 from grader.intake.names import brief, encodable, listing
 from grader.intake.tree import Entry, list_entries
 
@@ -33,7 +33,7 @@ class Content:
 
 
 def package_content(
-    folder: Path, *, limits: Limits, leave_out: Path | None = None, tolerant: bool = False
+    folder: Path, *, limits: IntakeLimits, leave_out: Path | None = None, tolerant: bool = False
 ) -> Content:
     """Return the content of a package's folder.
 
@@ -64,7 +64,7 @@ def _refuse_closed(paths: Iterable[str]) -> None:
             )
 
 
-def _too_large(files: list[Entry], limits: Limits) -> list[str]:
+def _too_large(files: list[Entry], limits: IntakeLimits) -> list[str]:
     """Each that is too large by itself, then the largest, until the rest is no more than a package may be."""
     total = sum(e.size_bytes for e in files)
     found = []
@@ -99,7 +99,7 @@ def _odd(paths: Iterable[str]) -> list[str]:
 
 
 def _with_folders(paths: Iterable[str]) -> set[str]:
-    """The paths, and those of all folders on the way to them."""
+    """Return the paths, and those of all folders on the way to them."""
     found: set[str] = set()
     for path in paths:
         while path and path not in found:

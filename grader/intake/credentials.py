@@ -95,7 +95,7 @@ def accesses(url: str, login: Login | None) -> tuple[Access, ...]:
 
 
 def refused(stderr: str) -> bool:
-    """Whether the server did not let git in. Servers say of what is private that it is not there."""
+    """Return whether the server did not let git in. Servers say of what is private that it is not there."""
     return _REFUSED.search(stderr) is not None
 
 

@@ -43,7 +43,7 @@ def archive_modes(entries: Iterable[Entry], known: Mapping[str, bool | None], *,
 
 
 def folder_modes(entries: Iterable[Entry], folder: Path, repositories: Repositories) -> Modes:
-    """git's word where the folder has tracked files, the disk's for the rest and where there is no git. Nobody's where
+    """git's word where the folder has tracked files, the disk's for the rest and where there is no git. No one's where
     the disk knows no modes."""
     on_disk = {e.path: e.executable if MODES_ON_DISK else None for e in entries if e.kind == "file"}
     index, hints = _index(folder, repositories)

@@ -241,7 +241,7 @@ class Git:
         return {**environment, **access.environment}
 
     def _ssh(self, environment: dict[str, str], cwd: Path) -> str:
-        """The user's ssh command, told to fail where it would ask and to leave no connection open."""
+        """Return the user's ssh command, told to fail where it would ask and to leave no connection open."""
         if self._ssh_command is None:
             self._ssh_command = (
                 environment.get("GIT_SSH_COMMAND") or _configured_ssh(environment, cwd) or "ssh"

@@ -130,7 +130,7 @@ def explained(failure: GitFailed, source: Source) -> SubmissionError:
 
 
 def may_pass(failure: GitFailed) -> bool:
-    """Whether the same may go well a little later: the network or the server has failed."""
+    """Return whether the same may go well a little later: the network or the server has failed."""
     if isinstance(failure, GitMissing | GitTimeout | GitTooMuch):
         return isinstance(failure, GitTimeout)
     known = _cause(failure)

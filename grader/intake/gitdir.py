@@ -1,4 +1,4 @@
-"""Somebody else's repository as git may see it: its index, refs and objects, and none of its settings.
+"""Someone else's repository as git may see it: its index, refs and objects, and none of its settings.
 
 A repository's own settings, hooks and attributes can make git run programs; its links, `alternates` and `.git` files
 can lead to another student's work. So git is given a folder of ours, in which only its data are linked.
@@ -130,7 +130,7 @@ def _is_in(real: Path, within: Path) -> bool:
 
 
 def _content(path: Path, limit_bytes: int) -> bytes:
-    """A file's content; a link is not followed."""
+    """Return a file's content; a link is not followed."""
     try:
         data = None if path.is_symlink() else read_file(path, limit_bytes + 1)
     except OSError as error:
@@ -166,7 +166,7 @@ def _setting(config: Path, key: str, git: Git) -> str:
 
 
 def _is_plain(path: Path) -> bool:
-    """Whether it is there. Raises Unfit where it, or anything in it, is neither a file nor a folder."""
+    """Return whether it is there. Raises Unfit where it, or anything in it, is neither a file nor a folder."""
     if not is_there(path):
         return False
     for count, place in enumerate(_below(path)):

@@ -22,7 +22,7 @@ _BLOCK_BYTES = 4096
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limits:
+class IntakeLimits:
     """Of an archive: `packed_bytes` as it is handed in, `stream_bytes` that come out of a packed tar, kept or not.
 
     Of an archive or a commit: `entries`, and `total_bytes` on this machine's disk. A file of more than `file_bytes`
@@ -51,7 +51,7 @@ class Limits:
 class Meter:
     """Counts what is taken from a source and refuses more than the limits allow."""
 
-    def __init__(self, limits: Limits, *, name: str) -> None:
+    def __init__(self, limits: IntakeLimits, *, name: str) -> None:
         self._limits = limits
         self._name = name
         self._entries = 0
@@ -78,7 +78,7 @@ class Meter:
             above = above.rpartition("/")[0]
 
     def has_room(self, path: str, size_bytes: int) -> bool:
-        """Whether a file is taken: not one that is too large, nor one more picture where there are too many."""
+        """Return whether a file is taken: not one that is too large, nor one more picture where there are too many."""
         if size_bytes > self._limits.largest_bytes(path):
             return False
         suffix = PurePosixPath(path).suffix.lower()

@@ -9,6 +9,7 @@ import unicodedata
 from grader.wording import first_few
 
 MAX_NAME = 100
+LONGEST_PACKAGE_NAME = 255
 _LETTERS = str.maketrans(
     {"ß": "ss", "æ": "ae", "Æ": "AE", "ø": "o", "Ø": "O", "œ": "oe", "Œ": "OE", "ł": "l", "Ł": "L"}
     | {"đ": "d", "Đ": "D", "ð": "d", "þ": "th", "\N{LATIN SMALL LETTER DOTLESS I}": "i"}
@@ -22,7 +23,7 @@ _SHOWN_LETTERS = 120
 def safe_name(text: str) -> str:
     """Return `text` as a file's name: `[A-Za-z0-9._-]`, 1 to 100 characters, not hidden, never `.` or `..`.
 
-    Nor is it a device of Windows (`CON`, `nul.txt`), where somebody may look at the results. Accents are dropped.
+    Nor is it a device of Windows (`CON`, `nul.txt`), where someone may look at the results. Accents are dropped.
     Where letters had to be given up, or the name was too long, a short hash of the whole keeps two such names apart.
     """
     plain = unicodedata.normalize("NFKD", text.translate(_LETTERS))
@@ -52,13 +53,18 @@ def brief(text: str) -> str:
 
 
 def encodable(text: str) -> bool:
-    """Whether `text` is UTF-8; a file's name on Linux need not be."""
+    """Return whether `text` is UTF-8; a file's name on Linux need not be."""
     return not any("\ud800" <= char <= "\udfff" for char in text)
 
 
 def archive_stem(name: str) -> str:
     """Return a file's name without the ending that makes it an archive: `lab1.tar.gz` is `lab1`."""
     return _ARCHIVE_SUFFIX.sub("", name)
+
+
+def is_package_name(text: str) -> bool:
+    """Return whether `text` could stand between `<name>` and `</name>`, however wrong the name is."""
+    return 0 < len(text) <= LONGEST_PACKAGE_NAME and encodable(text) and text.isprintable()
 
 
 def is_archive_name(name: str) -> bool:

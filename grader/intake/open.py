@@ -16,20 +16,13 @@ from typing import TypeVar
 
 from grader.errors import GraderError, OutputError, SubmissionError
 from grader.intake.archive import unpack
+from grader.intake.choose import Choice, Wanted, choose, not_found
 from grader.intake.content import Content, package_content, remarks
 from grader.intake.file_modes import Modes, archive_modes, folder_modes, right_in_git, uploaded_modes
-from grader.intake.find import (
-    Candidate,
-    Choice,
-    choose,
-    enclosing_package,
-    find_candidates,
-    linked_candidate,
-    not_found,
-)
+from grader.intake.find import Candidate, enclosing_package, find_candidates, linked_candidate
 from grader.intake.git import Git, Repository
 from grader.intake.gitdir import Repositories
-from grader.intake.limits import Limits
+from grader.intake.limits import IntakeLimits
 from grader.intake.names import brief, encodable, printable, safe_name
 from grader.intake.repository import clone
 from grader.intake.source import Source, parse_source
@@ -76,11 +69,11 @@ class Located:
 def open_submission(
     source: str | Source,
     *,
-    package: str,
+    package: str | Wanted,
     workdir: Path,
     submission_id: str | None = None,
     git_timeout_s: float = 120.0,
-    limits: Limits | None = None,
+    limits: IntakeLimits | None = None,
 ) -> Submission:
     """Return the submission that `source` names, with the lab's `package` found in it; it may be read already.
 
@@ -95,9 +88,10 @@ def open_submission(
     with _base(workdir) as base:
         try:
             git = Git(base / "git-home", timeout_s=git_timeout_s)
-            limits = limits or Limits()
+            limits = limits or IntakeLimits()
             opened = open_source(parsed, git, base, limits)
-            located = locate(opened, package)
+            wanted = Wanted(name=package) if isinstance(package, str) else package
+            located = locate(opened, wanted)
             submission = describe(located, git, limits)
         except OSError as error:
             raise unreadable(parsed.given, error) from error
@@ -129,7 +123,7 @@ def open_recorded(
     with _base(workdir) as base:
         try:
             git = Git(base / "git-home", timeout_s=git_timeout_s)
-            submission = _all_recordings(open_source(parsed, git, base, Limits()), git)
+            submission = _all_recordings(open_source(parsed, git, base, IntakeLimits()), git)
         except OSError as error:
             raise unreadable(parsed.given, error) from error
     return _named(submission, submission_id)
@@ -180,7 +174,7 @@ def _base(workdir: Path) -> Iterator[Path]:
         shutil.rmtree(base, ignore_errors=True)
 
 
-def open_source(source: Source, git: Git, base: Path, limits: Limits) -> Opened:
+def open_source(source: Source, git: Git, base: Path, limits: IntakeLimits) -> Opened:
     """What `source` stands for, on disk. New folders are made below `base`, under the source's own name."""
     into = base / "tree" / safe_name(source.name)
     opened = Opened(source=source, name=source.name, root=into, leave_out=base)
@@ -204,7 +198,7 @@ def open_source(source: Source, git: Git, base: Path, limits: Limits) -> Opened:
     )
 
 
-def locate(opened: Opened, wanted: str) -> Located:
+def locate(opened: Opened, wanted: Wanted) -> Located:
     """Return the lab's package in what was opened. A folder inside the package (`lab1/src`) stands for the package.
 
     Raises PackageNotFound, or SubmissionError for an empty folder.
@@ -224,15 +218,18 @@ def locate(opened: Opened, wanted: str) -> Located:
     raise not_found(opened.root, candidates, wanted, opened.git_links)
 
 
-def _locate(opened: Opened, wanted: str) -> Located | None:
+def _locate(opened: Opened, wanted: Wanted) -> Located | None:
     candidates = find_candidates(opened.root, leave_out=opened.leave_out)
     choice = choose(candidates, wanted)
-    if choice is None and (linked := linked_candidate(opened.root, wanted)):
-        choice = Choice(package=linked, hints=(f"{wanted} is a link, followed to {printable(linked.path)}",))
+    name = wanted.asked or wanted.name
+    if choice is None and (linked := linked_candidate(opened.root, name)):
+        choice = Choice(
+            package=linked, hints=(f"{printable(name)} is a link, followed to {printable(linked.path)}",)
+        )
     return Located(opened=opened, candidates=candidates, choice=choice) if choice else None
 
 
-def describe(located: Located, git: Git, limits: Limits) -> Submission:
+def describe(located: Located, git: Git, limits: IntakeLimits) -> Submission:
     """Return the record that the next station reads. Raises OSError for a file that cannot be read."""
     opened, choice = located.opened, located.choice
     chosen = choice.package
@@ -271,7 +268,7 @@ def _modes(opened: Opened, candidate: Candidate, entries: list[Entry], repositor
 
 
 def _others(
-    opened: Opened, candidates: list[Candidate], repositories: Repositories, limits: Limits
+    opened: Opened, candidates: list[Candidate], repositories: Repositories, limits: IntakeLimits
 ) -> Iterator[SourcePackage]:
     """The neighbours, but for those that are too much: nothing of theirs costs the lab's package anything."""
     for candidate in candidates:
@@ -306,7 +303,7 @@ def _package(
 
 
 def is_recording(path: Path) -> bool:
-    """Whether a file is a recording by its name or its first bytes; a damaged one is one too.
+    """Return whether a file is a recording by its name or its first bytes; a damaged one is one too.
 
     Raises OSError where it cannot be read.
     """
@@ -321,7 +318,7 @@ def is_recording(path: Path) -> bool:
 def _one_recording(source: Source, path: Path) -> RecordedSubmission:
     """Return the submission that is one recording. Raises OSError where it cannot be read, SubmissionError for its
     size."""
-    limit_bytes = Limits().recording_bytes
+    limit_bytes = IntakeLimits().recording_bytes
     if path.stat().st_size > limit_bytes:
         raise SubmissionError(
             f"{source.given} is larger than {limit_bytes >> 20} MiB",
@@ -340,7 +337,9 @@ def _one_recording(source: Source, path: Path) -> RecordedSubmission:
 def _all_recordings(opened: Opened, git: Git) -> RecordedSubmission:
     """Return the submission whose recordings lie somewhere in what was opened, with or without a package."""
     entries = list_entries(opened.root, leave_out=opened.leave_out, tolerant=True)
-    left_out = {e.path for e in entries if e.size_bytes > Limits().recording_bytes or not _is_open(opened, e)}
+    left_out = {
+        e.path for e in entries if e.size_bytes > IntakeLimits().recording_bytes or not _is_open(opened, e)
+    }
     commit = opened.commit
     if opened.in_place and is_there(opened.root / ".git"):
         commit = Repositories(git, opened.leave_out, root=opened.root).head(opened.root)
@@ -369,7 +368,7 @@ def find_recordings(root: Path, pattern: str) -> list[Path]:
         folder.folders[:] = [n for n in folder.folders if n not in NO_CONTENT and not n.startswith(".")]
         names = [entry.name for entry in folder.others if entry.is_file(follow_symlinks=False)]
         found += [root / path for path in map(folder.inside, names) if _fits(path, wanted)]
-    if len(found) < 2 or any(path.stat().st_size > Limits().recording_bytes for path in found):
+    if len(found) < 2 or any(path.stat().st_size > IntakeLimits().recording_bytes for path in found):
         return found
     return list({file_digest(path).hexdigest(): path for path in reversed(found)}.values())[::-1]
 

@@ -16,7 +16,7 @@ from grader.intake.credentials import Access, accesses, split_address
 from grader.intake.git import Git, GitFailed, GitTimeout, GitTooMuch, Repository
 from grader.intake.git_errors import explained
 from grader.intake.gitdir import Unfit, link_repository
-from grader.intake.limits import Limits, Meter
+from grader.intake.limits import IntakeLimits, Meter
 from grader.intake.names import brief, listing, printable
 from grader.intake.source import Source
 
@@ -59,7 +59,7 @@ class _Files:
     left_out: tuple[str, ...]
 
 
-def clone(source: Source, git: Git, into: Path, limits: Limits) -> Clone:
+def clone(source: Source, git: Git, into: Path, limits: IntakeLimits) -> Clone:
     """Return the commit of `source`, checked out in the new folder `into`.
 
     Raises SubmissionError where it cannot be had; the reason is named.
@@ -176,7 +176,7 @@ def _peeled(git: Git, into: Path, name: str) -> str:
     return git.run(*args, cwd=into, repository=_own(into)).decode().strip()
 
 
-def _measured(source: Source, git: Git, into: Path, commit: str, limits: Limits) -> _Files:
+def _measured(source: Source, git: Git, into: Path, commit: str, limits: IntakeLimits) -> _Files:
     """Counts the commit's files before they are written: a few objects can stand for any number of them."""
     meter = Meter(limits, name=source.given)
     git_links, left_out = [], []

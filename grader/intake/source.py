@@ -76,7 +76,7 @@ def parse_source(text: str) -> Source:
 
 
 def with_ref(source: Source, ref: str | None) -> Source:
-    """The same at `ref`, which a roster names in a column of its own.
+    """Return the same at `ref`, which a roster names in a column of its own.
 
     Raises UsageError where the source says another one, or is a file, SubmissionError for a folder without git.
     """
@@ -208,7 +208,7 @@ def _from_scp(text: str, match: re.Match[str]) -> Source:
 
 
 def _split_remote(path: str) -> tuple[str, str | None]:
-    """The path of a remote repository and its ref. An `@` that begins a folder's name (`/@user/`) is none."""
+    """Return the path of a remote repository and its ref. An `@` that begins a folder's name (`/@user/`) is none."""
     if path.rstrip("/").endswith(".git"):
         return path, None
     cut = path.find(".git@") + 4 if ".git@" in path else -1

@@ -128,7 +128,7 @@ def list_entries(
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is a file; where that may not even be asked, there is none."""
+    """Return whether there is a file; where that may not even be asked, there is none."""
     try:
         return stat.S_ISREG(path.stat().st_mode)
     except (OSError, ValueError):
@@ -136,7 +136,7 @@ def is_file(path: Path) -> bool:
 
 
 def is_there(path: Path) -> bool:
-    """Whether there is anything of that name; where that may not even be asked, there is nothing."""
+    """Return whether there is anything of that name; where that may not even be asked, there is nothing."""
     try:
         path.lstat()
     except (OSError, ValueError):

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import IO
 
 from grader.errors import SubmissionError
-from grader.intake.limits import Limits, Meter
+from grader.intake.limits import IntakeLimits, Meter
 from grader.intake.names import brief, listing
 from grader.intake.tree import NO_CONTENT
 
@@ -27,7 +27,7 @@ class Unpacker:
     Files come first and links last, so that nothing is ever written through a link.
     """
 
-    def __init__(self, root: Path, *, name: str, limits: Limits) -> None:
+    def __init__(self, root: Path, *, name: str, limits: IntakeLimits) -> None:
         self.executable: dict[str, bool | None] = {}
         self._root = root
         self._name = name
@@ -153,7 +153,7 @@ class Unpacker:
         return not Path(os.path.realpath(place)).is_relative_to(self._root.resolve())
 
     def _free(self, path: str) -> Path:
-        """The place for an entry; a later entry of the same name replaces the one before."""
+        """Return the place for an entry; a later entry of the same name replaces the one before."""
         target = self._root / path
         target.parent.mkdir(parents=True, exist_ok=True)
         target.unlink(missing_ok=True)

@@ -14,7 +14,7 @@ from pathlib import Path
 from grader.errors import ExitCode, GraderError, OutputError, PackageNotFound, SubmissionError
 from grader.files import atomic_write, make_folder
 from grader.model.result import GradingResult
-from grader.report.forms import FORMS, Shown
+from grader.report.forms import FORMS, ReportInput
 from grader.report.view import arrange
 from grader.rubric.model import Rubric
 from grader.wording import number
@@ -159,7 +159,7 @@ def add_forms(
     out: Path, result: GradingResult, rubric: Rubric, prefix: str, docs: dict[str, dict[str, str]]
 ) -> None:
     """Write the reports that name files by their path in the repository. Raises OutputError."""
-    shown = Shown(result=result, rubric=rubric, prefix=prefix, docs=docs)
+    shown = ReportInput(result=result, rubric=rubric, prefix=prefix, docs=docs)
     for name in WITH_LINES:
         atomic_write(out / FORMS[name].file, FORMS[name].render(shown))
 

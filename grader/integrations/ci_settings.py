@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import cast
 
 from grader.errors import UsageError
+from grader.intake.names import is_package_name
 from grader.integrations.ci_results import Outcome
 from grader.model.sandbox_mode import SandboxMode
 from grader.rubric.load import LoadedRubric
@@ -31,11 +32,13 @@ MARK_HINT = "write points (12.5) or a percentage of the visible points (60%)"
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """`lab` is a rubric's id or file, or None if the package's name decides. `fail_on` holds the outcomes that fail the
-    job. `out` is the folder for the reports."""
+    """`lab` is a rubric's id or file, or None if the package's name decides. `package` is the name of the package to
+    grade in place of the lab's, or "". `fail_on` holds the outcomes that fail the job. `out` is the
+    folder for the reports."""
 
     lab: str | None
     path: Path
+    package: str
     mark: PassMark | None
     fail_on: frozenset[Outcome]
     static: bool
@@ -44,8 +47,9 @@ class Settings:
 
 
 def read_settings(variables: Mapping[str, str]) -> Settings:
-    """Read `GRADER_LAB`, `_PATH`, `_PASS_MARK`, `_FAIL_ON`, `_STATIC`, `_SANDBOX` and `_OUT`. One that is missing or
-    empty has its default. Raises UsageError that names the input of the action, as the variable is named."""
+    """Read `GRADER_LAB`, `_PATH`, `_PACKAGE`, `_PASS_MARK`, `_FAIL_ON`, `_STATIC`, `_SANDBOX` and `_OUT`. One that
+    is missing or empty has its default. Raises UsageError that names the input of the action, as the
+    variable is named."""
 
     def given(name: str) -> str:
         return variables.get(f"GRADER_{name}", "").strip()
@@ -53,12 +57,19 @@ def read_settings(variables: Mapping[str, str]) -> Settings:
     return Settings(
         lab=given("LAB") or None,
         path=Path(given("PATH") or "."),
+        package=_package(given("PACKAGE")),
         mark=read_pass_mark(given("PASS_MARK")),
         fail_on=_fail_on(given("FAIL_ON")),
         static=_yes(given("STATIC")),
         sandbox=_sandbox(given("SANDBOX")),
         out=Path(given("OUT") or OUT),
     )
+
+
+def _package(text: str) -> str:
+    if text and not is_package_name(text):
+        raise UsageError(f"package: {_quoted(text)} cannot be a package's name", hint="write its <name>")
+    return text
 
 
 def _fail_on(text: str) -> frozenset[Outcome]:

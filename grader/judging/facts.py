@@ -105,7 +105,7 @@ class Facts:
         return found.model_copy(update={"unjudged": True}) if found else None
 
     def _lacks_files(self, scenario: str) -> bool:
-        """Whether the package has none of the files that the scenario starts: then there was nothing to run."""
+        """Return whether the package has none of the files that the scenario starts: then there was nothing to run."""
         known = self.rubric.scenarios.get(scenario)
         if known is None or self.package is None or known.recording is not None:
             return False
@@ -127,7 +127,7 @@ def _not_in_messages(run: Run) -> Verdict:
 
 
 def try_facts(rubric: Rubric, runs: Mapping[str, Run]) -> Facts:
-    """The facts; `package` is None where none was recorded, or where it is of another version."""
+    """Return the facts; `package` is None where none was recorded, or where it is of another version."""
     runs = with_recordings(rubric, runs)
     recorded = runs.get(PACKAGE_RUN)
     if recorded is None or recorded.package_json is None:

@@ -14,7 +14,7 @@ from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
 from grader.judging.facts import Facts, try_facts
-from grader.judging.other_runs import judged_on_copy, repairs_of, seen_twice, split_runs
+from grader.judging.other_runs import judged_on_copy, repairs_of, seen_twice, split_runs, was_built
 from grader.judging.summary import round_half_up
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import Status, Verdict, inconclusive
@@ -54,7 +54,8 @@ def judge_all_runs(
     uses: dict[str, Repaired] = {}
     if repaired:
         on_copy = judge_runs(rubric, {**first, **repaired}, checks)
-        verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs_of(rubric, repaired))
+        repairs, built = repairs_of(rubric, repaired), was_built(first)
+        verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs, built=built)
     results = (result_of(c, verdicts[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
     return Judgement(tuple(results), doubtful)
 

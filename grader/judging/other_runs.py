@@ -10,6 +10,7 @@ from pathlib import PurePosixPath
 
 from pydantic import ValidationError
 
+from grader.checks.build import CATKIN_MAKE
 from grader.evidence.run import Run
 from grader.model.repair import Repair, place_of
 from grader.model.result import Repaired
@@ -20,6 +21,8 @@ from grader.wording import join_words
 PACKAGE_RUN, REPAIRS = "package", "repairs"
 NAMES = {"topic-name", "node-name", "parameter-name", "file-name", "package-name", "launch-type"}
 EVERYWHERE = {"build-line", "manifest-line", "package-name"}
+OF_BUILDS = {"build-line", "manifest-line"}
+"""These explain nothing but the build and the files, where the package as handed in was built."""
 SHARES = {1.0: "all", 0.5: "half"}
 
 Runs = dict[str, Run]
@@ -53,6 +56,12 @@ def seen_twice(
     return verdicts
 
 
+def was_built(runs: Mapping[str, Run]) -> bool:
+    """Return whether `catkin_make` worked."""
+    events = runs[PACKAGE_RUN].processes if PACKAGE_RUN in runs else ()
+    return any(e.event == "exit" and e.name == CATKIN_MAKE and e.exit_code == 0 for _, e in events)
+
+
 def repairs_of(rubric: Rubric, repaired: Mapping[str, Run]) -> tuple[Repair, ...]:
     """Return the repairs of the copy that was run, as far as the rubric lets them count."""
     written = repaired[PACKAGE_RUN].metadata.get(REPAIRS, "[]") if PACKAGE_RUN in repaired else "[]"
@@ -64,7 +73,12 @@ def repairs_of(rubric: Rubric, repaired: Mapping[str, Run]) -> tuple[Repair, ...
 
 
 def judged_on_copy(
-    rubric: Rubric, first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], repairs: tuple[Repair, ...]
+    rubric: Rubric,
+    first: Mapping[str, Verdict],
+    on_copy: Mapping[str, Verdict],
+    repairs: tuple[Repair, ...],
+    *,
+    built: bool,
 ) -> tuple[dict[str, Verdict], dict[str, Repaired]]:
     """Return the verdicts with what the copy shows, and for each criterion that it changes the repairs behind it.
 
@@ -75,9 +89,13 @@ def judged_on_copy(
     better = {
         c.id for c in rubric.criteria if first[c.id].status.is_lost and not _is_worse(first, on_copy, c)
     }
-    charges = _charges(rubric, first, better, repairs)
+    needs = {
+        c.id: tuple(one for one in repairs if concerns(one, c, rubric, first[c.id], built=built))
+        for c in rubric.criteria
+    }
+    charges = _charges(rubric, first, better, needs)
     for criterion in rubric.criteria:
-        needed = tuple(one for one in repairs if concerns(one, criterion, rubric, first[criterion.id]))
+        needed = needs[criterion.id]
         if criterion.id not in better or not needed:
             continue
         verdict, copy = first[criterion.id], on_copy[criterion.id]
@@ -91,17 +109,21 @@ def judged_on_copy(
     return verdicts, uses
 
 
-def concerns(repair: Repair, criterion: Criterion, rubric: Rubric, verdict: Verdict) -> bool:
-    """Return whether the criterion may depend on what was repaired: its files cite it, or its run uses the file."""
-    if repair.kind in EVERYWHERE:
-        return True
-    if criterion.scenario is None:
-        return any(getattr(cited, "file", None) == repair.file for cited in verdict.citations)
-    return is_used_by(rubric.scenarios[criterion.scenario], repair, rubric)
+def concerns(repair: Repair, criterion: Criterion, rubric: Rubric, verdict: Verdict, *, built: bool) -> bool:
+    """Return whether the criterion may depend on what was repaired: its files cite it, or its run uses the file.
+
+    `built` is whether the package was built without the repair.
+    """
+    if criterion.scenario is not None:
+        return is_used_by(rubric.scenarios[criterion.scenario], repair, rubric, built=built)
+    cited = any(getattr(citation, "file", None) == repair.file for citation in verdict.citations)
+    return cited or repair.kind in EVERYWHERE
 
 
-def is_used_by(scenario: Scenario, repair: Repair, rubric: Rubric) -> bool:
+def is_used_by(scenario: Scenario, repair: Repair, rubric: Rubric, *, built: bool) -> bool:
     """Return whether the scenario runs the repaired file, as far as the rubric says. A launch file may run any."""
+    if repair.kind in OF_BUILDS:
+        return not built or any(start.built for start in scenario.start)
     if any(start.launch for start in scenario.start) or repair.kind in EVERYWHERE:
         return True
     name = PurePosixPath(repair.file).name
@@ -119,7 +141,10 @@ def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], crit
 
 
 def _charges(
-    rubric: Rubric, first: Mapping[str, Verdict], better: Collection[str], repairs: tuple[Repair, ...]
+    rubric: Rubric,
+    first: Mapping[str, Verdict],
+    better: Collection[str],
+    needs: Mapping[str, tuple[Repair, ...]],
 ) -> dict[Repair, set[str]]:
     """Return for each repair the criterion that asks for what was wrong: by its name where a name was wrong, else the
     first that failed by itself. What others require comes first."""
@@ -127,8 +152,8 @@ def _charges(
     by_id = {c.id: c for c in rubric.criteria}
     order = TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order()
     criteria = [by_id[name] for name in order if name in better]
-    for repair in repairs:
-        possible = [c for c in criteria if concerns(repair, c, rubric, first[c.id])]
+    for repair in dict.fromkeys(one for repairs in needs.values() for one in repairs):
+        possible = [c for c in criteria if repair in needs[c.id]]
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
         failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
         counting = [c for c in (*named, *failing, *possible) if c.points > 0]

@@ -26,7 +26,7 @@ from grader.wording import plural
 
 UNITS = {"day": timedelta(days=1), "hour": timedelta(hours=1)}
 SPANS = {"day": 86_400, "hour": 3600, "minute": 60, "second": 1}
-NOBODY = "nobody says when it was handed in, so it counts as in time"
+UNDATED = "it is not known when it was submitted, so it counts as in time"
 
 
 def settle(
@@ -138,7 +138,7 @@ def lateness(points: float, rubric: Rubric, handed_in: HandedIn | None) -> Laten
     """Return what is left of `points`, and why. None where there is no deadline.
 
     The deadline is that of `handed_in`, which holds the extension already; where it has none, the rubric's with the
-    extension. What nobody dates counts as in time.
+    extension. What no one dates counts as in time.
     """
     given = handed_in or HandedIn()
     deadline = given.deadline or deadline_of(rubric, given.extension_days) or given.before
@@ -193,7 +193,7 @@ def _cost(points: float, rubric: Rubric, late: timedelta) -> tuple[float, str]:
 
 def _in_time(given: HandedIn, deadline: datetime) -> str:
     if given.at is None:
-        return NOBODY
+        return UNDATED
     over = _between(deadline, given.at)
     if over > timedelta():
         return f"in time: {_span(over)} after the deadline, which is within the grace"

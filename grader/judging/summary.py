@@ -59,7 +59,7 @@ def passed(rubric: Rubric, result: GradingResult) -> bool:
 
 
 def criteria_text(results: Sequence[CriterionResult], *, ascii_only: bool = False) -> str:
-    """The criteria as canonical JSON in the rubric's order: the same from `grader grade` and `grader judge`."""
+    """Return the criteria as canonical JSON in the rubric's order: the same from `grader grade` and `grader judge`."""
     return json_text(_criteria(results), ascii_only=ascii_only)
 
 
@@ -101,7 +101,7 @@ def round_half_up(points: float, digits: int) -> float:
 def notes_of(runs: Mapping[str, Run]) -> tuple[Note, ...]:
     """The notes of all runs, in the order of the runs and of time; equal ones once, at most 20 of each kind a run.
 
-    What was left out is counted in a last note. Recordings of other tools have none: nobody watched.
+    What was left out is counted in a last note. Recordings of other tools have none: no one watched.
     """
     return tuple(
         note

@@ -24,6 +24,8 @@ class Entry(Record):
     """What `grader grade` takes (paths are absolute), without passwords."""
     ref: str | None = None
     """A repository's branch, tag or commit."""
+    package: str = ""
+    """The name of the package to grade in place of the lab's, or empty."""
     name: str = ""
     """The student's name."""
     group: str = ""

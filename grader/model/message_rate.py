@@ -16,6 +16,7 @@ ROUNDING = 1e-6
 CONFIDENCE = 1.96
 LEAST_GAPS = 5
 CLEAR_GAPS = 20
+EVEN_FROM, EVEN_TO, UNEVEN_SHARE = 0.5, 1.5, 0.05
 FLOOD = 5
 """So many times too fast, nothing that comes later helps."""
 
@@ -62,6 +63,12 @@ class Rhythm(Record):
         mean_ns = self.span_ns / len(self.gaps_ns)
         short = sum(gap < 0.3 * mean_ns for gap in self.gaps_ns)
         return short >= 0.25 * len(self.gaps_ns) and max(self.gaps_ns) > 1.5 * mean_ns
+
+    @property
+    def is_even(self) -> bool:
+        """Nearly all gaps are like the mean one, whatever that is."""
+        mean_ns = self.span_ns / len(self.gaps_ns)
+        return len(self.outside(EVEN_FROM * mean_ns, EVEN_TO * mean_ns)) <= UNEVEN_SHARE * len(self.gaps_ns)
 
     def is_single_stall(self, outside: Sequence[int], period_ns: float) -> bool:
         """One message came late and the next on its schedule again: one long gap, then one short one."""

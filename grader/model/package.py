@@ -226,7 +226,7 @@ class PackageFacts(Record):
     slips: tuple[PythonSlip, ...] = ()
 
     def file(self, path: str) -> SourceFile | None:
-        """The file at this path, or None."""
+        """Return the file at this path, or None."""
         return next((f for f in self.files if f.path == path), None)
 
     def hints_on(self, path: str) -> tuple[str, ...]:

@@ -32,6 +32,25 @@ HALF: frozenset[RepairKind] = frozenset(
 )
 DEFAULT_SHARES: dict[RepairKind, float] = {kind: 0.5 if kind in HALF else 1.0 for kind in KINDS}
 """How much of its points a criterion is worth that was judged on a copy with a repair of this kind."""
+BY_HAND: dict[RepairKind, str] = {
+    "executable-bit": "not executable: chmod +x FILE, then git add FILE",
+    "encoding": "not saved as UTF-8: in the editor, save it with the encoding UTF-8",
+    "byte-order-mark": "an invisible mark before the first line: save it as UTF-8 without BOM",
+    "line-ends": "Windows' line ends: dos2unix FILE, or switch CRLF to LF in the editor",
+    "shebang": "no usable first line: write #!/usr/bin/env python3 as the very first line",
+    "file-name": "a misspelt file name: git mv OLD NEW, and write the new name wherever the old one stands",
+    "python-syntax": "it does not parse: python3 -m py_compile FILE names the line",
+    "manifest-line": "a line is missing in package.xml: compare it with one that catkin_create_pkg makes",
+    "build-line": "a line is missing in CMakeLists.txt: compare it with one that catkin_create_pkg makes",
+    "package-name": "a misspelt package name: it is the same in package.xml, in project(…) and in each pkg=",
+    "launch-type": "type= without .py: it is the file's whole name, as ls shows it",
+    "missing-import": "a name that is not imported: from std_msgs.msg import NAME",
+    "missing-call": "a call that is missing or lacks its brackets: rospy.spin(), rate.sleep()",
+    "node-name": "a misspelt node name: rosnode list shows how it is called",
+    "topic-name": "a misspelt topic: rostopic list shows how it is called",
+    "parameter-name": "a misspelt parameter: rosparam list shows how it is called",
+}
+"""How a mistake of this kind looks, and how it is repaired."""
 
 
 class Repair(Record):

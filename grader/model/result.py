@@ -8,7 +8,7 @@ from __future__ import annotations
 from datetime import date, datetime
 from typing import Annotated, Literal
 
-from pydantic import AwareDatetime, Field
+from pydantic import AliasChoices, AwareDatetime, Field
 
 from grader.model.record import Record
 from grader.model.repair import Repair
@@ -94,13 +94,13 @@ class Point(Record):
     """A word for programs: `uncommitted`, `untracked`, `ignored`, `mode`, `unpushed`, …"""
     text: str
     """One line for people."""
-    mend: str = ""
+    fix: str = Field(default="", validation_alias=AliasChoices("mend", "fix"), serialization_alias="mend")
     """A command that fixes it, or nothing."""
     remark: bool = False
     """Whether it is only a remark: nothing is known to differ."""
 
 
-class Standing(Record):
+class GitStatus(Record):
     """How the files on the disk compare with what git has, for `grader check`. It changes no verdict."""
 
     points: tuple[Point, ...] = ()
@@ -266,7 +266,7 @@ class GradingResult(Record):
     """When it was submitted. Only there if a roster or a deadline says so."""
     late: Lateness | None = None
     """The late penalty. Only there if the rubric has a deadline."""
-    standing: Standing | None = None
+    standing: GitStatus | None = None
     """What of the work is not committed or not pushed. Only in the output of `grader check`, and if there is
     anything; it costs no points."""
     error: ErrorInfo | None = None

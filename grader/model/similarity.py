@@ -41,7 +41,7 @@ class Pair(Record):
 
 
 class TakenOut(Record):
-    """What is nobody's own.
+    """What is no one's own.
 
     `starter` are the files of the starter code, `tutorials` those that the grader knows. `common` is the number of
     fingerprints that are in more than half of the submissions, None where the class is too small to say so.

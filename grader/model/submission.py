@@ -1,4 +1,4 @@
-"""What intake hands on: a folder on disk with the lab's package in it, and who it is."""
+"""What intake returns: a folder on disk with the lab's package in it, and who it is."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class SourcePackage(Record):
     `folder` is absolute on this machine, `path` the same relative to the submission's root (posix, `.` for the
     root itself). `executable` maps each regular file's path, relative to `folder`, to its executable bit, or to
     None where the source carries no modes (`mode_source` "none"). `left_out` are the paths, as in `SourceFile.path`, of
-    what nobody opens or copies: files too large or not readable here, pipes and devices. `right_in_git` are those whose
+    what no one opens or copies: files too large or not readable here, pipes and devices. `right_in_git` are those whose
     Windows line ends are this disk's alone: git hands them in without.
     """
 

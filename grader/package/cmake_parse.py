@@ -268,7 +268,7 @@ def _commands(text: str, file: str) -> tuple[list[nodes.Command], Fault | None]:
 
 
 def _explained(text: str, end: int, file: str, message: str) -> Fault:
-    """The fault of the command that begins behind `end`, the place where the last good one stopped."""
+    """Return the fault of the command that begins behind `end`, the place where the last good one stopped."""
     tokens = [t for t in tokenize(text) if t.kind != "COMMENT" and t.span.start >= end]
     first = tokens[0] if tokens else Token("RAW", "", slice(end, end), text.count("\n") + 1, 1)
     unparsed = next((t for t in tokens if t.kind == "UNPARSEABLE"), None)

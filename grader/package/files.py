@@ -142,7 +142,7 @@ def _text_facts(
 
 
 def _encoding(data: bytes, *, python: bool) -> str:
-    """The encoding that a reader would use: of Python by PEP 263, `unknown-8bit` for what is not UTF-8."""
+    """Return the encoding that a reader would use: of Python by PEP 263, `unknown-8bit` for what is not UTF-8."""
     if data.startswith(_UTF16):
         return "utf-16"
     name = "utf-8-sig" if data.startswith(b"\xef\xbb\xbf") else "utf-8"
@@ -243,5 +243,5 @@ def _near(data: bytes) -> str:
 
 
 def is_near_python(data: bytes) -> bool:
-    """Whether a file begins with a shebang of Python, usable or spoilt by a BOM, a blank or a blank line."""
+    """Return whether a file begins with a shebang of Python, usable or spoilt by a BOM, a blank or a blank line."""
     return re.match(rb"(\xef\xbb\xbf)?\s*#\s*![^\n]*\bpython", data[:512]) is not None

@@ -50,7 +50,7 @@ class Loaded:
     work: int = 0
 
     def full(self, more: int) -> bool:
-        """Whether there is too much of it already; `more` is what the next tag takes."""
+        """Return whether there is too much of it already; `more` is what the next tag takes."""
         self.work += 1 + more
         return self.work > WORK_MAX
 
@@ -213,7 +213,7 @@ def _param(element: etree._Element, scope: Scope) -> LaunchParam:
 
 
 def _private(param: LaunchParam, inside: Scope) -> LaunchParam:
-    """A parameter of a node's own: a slash in front of its name does not lead out of it."""
+    """Return a parameter of a node's own: a slash in front of its name does not lead out of it."""
     return param.model_copy(update={"name": inside.resolved(param.name.lstrip("~/"))})
 
 

@@ -213,7 +213,7 @@ def explain(message: str, root: etree._Element) -> tuple[int | None, str]:
 
 
 def _line_of(root: etree._Element, tags: str) -> int | None:
-    """The line of the last element with one of the tags: where a tag stands twice, the second is too much."""
+    """Return the line of the last element with one of the tags: where a tag stands twice, the second is too much."""
     wanted = tags.split(", ")
     lines = [
         line_of(element)

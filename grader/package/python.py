@@ -244,7 +244,7 @@ def _first(table: tuple[tuple[str, str], ...], text: str) -> str:
 
 
 def _without_texts(line: str) -> str:
-    """The line with its string literals emptied and its comment cut."""
+    """Return the line with its string literals emptied and its comment cut."""
     return re.sub(r"""("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*')|#.*""", lambda m: '""' if m[1] else "", line)
 
 

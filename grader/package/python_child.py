@@ -123,6 +123,20 @@ def _one_step(text: str, error: Error) -> Step | None:
     return None
 
 
+def _all_expanded(text: str, width: int) -> str:
+    return "\n".join(_expanded(line, width) for line in text.split("\n"))
+
+
+def _like_the_line_before(text: str, number: int) -> str:
+    """The line with that number begins where the one before it does, which an editor showed below each other."""
+    lines = text.split("\n")
+    before = next((line for line in reversed(lines[: number - 1]) if line.strip()), "")
+    if number <= len(lines) and "\t" in lines[number - 1] and not before.rstrip().endswith(":"):
+        indentation = before[: len(before) - len(before.lstrip())]
+        lines[number - 1] = indentation + lines[number - 1].lstrip()
+    return "\n".join(lines)
+
+
 def _is_next(error: Error, left: Error) -> bool:
     """Tabs are told before all else, wherever they are, and of open brackets the last one."""
     spaces = ("TabError", "IndentationError")
@@ -133,8 +147,9 @@ def _is_next(error: Error, left: Error) -> bool:
 
 def _candidates(text: str, error: Error) -> Iterator[tuple[str, str]]:
     if error["kind"] in {"TabError", "IndentationError"}:
-        for width in (8, 4):
-            yield "tabs", "\n".join(_expanded(line, width) for line in text.split("\n"))
+        yield "tabs", _all_expanded(text, 8)
+        yield "tabs", _like_the_line_before(text, error["line"])
+        yield "tabs", _all_expanded(text, 4)
     lines = text.split("\n")
     at = error["line"] - 1
     if not 0 <= at < len(lines):

@@ -1,4 +1,4 @@
-"""Reading files that somebody else wrote: nothing outside the package's folder, nothing without a limit."""
+"""Reading files that someone else wrote: nothing outside the package's folder, nothing without a limit."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ _PROPERTY = str.maketrans({"%": "%25", "\r": "%0D", "\n": "%0A", ":": "%3A", ","
 
 
 def render_annotations(result: GradingResult, prefix: str = "", *, each_max: int = EACH_MAX) -> str:
-    """A line each, the costliest first, `each_max` of each kind at most; the rest is counted in the log.
+    """Return a line each, the costliest first, `each_max` of each kind at most; the rest is counted in the log.
 
     What has no line of a file is shown at the run itself. `prefix` is the package's folder in the repository.
     """
@@ -26,7 +26,7 @@ def render_annotations(result: GradingResult, prefix: str = "", *, each_max: int
 
 
 def github_annotation(severity: Severity, title: str, message: str) -> str:
-    """A line of ours, at the run itself. The texts are made visible and bounded here."""
+    """Return a line of ours, at the run itself. The texts are made visible and bounded here."""
     told = "\n".join(line(row, TEXT_CHARS) for row in message.split("\n"))
     return _command(severity, {"title": line(title, TEXT_CHARS)}, told) + "\n"
 

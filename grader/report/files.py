@@ -8,7 +8,7 @@ from pathlib import Path
 from grader.files import atomic_write
 from grader.model.figure import Figures
 from grader.model.result import GradingResult
-from grader.report.forms import FORMS, Shown
+from grader.report.forms import FORMS, ReportInput
 from grader.report.result_json import result_bytes
 from grader.report.text import visible
 from grader.report.view import without_hidden
@@ -33,7 +33,7 @@ def write_reports(
     sections of its docstring. Raises OutputError.
     """
     shown = result if keep_hidden else without_hidden(result, rubric)
-    about = Shown(
+    about = ReportInput(
         result=shown,
         rubric=rubric,
         hidden=len(result.criteria) - len(shown.criteria),
@@ -50,7 +50,7 @@ def write_reports(
     return tuple(out_dir / name for name in files)
 
 
-def render_files(shown: Shown) -> dict[str, bytes]:
+def render_files(shown: ReportInput) -> dict[str, bytes]:
     """Return the reports that stand beside every `result.json`, by the names of their files."""
     return {form.file: form.render(shown) for form in FORMS.values() if form.in_results}
 

@@ -25,7 +25,7 @@ class Severity(str, Enum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class SourceLine:
     """A file, relative to the repository's root, and its line, counted from 1."""
 
     path: str
@@ -44,7 +44,7 @@ class Finding:
     title: str
     message: str
     hint: str
-    places: tuple[Place, ...]
+    places: tuple[SourceLine, ...]
     fingerprint: str
 
     @property
@@ -67,7 +67,7 @@ def findings(result: GradingResult, prefix: str = "") -> tuple[Finding, ...]:
 
 def _finding(criterion: CriterionResult, result: GradingResult, prefix: str, limit: int) -> Finding:
     places = tuple(
-        Place(path=path, line=cited.line)
+        SourceLine(path=path, line=cited.line)
         for cited in criterion.citations[:PLACES_MAX]
         if isinstance(cited, FileCitation) and cited.line and (path := repository_path(prefix, cited.file))
     )
@@ -100,6 +100,6 @@ def repository_path(prefix: str, file: str) -> str:
     return "" if ".." in parts or not parts else line("/".join(parts), LIMIT)
 
 
-def _fingerprint(rubric_id: str, criterion_id: str, places: tuple[Place, ...]) -> str:
+def _fingerprint(rubric_id: str, criterion_id: str, places: tuple[SourceLine, ...]) -> str:
     told = (rubric_id, criterion_id, places[0].path if places else "")
     return hashlib.sha256("\0".join(told).encode("utf-8", "backslashreplace")).hexdigest()

@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # the parser of the command line reads the names of forms, an
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shown:
+class ReportInput:
     """What a form may be rendered from.
 
     `hidden` is how many criteria are left out of `result`, `prefix` the package's folder in the repository, `passed`
@@ -45,8 +45,8 @@ class Shown:
 class Form:
     """`file` is the usual name of its file, `purpose` one line for the documentation.
 
-    `function` is `module:function` in this package. It takes as parameters those of `Shown`'s values that it needs, and
-    gives text or bytes. It is imported when first called, since templates and XML are slow to load.
+    `function` is `module:function` in this package. It takes as parameters those values of `ReportInput` that it
+    needs, and returns text or bytes. It is imported when first called, since templates and XML are slow to load.
     """
 
     name: str
@@ -59,11 +59,11 @@ class Form:
     in_results: bool = False
     """Whether every grading writes it beside `result.json`."""
 
-    def render(self, shown: Shown) -> bytes:
+    def render(self, shown: ReportInput) -> bytes:
         """Return the file's bytes, UTF-8. Raises GraderError where this result cannot be shown in this form."""
         module, _, name = self.function.partition(":")
         make = getattr(import_module(f"{__package__}.{module}"), name)
-        given = {one.name for one in fields(Shown)} | {"figures"}
+        given = {one.name for one in fields(ReportInput)} | {"figures"}
         made = make(**{key: getattr(shown, key) for key in signature(make).parameters if key in given})
         return made if isinstance(made, bytes) else made.encode("utf-8", "backslashreplace")
 

@@ -37,7 +37,7 @@ LIMIT = 2000
 
 
 def render_junit(result: GradingResult, prefix: str = "") -> bytes:
-    """The file's bytes, UTF-8. Among the suite's properties are `points`, `max_points` and each `points:<id>`.
+    """Return the file's bytes, UTF-8. Among the suite's properties are `points`, `max_points` and each `points:<id>`.
 
     `prefix` is the package's folder in the repository; without it, files are relative to the package.
     """

@@ -80,7 +80,7 @@ def render_markdown(
 
 
 def _surely_too_long(result: GradingResult, detail: Detail) -> bool:
-    """Whether what is told of the losses alone has no room: then nothing needs to be made to see that."""
+    """Return whether what is told of the losses alone has no room: then nothing needs to be made to see that."""
     lost = (c for c in result.criteria if c.status in {Status.FAIL, Status.PARTIAL})
     texts = (text for c in lost for text in (c.measured, c.expected, c.hint))
     return detail.folded and sum(min(len(text), detail.text) for text in texts) > BYTES_MAX
@@ -243,7 +243,7 @@ class _Writer:
         )
 
     def _folded(self, title: str, rows: Iterable[str]) -> Iterator[str]:
-        """What is shown when somebody opens it. The empty lines make Markdown of what is inside."""
+        """What is shown when someone opens it. The empty lines make Markdown of what is inside."""
         inside = list(rows)
         if inside:
             yield from ("<details>", f"<summary>{title}</summary>", "", *inside, "</details>", "")
@@ -274,7 +274,7 @@ _PLAIN = re.compile(r"[A-Za-z0-9/ ]|(?<=[A-Za-z0-9])[_-](?=[A-Za-z0-9])")
 
 
 def mermaid(graph: GraphFigure) -> str:
-    """The diagram's text: round nodes, square topics, arrows from publisher to subscriber.
+    """Return the diagram's text: round nodes, square topics, arrows from publisher to subscriber.
 
     Names are written in the characters' numbers wherever they are more than letters: none of them leaves its quotes.
     """

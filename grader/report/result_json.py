@@ -11,7 +11,7 @@ LIMIT = 2000
 
 
 def result_bytes(result: GradingResult) -> bytes:
-    """The file's bytes, UTF-8 (see `result_text`)."""
+    """Return the file's bytes, UTF-8 (see `result_text`)."""
     return result_text(result).encode()
 
 

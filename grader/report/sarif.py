@@ -7,7 +7,7 @@ from urllib.parse import quote
 
 from grader import __version__
 from grader.model.result import GradingResult
-from grader.report.findings import Finding, Place, Severity, findings
+from grader.report.findings import Finding, Severity, SourceLine, findings
 from grader.report.text import json_text, line
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -60,7 +60,7 @@ def _result(finding: Finding, rule: int) -> dict[str, object]:
     }
 
 
-def _location(place: Place) -> dict[str, object]:
+def _location(place: SourceLine) -> dict[str, object]:
     artifact = {"uri": quote(place.path), "uriBaseId": ROOT}
     return {"physicalLocation": {"artifactLocation": artifact, "region": {"startLine": place.line}}}
 

@@ -49,7 +49,7 @@ def _repair_words(repair: Repair, criteria: list[CriterionResult]) -> str:
 
 
 def late_words(result: GradingResult) -> tuple[str, ...]:
-    """Lines that say what being late cost, when it was handed in, and which commit counts; none where nobody asked."""
+    """Lines that say what being late cost, when it was handed in, and which commit counts; none where no one asked."""
     late, known = result.late, result.late or result.handed_in
     if known is None:
         return ()
@@ -112,7 +112,7 @@ NOT_SETTLED = "some criteria could not be judged; no points are lost for good."
 
 
 def missing_hidden(result: GradingResult, rubric: Rubric) -> int:
-    """How many of the rubric's hidden criteria are not in the result: it is the student's view of it."""
+    """Return how many of the rubric's hidden criteria are not in the result: it is the student's view of it."""
     return len(hidden_ids(rubric) - {c.id for c in result.criteria})
 
 
@@ -214,7 +214,7 @@ def count_points(value: float) -> str:
 
 
 def verdict(result: GradingResult, rubric: Rubric, hidden: int) -> tuple[str, str]:
-    """Whether it passed as a status of the page and in a few words."""
+    """Return whether it passed as a status of the page and in a few words."""
     if not_graded(result):
         return "error", "Not graded"
     if not hidden and passed(rubric, result):

@@ -75,6 +75,9 @@ _LINKED = re.compile(
 )
 _BEFORE, _AFTER = "(\"'", ".,:;)\"'"
 _MARKUP = re.compile(r"[\\`*\[\]|~$]|(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])")
+_SPAN = re.compile(r"(?<!`)`(?! )([^`]*[^` ])`(?!`)")
+_TOKEN = re.compile(r"(?:(?<!`)`(?! )[^`]*[^` ]`(?!`)|[^\s])+")
+"""A word, whose code may have blanks in it."""
 _FIRST = re.compile(r"[#=:{]|[-+](?![^\s+-])")
 _NUMBERED = re.compile(r"(\d{1,9})([.)])(?!\S)")
 _ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
@@ -83,10 +86,10 @@ _ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
 def markdown(text: str, *, cell: bool = False) -> str:
     """One line of Markdown that reads as `text`, wherever it stands: at a line's start, in a list, in a table's `cell`.
 
-    No markup, link, mention, emoji, formula or HTML of it takes effect.
+    No markup, link, mention, emoji, formula or HTML of it takes effect, but for `code` between two single backticks.
     """
-    words = visible(text).split()
-    shown = " ".join(_word(word, cell=cell) for word in words)
+    words = _TOKEN.findall(" ".join(visible(text).split()))
+    shown = " ".join(_with_code(word, cell=cell) for word in words)
     return shown if cell else _begun(shown)
 
 
@@ -112,6 +115,16 @@ def _code(text: str, *, cell: bool) -> str:
     fence = "`" * (1 + _longest_run(text))
     pad = " " if text[0] in "` " or text[-1] in "` " else ""
     return f"{fence}{pad}{text.replace('|', chr(92) + '|') if cell else text}{pad}{fence}"
+
+
+def _with_code(word: str, *, cell: bool) -> str:
+    """A word of which parts may be code; those parts stand apart from what is made code for another reason."""
+    plain = _SPAN.split(word)
+    if len(plain) == 1:
+        return _word(word, cell=cell)
+    if any(_LINKED.search(part) for part in plain[::2]):
+        return _code("".join(plain), cell=cell)
+    return "".join(_code(part, cell=cell) if i % 2 else _escaped(part) for i, part in enumerate(plain))
 
 
 def _word(word: str, *, cell: bool) -> str:

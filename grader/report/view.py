@@ -84,7 +84,7 @@ def _folded(losses: list[Loss]) -> tuple[Loss, ...]:
 
 
 def not_graded(result: GradingResult) -> bool:
-    """Whether it could not be graded, and no person has decided instead."""
+    """Return whether it could not be graded, and no person has decided instead."""
     return result.error is not None and result.status == "error"
 
 

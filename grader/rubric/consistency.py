@@ -12,7 +12,7 @@ from typing import Any
 from grader.checks.registry import Check
 from grader.rubric.faults import model_faults
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
-from grader.suggest import did_you_mean
+from grader.wording import did_you_mean
 
 TOTAL_POINTS = 100
 ANSWERS = "service-answers"

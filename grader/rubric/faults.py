@@ -13,8 +13,7 @@ from pydantic_core import ErrorDetails
 
 from grader.rubric.model import NAME_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
 from grader.rubric.source import Fault, KeyPath
-from grader.suggest import did_you_mean
-from grader.wording import shorten
+from grader.wording import did_you_mean, shorten
 
 PATTERN_RULES = {
     NAME_PATTERN: "must be lower-case letters, digits and hyphens, beginning with a letter",

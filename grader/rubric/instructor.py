@@ -151,7 +151,7 @@ class _Loader(ExecutionLoader):
         return importlib.util.decode_source(self._raw)
 
 
-class Shown(io.TextIOBase):
+class VisibleText(io.TextIOBase):
     """Writes whole lines to another stream, so that a command to a CI system is known wherever it was cut."""
 
     def __init__(self, stream: TextIO) -> None:
@@ -181,7 +181,7 @@ class Shown(io.TextIOBase):
 def printing_to_stderr() -> Iterator[None]:
     """Stdout may be JSON: nothing that is printed in the block gets there."""
     with _STREAMS:
-        shown = Shown(sys.stderr)
+        shown = VisibleText(sys.stderr)
         try:
             with redirect_stdout(shown), redirect_stderr(shown):
                 yield

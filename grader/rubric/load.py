@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Collection, Mapping
 from functools import cache
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from grader.checks import Check
 from grader.errors import RubricError, UsageError
@@ -134,6 +134,19 @@ def started(rubric: Rubric, only: Collection[str] | None = None) -> Rubric:
         if s.recording is None and (only is None or name in only)
     }
     return rubric.model_copy(update={"scenarios": scenarios})
+
+
+def files_of(rubric: Rubric) -> frozenset[str]:
+    """Return the names of the scripts, launch files and other files that the rubric asks for, without folders."""
+    paths = [
+        path for s in rubric.scenarios.values() for p in s.start for path in (p.script, p.launch, p.load)
+    ]
+    for criterion in rubric.criteria:
+        given = criterion.parameters
+        scripts = given.get("scripts")
+        paths += [given.get("path"), given.get("file"), given.get("launch")]
+        paths += scripts if isinstance(scripts, list | tuple) else []
+    return frozenset(PurePosixPath(path).name for path in paths if isinstance(path, str))
 
 
 def needs_package(loaded: LoadedRubric) -> bool:

@@ -56,7 +56,7 @@ class Param(Record):
 
     `file` is a YAML file of the student's, read as `rosparam load` would, each of its values replaced by one of the
     same type that the grader makes up for this run. Names of `also` that the file lacks get made-up values too.
-    `made_up` is the type of a value for `name` that nobody can guess.
+    `made_up` is the type of a value for `name` that no one can guess.
     """
 
     name: str | None = None
@@ -105,13 +105,14 @@ class Until(Record):
     another). `messages`: so many
     messages on each topic. `connected`: a student's publisher and a student's subscriber are connected over
     the topic, for a second. `heard`: every probe's value was printed. `nodes`: so many nodes of the student's have
-    registered. `alive_s`: that long after the student's first node registered. `opened`: these programs (`firefox`)
-    were asked to open something. `ended`: these processes have ended. `quiet_s`: for so long, nothing was printed,
-    published, registered or set, and something was before.
+    registered. `alive_s`: that long after the student's first node registered, and half as long after the last
+    process's did. `opened`: these programs (`firefox`) were asked to open something. `ended`: these processes have
+    ended. `quiet_s`: for so long, nothing was printed, published, registered or set, and something was before.
     A run gives up when no message came within `first_message_s`, when all that is waited for has been silent for
     `silent_s`, when nothing in the graph has changed for the longer of the two while a connection is waited for, or
-    after `limit_s`. Neither silence nor quiet counts while a process may still become a node: until it is one, or
-    `first_message_s` after its start. With no condition at all it is watched for `limit_s`.
+    after `limit_s`. `alive_s`, silence and quiet do not count while a process may still become a node: until it is one,
+    or `first_message_s` after its start. Where others fill the machine, `first_message_s` and `limit_s` are longer by
+    what they take. With no condition at all it is watched for `limit_s`.
     """
 
     window_s: Seconds | None = None

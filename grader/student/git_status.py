@@ -1,6 +1,6 @@
 """What git lacks of the package that was checked, as advice to a student. It changes no verdict and no point.
 
-A package's folder comes in, `model.git_status.Standing` goes out, with commands that can be typed as they are printed.
+A package's folder comes in, `model.result.GitStatus` goes out, with commands that can be typed as they are printed.
 The network is not asked: what the server has is known from the last fetch or push. What a hostile repository must not
 do through git is the business of `git_view`.
 """
@@ -22,7 +22,7 @@ from grader.intake.git import Git, GitFailed, GitMissing, GitTimeout, GitTooMuch
 from grader.intake.gitdir import Unfit, repository_around
 from grader.intake.names import brief, encodable, listing, printable
 from grader.intake.tree import list_entries
-from grader.model.result import Point, Standing
+from grader.model.result import GitStatus, Point
 from grader.portable import MODES_ON_DISK
 from grader.student.git_view import View, open_view
 
@@ -94,7 +94,7 @@ def read_environment(variables: Mapping[str, str], here: Path) -> Environment:
     return Environment(here=here, ci=ci, committing=committing)
 
 
-def advise(package: Path, base: Path, environment: Environment, *, seconds: float = SECONDS) -> Standing:
+def advise(package: Path, base: Path, environment: Environment, *, seconds: float = SECONDS) -> GitStatus:
     """Return what is not committed or not pushed of the package in the folder `package`. Raises nothing.
 
     `base` is a new folder of ours. All of git's work together takes at most `seconds`.
@@ -105,7 +105,7 @@ def advise(package: Path, base: Path, environment: Environment, *, seconds: floa
         if top is None:
             text = "This package is in no git repository: hand in these very files."
             remark = Point(kind="no-repository", text=text, remark=True)
-            return Standing(points=() if environment.ci else (remark,))
+            return GitStatus(points=() if environment.ci else (remark,))
         view = open_view(top, base / "view", Git(base / "home", timeout_s=seconds))
         return _Advice(view, package, top, environment).standing()
     except GitFailed as failure:
@@ -124,9 +124,9 @@ def _reason(failure: GitFailed, seconds: float) -> str:
     return brief((failure.stderr.strip().splitlines() or ["git failed"])[-1])
 
 
-def _unknown(reason: str) -> Standing:
+def _unknown(reason: str) -> GitStatus:
     text = f"What git has of this package is not known: {reason}."
-    return Standing(points=(Point(kind="unknown", text=text, remark=True),))
+    return GitStatus(points=(Point(kind="unknown", text=text, remark=True),))
 
 
 class _Advice:
@@ -138,20 +138,20 @@ class _Advice:
         self._view, self._package = view, package
         self._commands = Commands(package, top, environment.here)
 
-    def standing(self) -> Standing:
+    def standing(self) -> GitStatus:
         if self._files.hidden:
             names = listing(list(self._files.hidden))
             return _unknown(f"git was told not to look at {names} (assume-unchanged, skip-worktree)")
         early = self._environment.ci or self._environment.committing
         points = [*self._in_git()]
         if early:
-            return Standing(points=tuple(points))
+            return GitStatus(points=tuple(points))
         server = read_server(self._view, self._package, self._branch, self._commit)
         points += self._pushed(server)
         if points:
-            return Standing(points=tuple(points))
+            return GitStatus(points=tuple(points))
         where = printable(server.marked or "the server")
-        return Standing(summary=f"All of it is committed and pushed: {where} has it ({LAST_FETCH}).")
+        return GitStatus(summary=f"All of it is committed and pushed: {where} has it ({LAST_FETCH}).")
 
     def _in_git(self) -> Iterator[Point]:
         """What is on the disk and not in a commit. What is staged just before a commit is on its way into one."""
@@ -160,28 +160,26 @@ class _Advice:
             changes = "1 change is" if len(files.changed) == 1 else f"{len(files.changed)} changes are"
             text = f"{changes} not committed: {listing(list(files.changed))}"
             fix = commands.add_and_commit([p for p in files.changed if p not in files.staged])
-            yield Point(
-                kind="uncommitted", text=text, mend=commands.git("status") if files.conflicts else fix
-            )
+            yield Point(kind="uncommitted", text=text, fix=commands.git("status") if files.conflicts else fix)
         for in_git, on_disk in list(files.renamed.items())[:NAMED_AT_MOST]:
             text = (
                 f"git calls it {printable(in_git)}, this disk {printable(on_disk)}: on Linux these are two."
             )
-            yield Point(kind="uncommitted", text=text, mend=commands.rename(in_git, on_disk))
+            yield Point(kind="uncommitted", text=text, fix=commands.rename(in_git, on_disk))
         if files.untracked:
             number = "1 file" if len(files.untracked) == 1 else f"{len(files.untracked)} files"
             verb = "is" if len(files.untracked) == 1 else "are"
             text = f"{number} of the package {verb} not in git: {listing(list(files.untracked))}"
-            yield Point(kind="untracked", text=text, mend=commands.add_and_commit(files.untracked))
+            yield Point(kind="untracked", text=text, fix=commands.add_and_commit(files.untracked))
         if files.pointers:
             text = f"Of {listing(list(files.pointers))} git has only a pointer to another repository, not the files."
-            yield Point(kind="untracked", text=text, mend=commands.git("submodule", "status"))
+            yield Point(kind="untracked", text=text, fix=commands.git("submodule", "status"))
         if files.ignored:
             text = f"A .gitignore hides what the package uses, so git will not have it: {listing(list(files.ignored))}"
-            yield Point(kind="ignored", text=text, mend=commands.add_and_commit(files.ignored, force=True))
+            yield Point(kind="ignored", text=text, fix=commands.add_and_commit(files.ignored, force=True))
         if files.modes:
             text = f"git does not have the executable bit of {listing(list(files.modes))}"
-            yield Point(kind="mode", text=text, mend=commands.make_executable(files.modes))
+            yield Point(kind="mode", text=text, fix=commands.make_executable(files.modes))
 
     def _pushed(self, server: Server) -> Iterator[Point]:
         """What the server lacks, or has on another branch than the marked one. Commits that do not touch the package
@@ -193,12 +191,12 @@ class _Advice:
             fix = (
                 f"{git('remote', 'add', 'origin', 'URL')} && {git('push', '-u', 'origin', branch or 'main')}"
             )
-            yield Point(kind="unpushed", text=text, mend=fix)
+            yield Point(kind="unpushed", text=text, fix=fix)
         elif self._commit is None or (server.has_head and not server.differing):
             return
         elif server.marked is None:
             what = f"The branch {printable(branch)}" if branch else "What is checked out"
-            yield Point(kind="unpushed", text=f"{what} was never pushed.", mend=push)
+            yield Point(kind="unpushed", text=f"{what} was never pushed.", fix=push)
         elif server.differing:
             yield self._differs(server, server.marked, push)
 
@@ -209,18 +207,18 @@ class _Advice:
         if branch is None:
             text = f"No branch is checked out, and what is marked is usually {printable(default)}; {where}"
             fix = git("switch", default) if server.has_head else git("switch", "-c", "BRANCH")
-            return Point(kind="other-branch", text=text, mend=fix)
+            return Point(kind="other-branch", text=text, fix=fix)
         if marked not in (server.upstream, f"{server.name}/{branch}"):
             text = f"You are on the branch {printable(branch)}; what is marked is usually {printable(default)}; {where}"
             fix = " && ".join((git("switch", default), git("merge", branch), git("push")))
-            return Point(kind="other-branch", text=text, mend=fix)
+            return Point(kind="other-branch", text=text, fix=fix)
         if server.ahead:
             commits = "1 commit is" if server.ahead == 1 else f"{server.ahead} commits are"
             text = f"{commits} not pushed to {printable(marked)}; {where}"
             fix = f"{git('pull')} && {push}" if server.behind else push
-            return Point(kind="unpushed", text=text, mend=fix)
+            return Point(kind="unpushed", text=text, fix=fix)
         commits = "1 commit that is" if server.behind == 1 else f"{server.behind} commits that are"
-        return Point(kind="unpushed", text=f"{printable(marked)} has {commits} not here", mend=git("pull"))
+        return Point(kind="unpushed", text=f"{printable(marked)} has {commits} not here", fix=git("pull"))
 
 
 class Commands:
@@ -353,12 +351,12 @@ def _is_executable(path: Path) -> bool:
 
 
 def _is_hidden(tag: str) -> bool:
-    """Whether git leaves the file as it is in the index, whatever is on the disk."""
+    """Return whether git leaves the file as it is in the index, whatever is on the disk."""
     return tag.islower() or tag == "S"
 
 
 def _is_own(path: str) -> bool:
-    """Whether a person wrote the file, rather than a build, an editor or another program."""
+    """Return whether a person wrote the file, rather than a build, an editor or another program."""
     *folders, name = path.split("/")
     made = any(f in BUILD_SPACES or f.startswith((".", "__")) or f == "venv" for f in folders)
     return not (made or name.startswith(".") or name.endswith(LEFTOVERS))
@@ -428,7 +426,7 @@ def _default_branch(name: str, refs: Mapping[str, str]) -> str | None:
 
 
 def _has_head(view: View) -> bool:
-    """Whether the commit here is on some branch of the server."""
+    """Return whether the commit here is on some branch of the server."""
     try:
         return bool(view.run("for-each-ref", "--count=1", "--contains=HEAD", TRACKING).strip())
     except GitTimeout:

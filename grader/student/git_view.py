@@ -14,7 +14,7 @@ from pathlib import Path
 from grader.errors import SubmissionError, UsageError
 from grader.intake.git import Git, GitFailed, GitMissing, GitTimeout, Repository
 from grader.intake.gitdir import Unfit, git_folder, link_repository, repository_around
-from grader.intake.limits import Limits
+from grader.intake.limits import IntakeLimits
 from grader.intake.names import brief, printable
 from grader.intake.tree import is_file, read_file
 
@@ -73,7 +73,7 @@ def _parse(listed: bytes) -> dict[str, str]:
 
 
 def _user_settings(git: Git) -> dict[str, str]:
-    """The settings of the user and of the machine."""
+    """Return the settings of the user and of the machine."""
     try:
         said = git.run("config", "--list", "--show-scope", "-z", cwd=git.home, remote=True)
     except (GitMissing, GitTimeout):
@@ -124,7 +124,7 @@ def write_staged(package: Path, base: Path, *, index: str = "") -> Path:
 
 
 def _open_index(top: Path, base: Path, index: str) -> View:
-    """The repository with the index that git names, if that lies where git puts one."""
+    """Return the repository with the index that git names, if that lies where git puts one."""
     git = Git(base / "home", timeout_s=SECONDS)
     view = open_view(top, base / "view", git)
     own = git_folder(top, top, git).resolve()
@@ -137,7 +137,7 @@ def _open_index(top: Path, base: Path, index: str) -> View:
 
 
 def _staged_paths(view: View, package: Path) -> list[str]:
-    """The package's staged files, relative to its folder, without pointers to other repositories."""
+    """Return the package's staged files, relative to its folder, without pointers to other repositories."""
     said = view.run("ls-files", "--stage", "-z", cwd=package)
     pairs = (record.partition(b"\t") for record in said.split(b"\0") if record)
     paths = [os.fsdecode(path) for meta, _, path in pairs if not meta.startswith(b"160000")]
@@ -146,7 +146,7 @@ def _staged_paths(view: View, package: Path) -> list[str]:
             f"git has nothing of the package in {printable(package.name)}",
             hint="git add its files, and commit",
         )
-    if len(paths) > Limits().package_files:
+    if len(paths) > IntakeLimits().package_files:
         raise SubmissionError(
             f"{len(paths)} files are staged", hint="take what was built or recorded out of the repository"
         )

@@ -25,6 +25,7 @@ from grader.errors import ExitCode, GraderError, SubmissionError, UsageError
 from grader.faults import error_result
 from grader.files import temporary_folder
 from grader.intake import open_submission
+from grader.intake.choose import Wanted
 from grader.intake.source import identify
 from grader.model.package import SourceFile
 from grader.model.progress import Progress
@@ -85,7 +86,7 @@ class Screen:
         """Show that a run begins because these files were saved; none for the first run."""
 
     def restart(self) -> None:
-        """Show that a run was stopped because something was saved meanwhile."""
+        """Show that a run was stopped because something was saved during it."""
 
     def end(self, outcome: Outcome, saved: tuple[str, ...]) -> None:
         """Show a result."""
@@ -170,7 +171,7 @@ class Watch:
             return self._last.code
 
     def _run_once(self) -> bool:
-        """Grade and show the result; false where files were saved meanwhile, so that it no longer holds."""
+        """Grade and show the result; false if files were saved during it, so that it no longer holds."""
         snapshot = self._look()
         saved = self._names_to_show(snapshot)
         self._screen.begin(saved)
@@ -181,9 +182,9 @@ class Watch:
         except Stopped:
             self._saved |= self._saves.wait(0)
             return False
-        meanwhile = self._saves.wait(AGAIN_S if outcome.result.error is not None else 0)
-        if meanwhile and self._look() != snapshot:
-            self._saved |= meanwhile
+        saved_since = self._saves.wait(AGAIN_S if outcome.result.error is not None else 0)
+        if saved_since and self._look() != snapshot:
+            self._saved |= saved_since
             return False
         self._graded, self._last = snapshot, outcome
         self._screen.end(outcome, saved)
@@ -229,7 +230,7 @@ class Watch:
             self._saves.wait(GONE_S / 10)
 
     def _names_to_show(self, snapshot: Snapshot | None) -> tuple[str, ...]:
-        """The files that differ from the last graded ones; else those that were saved."""
+        """Return the files that differ from the last graded ones; else those that were saved."""
         changed = changed_files(self._graded, snapshot) if snapshot and self._graded else ()
         return changed or self._relative(self._saved)
 
@@ -317,7 +318,11 @@ def watch(grading: Grading, screen: Screen, *, without: Path | None = None) -> E
     """Grade again at each save until Ctrl-C; see `Watch.run`. `without` is a folder of our own results."""
     return Watch(
         Path(grading.source),
-        look=lambda: take_snapshot(grading.source, grading.rubric.rubric.package, without=without),
+        look=lambda: take_snapshot(
+            grading.source,
+            pipeline.wanted_package(grading.rubric.rubric, grading.options.package),
+            without=without,
+        ),
         grade=grading,
         saves=Saves(without),
         screen=screen,
@@ -325,7 +330,7 @@ def watch(grading: Grading, screen: Screen, *, without: Path | None = None) -> E
 
 
 def is_ignored(path: str) -> bool:
-    """Whether a path relative to the package's folder is a leftover of a build, an editor, git or the grader."""
+    """Return whether a path relative to the package's folder is a leftover of a build, an editor, git or the grader."""
     parts = PurePosixPath(path).parts
     return any(part in IGNORED_FOLDERS for part in parts) or bool(parts and IGNORED_NAMES.search(parts[-1]))
 
@@ -337,7 +342,7 @@ def changed_files(before: Snapshot, after: Snapshot) -> tuple[str, ...]:
     return tuple(sorted(changed, key=lambda path: (path.startswith("../"), path)))
 
 
-def take_snapshot(source: str, package: str, *, without: Path | None = None) -> Snapshot:
+def take_snapshot(source: str, package: str | Wanted, *, without: Path | None = None) -> Snapshot:
     """Return the package as `grader check SOURCE` sees it now, without what is in the folder `without`.
 
     Raises SubmissionError where there is no such package or a file cannot be read, OSError where one vanishes.

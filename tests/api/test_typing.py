@@ -100,6 +100,7 @@ def test_a_users_mistakes_are_found(place: Path) -> None:
     assert {line.split(":")[1] for line in found if ": error: " in line} == {"2", "4", "5", "6", "7", "8"}
 
 
+@pytest.mark.full
 def test_it_is_the_mark_that_makes_it_typed(place: Path) -> None:
     """Without it, mypy takes nothing from an installed package: so it was that package that was looked at."""
     mark = next((place / "venv").rglob("site-packages/grader/py.typed"))

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.limits import Limits
-from grader.arena.process_environment import Place
+from grader.arena.limits import RunLimits
+from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.ros_env import RosInstallation, find_ros
 from grader.arena.sandbox_files import prepare
 from grader.arena.sandbox_probe import choose, why_not
@@ -69,9 +69,9 @@ def make_place(
     files: Mapping[str, str],
     *,
     sandbox: str = "auto",
-    limits: Limits | None = None,
+    limits: RunLimits | None = None,
     folder: Path | None = None,
-) -> Iterator[Place]:
+) -> Iterator[ProcessEnvironment]:
     """A place with the package unbuilt: ROS finds its sources."""
     with tempfile.TemporaryDirectory(prefix="grader-test-") as name:
         top = Path(name)
@@ -82,32 +82,32 @@ def make_place(
         scripts = [f for f in files if f.endswith(".py")]
         facts = read_package(submission.package)
         workspace = make_workspace(top / "place", submission, facts, scripts, chosen)
-        place = Place(
+        place = ProcessEnvironment(
             folder=top / "place",
             ros=ros,
             sandbox=chosen,
-            limits=limits or Limits(),
+            limits=limits or RunLimits(),
             workspace=workspace,
             package="lab",
         )
         yield place.from_source()
 
 
-def repaired(place: Place) -> Place:
+def repaired(place: ProcessEnvironment) -> ProcessEnvironment:
     """As after a build: what runs are the repaired sources."""
     if not place.sandbox.bubblewrap:
         run_in_place(place.workspace, place.sandbox)
     return place
 
 
-def run(place: Place, scenario: Scenario, path: Path) -> Run:
+def run(place: ProcessEnvironment, scenario: Scenario, path: Path) -> Run:
     """Record a scenario and read it back."""
     asyncio.run(_bounded(repaired(place), scenario, path))
     return load_run(path)
 
 
 def run_script(
-    tmp_path: Path, code: str, *, sandbox: str = "auto", limits: Limits | None = None, **until: object
+    tmp_path: Path, code: str, *, sandbox: str = "auto", limits: RunLimits | None = None, **until: object
 ) -> Run:
     """Run one script as `node.py` until the conditions hold."""
     scenario = Scenario(
@@ -120,7 +120,7 @@ def run_script(
         return run(place, scenario, tmp_path / "run.mcap")
 
 
-async def _bounded(place: Place, scenario: Scenario, path: Path) -> None:
+async def _bounded(place: ProcessEnvironment, scenario: Scenario, path: Path) -> None:
     await asyncio.wait_for(
         run_scenario("run", scenario, place, path=path, metadata={}, tell=lambda _: None), RUN_S
     )

@@ -13,7 +13,7 @@ import pytest
 
 from grader.arena import base_workspace, build
 from grader.arena.base_workspace import FILES_MAX, base_spec, has_base, keep, provide_base, read_kept
-from grader.arena.process_environment import Place
+from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.sandbox_files import ANSWERS, QUESTIONS
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
@@ -90,7 +90,7 @@ def test_old_ones_do_not_pile_up(cache: Path) -> None:
     assert read_kept(str(FILES_MAX + 2)) == b"something"
 
 
-def _build(place: Place, tmp_path: Path) -> tuple[bool, Run, dict[str, bytes | None], bytes]:
+def _build(place: ProcessEnvironment, tmp_path: Path) -> tuple[bool, Run, dict[str, bytes | None], bytes]:
     """Whether it worked, what was seen, the files of `devel`, and CMake's trace."""
     path = tmp_path / "package.mcap"
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from grader.arena.build import BuildOutcome, build
-from grader.arena.process_environment import Place
+from grader.arena.process_environment import ProcessEnvironment
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter
@@ -43,10 +43,12 @@ int main(int argc, char** argv) {
 """
 
 
-def _built(place: Place, tmp_path: Path, answers: tuple[str, ...] = ()) -> tuple[Place, BuildOutcome, Run]:
+def _built(
+    place: ProcessEnvironment, tmp_path: Path, answers: tuple[str, ...] = ()
+) -> tuple[ProcessEnvironment, BuildOutcome, Run]:
     path = tmp_path / "package.mcap"
 
-    async def work() -> tuple[Place, BuildOutcome]:
+    async def work() -> tuple[ProcessEnvironment, BuildOutcome]:
         with EvidenceWriter(path, scenario="package", clock="real", warp=1.0, metadata={}) as writer:
             return await build(place, writer, ["src/node.py"], answers)
 

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from grader.arena.build import build
-from grader.arena.process_environment import Place
+from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.ros_env import (
     DUMP_BYTES,
     NAMES_MAX,
@@ -108,7 +108,7 @@ def test_an_environment_within_bounds_is_a_nodes(tmp_path: Path) -> None:
     assert not {"LD_AUDIT", "BASH_ENV"} & env.keys()
 
 
-def everything_of(place: Place) -> Iterator[dict[str, Any]]:
+def everything_of(place: ProcessEnvironment) -> Iterator[dict[str, Any]]:
     """How processes of each kind are started, with the canary in all that a submission says."""
     argv = ["rosrun", f"{CANARY}-package", f"{CANARY}; --bind / /"]
     yield place.spec("node", argv)
@@ -170,7 +170,9 @@ def test_nothing_of_a_submission_reaches_a_program_outside(
     sandbox: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with make_place({"src/node.py": SCRIPT}, sandbox=sandbox) as place:
-        hostile = Place(**{**vars(place), "package": CANARY, "env": dict.fromkeys(ROS_VARIABLES, CANARY)})
+        hostile = ProcessEnvironment(
+            **{**vars(place), "package": CANARY, "env": dict.fromkeys(ROS_VARIABLES, CANARY)}
+        )
         specs = [json.loads(json.dumps(spec)) for spec in everything_of(hostile)]
     with recorded_start(monkeypatch, tmp_path) as started:
         import launching  # noqa: PLC0415 - as above

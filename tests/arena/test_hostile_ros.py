@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.limits import Limits
+from grader.arena.limits import RunLimits
 from grader.evidence.run import Channel, Run
 from grader.rubric.model import Probe, Scenario, Start, Until
 from tests.arena.support import SCRIPT, exit_of, make_place, printed, run
@@ -65,7 +65,7 @@ def beside_a_talker(
     *,
     window_s: float = 3.0,
     ends: bool = False,
-    limits: Limits | None = None,
+    limits: RunLimits | None = None,
     sandbox: str = "auto",
 ) -> Run:
     """Run an attack in one process beside an honest 10 Hz talker in another; one that `ends` is seen to its end."""
@@ -76,7 +76,8 @@ def beside_a_talker(
             window_s=window_s,
             topics=("/chatter",),
             ended=("attack",) if ends else (),
-            first_message_s=15,
+            first_message_s=30,
+            silent_s=30,
             limit_s=60,
         ),
     )
@@ -86,14 +87,13 @@ def beside_a_talker(
 
 
 def assert_unharmed(seen: Run, *, window_s: float = 3.0) -> None:
-    """The talker is recorded whole and in time, the arena stayed small, and the run took no longer than it had to."""
+    """The talker is recorded whole and in time, the arena stayed small, and the run ended as it had to."""
     assert (seen.outcome.outcome, seen.outcome.detail) == ("complete", "")
     (chatter,) = seen.student_channels("/chatter")
     assert list(chatter.data) == list(range(len(chatter.data)))
     assert len(chatter.data) >= window_s * 10 - 1
     assert rate_hz(chatter) == pytest.approx(10, abs=0.5)
     assert exit_of(seen, "arena").max_rss_bytes < ARENA_BYTES_MAX
-    assert seen.end_ns - seen.start_ns < 30e9
 
 
 def rate_hz(channel: Channel) -> float:
@@ -147,12 +147,12 @@ def hammer():
         proxy().getParam('/x', '/rosout_disable_topics_generation')
 for _ in range(20):
     threading.Thread(target=hammer, daemon=True).start()
-time.sleep(60)
+time.sleep(3)
 """
 
 
 def test_calls_that_are_made_to_break_the_master(tmp_path: Path) -> None:
-    seen = beside_a_talker(tmp_path, CALLS)
+    seen = beside_a_talker(tmp_path, CALLS, ends=True)
     assert_unharmed(seen)
     refused = (
         "a document type",
@@ -390,12 +390,12 @@ for number in range(20):
     one.registerPublisher('/bomb', '/bomb%d' % number, 'std_msgs/Int32', 'http://127.0.0.1:%d/' % bomb.getsockname()[1])
 one.registerSubscriber('/bomb', '/chatter', 'std_msgs/Int32', 'http://127.0.0.1:%d/' % bomb.getsockname()[1])
 print('done')
-time.sleep(60)
+time.sleep(4)
 """
 
 
 def test_publishers_that_do_not_keep_to_the_protocol(tmp_path: Path) -> None:
-    seen = beside_a_talker(tmp_path, PUBLISHERS, window_s=4)
+    seen = beside_a_talker(tmp_path, PUBLISHERS, window_s=4, ends=True)
     assert_unharmed(seen, window_s=4)
     assert "done" in printed(seen, "attack")
     whole = {c.callerid: len(c.messages) for c in seen.student_channels() if c.callerid.startswith("/m_")}
@@ -505,13 +505,13 @@ rospy.spin()
 
 
 def test_floods_of_messages(tmp_path: Path) -> None:
-    seen = beside_a_talker(tmp_path, FLOOD, limits=Limits(run_bytes=32 << 20))
+    seen = beside_a_talker(tmp_path, FLOOD, limits=RunLimits(run_bytes=32 << 20))
     assert_unharmed(seen)
     recorded = {c.topic: sum(len(m.data) for m in c.messages) for c in seen.channels}
     assert 1 << 20 < recorded["/large"] < 24 << 20
     assert sum(recorded.values()) < 32 << 20
     (small,) = seen.student_channels("/small")
-    assert 180 <= len(small.messages) <= Limits().channel_messages
+    assert 180 <= len(small.messages) <= RunLimits().channel_messages
     closed = {e.topic: e.dropped for _, e in seen.recorder if e.event == "closed"}
     assert closed["/small"] > 100_000
     assert closed["/chatter"] == 0

@@ -53,12 +53,28 @@ def test_settled(until: Until, live: RunState, now_s: float, outcome: str | None
 
 
 @pytest.mark.parametrize(
+    ("busy", "own", "outcome"),
+    [(1.0, 0.0, None), (1.0, 0.5, None), (1.0, 0.95, "silent"), (0.8, 0.0, "silent")],
+)
+def test_a_node_is_waited_for_longer_where_others_fill_the_machine(
+    busy: float, own: float, outcome: str | None
+) -> None:
+    live = _live()
+    for now_s in range(1, 25):
+        live.machine(busy, own, float(now_s))
+    done = find_outcome(live, WINDOW, 24.0)
+    assert (done and done[0]) == outcome
+    assert find_outcome(live, WINDOW, 4 * WINDOW.first_message_s) is not None
+
+
+@pytest.mark.parametrize(
     ("until", "live", "now_s", "outcome"),
     [
         (Until(quiet_s=3), _live(), 6.0, "complete"),
         (WINDOW, _live(a=(5, 1.0, 2.0)), 9.0, "complete"),
         (COUNT, _live(b=(9, 1.0, 9.0)), 9.0, "silent"),
         (Until(nodes=2), _live(), 9.0, "silent"),
+        (Until(alive_s=8), _live(), 9.0, "complete"),
     ],
 )
 def test_a_process_that_is_no_node_yet_is_waited_for(
@@ -71,6 +87,23 @@ def test_a_process_that_is_no_node_yet_is_waited_for(
     live.running, live.last_start_s = {"node", "late"}, 2.0
     assert find_outcome(live, until, now_s) is None
     assert find_outcome(live, until, 2.1 + until.first_message_s) is not None
+
+
+def test_what_is_sent_has_longer_to_be_printed_where_others_fill_the_machine() -> None:
+    live, until = _live(), Until(heard=True)
+    live.sent("word", 1.0)
+    assert find_outcome(live, until, 3.1) == ("complete", "")
+    live.lost_s = 4.0
+    assert find_outcome(live, until, 6.9) is None
+    assert find_outcome(live, until, 7.1) == ("complete", "")
+
+
+def test_the_last_process_is_watched_for_half_as_long_as_the_first() -> None:
+    live, until = RunState(running={"first", "second"}, last_start_s=1.0), Until(alive_s=8)
+    live.graph(["/first"], {"/first": "first"}, 2.0)
+    live.graph(["/first", "/second"], {"/first": "first", "/second": "second"}, 9.0)
+    assert find_outcome(live, until, 12.9) is None
+    assert find_outcome(live, until, 13.0) == ("complete", "")
 
 
 def test_ended_comes_before_all_else() -> None:

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from grader.arena.scenario_inputs import make_shots
+from grader.arena.scenario_inputs import made_up, make_shots
 from grader.rubric.model import Probe
 
 CHATTER = Probe(topic="/chatter", type="std_msgs/String", text=8)
@@ -41,3 +41,25 @@ def test_topics_take_turns() -> None:
     shots = make_shots((CHATTER, numbers))
     assert [shot.topic for shot in shots[:4]] == ["/chatter", "/n", "/chatter", "/n"]
     assert sorted({shot.topic for shot in shots[6:]}) == ["/chatter"]
+
+
+def test_a_text_that_is_cut_is_noticed() -> None:
+    texts = [str(shot.value) for shot in make_shots((CHATTER,))]
+    for cut in (
+        lambda t: t[:18],
+        lambda t: t.split(",")[0],
+        lambda t: t.split(":")[0],
+        lambda t: t.rstrip("0123456789"),
+    ):
+        assert any(cut(text) != text for text in texts)
+
+
+@pytest.mark.parametrize("like", ["12 Station Road, Mumbai", "Asha", "+91 98-76", "a\nb: c\n", "Al", "", "7"])
+def test_what_is_made_up_has_the_shape_of_the_original(like: str) -> None:
+    found = {made_up(like) for _ in range(20)}
+    assert len(found) == 20
+    for text in found:
+        rest = "".join("x" if c.isalnum() else c for c in text)
+        assert rest.startswith("".join("x" if c.isalnum() else c for c in like).rstrip())
+        assert [c.isdigit() for c in text][: len(like.rstrip())] == [c.isdigit() for c in like.rstrip()]
+        assert sum(c.isalnum() for c in text) >= 5

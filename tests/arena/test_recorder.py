@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from grader.arena.limits import Limits
+from grader.arena.limits import RunLimits
 from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.session import ARENA
 from grader.checks import CHECKS
@@ -259,7 +259,7 @@ rospy.sleep(0.5)
 @pytest.mark.ros
 @pytest.mark.filterwarnings("ignore")
 def test_a_run_says_how_many_messages_it_dropped_and_so_do_its_verdicts(tmp_path: Path) -> None:
-    seen = run_script(tmp_path, FLOOD, limits=Limits(channel_messages=1000), ended=("node",), limit_s=30)
+    seen = run_script(tmp_path, FLOOD, limits=RunLimits(channel_messages=1000), ended=("node",), limit_s=30)
     assert "sent 8000" in printed(seen)
     (channel,) = seen.student_channels("/numbers")
     assert list(channel.data) == list(range(1000))

@@ -92,6 +92,7 @@ def test_another_rubric_grades_all_again(tmp_path) -> None:
     assert run_of(out)["counts"]["kept"] == 0
 
 
+@pytest.mark.full
 def test_only_some_of_them(tmp_path, capsys) -> None:
     rows = ["ada,ada", "bob,bob.zip", "cem,cem"]
     handed_in(tmp_path / "in", ["ada", "cem"])

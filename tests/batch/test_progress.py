@@ -7,6 +7,7 @@ import io
 import pytest
 from rich.console import Console
 
+from grader.classes.batch.gradings import _Steps
 from grader.classes.batch.job import Outcome
 from grader.classes.batch.progress import LATELY, BatchProgress
 from grader.cli.class_display import LiveClass, PlainClass, summary
@@ -110,3 +111,17 @@ def test_a_terminal_shows_a_bar_what_runs_and_what_failed() -> None:
     assert "s1" in text
     assert "and 3 more" in text
     assert "1 of 30 done, 11 running, 18 waiting, 1 failed" in text
+
+
+def test_a_run_that_is_made_again_is_counted_and_one_that_is_still_going_on_is_not() -> None:
+    steps = _Steps()
+    for name in ("intake", "build", "talker", "launch"):
+        steps.step(name, "running")
+        steps.step(name, "done")
+    assert steps.again == 0
+    steps.step("talker", "waiting", "to be run again")
+    steps.step("talker", "running")
+    assert steps.again == 0
+    steps.step("talker", "done")
+    steps.step("talker", "done")
+    assert steps.again == 2

@@ -7,15 +7,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple, Protocol
 from urllib.parse import urlsplit
 
 import pytest
-from playwright.sync_api import Browser, ConsoleMessage, Page, sync_playwright
+from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
 from tests.browser import ground
 
+expect.set_options(timeout=60_000)  # how busy the machine is says nothing of a page
 LOOPBACK = {"127.0.0.1", "localhost", "::1"}
 
 
@@ -62,9 +64,8 @@ def complaints() -> list[str]:
     return []
 
 
-@pytest.fixture
-def visit(browser: Browser, complaints: list[str]) -> Iterator[Visit]:
-    """Opens pages; at the end none of them may have complained."""
+@contextmanager
+def _visits(browser: Browser, complaints: list[str]) -> Iterator[Visit]:
     contexts = []
 
     def open_page(place: Path | str, *, size: Size = DESKTOP, dark: bool = False) -> Page:
@@ -75,7 +76,7 @@ def visit(browser: Browser, complaints: list[str]) -> Iterator[Visit]:
             accept_downloads=True,
         )
         contexts.append(context)
-        context.set_default_timeout(10_000)
+        context.set_default_timeout(60_000)
         page = context.new_page()
         address = place.absolute().as_uri() if isinstance(place, Path) else place
         _watch(page, address, complaints)
@@ -86,6 +87,20 @@ def visit(browser: Browser, complaints: list[str]) -> Iterator[Visit]:
     for context in contexts:
         context.close()
     assert complaints == []
+
+
+@pytest.fixture
+def visit(browser: Browser, complaints: list[str]) -> Iterator[Visit]:
+    """Opens pages; at the end none of them may have complained."""
+    with _visits(browser, complaints) as open_page:
+        yield open_page
+
+
+@pytest.fixture(scope="module")
+def visit_once(browser: Browser) -> Iterator[Visit]:
+    """The same, for a page that several tests look at and none changes."""
+    with _visits(browser, []) as open_page:
+        yield open_page
 
 
 @pytest.fixture
@@ -106,8 +121,8 @@ def axe(browser: Browser) -> Callable[[Page], list[str]]:
 
 
 @pytest.fixture
-def validate(browser: Browser) -> Callable[[Path], list[str]]:
-    """What html-validate has against a file, a line each."""
+def validate(browser: Browser) -> Callable[..., list[str]]:
+    """What html-validate has against files, a line each."""
     return ground.validate
 
 

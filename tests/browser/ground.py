@@ -35,12 +35,17 @@ def missing() -> str | None:
     return f"no {', no '.join(lacking)}: apt-get install chromium nodejs npm, then make setup"
 
 
-def validate(path: Path) -> list[str]:
-    """What html-validate has against an HTML file, a line each: `12:3 rule: text`."""
+def validate(*paths: Path) -> list[str]:
+    """What html-validate has against HTML files, a line each: `12:3 rule: text`."""
     command = ["node", str(VALIDATE), "--config", str(HERE / "htmlvalidate.mjs"), "--formatter", "json"]
     with tempfile.TemporaryFile() as out:  # into a pipe, node writes the beginning only
         done = subprocess.run(
-            [*command, str(path)], cwd=HERE, stdout=out, stderr=subprocess.PIPE, timeout=60, check=False
+            [*command, *map(str, paths)],
+            cwd=HERE,
+            stdout=out,
+            stderr=subprocess.PIPE,
+            timeout=60,
+            check=False,
         )
         if done.returncode not in (0, 1):
             raise RuntimeError(done.stderr.decode())

@@ -18,7 +18,8 @@ from tests.review.running import Server
 HOSTILE = (
     "<img src=x onerror=\"document.title='caught'\">\u202e</textarea><script>document.title='caught'</script>"
 )
-SIZES = pytest.mark.parametrize("size", [DESKTOP, PHONE], ids=["desktop", "phone"])
+ON_PHONES = pytest.param(PHONE, marks=pytest.mark.full)
+SIZES = pytest.mark.parametrize("size", [DESKTOP, ON_PHONES], ids=["desktop", "phone"])
 ESCAPING = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>r</title></head><body>
 <form id="f" method="post" action="{address}s/ada/c/style"><input name="points" value="10"></form>
 <p id="out">began</p><script>
@@ -97,6 +98,7 @@ def test_through_the_class_and_save(opened, out, size) -> None:
     expect(report.get_by_text("clear names").first).to_be_attached()
 
 
+@pytest.mark.full
 def test_by_keyboard_alone(opened, out) -> None:
     page = opened()
     page.keyboard.press("j")
@@ -119,6 +121,7 @@ def test_by_keyboard_alone(opened, out) -> None:
     assert overrides_of(out)["dana"]["style"]["comment"] == "jk: too long"
 
 
+@pytest.mark.full
 def test_save_then_next(opened) -> None:
     page = opened("s/ada/?show=manual")
     card = page.locator("#c-style")
@@ -127,6 +130,7 @@ def test_save_then_next(opened) -> None:
     expect(page.get_by_role("heading", level=1)).to_have_text("dana")
 
 
+@pytest.mark.full
 def test_two_tabs_show_both_values(opened, out, complaints) -> None:
     one, two = opened("s/ada/"), opened("s/ada/")
     for page, points in ((one, "9"), (two, "2")):
@@ -143,6 +147,7 @@ def test_two_tabs_show_both_values(opened, out, complaints) -> None:
     complaints.clear()
 
 
+@pytest.mark.full
 def test_taking_back(opened, out) -> None:
     page = opened("s/dana/")
     card = page.locator("#c-counter-wrap")
@@ -157,6 +162,7 @@ def test_taking_back(opened, out) -> None:
     assert overrides_of(out) == {}
 
 
+@pytest.mark.full
 def test_without_javascript_everything_is_saved(browser, server, out) -> None:
     context = browser.new_context(java_script_enabled=False)
     page = context.new_page()
@@ -169,6 +175,7 @@ def test_without_javascript_everything_is_saved(browser, server, out) -> None:
     context.close()
 
 
+@pytest.mark.full
 def test_the_name_is_changed_in_the_page(opened, out) -> None:
     page = opened("s/ada/")
     page.get_by_text("You decide as").click()
@@ -211,6 +218,7 @@ def test_a_hostile_report_reaches_nothing(opened, server, out, complaints) -> No
     complaints.clear()
 
 
+@pytest.mark.full
 def test_opened_by_a_file_of_its_user(visit, server, tmp_path, complaints) -> None:
     path = tmp_path / "open.html"
     path.write_text(
@@ -222,20 +230,17 @@ def test_opened_by_a_file_of_its_user(visit, server, tmp_path, complaints) -> No
     complaints.clear()
 
 
-@SIZES
-def test_the_pages_are_clean(opened, axe, validate, tmp_path, size) -> None:
-    for path, dark in (
-        ("", False),
-        ("", True),
-        ("s/dana/", False),
-        ("s/dana/", True),
-        ("s/fay/", False),
-        ("s/gus/", False),
-    ):
+LOOKS = [(size, dark) for size in (DESKTOP, PHONE) for dark in (False, True)]
+
+
+@pytest.mark.full
+def test_the_pages_are_clean(opened, axe, validate, tmp_path) -> None:
+    kept = []
+    for path, size, dark in [(path, *look) for path in ("", "s/dana/", "s/fay/", "s/gus/") for look in LOOKS]:
         page = opened(path, size=size, dark=dark)
         page.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
         assert axe(page) == []
         assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
-        kept = tmp_path / "page.html"
-        kept.write_text(page.request.get(page.url).text(), encoding="utf-8")
-        assert validate(kept) == []
+        kept.append(tmp_path / f"page-{len(kept)}.html")
+        kept[-1].write_text(page.request.get(page.url).text(), encoding="utf-8")
+    assert validate(*kept) == []

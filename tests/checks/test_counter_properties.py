@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.checks.support.counters import Count
@@ -23,7 +23,6 @@ def verdict(check: str, params: dict[str, Any] | None = None, **topic: Any) -> V
     return judge_runs(check, {"topic": TOPIC, **(params or {})}, runs)
 
 
-@settings(max_examples=25, deadline=None)
 @given(maximum=st.integers(8, 200), minimum=st.integers(-3, 2), early=st.booleans())
 def test_right_counters_pass(maximum: int, minimum: int, early: bool) -> None:
     last = maximum - 1 if early else maximum
@@ -38,7 +37,6 @@ def test_right_counters_pass(maximum: int, minimum: int, early: bool) -> None:
 
 
 @pytest.mark.full
-@settings(max_examples=40, deadline=None)
 @given(last=st.integers(0, 300), to=st.integers(-300, 299))
 def test_wrong_wraps_fail(last: int, to: int) -> None:
     right = last in {126, 127} and to == 0
@@ -52,7 +50,6 @@ def test_wrong_wraps_fail(last: int, to: int) -> None:
     assert found.hint
 
 
-@settings(max_examples=25, deadline=None)
 @given(values=st.lists(st.integers(-128, 127), min_size=30, max_size=300))
 def test_random_numbers_never_pass(values: list[int]) -> None:
     found = verdict("counter-step", values=values)
@@ -60,7 +57,6 @@ def test_random_numbers_never_pass(values: list[int]) -> None:
     assert verdict("counter-wrap", values=values).status is not Status.PASS
 
 
-@settings(max_examples=25, deadline=None)
 @given(step=st.integers(2, 9))
 def test_other_steps_fail_and_are_named(step: int) -> None:
     found = verdict("counter-step", values={"count_from": 0, "step": step}, count=60)
@@ -68,7 +64,6 @@ def test_other_steps_fail_and_are_named(step: int) -> None:
     assert f"steps of {step}" in found.message
 
 
-@settings(max_examples=25, deadline=None)
 @given(at=st.integers(5, 190), length=st.integers(1, 3))
 def test_what_is_lost_on_the_way_is_nobodys_fault(at: int, length: int) -> None:
     drop = list(range(at, at + length))

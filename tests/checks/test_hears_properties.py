@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.checks.support.console_output import in_order, numbers_in
@@ -54,7 +54,6 @@ def test_no_number_where_there_is_none(text: str, missing: int) -> None:
     assert missing not in numbers_in(text)
 
 
-@settings(max_examples=40, deadline=None)
 @given(sent=st.lists(INT8, min_size=3, max_size=12), form=st.sampled_from(FORMS))
 def test_who_prints_all_passes(sent: list[int], form: str) -> None:
     if form == "+{}" and min(sent) < 0:
@@ -62,7 +61,6 @@ def test_who_prints_all_passes(sent: list[int], form: str) -> None:
     assert status("/numeric_chatter", sent, [form.format(v).strip() for v in sent]) is Status.PASS
 
 
-@settings(max_examples=40, deadline=None)
 @given(
     sent=st.lists(INT8, min_size=3, max_size=12, unique=True),
     between=st.sampled_from([", ", "\r", " ", "\t", "; "]),
@@ -77,7 +75,6 @@ def test_who_prints_all_in_one_line_passes(sent: list[int], between: str) -> Non
     assert judge_runs("hears", {"topic": "/n"}, runs).status is Status.PASS
 
 
-@settings(max_examples=40, deadline=None)
 @given(sent=st.lists(INT8, min_size=3, max_size=12, unique=True))
 def test_who_prints_what_came_so_far_passes(sent: list[int]) -> None:
     lines = [f"received {value} so far {sent[: i + 1]}" for i, value in enumerate(sent)]
@@ -92,20 +89,17 @@ def test_who_prints_the_absolute_value_fails(form: str) -> None:
     )
 
 
-@settings(max_examples=40, deadline=None)
 @given(sent=st.lists(INT8, min_size=3, max_size=12, unique=True), data=st.data())
 def test_who_leaves_one_out_fails(sent: list[int], data: st.DataObject) -> None:
     left_out = data.draw(st.sampled_from(sent))
     assert status("/numeric_chatter", sent, [str(v) for v in sent if v != left_out]) is Status.FAIL
 
 
-@settings(max_examples=40, deadline=None)
 @given(sent=st.lists(INT8, min_size=4, max_size=12, unique=True), shift=st.integers(1, 255))
 def test_who_prints_other_numbers_fails(sent: list[int], shift: int) -> None:
     assert status("/numeric_chatter", sent, [str(v + shift) for v in sent]) is Status.FAIL
 
 
-@settings(max_examples=40, deadline=None)
 @given(
     sent=st.lists(st.text("abcdefghij ", min_size=6, max_size=16).filter(str.strip), min_size=2, max_size=6)
 )
@@ -113,7 +107,6 @@ def test_texts(sent: list[str]) -> None:
     assert status("/chatter", sent, [f"I heard {text}" for text in sent]) is Status.PASS
 
 
-@settings(max_examples=40, deadline=None)
 @given(
     sent=st.lists(st.text("abcdefghijXYZ", min_size=6, max_size=16), min_size=2, max_size=6, unique=True),
     words=st.sampled_from(

@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from grader.checks.support.geometry import (
@@ -49,7 +49,6 @@ def euler(pose: Pose, command: Command, duration_s: float, steps: int = 4000) ->
     return Pose(pose.time_s + duration_s, x, y, pose.heading + command.turn * duration_s)
 
 
-@settings(max_examples=30, deadline=None)
 @given(pose=WHERE, command=COMMAND, duration_s=TIME)
 def test_arcs_are_what_small_steps_come_to(pose: Pose, command: Command, duration_s: float) -> None:
     assert moved(pose, command, duration_s) == pytest.approx(euler(pose, command, duration_s), abs=1e-3)
@@ -133,13 +132,11 @@ def verdict(way: list[Leg], **changes: Any) -> Verdict:
     return judge_runs("path", {"topic": "/cmd_vel", "points": points, "tolerance_m": 0.3}, runs)
 
 
-@settings(max_examples=40, deadline=None)
 @given(way=WAYS, longer=st.floats(-0.25, 0.25))
 def test_a_way_within_the_tolerance_passes(way: list[Leg], longer: float) -> None:
     assert verdict(way, longer=longer).status is Status.PASS
 
 
-@settings(max_examples=40, deadline=None)
 @given(way=WAYS, longer=st.one_of(st.floats(0.35, 0.9), st.floats(-0.65, -0.35)))
 def test_a_way_beyond_the_tolerance_fails_and_says_why(way: list[Leg], longer: float) -> None:
     found = verdict(way, longer=longer)
@@ -149,7 +146,6 @@ def test_a_way_beyond_the_tolerance_fails_and_says_why(way: list[Leg], longer: f
     assert not found.unjudged
 
 
-@settings(max_examples=40, deadline=None)
 @given(way=WAYS)
 def test_a_mirrored_way_never_passes(way: list[Leg]) -> None:
     assume(len(way) > 1)

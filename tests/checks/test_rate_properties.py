@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.model.message_rate import Rhythm
@@ -37,20 +37,17 @@ def test_where_the_run_begins_does_not_matter(start_s: float) -> None:
     assert status({"rate_hz": 9.49, "count": 61, "start_s": start_s}) is Status.FAIL
 
 
-@settings(max_examples=30, deadline=None)
 @given(jitter_ms=st.lists(st.floats(-20, 20), min_size=1, max_size=20))
 def test_small_jitter_costs_nothing(jitter_ms: list[float]) -> None:
     assert status({"count": 71, "jitter_ms": jitter_ms}) is Status.PASS
 
 
 @pytest.mark.full
-@settings(max_examples=30, deadline=None)
 @given(rate_hz=st.floats(0.5, 400).filter(lambda hz: not 9.49 < hz < 10.51))
 def test_no_other_rate_passes(rate_hz: float) -> None:
     assert status({"rate_hz": rate_hz, "count": int(rate_hz * 7) + 2}) is Status.FAIL
 
 
-@settings(max_examples=20, deadline=None)
 @given(burst=st.integers(2, 20))
 def test_no_burst_passes(burst: int) -> None:
     assert status({"count": burst * 10 + 1, "burst": burst}) is not Status.PASS

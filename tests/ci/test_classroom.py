@@ -6,7 +6,7 @@ import base64
 import json
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.model.result import ErrorInfo
@@ -109,7 +109,6 @@ def test_the_longest_report_fits_into_a_variable_of_the_environment():
     assert reporter(encoded).of == 120
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.lists(st.integers(0, 1000), min_size=1, max_size=12).filter(any))
 def test_the_sum_is_the_points_to_the_last_digit(tenths):
     criteria = tuple(criterion(f"c{i}", "partial", n / 10, 100) for i, n in enumerate(tenths))

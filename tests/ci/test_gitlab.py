@@ -96,6 +96,7 @@ def test_every_report_is_where_gitlab_looks_for_it(job):
     assert (job.project / JOB["artifacts"]["paths"][0] / "report.html").is_file()
 
 
+@pytest.mark.full
 def test_a_package_without_mistakes_passes(job):
     handed_in(job.project, "src/lab1")
     assert job.run(GRADER_STATIC="true", **ALL).code == 0, job.log

@@ -96,3 +96,11 @@ def test_nothing_said_is_the_package_here_with_the_rubrics_mark():
     settings = read_settings({"GRADER_LAB": " ", "GRADER_STATIC": "False"})
     assert (settings.lab, str(settings.path), settings.mark) == (None, ".", None)
     assert (settings.static, settings.sandbox, str(settings.out)) == (False, "auto", "grader-results")
+
+
+@pytest.mark.parametrize("name", ["a\nb", "\x1b[2J", "x" * 256])
+def test_a_package_that_can_have_no_such_name(name):
+    assert read_settings({"GRADER_PACKAGE": " lab_1 "}).package == "lab_1"
+    with pytest.raises(UsageError, match="package: ") as caught:
+        read_settings({"GRADER_PACKAGE": name})
+    assert "\x1b" not in caught.value.message

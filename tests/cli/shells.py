@@ -16,7 +16,7 @@ BIN = Path(sys.executable).parent
 PROMPT = "ready> "
 TAB, CLEAR = "\t", "\x15"
 CONTROLS = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|[\r\x07]")
-SECONDS = 20
+SECONDS = 120
 START = {
     "bash": (
         ["--norc", "--noprofile", "-i"],

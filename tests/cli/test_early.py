@@ -7,7 +7,7 @@ import sys
 from functools import partial
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from rich.console import Console
 from rich.live import Live
 
@@ -119,7 +119,6 @@ def test_without_a_verdict_there_is_no_title(capsys) -> None:
     assert capsys.readouterr().out == ""
 
 
-@settings(max_examples=40)
 @given(TEXTS, TEXTS)
 @example("0" * 60 + " ::error::x", "")
 @example("0" * 49 + "::" * 40, "::" * 120)

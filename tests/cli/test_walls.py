@@ -26,7 +26,7 @@ def test_every_part_has_a_row_and_what_is_missing_a_command() -> None:
         "bwrap", "setpriv", "prlimit", "user namespaces", "network", "limits", "ulimit -u", "ulimit -n", "ulimit -v",
         "ulimit -d", "ulimit -s", "ulimit -f", "ulimit -t", "ulimit", "sandbox",
     ]  # fmt: skip
-    assert all(row.mend for row in found.values() if row.state != "ok")
+    assert all(row.fix for row in found.values() if row.state != "ok")
 
 
 @pytest.mark.parametrize(("program", "package"), [("bwrap", "bubblewrap"), ("setpriv", "util-linux")])
@@ -37,13 +37,13 @@ def test_a_program_that_is_not_installed(monkeypatch, program: str, package: str
     none = Sandbox(bubblewrap=False, uid=None, reason=f"{program} is not installed")
     monkeypatch.setattr(host_support, "choose", lambda _: none)
     found = rows()
-    assert (found[program].state, found[program].mend) == ("limited", f"apt-get install {package}")
+    assert (found[program].state, found[program].fix) == ("limited", f"apt-get install {package}")
     assert found["sandbox"].state == "limited"
     assert f"has no sandbox ({program} is not installed): students' code runs" in found["sandbox"].detail
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "mend"),
+    ("name", "value", "fix"),
     [
         ("kernel/unprivileged_userns_clone", "0", "sysctl -w kernel.unprivileged_userns_clone=1"),
         ("user/max_user_namespaces", "0", "sysctl -w user.max_user_namespaces=10000"),
@@ -55,7 +55,7 @@ def test_a_program_that_is_not_installed(monkeypatch, program: str, package: str
         ("user/max_user_namespaces", "1000", "--security-opt seccomp=unconfined"),
     ],
 )
-def test_namespaces_that_are_forbidden(monkeypatch, tmp_path: Path, name: str, value: str, mend: str) -> None:
+def test_namespaces_that_are_forbidden(monkeypatch, tmp_path: Path, name: str, value: str, fix: str) -> None:
     (tmp_path / name).parent.mkdir()
     (tmp_path / name).write_text(f"{value}\n")
     refused = subprocess.CompletedProcess([], 1, b"", b"unshare: unshare failed: Operation not permitted\n")
@@ -63,7 +63,7 @@ def test_namespaces_that_are_forbidden(monkeypatch, tmp_path: Path, name: str, v
     monkeypatch.setattr(host_support.subprocess, "run", lambda *_args, **_more: refused)
     row = host_support._probe("user namespaces", ["unshare"], drop=False)
     assert (row.state, row.detail) == ("limited", "unshare: unshare failed: Operation not permitted")
-    assert mend in row.mend
+    assert fix in row.fix
 
 
 def test_a_probe_that_does_not_answer_is_not_taken_for_a_machine_without(monkeypatch) -> None:
@@ -72,26 +72,26 @@ def test_a_probe_that_does_not_answer_is_not_taken_for_a_machine_without(monkeyp
 
     monkeypatch.setattr(host_support, "choose", no_answer)
     row = rows()["sandbox"]
-    assert (row.state, row.detail, row.mend) == ("missing", "no answer within 20 s", "look at each part")
+    assert (row.state, row.detail, row.fix) == ("missing", "no answer within 20 s", "look at each part")
 
 
 @pytest.mark.parametrize(
-    ("user", "could", "mend"),
+    ("user", "could", "fix"),
     [
         (1000, True, host_support.DELEGATE),
         (1000, False, host_support.OLD_GROUPS),
         (0, True, host_support.ROOTS_GROUPS),
     ],
 )
-def test_what_holds_memory_where_no_group_can_be_made(monkeypatch, user: int, could: bool, mend: str) -> None:
+def test_what_holds_memory_where_no_group_can_be_made(monkeypatch, user: int, could: bool, fix: str) -> None:
     for module in (host_support, control_groups):
         monkeypatch.setattr(module, "find_cgroups", Cgroups)
     monkeypatch.setattr(host_support, "user_id", lambda: user)
     monkeypatch.setattr(host_support, "has_memory", lambda: could)
     row = host_support._limits_of_trees()
-    assert (row.state, row.mend) == ("limited", mend)
+    assert (row.state, row.fix) == ("limited", fix)
     assert "looked at twice a second" in row.detail
-    assert "children that nobody waited for is not counted" in row.detail
+    assert "children that were not waited for is not counted" in row.detail
 
 
 def test_what_holds_memory_where_groups_can_be_made(monkeypatch) -> None:
@@ -99,7 +99,7 @@ def test_what_holds_memory_where_groups_can_be_made(monkeypatch) -> None:
     for module in (host_support, control_groups):
         monkeypatch.setattr(module, "find_cgroups", lambda: held)
     row = host_support._limits_of_trees()
-    assert (row.state, row.mend) == ("ok", "")
+    assert (row.state, row.fix) == ("ok", "")
     assert "memory by cgroup v2, tasks by rlimits and a watchdog; below its own group" in row.detail
 
 
@@ -111,7 +111,7 @@ def test_limits_that_cannot_be_set_keep_everything_from_being_graded(monkeypatch
     monkeypatch.setattr(host_support, "choose", refuses)
     found = rows()
     assert (found["ulimit"].state, found["ulimit"].detail) == ("missing", "prlimit: Operation not permitted")
-    assert (found["sandbox"].state, found["sandbox"].mend) == ("missing", "raise them")
+    assert (found["sandbox"].state, found["sandbox"].fix) == ("missing", "raise them")
 
 
 @pytest.mark.parametrize(

@@ -69,6 +69,7 @@ def test_results_come_through_a_url_that_is_no_path(place: Cluster, tmp_path: Pa
     assert on_shelf(shelf) == []
 
 
+@pytest.mark.full
 def test_a_cluster_with_certificates_needs_no_flag(tmp_path: Path) -> None:
     out = tmp_path / "out"
     with cluster(tmp_path, tls=True) as made:
@@ -81,6 +82,7 @@ def test_a_cluster_with_certificates_needs_no_flag(tmp_path: Path) -> None:
     assert sorted(verdicts(out)) == NAMES[:2]
 
 
+@pytest.mark.full
 def test_workers_that_differ_are_named_and_left_out(place: Cluster, tmp_path: Path) -> None:
     place.worker(preload="older")
     place.worker(preload="without")

@@ -78,7 +78,7 @@ def test_a_folder_on_this_machine_is_its_owners_and_never_one_that_somebody_else
 ) -> None:
     assert Path(exchange.url).stat().st_mode & 0o777 == 0o700
     monkeypatch.setattr(LocalFileSystem, "rm", lambda *_, **__: None)
-    with pytest.raises(HostError, match="somebody else has just made it"):
+    with pytest.raises(HostError, match="another program has just made it"):
         exchange.make()
 
 

@@ -103,6 +103,7 @@ def test_a_killed_client_leaves_its_workers_free_and_the_next_one_goes_on(
     assert not (out / EXCHANGE).exists()
 
 
+@pytest.mark.full
 def test_without_its_scheduler_the_batch_ends_with_one_line(place: Cluster, tmp_path: Path) -> None:
     place.worker()
     out = tmp_path / "out"

@@ -27,7 +27,7 @@ from distributed.security import Security
 logging.disable(logging.CRITICAL)
 address, files = json.load(sys.stdin)
 try:
-    client = Client(address, timeout=20, security=Security(**files))
+    client = Client(address, timeout=120, security=Security(**files))
 except (OSError, TypeError, RuntimeError, ValueError) as error:
     print("refused", type(error).__name__)
 else:
@@ -158,7 +158,7 @@ def _outside(address: str, files: dict[str, str]) -> str:
 
 
 def _connected(port: int) -> socket.socket:
-    return socket.create_connection(("127.0.0.1", port), timeout=10)
+    return socket.create_connection(("127.0.0.1", port), timeout=60)
 
 
 def _told(connection: socket.socket) -> bytes:

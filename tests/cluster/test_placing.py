@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
+from grader.arena.limits import RunLimits
 from grader.classes.batch.job import Job, Outcome
 from grader.classes.cluster import executor
 from grader.classes.cluster.exchange import Exchange, Parcel, Report, pack
@@ -107,3 +109,13 @@ def test_a_submission_that_another_grader_works_on_is_left_to_it(
     parcel = _sent(exchange, tmp_path)
     with Results(job.out / "s000"), pytest.raises(Busy):
         place(job, Report(outcome=_outcome(), parcel=parcel), exchange)
+
+
+def test_the_page_on_clusters_has_the_limits_of_memory_as_they_are() -> None:
+    """Half a gigabyte for each thread, in what it says and in both of its examples."""
+    text = (Path(__file__).parents[2] / "docs" / "how-to" / "cluster.md").read_text(encoding="utf-8")
+    assert f"at most {RunLimits().memory_bytes / 2**30:g} GB for each process tree" in text
+    assert "0.5 GB of memory for each thread" in text
+    threads = {int(count) for count in re.findall(r"(?:nthreads\"?,? \"?|cores=)(\d+)", text)}
+    memory = {int(size) for size in re.findall(r"memory(?:=\"|: )(\d+)G", text)}
+    assert (threads, memory) == ({16}, {8})

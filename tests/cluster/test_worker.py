@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from grader.classes.cluster import worker
-from grader.classes.cluster.exchange import Errand, Exchange
+from grader.classes.cluster.exchange import Exchange, GradeRequest
 from grader.errors import HostError
 from tests.cluster.clusters import children_of, lives, until
 from tests.cluster.jobs import named_job
@@ -28,16 +28,16 @@ def exchange(tmp_path: Path) -> Iterator[Exchange]:
     asyncio.run(worker.dismiss(WORD))
 
 
-def _errand(exchange: Exchange, tmp_path: Path, *, source: str = "", seen: bool = True) -> Errand:
+def _request(exchange: Exchange, tmp_path: Path, *, source: str = "", seen: bool = True) -> GradeRequest:
     job = named_job(tmp_path / "out", "ada")
     if source:
         job = job.model_copy(update={"entry": job.entry.model_copy(update={"source": source})})
-    return Errand(job=job, exchange=exchange.url, batch=WORD, seen=seen)
+    return GradeRequest(job=job, exchange=exchange.url, batch=WORD, seen=seen)
 
 
 @pytest.mark.full
 def test_it_leaves_one_parcel_and_nothing_in_the_batchs_folder(exchange: Exchange, tmp_path: Path) -> None:
-    report = worker.grade(_errand(exchange, tmp_path), lambda: True)
+    report = worker.grade(_request(exchange, tmp_path), lambda: True)
     assert report.outcome.status == "inconclusive"
     assert report.parcel is not None
     assert [path.name for path in Path(exchange.url).iterdir()] == [report.parcel.name]
@@ -46,20 +46,20 @@ def test_it_leaves_one_parcel_and_nothing_in_the_batchs_folder(exchange: Exchang
 
 def test_a_path_that_only_the_client_sees_is_the_machines_fault(exchange: Exchange, tmp_path: Path) -> None:
     with pytest.raises(HostError, match=r"/only/there/ada\.zip cannot be seen on ") as caught:
-        worker.grade(_errand(exchange, tmp_path, source="/only/there/ada.zip"), lambda: True)
+        worker.grade(_request(exchange, tmp_path, source="/only/there/ada.zip"), lambda: True)
     assert "a path that all machines share" in caught.value.hint
 
 
 @pytest.mark.full
 def test_a_path_that_nobody_sees_is_the_submissions(exchange: Exchange, tmp_path: Path) -> None:
-    report = worker.grade(_errand(exchange, tmp_path, source="/nowhere/ada", seen=False), lambda: True)
+    report = worker.grade(_request(exchange, tmp_path, source="/nowhere/ada", seen=False), lambda: True)
     assert (report.outcome.status, report.outcome.kind) == ("error", "submission")
     assert report.parcel is not None
 
 
 @pytest.mark.full
 def test_what_nobody_wants_any_more_is_not_delivered(exchange: Exchange, tmp_path: Path) -> None:
-    report = worker.grade(_errand(exchange, tmp_path), lambda: False)
+    report = worker.grade(_request(exchange, tmp_path), lambda: False)
     assert report.parcel is None
     assert list(Path(exchange.url).iterdir()) == []
 
@@ -68,7 +68,7 @@ def test_what_nobody_wants_any_more_is_not_delivered(exchange: Exchange, tmp_pat
 def test_an_exchange_that_cannot_be_written_is_said_with_the_machines_name(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("no folder")
     with pytest.raises(HostError, match=rf"cannot be written: .* \(on {socket.gethostname()}\)"):
-        worker.grade(_errand(Exchange(str(tmp_path / "file")), tmp_path), lambda: True)
+        worker.grade(_request(Exchange(str(tmp_path / "file")), tmp_path), lambda: True)
     asyncio.run(worker.dismiss(WORD))
 
 
@@ -76,7 +76,7 @@ def test_dismissed_it_interrupts_what_runs_and_ends_its_processes(exchange: Exch
     before = set(children_of(os.getpid()))
     found = []
     thread = threading.Thread(
-        target=lambda: found.append(worker.grade(_errand(exchange, tmp_path), lambda: True))
+        target=lambda: found.append(worker.grade(_request(exchange, tmp_path), lambda: True))
     )
     thread.start()
     until(lambda: set(children_of(os.getpid())) - before)
@@ -92,9 +92,9 @@ def test_a_process_serves_many_jobs_and_is_ended_when_it_has_none(
 ) -> None:
     before = set(children_of(os.getpid()))
     monkeypatch.setattr(worker, "IDLE_S", 5.0)
-    worker.grade(_errand(exchange, tmp_path), lambda: True)
+    worker.grade(_request(exchange, tmp_path), lambda: True)
     first = set(children_of(os.getpid())) - before
-    worker.grade(_errand(exchange, tmp_path), lambda: True)
+    worker.grade(_request(exchange, tmp_path), lambda: True)
     assert len(first) == 1
     assert set(children_of(os.getpid())) - before == first
     until(lambda: not any(lives(pid) for pid in first))

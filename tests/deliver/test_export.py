@@ -128,6 +128,7 @@ def test_what_cannot_be_is_refused(arguments, tmp_path, monkeypatch, capsys) -> 
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.full
 def test_a_folder_takes_the_zip_under_its_own_name_and_stdout_takes_it_alone(tmp_path, capfdbinary) -> None:
     assert run(["export", "gradescope", LAB, "--out", str(tmp_path)]) == 0
     data = (tmp_path / f"{LAB}-gradescope.zip").read_bytes()
@@ -153,6 +154,7 @@ def test_prairielearn_gets_a_question_and_the_files_of_its_image(tmp_path) -> No
     assert {path.name for path in (out / "image").iterdir()} >= {"Dockerfile", "system.sh", wheel()[0]}
 
 
+@pytest.mark.full
 def test_prairielearn_again_is_the_same_question_and_nobody_elses_folder_is_written_over(
     tmp_path, capsys
 ) -> None:

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -48,7 +49,6 @@ def _write_check(clone: Path) -> None:
 
 def _write_form(clone: Path) -> None:
     _follow("A new report form", clone)
-    _run(clone, "-m", "pytest", "-q", "tests/report/test_golden.py", GRADER_REGENERATE="1")
 
 
 def _write_lab(clone: Path) -> None:
@@ -85,17 +85,30 @@ QUICK = {
 
 
 @pytest.fixture(scope="module")
-def clones(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """Return the clone in which a guide was followed, up to its `make reference`."""
-    made: dict[str, Path] = {}
+def followed(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """Return the clone in which a guide was followed, but for what a command writes."""
 
+    @cache
     def clone_of(guide: str) -> Path:
-        if guide not in made:
-            made[guide] = tmp_path_factory.mktemp("contributing") / guide
-            subprocess.run([GIT, "clone", "-q", ROOT, made[guide]], check=True)
-            GUIDES[guide](made[guide])
-            _run(made[guide], "-m", "scripts.reference")
-        return made[guide]
+        clone = tmp_path_factory.mktemp("contributing") / guide
+        subprocess.run([GIT, "clone", "-q", ROOT, clone], check=True)
+        GUIDES[guide](clone)
+        return clone
+
+    return clone_of
+
+
+@pytest.fixture(scope="module")
+def clones(followed: Callable[[str], Path]) -> Callable[[str], Path]:
+    """Return the clone in which a guide was followed, up to its `make reference`."""
+
+    @cache
+    def clone_of(guide: str) -> Path:
+        clone = followed(guide)
+        if guide == "form":
+            _run(clone, "-m", "pytest", "-q", "tests/report/test_golden.py", GRADER_REGENERATE="1")
+        _run(clone, "-m", "scripts.reference")
+        return clone
 
     return clone_of
 
@@ -127,6 +140,7 @@ def _changed(clone: Path) -> set[str]:
 each_guide = pytest.mark.parametrize("guide", GUIDES)
 
 
+@pytest.mark.full
 @each_guide
 def test_the_tests_of_what_it_adds_accept_it(guide: str, clones: Callable[[str], Path]) -> None:
     said = _run(clones(guide), "-m", "pytest", "-q", "-m", "not ros and not full", *QUICK[guide])
@@ -136,13 +150,15 @@ def test_the_tests_of_what_it_adds_accept_it(guide: str, clones: Callable[[str],
 
 
 @each_guide
-def test_its_code_is_in_shape(guide: str, clones: Callable[[str], Path]) -> None:
-    clone = clones(guide)
+def test_its_code_is_in_shape(guide: str, followed: Callable[[str], Path]) -> None:
+    """And its diffs apply to the files as they are."""
+    clone = followed(guide)
     python = sorted(name for name in _changed(clone) if name.startswith("grader/"))
     for words in STYLE:
         _run(clone, "-m", "ruff", *words, *(python or ["."]))
 
 
+@pytest.mark.full
 def test_a_form_is_a_file_an_entry_a_row_and_a_golden_file(clones: Callable[[str], Path]) -> None:
     assert _changed(clones("form")) == {
         "grader/report/tap.py",
@@ -153,6 +169,7 @@ def test_a_form_is_a_file_an_entry_a_row_and_a_golden_file(clones: Callable[[str
     }
 
 
+@pytest.mark.full
 def test_a_lab_is_the_files_of_the_table(clones: Callable[[str], Path]) -> None:
     listed = {name.replace("<lab>", LAB) for name in LAB_FILES.findall(_section("A new lab"))}
     changed = _changed(clones("lab"))

@@ -12,7 +12,6 @@ def pages() -> dict[str, str]:
     return made()
 
 
-@pytest.mark.full
 def test_pages_are_up_to_date(pages: dict[str, str]) -> None:
     old = [name for name, text in pages.items() if (FOLDER / name).read_text(encoding="utf-8") != text]
     assert old == [], "run: make reference"

@@ -47,6 +47,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.full
 def test_every_page_is_in_the_navigation(site: Path) -> None:
     start = html.parse(site / "index.html")
     found = {str(target).partition("#")[0] for target in start.xpath("//nav//a/@href")}
@@ -57,6 +58,7 @@ def test_every_page_is_in_the_navigation(site: Path) -> None:
     assert pages - found == set()
 
 
+@pytest.mark.full
 def test_nothing_is_loaded_from_anywhere(site: Path) -> None:
     pages = sorted(site.rglob("*.html"))
     loaded = {
@@ -70,6 +72,7 @@ def test_nothing_is_loaded_from_anywhere(site: Path) -> None:
     assert loaded == set()
 
 
+@pytest.mark.full
 def test_no_page_asks_for_a_diagram_that_would_be_drawn_by_a_script_from_elsewhere(site: Path) -> None:
     assert [
         page.name

@@ -121,6 +121,7 @@ def test_by_the_roster_s_time(rule, submitted, name, by, words, *, commits, serv
     assert "\n" not in handed_in.note
 
 
+@pytest.mark.full
 def test_a_commit_or_a_tag_was_chosen_by_people(commits, server):
     git(server.folder / "student", "tag", "-a", "handed-in", "-m", "x", commits["late"])
     for ref in (commits["late"], commits["late"][:10], "handed-in", "refs/tags/handed-in"):
@@ -169,6 +170,7 @@ def test_what_was_merged_late_does_not_count_by_its_own_date(server):
     assert server.obtain(rule=Rule(deadline=DEADLINE)).source.ref == own
 
 
+@pytest.mark.full
 def test_a_clone_on_this_machine_counts_as_it_is_committed(server):
     repo = server.new()
     commit_at(repo, DATES["late"], {"lab1/step": "late"})
@@ -193,6 +195,7 @@ def test_a_clone_whose_history_cannot_be_read_counts_as_a_folder(server):
     assert "its history cannot be read" in found.handed_in.note
 
 
+@pytest.mark.full
 def test_a_shallow_clone_says_so(commits, server):
     clone = server.base / "shallow"
     git(server.base, "clone", "-q", "--depth=2", f"file://{server.folder}/student", str(clone))

@@ -56,6 +56,7 @@ def test_hashes_and_their_beginnings(grown, server):
         assert mirrored["commit"] == first
 
 
+@pytest.mark.full
 def test_a_default_branch_that_is_not_there_is_hinted_at_as_without_a_mirror(server):
     repo = server.new()
     git(repo, "symbolic-ref", "HEAD", "refs/heads/gone")
@@ -64,6 +65,7 @@ def test_a_default_branch_that_is_not_there_is_hinted_at_as_without_a_mirror(ser
     assert "main was taken" in mirrored["hints"][0]
 
 
+@pytest.mark.full
 def test_a_repository_with_sha256(server):
     repo = write(server.folder / "new", lab())
     git(repo, "init", "-q", "--object-format=sha256", "--initial-branch=main")
@@ -72,6 +74,7 @@ def test_a_repository_with_sha256(server):
     assert server.opened(f"{HOST}/new", ref=head).commit == head
 
 
+@pytest.mark.full
 def test_a_server_whose_head_is_no_branch(server):
     repo = server.new()
     git(repo, "checkout", "-q", "--detach")
@@ -193,6 +196,7 @@ def test_only_the_commit_stays_in_the_work_folder(server):
     assert open_submission(source, package="lab1", workdir=server.base / "w").commit == source.ref
 
 
+@pytest.mark.full
 def test_too_much_history_is_left_behind_where_nobody_asks_for_it(server, monkeypatch):
     repo = server.new()
     noise = b"".join(hashlib.sha256(str(n).encode()).digest() for n in range(10_000))

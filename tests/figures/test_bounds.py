@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from grader.evidence.events import ActorEvent, ConsoleLine, ProcessEvent
@@ -73,7 +73,6 @@ NUMBERS = st.one_of(
 
 
 @pytest.mark.full
-@settings(max_examples=60)
 @given(sent=NUMBERS, count=st.integers(1, 2000), rate_hz=st.floats(0.5, 1000))
 def test_any_messages(sent: tuple[str, list[Any]], count: int, rate_hz: float) -> None:
     kind, values = sent
@@ -88,7 +87,6 @@ def test_any_messages(sent: tuple[str, list[Any]], count: int, rate_hz: float) -
 
 
 @pytest.mark.full
-@settings(max_examples=60)
 @given(
     values=st.lists(st.one_of(st.integers(), st.floats(), st.text(), st.none(), st.lists(st.integers()))),
     lines=st.lists(st.text()),

@@ -47,6 +47,7 @@ def test_the_first_point_that_strays_stays_of_many() -> None:
     assert figure.reached == 2
 
 
+@pytest.mark.full
 def test_a_robot_that_waits_long_is_shown_where_it_moves() -> None:
     way = [(0.0, 0.0)] * 4000 + line((0, 0), (1, 0), 200) + line((1, 0), (1, 1), 200) + [(1.0, 1.0)] * 4000
     figures, _ = drawn(poses(*way, rate_hz=100), SQUARE)

@@ -205,6 +205,7 @@ def test_prairielearn_gives_full_marks_to_the_correct_package(rooms, question, l
     assert sum(test["points"] for test in document["tests"]) == 100
 
 
+@pytest.mark.full
 def test_prairielearn_takes_no_attempt_for_what_is_no_package(rooms, question, locks) -> None:
     document = _graded_by_prairielearn(rooms, question, "basic_comms.zip", b"PK, not really", locks)
     assert document["gradable"] is False
@@ -247,6 +248,7 @@ def test_docker_grades_the_package_in_its_folder_as_an_ordinary_user(rooms, dock
     assert done.returncode in {0, 4}  # a machine that was late is nobody's fault
 
 
+@pytest.mark.full
 def test_docker_does_so_as_any_user_with_a_folder_that_is_only_read(rooms, docker) -> None:
     """As `docker run --user` has it on a CI system: a number that no name in the image stands for."""
     root = rooms.fresh_root(on=docker.root)
@@ -256,6 +258,7 @@ def test_docker_does_so_as_any_user_with_a_folder_that_is_only_read(rooms, docke
     assert {c["status"] for c in json.loads(done.stdout)["criteria"]} <= {"pass", "inconclusive"}
 
 
+@pytest.mark.full
 def test_docker_says_what_it_can_do_when_asked_for_nothing(rooms, docker) -> None:
     root = rooms.fresh_root(on=docker.root)
     done = root.run(
@@ -264,6 +267,7 @@ def test_docker_says_what_it_can_do_when_asked_for_nothing(rooms, docker) -> Non
     assert "Grades introductory ROS 1 labs" in done.stdout
 
 
+@pytest.mark.full
 def test_the_development_container_runs_its_commands(rooms, docker) -> None:
     file = REPO / ".devcontainer" / "devcontainer.json"
     settings = json.loads(file.read_text())

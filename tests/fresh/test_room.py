@@ -10,7 +10,11 @@ import pytest
 
 from tests.fresh.room import Failed, Rooms, missing
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(missing()), reason=missing() or "-")]
+pytestmark = [
+    pytest.mark.full,
+    pytest.mark.slow,
+    pytest.mark.skipif(bool(missing()), reason=missing() or "-"),
+]
 
 
 @pytest.fixture(scope="module")

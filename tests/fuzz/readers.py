@@ -30,7 +30,7 @@ from grader.evidence.inspect import inspect_run
 from grader.evidence.reader import load_run, package_facts
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceStream
-from grader.intake import Limits, open_submission, safe_name
+from grader.intake import IntakeLimits, open_submission, safe_name
 from grader.intake.find import manifest_name
 from grader.intake.repository import choose_ref, parse_refs
 from grader.intake.source import parse_source
@@ -52,7 +52,7 @@ Promised = tuple[type[Exception], ...]
 
 PACKAGE = "lab1"
 PART = b"%%% "
-SMALL = Limits(total_bytes=8 << 20, entries=500)
+SMALL = IntakeLimits(total_bytes=8 << 20, entries=500)
 RECORD_BYTES_MAX = 24 << 20
 LINE_MAX = 2000
 PLACE = SimpleNamespace(sandbox=Sandbox(bubblewrap=True, uid=None))

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from grader.rubric.instructor import Shown, printing_to_stderr
+from grader.rubric.instructor import VisibleText, printing_to_stderr
 from tests.report.nasty import STEERING, TEXTS
 from tests.report.test_shown import TO_A_CI
 
@@ -17,7 +17,7 @@ from tests.report.test_shown import TO_A_CI
 @given(st.lists(TEXTS, max_size=6))
 def test_pieces_that_are_harmless_alone_are_harmless_together(pieces):
     out = io.StringIO()
-    shown = Shown(out)
+    shown = VisibleText(out)
     for piece in pieces:
         assert shown.write(piece) == len(piece)
     shown.finish()
@@ -27,7 +27,7 @@ def test_pieces_that_are_harmless_alone_are_harmless_together(pieces):
 
 def test_a_line_without_an_end_does_not_fill_the_memory():
     out = io.StringIO()
-    shown = Shown(out)
+    shown = VisibleText(out)
     for _ in range(300):
         shown.write("x" * 1000)
     assert len(out.getvalue()) > 250_000

@@ -159,7 +159,6 @@ def runs_on(cmdline: Path) -> bool:
         return False
 
 
-@pytest.mark.full
 def test_nothing_of_the_surrounding_folders_takes_part(tmp_path, monkeypatch):
     (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --nonsense\n")
     (tmp_path / "conftest.py").write_text("raise RuntimeError\n")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import hashlib
 import io
+import json
 import os
 import struct
 import tarfile
@@ -13,7 +14,9 @@ import zipfile
 import pytest
 
 from grader.errors import SubmissionError
-from grader.intake.limits import Limits
+from grader.intake import archive
+from grader.intake.limits import IntakeLimits
+from grader.limited_child import Answer, ChildLimits
 from tests.intake.samples import (
     NODE,
     lab_tar,
@@ -25,6 +28,20 @@ from tests.intake.samples import (
     tar_entry,
     zip_entry,
 )
+
+
+@pytest.fixture(autouse=True)
+def _in_this_process(monkeypatch) -> None:
+    """No child for each archive: what it may take is looked at in test_hostile_archive.py."""
+
+    def call(function: str, *arguments: object, limits: ChildLimits) -> Answer:
+        assert function == "grader.intake.archive:unpack_here"
+        assert limits.memory_bytes == archive.MEMORY_BYTES
+        (record,) = archive.unpack_here(*json.loads(json.dumps(arguments)))
+        return Answer(lines=json.dumps(record).encode(), done=True)
+
+    monkeypatch.setattr(archive, "run_limited", call)
+
 
 MANIFEST = ("lab1/package.xml", manifest("lab1"))
 
@@ -238,8 +255,8 @@ def test_a_later_entry_replaces_an_earlier_one(tmp_path):
 @pytest.mark.parametrize(
     ("limits", "says"),
     [
-        (Limits(entries=2), "more than 2 files"),
-        (Limits(total_bytes=1 << 20), "larger than 1 MiB"),
+        (IntakeLimits(entries=2), "more than 2 files"),
+        (IntakeLimits(total_bytes=1 << 20), "larger than 1 MiB"),
     ],
 )
 @pytest.mark.parametrize("kind", ["zip", "tar.gz"])

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import subprocess
+import time
 
 import pytest
 
 from grader.errors import PackageNotFound, SubmissionError
 from grader.intake import enclosing_package, find_packages
+from grader.intake.choose import Wanted
 from tests.intake.samples import lab, manifest, opened, repository, write
 
 BROKEN = "<package><name>lab1</name><oops></package>"
@@ -41,6 +43,24 @@ def tree(*packages: str, **files: str) -> dict[str, str | bytes]:
         (tree("lab1:lab_one"), "lab1", ("names the package lab_one",)),
         (tree("LAB1:lab_one"), "LAB1", ("names the package lab_one",)),
         (tree("lab1-main:foo"), "lab1-main", ("names the package foo",)),
+        # A name that is nearly right counts where it is the only one; lab2 is another lab's.
+        (tree("week1:lab_1"), "week1", ("exactly lab1",)),
+        (tree("week1:LAB-1", "lab2"), "week1", ("exactly lab1",)),
+        (tree("week1:labb1"), "week1", ("exactly lab1",)),
+        (tree("week1:alb1"), "week1", ("exactly lab1",)),
+        (tree("week1:lb1", "old:lab1"), "old", ()),
+        # Of two copies: what catkin sees, then the lab's files, then depth.
+        (
+            {"lab1/package.xml": manifest("lab1"), "lab1/CMakeLists.txt": "", **tree("src/a/lab1")},
+            "src/a/lab1",
+            ("src/a/lab1 is graded, lab1 is not",),
+        ),
+        (
+            tree("lab1", "ws/src/a/lab1") | {"ws/.catkin_workspace": ""},
+            "ws/src/a/lab1",
+            ("ws/src/a/lab1 is",),
+        ),
+        (tree("lab1", "a/src/lab1") | {"a/src/CATKIN_IGNORE": "", "a/src/CMakeLists.txt": ""}, "lab1", ()),
         (tree("lab1") | {"lab1/package.xml": BROKEN}, "lab1", ()),
         (tree("x:lab1") | {"x/package.xml": BROKEN}, "x", ()),
         (tree("lab1") | {"lab1/package.xml": NAMELESS}, "lab1", ("no name can be read",)),
@@ -69,14 +89,27 @@ def test_the_package_is_found(files, path, hints, tmp_path):
 @pytest.mark.parametrize(
     ("files", "message", "hint"),
     [
-        (tree("lab2", "project"), "packages here: lab2, project", "<name>lab1</name>"),
+        (
+            tree("lab2", "project"),
+            "packages here: lab2, project",
+            "rename that to lab1 (<name> in its package.xml)",
+        ),
+        (
+            tree("a:other"),
+            "packages here: other",
+            "Rename to lab1 (<name>other</name> in a/package.xml, line 3;",
+        ),
+        (tree("a:other"), "packages here: other", "or grade it with --package other."),
+        (tree("a:lab2"), "packages here: lab2", "--package lab2"),
+        (tree("a:lab_1", "b:lab-1"), "packages here: lab-1, lab_1", "--package NAME"),
+        (tree("a:../x\n\x85;rm -rf"), "packages here: ../x ;rm -rf", "--package '../x ;rm -rf'."),
         ({"readme": "x"}, "no package.xml", "<name>lab1</name>"),
         (tree("build/lab1"), "no package.xml", "only a copy in build/"),
         (tree("devel/share/lab1"), "no package.xml", "only a copy in devel/"),
         (tree("ws", "ws/lab1"), "packages here: ws", "below another package.xml"),
         ({"lab1.zip": "", "x": ""}, "no package.xml", "lab1.zip lies here"),
         # A workspace that is called like the lab is not the lab's package.
-        (tree("lab1/src/other"), "packages here: other", "<name>lab1</name>"),
+        (tree("lab1/src/other"), "packages here: other", "Rename to lab1"),
     ],
 )
 def test_what_is_there_instead_is_named(files, message, hint, tmp_path):
@@ -260,3 +293,45 @@ def test_the_work_folder_may_lie_in_the_submission(tmp_path):
     within = opened(root, root)
     assert within.digest == plain.digest
     assert set(within.package.executable) == set(plain.package.executable)
+
+
+FILES = frozenset({"numeric_talker.py", "lab1.launch"})
+
+
+@pytest.mark.parametrize(
+    ("asked", "path"),
+    [("lab_1", "a"), ("other", "z/src/other"), ("lab1", "lab1"), ("../..", "dots"), ("a b", "blank")],
+)
+def test_a_package_that_is_asked_for_is_taken_by_its_own_name(asked, path, tmp_path):
+    files = tree("a:lab_1", "lab1", "other", "z/src/other", "dots:../..", "blank:a\nb")
+    files["z/.catkin_workspace"] = ""
+    submission = opened(
+        write(tmp_path / "repo", files), tmp_path, package=Wanted(name="lab1", files=FILES, asked=asked)
+    )
+    assert (submission.package.path, submission.package.name) == (path, asked)
+
+
+def test_a_package_that_is_asked_for_and_is_not_there(tmp_path):
+    repo = write(tmp_path / "repo", tree("a:lab_1", "lab1"))
+    with pytest.raises(PackageNotFound, match=r"no package lab_2 .*: lab1, lab_1") as caught:
+        opened(repo, tmp_path, package=Wanted(name="lab1", asked="lab_2"))
+    assert caught.value.hint == "Give one of these names with --package, or leave it out."
+
+
+def test_a_copy_behind_a_link_is_no_second_one(tmp_path):
+    repo = write(tmp_path / "repo", tree("z/lab1"))
+    (repo / "src").mkdir()
+    (repo / "src/lab1").symlink_to("../z/lab1")
+    (repo / "src/out").symlink_to("/")
+    submission = opened(repo, tmp_path)
+    assert (submission.package.path, submission.hints) == ("z/lab1", ())
+
+
+def test_a_thousand_copies_are_chosen_from_in_no_time(tmp_path):
+    copies = {f"c{i:04}/package.xml": manifest("lab1") for i in range(1000)}
+    repo = write(tmp_path / "repo", {**copies, "c0030/src/numeric_talker.py": ""})
+    begun = time.process_time()
+    submission = opened(repo, tmp_path, package=Wanted(name="lab1", files=FILES))
+    assert submission.package.path == "c0030"
+    assert len(submission.hints[0]) < 300
+    assert time.process_time() - begun < 10

@@ -14,7 +14,7 @@ import pytest
 
 from grader.errors import PackageNotFound, SubmissionError
 from grader.intake import open_recorded, open_recording, open_submission
-from grader.intake.limits import Limits
+from grader.intake.limits import IntakeLimits
 from grader.intake.source import identify, parse_source
 from tests.intake.samples import commit, git, lab, opened, repository, write
 
@@ -60,6 +60,7 @@ def refused(source, tmp_path, **fields):
     return caught.value
 
 
+@pytest.mark.full
 def test_every_way_to_name_a_repository_gives_the_same(repo, tmp_path):
     bare = bare_copy(repo)
     sources = [repo, f"{repo}@main", f"{repo}/.git", bare, f"{bare}@main", f"file://{repo}", bare.as_uri()]
@@ -90,7 +91,9 @@ def test_every_way_to_name_a_repository_gives_the_same(repo, tmp_path):
         ("MIDDLE:12", "middle"),
     ],
 )
-@pytest.mark.parametrize("form", ["{repo}@{ref}", "file://{repo}@{ref}"])
+@pytest.mark.parametrize(
+    "form", [pytest.param("{repo}@{ref}", marks=pytest.mark.full), "file://{repo}@{ref}"]
+)
 def test_refs(repo, history, tmp_path, *, form, ref, which):
     name, _, digits = ref.partition(":")
     if name.lower() in history:
@@ -162,6 +165,7 @@ def test_a_default_branch_that_is_not_there(repo, history, tmp_path):
     assert "default branch does not exist" in refused(bare, tmp_path).message
 
 
+@pytest.mark.full
 def test_a_repository_with_sha256(tmp_path):
     folder = write(tmp_path / "new", lab())
     git(folder, "init", "-q", "--object-format=sha256", "--initial-branch=main")
@@ -259,8 +263,8 @@ def test_line_ends_come_as_they_are_stored(tmp_path):
 
 
 def test_too_many_files_are_refused_before_they_are_written(repo, tmp_path):
-    assert "more than 2 files" in refused(repo.as_uri(), tmp_path, limits=Limits(entries=2)).message
-    assert "larger than" in refused(repo.as_uri(), tmp_path, limits=Limits(total_bytes=10)).message
+    assert "more than 2 files" in refused(repo.as_uri(), tmp_path, limits=IntakeLimits(entries=2)).message
+    assert "larger than" in refused(repo.as_uri(), tmp_path, limits=IntakeLimits(total_bytes=10)).message
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ class Lab:
     text: str
     heard: str
 
-    @property
+    @cached_property
     def rubric(self) -> Rubric:
         path = ROOT / "rubrics" / f"{self.id}.yaml"
         return Rubric.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))

@@ -265,7 +265,7 @@ CHANGES = st.lists(
 
 
 @pytest.mark.full
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(CHANGES)
 def test_any_changes_one_after_another(tmp_path, changes):
     path = file(tmp_path)

@@ -258,6 +258,7 @@ def test_text_of_another_encoding_that_looks_like_markup(part):
         parse_launch(b"\xff\xfe" + text.encode("utf-16-le"), "launch/a.launch")
 
 
+@pytest.mark.full
 def test_remarks_on_python_files_without_end(tmp_path):
     """Each file has a hundred, as far as a thousand go."""
     line = "a." + "b" * 290 + "\n"

@@ -53,6 +53,7 @@ def test_submissions_are_compared(complete: Installed, folder: Path):
     assert all(name in out for name in NAMES)
 
 
+@pytest.mark.full
 def test_a_class_is_looked_at(complete: Installed, folder: Path):
     command = [str(complete.program), "review", "results", "--no-browser"]
     server = subprocess.Popen(

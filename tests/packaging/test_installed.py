@@ -26,6 +26,7 @@ def test_pipx_shows_the_program_its_man_page_and_its_completion(pipx_home: Path,
     assert (pipx_home / "share/fish/vendor_completions.d/grader.fish").is_file()
 
 
+@pytest.mark.full
 @pytest.mark.skipif(MAN is None, reason="no man here: apt-get install man-db")
 def test_man_finds_the_page(pipx_home: Path):
     environment = {**plain_environment(), "MANPATH": str(pipx_home / "man"), "MANWIDTH": "80"}
@@ -35,6 +36,7 @@ def test_man_finds_the_page(pipx_home: Path):
     assert "grader - grade introductory ROS 1 labs" in done.stdout
 
 
+@pytest.mark.full
 def test_the_first_line_of_the_version_is_the_grader_s(installed: Installed, tmp_path):
     lines = installed("--version", cwd=tmp_path).splitlines()
     assert lines[0] == f"grader {__version__}"
@@ -42,6 +44,7 @@ def test_the_first_line_of_the_version_is_the_grader_s(installed: Installed, tmp
     assert lines[2].startswith("ROS 1 ")
 
 
+@pytest.mark.full
 def test_the_labs_are_those_of_the_repository(installed: Installed, tmp_path):
     labs = json.loads(installed("labs", "--json", cwd=tmp_path))
     assert {lab["id"] for lab in labs} == {path.stem for path in (ROOT / "rubrics").glob("*.yaml")}
@@ -53,28 +56,33 @@ def test_a_student_checks_a_package(installed: Installed, package: Path):
     assert criteria["manifest"] == criteria["cmake"] == criteria["talker-executable"] == "pass"
 
 
+@pytest.mark.full
 def test_a_student_s_fault_is_found(installed: Installed, package: Path):
     (package / "package.xml").write_text("<package", encoding="utf-8")
     out = installed("check", "--static", cwd=package, code=1)
     assert "package.xml" in out
 
 
+@pytest.mark.full
 def test_evidence_is_judged(installed: Installed, tmp_path):
     out = installed("judge", RECORDING, "--rubric", LAB, cwd=tmp_path)
     assert {one["status"] for one in json.loads(out)} == {"pass"}
 
 
+@pytest.mark.full
 def test_explain_and_validate_find_the_rubrics(installed: Installed, tmp_path):
     assert f"{LAB}/counter-wrap: " in installed("explain", "counter-wrap", cwd=tmp_path)
     assert f"{LAB}: ok" in installed("rubric", "validate", LAB, cwd=tmp_path)
 
 
+@pytest.mark.full
 def test_the_reference_solutions_and_their_mutants_are_inside(installed: Installed, tmp_path):
     installed("example", LAB, "correct", cwd=tmp_path)
     assert (tmp_path / "correct" / "lab1" / "src" / "talker.py").stat().st_mode & 0o100
     assert "counter" in installed("example", LAB, cwd=tmp_path)
 
 
+@pytest.mark.full
 def test_an_example_rubric_with_its_own_checks_works(installed: Installed, pipx_home: Path, tmp_path):
     (examples,) = pipx_home.glob("home/venvs/*/lib/python3*/site-packages/grader/_data/rubrics/examples")
     for rubric in ("turtle-square.yaml", "own-checks/own-checks.yaml"):

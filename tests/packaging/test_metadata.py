@@ -47,6 +47,7 @@ def test_indexes_take_both(packages: Built):
     assert done.stdout.count("PASSED") == 2
 
 
+@pytest.mark.full
 def test_twine_refuses_a_wheel_without_a_name(packages: Built, tmp_path):
     assert check(*CHECKS["twine"], spoiled(packages.wheel, tmp_path, without="Name:")).returncode != 0
 
@@ -56,6 +57,7 @@ def test_the_wheel_holds_nothing_that_would_lie_about_in_site_packages(packages:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["grader/__pycache__/a.cpython-311.pyc", "tests/__init__.py"])
 def test_rubbish_in_a_wheel_is_refused(packages: Built, tmp_path, name):
     wheel = spoiled(packages.wheel, tmp_path, more=name)

@@ -53,6 +53,7 @@ def test_it_judges_recordings_alike(grader: Installed, tmp_path: Path):
     assert statuses(dies)["counter-wrap"] == "fail"
 
 
+@pytest.mark.full
 def test_it_checks_a_package_s_files(grader: Installed, package: Path):
     (package / "src" / "numeric_talker.py").chmod(0o644)
     found = statuses(json.loads(grader("check", "--static", "--json", cwd=package, code=1))["criteria"])

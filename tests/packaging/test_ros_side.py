@@ -51,6 +51,7 @@ def test_nothing_needs_a_newer_python():
     assert done.returncode == 0, done.stdout
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("kind", NEWER)
 def test_what_needs_one_is_found(tmp_path, kind):
     path = tmp_path / "newer.py"

@@ -44,7 +44,7 @@ from tests.report.test_text import FOUND_BY_FORGES, HARMLESS, MARKDOWN, QUICK_AC
 from tests.support.a_class import criterion
 
 FIELDS = ("id", "title", "check", "scenario", "message", "expected", "measured", "hint", "reproduce")
-SOME = settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow])
+SOME = settings(suppress_health_check=[HealthCheck.too_slow])
 
 
 def spoiled(texts: Iterator[str], status: str = "fail") -> GradingResult:

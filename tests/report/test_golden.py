@@ -17,7 +17,7 @@ from grader.classes.gradebook import Book, Row, write_gradebook
 from grader.classes.gradebook.table import Form
 from grader.model.batch import Entry
 from grader.model.result import GradingResult
-from grader.report.forms import FORMS, Shown
+from grader.report.forms import FORMS, ReportInput
 from grader.report.result_json import result_bytes
 from grader.report.terminal import open_console, print_report
 from grader.report.view import without_hidden
@@ -59,7 +59,7 @@ def gradebook(kind: Form) -> bytes:
 def form(name: str) -> bytes:
     """A form of the registry: as students see it where hidden criteria are left out of it."""
     own = name in {"markdown", "classroom"}
-    about = Shown(
+    about = ReportInput(
         result=student() if own else worst(),
         rubric=rubric(),
         hidden=3 if own else 0,

@@ -45,7 +45,29 @@ def prose(tokens) -> str:
 
 
 def words(text: str) -> list[str]:
-    return visible(text).split()
+    """What is read of it: the signs around code are not."""
+    return re.sub(r"(?<!`)`(?! )([^`]*[^` ])`(?!`)", r"\1", " ".join(visible(text).split())).split()
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("`rate.sleep` is named", "<code>rate.sleep</code> is named"),
+        ("(`try: … except rospy.X: pass`).", "(<code>try: … except rospy.X: pass</code>)."),
+        ("`a.py`, `b c.py`", "<code>a.py</code>, <code>b c.py</code>"),
+        ("one ` alone, and a.py", "one ` alone, and <code>a.py</code>"),
+        ("`` `a.py` ``", "`` <code>a.py</code> ``"),
+        ("`<b>|&`", "<code>&lt;b&gt;|&amp;</code>"),
+    ],
+)
+def test_code_in_a_text_is_code(text, shown):
+    assert _github(markdown(text)) == f"<p>{shown}</p>\n"
+
+
+@pytest.mark.parametrize("code", ["a ` b", "``", "`a", "a`", " a ", "a `` b ` c"])
+def test_backticks_within_code_stay(code):
+    page = parser.fragment_fromstring(_github(markdown_code(code)))
+    assert page.xpath("string(code)").strip() == code.strip()
 
 
 @given(TEXTS)

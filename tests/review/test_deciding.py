@@ -117,6 +117,7 @@ def test_a_comment_comes_back_as_it_was_typed(page, out) -> None:
     assert overrides_of(out)["ada"]["style"]["comment"] == comment
 
 
+@pytest.mark.full
 def test_the_author_is_remembered_in_the_session(page, app, out) -> None:
     csrf = page.form("ada", "style")["csrf"]
     answer = page.client.post("/author", data={"csrf": csrf, "author": "  Kim\nLee ", "key": "ada"})
@@ -136,6 +137,7 @@ def test_save_then_next_goes_on_in_the_filter(page) -> None:
     assert answer.headers["Location"] == "/s/eve/?show=inconclusive"
 
 
+@pytest.mark.full
 def test_what_left_the_filter_still_has_neighbours(page) -> None:
     page.save("dana", "style", points="1")
     page.save("dana", "answers", points="1")
@@ -167,6 +169,7 @@ def test_an_overrides_file_with_faults_is_said_and_left_alone(page, out) -> None
     assert "Nothing can be saved" in page.text("/s/ada/")
 
 
+@pytest.mark.full
 def test_comments_in_the_file_stay(page, out) -> None:
     (out / "overrides.yaml").write_text("# by hand\nada:\n  style: {points: 2}  # after talking to her\n")
     page.save("dana", "style", points="1")
@@ -213,6 +216,7 @@ def test_while_a_batch_works_decisions_are_kept_and_applied_when_it_has_ended(pa
     assert points_of(out, "ada", "style") == 6
 
 
+@pytest.mark.full
 def test_closing_writes_what_is_left(out) -> None:
 
     review = open_session(out, Pace(quiet_s=3600, latest_s=3600))

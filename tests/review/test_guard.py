@@ -6,10 +6,14 @@ import logging
 import os
 import re
 import shutil
+from collections.abc import Iterator
 
 import pytest
+from flask import Flask
 
-from tests.review.conftest import HOST, PORT, TOKEN, Client, Page
+from grader.classes.review.app import create_app
+from grader.classes.review.session import open_session
+from tests.review.conftest import HOST, PORT, QUICK, TOKEN, Client, Page
 
 PATHS = [
     "/",
@@ -23,9 +27,19 @@ PATHS = [
 ]
 
 
+@pytest.fixture(scope="module")
+def guarded(made_class, tmp_path_factory) -> Iterator[Flask]:
+    """A review that nobody gets into: nothing of it is changed."""
+    out = shutil.copytree(made_class, tmp_path_factory.mktemp("guarded") / "out")
+    review = open_session(out, QUICK)
+    review.start()
+    yield create_app(review, port=PORT, token=TOKEN, author="A. Miller")
+    review.close()
+
+
 @pytest.fixture
-def stranger(app) -> Client:
-    return Client(app)
+def stranger(guarded) -> Client:
+    return Client(guarded)
 
 
 @pytest.mark.parametrize("method", ["GET", "POST", "PUT", "OPTIONS", "HEAD", "TRACE"])

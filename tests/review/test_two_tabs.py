@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 
+import pytest
+
 from grader.classes.overrides.write import write_override
 from grader.classes.review.app import create_app
 from grader.classes.review.session import open_session
@@ -25,6 +27,7 @@ def test_the_second_one_sees_both_values(page, app, out) -> None:
     assert overrides_of(out)["ada"]["style"]["points"] == 9
 
 
+@pytest.mark.full
 def test_saving_again_after_that_is_a_decision(page, app, out) -> None:
     other = Page(app)
     mine = page.form("ada", "style")
@@ -45,6 +48,7 @@ def test_removing_what_another_tab_changed_is_a_clash(page, app, out) -> None:
     assert overrides_of(out)["ada"]["style"]["points"] == 6
 
 
+@pytest.mark.full
 def test_changing_what_another_tab_removed_is_a_clash(page, app, out) -> None:
     page.save("ada", "style", points="5")
     mine = page.form("ada", "style")
@@ -77,6 +81,7 @@ def test_different_criteria_are_no_clash(page, app, out) -> None:
     assert {k: v["points"] for k, v in overrides_of(out)["ada"].items()} == {"style": 2, "answers": 9}
 
 
+@pytest.mark.full
 def test_of_many_at_once_one_wins_and_all_others_are_told(app, out) -> None:
     tabs = [Page(app) for _ in range(6)]
     forms = [tab.form("ada", "style") for tab in tabs]

@@ -165,3 +165,13 @@ def test_an_address_with_one_slash(tmp_path: Path) -> None:
     assert fault.endswith(
         "https:/github.com/c/ada: an address has two slashes behind its colon, as in https://"
     )
+
+
+@pytest.mark.parametrize("package", ["a\x1b[2J", '"a\nb"', "x" * 256])
+def test_what_can_be_no_package_s_name(package: str, tmp_path: Path) -> None:
+    (tmp_path / "d").mkdir()
+    (fault,) = said(read(tmp_path, f"id,source,package\nada,d,{package}\n"))
+    assert fault.startswith("roster.csv:2: package: ")
+    assert fault.endswith("cannot be a package's name")
+    assert "\x1b" not in fault
+    assert "\n" not in fault

@@ -16,9 +16,9 @@ def test_all_columns(tmp_path: Path) -> None:
     (tmp_path / "handed-in").mkdir()
     (tmp_path / "handed-in" / "bob.zip").touch()
     text = (
-        "id,source,ref,name,group,submitted_at,extension_days,Seat\n"
-        "ada,https://git.example/ada.git,main,Ada Lovelace,A,2026-11-20T23:59:00+01:00,2,12\n"
-        "bob,handed-in/bob.zip,,,,,,\n"
+        "id,source,ref,package,name,group,submitted_at,extension_days,Seat\n"
+        "ada,https://git.example/ada.git,main,lab_1,Ada Lovelace,A,2026-11-20T23:59:00+01:00,2,12\n"
+        "bob,handed-in/bob.zip,,,,,,,\n"
     )
     roster = read(tmp_path, text)
     assert roster.faults == ()
@@ -28,6 +28,7 @@ def test_all_columns(tmp_path: Path) -> None:
             id="ada",
             source="https://git.example/ada.git",
             ref="main",
+            package="lab_1",
             name="Ada Lovelace",
             group="A",
             submitted_at=datetime(2026, 11, 20, 22, 59, tzinfo=timezone.utc),

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 
 import pytest
 import yaml
@@ -11,7 +12,10 @@ from grader.rubric.load import all_rubrics
 from grader.rubric.schema import rubric_schema
 from tests.rubric.samples import SOUND
 
-VALIDATOR = Draft202012Validator(rubric_schema())
+
+@cache
+def validator() -> Draft202012Validator:
+    return Draft202012Validator(rubric_schema())
 
 
 @pytest.mark.full
@@ -31,8 +35,8 @@ def test_every_check_offers_its_parameters_and_its_docs():
 
 def test_a_criterion_for_a_person_is_valid():
     by_check = "    check: rate\n    with:\n      topic: /chatter\n      rate_hz: 10\n"
-    assert VALIDATOR.is_valid(yaml.safe_load(SOUND.replace(by_check, "    check: manual\n")))
-    assert not VALIDATOR.is_valid(
+    assert validator().is_valid(yaml.safe_load(SOUND.replace(by_check, "    check: manual\n")))
+    assert not validator().is_valid(
         yaml.safe_load(SOUND.replace("    check: rate\n    with:\n", "    check: manual\n    with:\n"))
     )
 
@@ -40,7 +44,7 @@ def test_a_criterion_for_a_person_is_valid():
 @pytest.mark.full
 def test_sound_rubrics_are_valid():
     for text in [SOUND, *(loaded.path.read_text(encoding="utf-8") for loaded in all_rubrics())]:
-        assert [error.message for error in VALIDATOR.iter_errors(yaml.safe_load(text))] == []
+        assert [error.message for error in validator().iter_errors(yaml.safe_load(text))] == []
 
 
 @pytest.mark.parametrize(
@@ -59,4 +63,4 @@ def test_sound_rubrics_are_valid():
 )
 def test_spoiled_rubrics_are_refused(old, new):
     assert old in SOUND
-    assert not VALIDATOR.is_valid(yaml.safe_load(SOUND.replace(old, new, 1)))
+    assert not validator().is_valid(yaml.safe_load(SOUND.replace(old, new, 1)))

@@ -9,7 +9,7 @@ import pytest
 
 from grader.classes.similarity import compare, fingerprints, matching
 from grader.classes.similarity.comparison import Request
-from grader.classes.similarity.fingerprints import Place, read_files, read_place, reading_ended
+from grader.classes.similarity.fingerprints import CodeSource, read_files, read_place, reading_ended
 from grader.classes.similarity.sources import Source
 from grader.workers import WorkerEnded
 from tests.similarity.classes import class_of, hand_in, solution
@@ -55,7 +55,7 @@ def test_a_regular_expression_without_end_is_interrupted(monkeypatch) -> None:
 
     monkeypatch.setattr(fingerprints, "FILE_S", 0.2)
     monkeypatch.setattr(fingerprints, "read_text", stuck)
-    read = read_files(Place(name="ann"), (Source(path="a.py", code="", language="python"),))
+    read = read_files(CodeSource(name="ann"), (Source(path="a.py", code="", language="python"),))
     assert [(one.file, one.reason) for one in read.left_out] == [("a.py", "took longer than 0.2 s to read")]
 
 
@@ -69,7 +69,7 @@ def test_a_regular_expression_without_end_is_interrupted(monkeypatch) -> None:
 def test_what_harms_the_reader_is_said(tmp_path, monkeypatch, harm, reason) -> None:
     """What ends it costs its own submission alone: tests/test_workers.py."""
     monkeypatch.setattr(fingerprints, "read_submission", harm)
-    place = Place(name="bad", folder=tmp_path)
+    place = CodeSource(name="bad", folder=tmp_path)
     assert [one.reason for one in read_place(place).left_out] == [reason]
     ended = reading_ended(place, WorkerEnded("ended by signal 9"))
     assert [(one.id, one.reason) for one in ended.left_out] == [

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader.arena.build import BuildOutcome, build
-from grader.arena.process_environment import Place
+from grader.arena.process_environment import ProcessEnvironment
 from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceWriter
@@ -58,10 +58,10 @@ int main() {
 OWN = "from turtlesim.msg import Mine\nprint('imported', Mine)\n"
 
 
-def _built(place: Place, tmp_path: Path) -> Place:
+def _built(place: ProcessEnvironment, tmp_path: Path) -> ProcessEnvironment:
     path = tmp_path / "package.mcap"
 
-    async def work() -> tuple[Place, BuildOutcome]:
+    async def work() -> tuple[ProcessEnvironment, BuildOutcome]:
         with EvidenceWriter(path, scenario="package", clock="real", warp=1.0, metadata={}) as writer:
             return await build(place, writer, [], ())
 
@@ -70,7 +70,7 @@ def _built(place: Place, tmp_path: Path) -> Place:
     return built
 
 
-def _run(place: Place, tmp_path: Path, *start: Start) -> Run:
+def _run(place: ProcessEnvironment, tmp_path: Path, *start: Start) -> Run:
     return run(
         place,
         Scenario(title="t", start=start, until=Until(limit_s=8, ended=(start[0].name,))),

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from grader.model.result import Standing
+from grader.model.result import GitStatus
 from grader.student.git_status import advise, read_environment
 
 MANIFEST = """<package format="2"><name>{name}</name><version>0.0.1</version><description>d</description>
@@ -69,7 +70,7 @@ class Clone:
         self.git("add", "-A")
         self.git("commit", "-q", "-m", "Work")
 
-    def standing(self, base: Path, *, here: Path | None = None, **environment: str) -> Standing:
+    def standing(self, base: Path, *, here: Path | None = None, **environment: str) -> GitStatus:
         """What the student is told."""
         return advise(self.package, base / "asked", read_environment(environment, here or self.package))
 
@@ -77,18 +78,31 @@ class Clone:
         return [point.kind for point in self.standing(base, **environment).points]
 
 
+@pytest.fixture(scope="session")
+def pushed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a server's repository and its clone, for copies."""
+    folder = tmp_path_factory.mktemp("pushed")
+    git(folder, "init", "-q", "--bare", "-b", "main", "server.git")
+    git(folder, "clone", "-q", "server.git", "work")
+    top = folder / "work"
+    git(top, "checkout", "-q", "-B", "main")
+    write_package(top / "lab1")
+    git(top, "add", "-A")
+    git(top, "commit", "-q", "-m", "Work")
+    git(top, "push", "-q", "-u", "origin", "main")
+    git(top, "remote", "set-head", "origin", "main")
+    return folder
+
+
 @pytest.fixture
-def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Clone:
+def clone(pushed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Clone:
     """A clone whose package is committed and pushed."""
     monkeypatch.setenv("GIT_CONFIG_GLOBAL", os.devnull)
     for name in ("CI", "GITHUB_ACTIONS", "GITLAB_CI", "PRE_COMMIT", "GIT_INDEX_FILE", "GIT_DIR"):
         monkeypatch.delenv(name, raising=False)
-    server, top = tmp_path / "server.git", tmp_path / "work"
-    git(tmp_path, "init", "-q", "--bare", "-b", "main", str(server))
-    git(tmp_path, "clone", "-q", str(server), str(top))
-    git(top, "checkout", "-q", "-B", "main")
-    made = Clone(top=top, package=write_package(top / "lab1"), server=server)
-    made.commit()
-    made.git("push", "-q", "-u", "origin", "main")
-    made.git("remote", "set-head", "origin", "main")
+    made = Clone(top=tmp_path / "work", package=tmp_path / "work" / "lab1", server=tmp_path / "server.git")
+    for folder in (made.server, made.top):
+        shutil.copytree(pushed / folder.name, folder, symlinks=True)
+    made.git("remote", "set-url", "origin", str(made.server))
+    made.git("update-index", "-q", "--refresh")
     return made

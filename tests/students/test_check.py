@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.model.result import Point, Standing
+from grader.model.result import GitStatus, Point
 from tests.students.conftest import SCRIPT, Clone
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -145,7 +145,7 @@ def test_hostile_text_is_shown_and_obeyed_by_nobody(lab: Clone) -> None:
 
 
 def test_a_point_is_a_record() -> None:
-    point = Point(kind="mode", text="git does not have the executable bit of a.py", mend="git add a.py")
-    assert Standing.model_validate_json(Standing(points=(point,)).model_dump_json()) == Standing(
+    point = Point(kind="mode", text="git does not have the executable bit of a.py", fix="git add a.py")
+    assert GitStatus.model_validate_json(GitStatus(points=(point,)).model_dump_json()) == GitStatus(
         points=(point,)
     )

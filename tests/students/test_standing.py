@@ -28,14 +28,14 @@ def test_a_changed_file(clone: Clone, tmp_path: Path) -> None:
     (point,) = clone.standing(tmp_path).points
     assert point.kind == "uncommitted"
     assert point.text == "1 change is not committed: scripts/talker.py"
-    assert point.mend == "git add scripts/talker.py && git commit -m Lab"
+    assert point.fix == "git add scripts/talker.py && git commit -m Lab"
 
 
 def test_staged_files_need_a_commit_alone(clone: Clone, tmp_path: Path) -> None:
     (clone.package / "new file.py").write_text(SCRIPT)
     clone.git("add", "-A")
     (point,) = clone.standing(tmp_path).points
-    assert (point.kind, point.mend) == ("uncommitted", "git commit -m Lab")
+    assert (point.kind, point.fix) == ("uncommitted", "git commit -m Lab")
 
 
 def test_a_file_that_is_not_in_git(clone: Clone, tmp_path: Path) -> None:
@@ -47,7 +47,7 @@ def test_a_file_that_is_not_in_git(clone: Clone, tmp_path: Path) -> None:
     (point,) = clone.standing(tmp_path).points
     assert point.kind == "untracked"
     assert point.text == "1 file of the package is not in git: scripts/it's new.py"
-    subprocess.run(point.mend.partition(" && ")[0], shell=True, cwd=clone.package, check=True)  # noqa: S602 - as typed
+    subprocess.run(point.fix.partition(" && ")[0], shell=True, cwd=clone.package, check=True)  # noqa: S602 - as typed
     assert clone.kinds(tmp_path / "again") == ["uncommitted"]
 
 
@@ -55,7 +55,7 @@ def test_commands_fit_the_folder_that_they_are_typed_in(clone: Clone, tmp_path: 
     (clone.package / "scripts" / "talker.py").write_text(SCRIPT + "# more\n")
     for here in (clone.top, clone.package / "scripts", tmp_path):
         (point,) = clone.standing(tmp_path / here.name, here=here).points
-        subprocess.run(point.mend.partition(" && ")[0], shell=True, cwd=here, check=True)  # noqa: S602 - as typed
+        subprocess.run(point.fix.partition(" && ")[0], shell=True, cwd=here, check=True)  # noqa: S602 - as typed
         assert clone.git("diff", "--cached", "--name-only") == "lab1/scripts/talker.py"
         clone.git("reset", "-q")
 
@@ -72,7 +72,7 @@ def test_a_script_that_gitignore_hides(clone: Clone, tmp_path: Path) -> None:
     (point,) = clone.standing(tmp_path).points
     assert point.kind == "ignored"
     assert point.text.endswith(": launch/lab1.launch, scripts/talk_two.py")
-    assert point.mend.startswith("git add -f launch/lab1.launch scripts/talk_two.py && ")
+    assert point.fix.startswith("git add -f launch/lab1.launch scripts/talk_two.py && ")
 
 
 def test_a_package_that_is_ignored_as_a_whole(clone: Clone, tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_an_executable_bit_that_git_does_not_have(clone: Clone, tmp_path: Path, 
     (point,) = clone.standing(tmp_path).points
     assert point.kind == "mode"
     assert point.text == "git does not have the executable bit of scripts/talker.py"
-    assert point.mend == "git update-index --chmod=+x scripts/talker.py && git commit -m Lab"
+    assert point.fix == "git update-index --chmod=+x scripts/talker.py && git commit -m Lab"
 
 
 def test_an_executable_bit_that_is_staged(clone: Clone, tmp_path: Path) -> None:
@@ -104,7 +104,7 @@ def test_an_executable_bit_that_is_staged(clone: Clone, tmp_path: Path) -> None:
     clone.git("update-index", "--chmod=+x", "lab1/scripts/talker.py")
     (point,) = clone.standing(tmp_path).points
     assert point.text == "1 change is not committed: scripts/talker.py"
-    assert point.mend == "git commit -m Lab"
+    assert point.fix == "git commit -m Lab"
 
 
 def test_a_disk_on_which_everything_is_executable_says_nothing_of_bits(clone: Clone, tmp_path: Path) -> None:
@@ -127,7 +127,7 @@ def test_commits_that_are_not_pushed(clone: Clone, tmp_path: Path) -> None:
     (clone.package / "scripts" / "talker.py").write_text(SCRIPT + "# more\n")
     clone.commit()
     (point,) = clone.standing(tmp_path).points
-    assert (point.kind, point.mend, point.remark) == ("unpushed", "git push", False)
+    assert (point.kind, point.fix, point.remark) == ("unpushed", "git push", False)
     assert point.text == "1 commit is not pushed to origin/main; origin/main differs in scripts/talker.py"
 
 
@@ -146,7 +146,7 @@ def test_what_the_server_has_and_this_clone_has_not(clone: Clone, tmp_path: Path
     assert clone.kinds(tmp_path / "before") == []  # nobody asks the network
     clone.git("fetch", "-q")
     (point,) = clone.standing(tmp_path).points
-    assert (point.kind, point.text, point.mend) == (
+    assert (point.kind, point.text, point.fix) == (
         "unpushed",
         "origin/main has 1 commit that is not here",
         "git pull",
@@ -165,7 +165,7 @@ def test_a_branch_that_was_never_pushed(clone: Clone, tmp_path: Path) -> None:
     clone.git("update-ref", "refs/remotes/origin/third", "main")
     (point,) = clone.standing(tmp_path / "unknown").points
     assert (point.kind, point.text) == ("unpushed", "The branch feature was never pushed.")
-    assert point.mend == "git push -u origin feature"
+    assert point.fix == "git push -u origin feature"
 
 
 def test_both_sides_have_commits(clone: Clone, tmp_path: Path) -> None:
@@ -177,7 +177,7 @@ def test_both_sides_have_commits(clone: Clone, tmp_path: Path) -> None:
     script.write_text(SCRIPT + "# mine\n")
     clone.commit()
     (point,) = clone.standing(tmp_path).points
-    assert (point.kind, point.mend) == ("unpushed", "git pull && git push")
+    assert (point.kind, point.fix) == ("unpushed", "git pull && git push")
 
 
 def test_a_branch_that_is_not_the_one_that_is_marked(clone: Clone, tmp_path: Path) -> None:
@@ -190,7 +190,7 @@ def test_a_branch_that_is_not_the_one_that_is_marked(clone: Clone, tmp_path: Pat
     assert point.text == (
         "You are on the branch feature; what is marked is usually main; origin/main differs in scripts/talker.py"
     )
-    assert point.mend == "git switch main && git merge feature && git push"
+    assert point.fix == "git switch main && git merge feature && git push"
 
 
 def test_no_branch_is_checked_out(clone: Clone, tmp_path: Path) -> None:
@@ -199,7 +199,7 @@ def test_no_branch_is_checked_out(clone: Clone, tmp_path: Path) -> None:
     (clone.package / "scripts" / "talker.py").write_text(SCRIPT + "# more\n")
     clone.commit()
     (point,) = clone.standing(tmp_path / "lost").points
-    assert (point.kind, point.mend) == ("other-branch", "git switch -c BRANCH")
+    assert (point.kind, point.fix) == ("other-branch", "git switch -c BRANCH")
     assert clone.kinds(tmp_path / "ci", GITHUB_ACTIONS="true") == []
 
 
@@ -211,7 +211,7 @@ def test_an_older_commit_is_checked_out(clone: Clone, tmp_path: Path) -> None:
     (point,) = clone.standing(tmp_path).points
     assert point.kind == "other-branch"
     assert "origin/main differs in scripts/talker.py" in point.text
-    assert point.mend == "git switch main"
+    assert point.fix == "git switch main"
 
 
 def test_no_commit_yet(tmp_path: Path, clone: Clone) -> None:
@@ -278,7 +278,7 @@ def test_in_the_middle_of_a_merge(clone: Clone, tmp_path: Path) -> None:
     with pytest.raises(subprocess.CalledProcessError):
         clone.git("merge", "two")
     uncommitted, unpushed = clone.standing(tmp_path).points
-    assert (uncommitted.kind, uncommitted.mend) == ("uncommitted", "git status")
+    assert (uncommitted.kind, uncommitted.fix) == ("uncommitted", "git status")
     assert unpushed.kind == "unpushed"
 
 
@@ -294,7 +294,7 @@ def test_another_case_than_git_has(clone: Clone, tmp_path: Path) -> None:
     clone.git("config", "core.ignoreCase", "true")
     (clone.package / "scripts").rename(clone.package / "Scripts")
     (point,) = clone.standing(tmp_path).points
-    assert point.mend == "git mv -f scripts/talker.py Scripts/talker.py && git commit -m Lab"
+    assert point.fix == "git mv -f scripts/talker.py Scripts/talker.py && git commit -m Lab"
     assert "git calls it scripts/talker.py, this disk Scripts/talker.py" in point.text
 
 
@@ -386,4 +386,4 @@ def test_hostile_names_steer_nothing(clone: Clone, tmp_path: Path) -> None:
     found = clone.standing(tmp_path)
     assert found.points[0].kind == "untracked"
     assert found.points[0].text.isprintable()
-    assert "".join(p.mend for p in found.points).isprintable()
+    assert "".join(p.fix for p in found.points).isprintable()

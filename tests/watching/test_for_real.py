@@ -100,6 +100,7 @@ def test_files_alone_are_judged_within_a_moment_of_a_save(package) -> None:
         assert command.interrupt() == 0
 
 
+@pytest.mark.full
 def test_the_exit_code_is_the_last_results(package) -> None:
     with watching(package, "--static") as command:
         command.result(1)
@@ -108,6 +109,7 @@ def test_the_exit_code_is_the_last_results(package) -> None:
         assert command.interrupt() == 1
 
 
+@pytest.mark.full
 def test_a_package_that_is_gone_from_its_folder_is_an_error_until_it_is_back(package, tmp_path) -> None:
     aside = tmp_path / "aside"
     workspace = tmp_path / "ws" / "src"
@@ -124,6 +126,7 @@ def test_a_package_that_is_gone_from_its_folder_is_an_error_until_it_is_back(pac
         assert points(command.results[-1], "manifest") == 5
 
 
+@pytest.mark.full
 def test_what_git_says_of_modes_is_noticed(package) -> None:
     def git(*words: str) -> None:
         subprocess.run([GIT, *words], cwd=package, check=True, capture_output=True)
@@ -137,6 +140,7 @@ def test_what_git_says_of_modes_is_noticed(package) -> None:
         assert points(command.result(2), "talker-executable") == 5
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("leave", ["rename", "delete"])
 def test_a_package_folder_that_is_gone_ends_it_in_one_line(leave, package) -> None:
     with watching(package, "--static") as command:
@@ -158,6 +162,7 @@ def test_an_archive_is_not_watched(package) -> None:
     assert command.ended() == 2
 
 
+@pytest.mark.full
 @pytest.mark.ros
 def test_a_saved_launch_file_is_graded_again_and_again(package, tmp_path) -> None:
     out = tmp_path / "results"

@@ -304,7 +304,7 @@ def serve_requests(sock, live):
     CPU seconds that this process took since the last answer. `e` with a process id waits for an arena that has ended,
     or was killed; the answer has the same id. Until then no other process gets that id.
     """
-    gc.freeze()  # what is here is shared with every copy for as long as nobody touches it
+    gc.freeze()  # what is here is shared with every copy for as long as no one touches it
     told_s = 0.0
     while True:
         request, descriptors = _receive(sock)

@@ -12,7 +12,7 @@ import struct
 import threading
 import time
 
-from bounded_sockets import LOOPBACK, SOMEBODY, BoundedSocket, ProtocolError
+from bounded_sockets import LOOPBACK, UNKNOWN_PROCESS, BoundedSocket, ProtocolError
 from guard import shown
 from tcpros import HEADER_BYTES_MAX, Closed, check_fields, read_header, write_header
 from wire import LENGTH, now_ns
@@ -171,7 +171,8 @@ class Actor:
         if key in self._other_types or len(self._other_types) >= OTHER_TYPES_MAX:
             return
         self._other_types.add(key)
-        note = {"actor": who, "topic": topic.name, "type": type_, "detail": "asks for another type"}
+        note = {"actor": who, "topic": topic.name, "type": type_, "value": topic.type}
+        note["detail"] = "asks for another type"
         self._wire.event("/grader/actor", dict(note, action="note"))
 
 
@@ -236,7 +237,7 @@ class TcprosServer:
             oldest = self._waiting.popitem(last=False)[0] if len(self._waiting) >= WAITING_MAX else None
             self._waiting[sock] = address
         if oldest is not None:
-            with contextlib.suppress(OSError):  # closed meanwhile
+            with contextlib.suppress(OSError):  # it was closed
                 oldest.shutdown(socket.SHUT_RDWR)
         threading.Thread(target=self._handshake, args=(sock, address, oldest), daemon=True).start()
 
@@ -263,7 +264,7 @@ class TcprosServer:
                 self._waiting.pop(sock, None)
 
     def _who(self, address):
-        return self._owners.caller(address, (LOOPBACK, self.port)) or SOMEBODY
+        return self._owners.caller(address, (LOOPBACK, self.port)) or UNKNOWN_PROCESS
 
     def _note_crowd(self):
         """Whose most of them are: asked once."""
@@ -275,4 +276,4 @@ class TcprosServer:
             detail = "opened more than {} connections to the grader's node that said nothing".format(
                 WAITING_MAX
             )
-            self._guard.limit(most or SOMEBODY, detail)
+            self._guard.limit(most or UNKNOWN_PROCESS, detail)

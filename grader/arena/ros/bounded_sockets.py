@@ -14,13 +14,13 @@ from wire import now_ns
 
 LOOPBACK = "127.0.0.1"
 ANSWER_BYTES_MAX = 1 << 20
-SOMEBODY = "an unknown process"
+UNKNOWN_PROCESS = "an unknown process"
 SO_TIMESTAMPNS = 35
 TIMESPEC = struct.Struct("@ll")
 SPACE = socket.CMSG_SPACE(TIMESPEC.size)
 APART_NS_MAX = 100_000
 AGE_NS_MAX = 5 * 10**9
-"""Older ones come from a clock that was set meanwhile."""
+"""Older ones come from a clock that has been set since."""
 
 
 class ProtocolError(Exception):
@@ -156,7 +156,7 @@ class Pace:
         self._lock = threading.Lock()
 
     def wait_s(self, count):
-        """How long these calls have to wait (s)."""
+        """Return how long these calls have to wait (s)."""
         now_s = time.monotonic()
         with self._lock:
             self._next_s = max(self._next_s, now_s - self._at_once / self._per_s) + count / self._per_s
@@ -182,7 +182,7 @@ class Caller:
 
     @property
     def name(self):
-        return self.process or SOMEBODY
+        return self.process or UNKNOWN_PROCESS
 
 
 def note_arrivals(sock):
@@ -212,7 +212,7 @@ def _arrived_ns(notes):
         if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS and len(value) >= TIMESPEC.size:
             seconds, nanoseconds = TIMESPEC.unpack_from(value)
             before_ns, wall_ns, after_ns = now_ns(), time.time_ns(), now_ns()
-            if after_ns - before_ns > APART_NS_MAX:  # somebody else had the processor between the two clocks
+            if after_ns - before_ns > APART_NS_MAX:  # someone else had the processor between the two clocks
                 before_ns, wall_ns = now_ns(), time.time_ns()
             age_ns = wall_ns - seconds * 10**9 - nanoseconds
             return before_ns - age_ns if 0 <= age_ns < AGE_NS_MAX else before_ns

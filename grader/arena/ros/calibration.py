@@ -91,7 +91,7 @@ def _live(sock, parent):
 
 def _publish(descriptor):
     number = 0
-    with contextlib.suppress(OSError):  # nobody listens any more
+    with contextlib.suppress(OSError):  # no one listens any more
         while True:
             stamp_ns = now_ns()
             header = HEADER.pack(number, stamp_ns // 10**9, stamp_ns % 10**9, 0)
@@ -101,7 +101,7 @@ def _publish(descriptor):
 
 
 def _connection():
-    """Both ends of a connection over the loopback; nobody else's is taken for the other end."""
+    """Both ends of a connection over the loopback; no one else's is taken for the other end."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         theirs = socket.create_connection(server.getsockname())
         theirs.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -1,4 +1,4 @@
-"""One publisher's TCPROS connection: cuts the stream into messages and hands on those for which there is room."""
+"""One publisher's TCPROS connection: cuts the stream into messages and passes on those for which there is room."""
 
 from bounded_sockets import receive, receive_into
 from wire import LENGTH
@@ -8,7 +8,7 @@ READ_BYTES = 1 << 16
 LARGE_BYTES, LARGE_READ_BYTES = 1 << 14, 1 << 19
 """Longer messages are read into their own place, in pieces of so much."""
 HELD_BYTES_MAX = 16 << 20
-LATCHING_S = 1.5
+LATCHING_S = 6.0
 REST_S = 0.01
 BUSY_NS, BUSY_MESSAGES, BUSY_LOOKS = 250000, 4, 16
 BREATH_S = 0.001
@@ -46,7 +46,7 @@ class Connection:
         self._held_bytes = 0
 
     def watch(self):
-        """Read on, as far as the run has not ended meanwhile."""
+        """Read on, unless the run has ended since."""
         if not self._watched and not self._closed and not self._paused:
             self._watched = True
             self._recorder.loop.add_reader(self.sock, self._look)
@@ -150,7 +150,7 @@ class Connection:
         self._looked_ns = time_ns
 
     def _take(self, data, ends, time_ns):
-        """Hand on whole messages in one piece, or, where there is not room for all, one by one."""
+        """Pass on whole messages in one piece, or, where there is not room for all, one by one."""
         if self._has_room(ends[-1] - LENGTH.size * len(ends), len(ends)):
             self._hand_on([data[: ends[-1]]], len(ends), time_ns)
             return
@@ -207,7 +207,7 @@ class Connection:
             self._rests()
 
     def open(self, *, latching):
-        """Hand on what was held; the channel is made where it is not there from an earlier connection."""
+        """Pass on what was held; the channel is made where it is not there from an earlier connection."""
         if self._opened or self._account is None:
             return
         self._opened = True

@@ -91,7 +91,7 @@ class Rules:
         return ""
 
     def too_much(self, method, args, caller):
-        """Whether a registration is one more than its process may have."""
+        """Return whether a registration is one more than its process may have."""
         return method in REGISTER and not self._names.take(caller.process, (method, *map(str, args)))
 
     def _no_name(self, args):
@@ -106,11 +106,11 @@ class Rules:
     def _foreign_name(self, node, caller):
         if OWN_NODE.fullmatch(node):
             return "called the master in the name of the grader's node {}".format(node)
-        if node == ROSOUT and caller.process != ROSOUT_PROCESS and not self._nobody_knows(caller):
+        if node == ROSOUT and caller.process != ROSOUT_PROCESS and not self._is_unknown(caller):
             return "called the master in the name of {}".format(ROSOUT)
         return ""
 
-    def _nobody_knows(self, caller):
+    def _is_unknown(self, caller):
         """Where /proc does not say whose a socket is, not even rosout is known."""
         known = self._registered(ROSOUT)
         return caller.process is None and (known is None or self._owners.of(known) is None)

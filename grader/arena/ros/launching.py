@@ -30,7 +30,7 @@ class Launched:
 
 
 def launch(spec, stage, groups):
-    """Start what `spec` says (grader/arena/process_environment.py, `Place.spec`). Raises OSError."""
+    """Start what `spec` says (grader/arena/process_environment.py, `ProcessEnvironment.spec`). Raises OSError."""
     with contextlib.ExitStack() as ours, contextlib.ExitStack() as theirs:
         lifeline, far = socket.socketpair()
         ours.callback(lifeline.close)
@@ -75,7 +75,7 @@ def _go_first(pid):
 
 
 def _words(spec, fds):
-    """How many variables there are, the variables, and what is to be run: `place.HEAD` reads it."""
+    """Return how many variables there are, the variables, and what is to be run: `place.HEAD` reads it."""
     variables = ["{}={}".format(name, value) for name, value in spec["env"].items()]
     argv = [_filled_in(word, fds) for word in spec["argv"]] if spec["collect"] else spec["argv"]
     return _joined([str(len(variables)), *variables, *argv])

@@ -14,7 +14,7 @@ from bounded_sockets import ProtocolError, call, port_of, slave_api
 from guard import NAME_CHARS_MAX, OWN_NODE, shown
 from quotas import Pool, cut
 
-BUS_INFO_S, ROUND_S = 0.5, 1.5
+BUS_INFO_S, ROUND_S = 1.5, 3.0
 CONNECTIONS_MAX = 2000
 UDP = "UDPROS"
 DOUBTED_ROUNDS, DOUBTS_MAX = 3, 100

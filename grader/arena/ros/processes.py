@@ -18,8 +18,8 @@ PIPE_READS = 16
 
 
 class Process:
-    """One process tree. `spec` is made by `Place.spec` (arena/process_environment.py): name, role, argv, env, outer,
-    bwrap, wall, filter, shell, collect, script, repairs.
+    """One process tree. `spec` is made by `ProcessEnvironment.spec` (arena/process_environment.py): name,
+    role, argv, env, outer, bwrap, wall, filter, shell, collect, script, repairs.
 
     `collect` names a file for what the process writes to `{collect}`, and how many bytes of it are taken.
     """

@@ -42,7 +42,7 @@ class Budget:
         self._lock = threading.Lock()
 
     def open(self, key, process):
-        """The account of a channel, made anew where there is room for one more; else None. `key` is all that makes it
+        """The account of a channel, made again where there is room for one more; else None. `key` is all that makes it
         what it is, its definition too."""
         with self._lock:
             if key not in self._channels:
@@ -57,7 +57,7 @@ class Budget:
             return self._channels[key]
 
     def take(self, account, size, messages):
-        """Whether so many more messages, of so many bytes together, are recorded."""
+        """Return whether so many more messages, of so many bytes together, are recorded."""
         size += MESSAGE_BYTES * messages
         with self._lock:
             total = account.messages + messages
@@ -207,7 +207,7 @@ def weight(value, most):
 
 
 def depth(value, most):
-    """How many maps and lists are one inside the other; counting ends past `most`."""
+    """Return how many maps and lists are one inside the other; counting ends past `most`."""
     level, inside = 0, [value]
     while level <= most:
         inside = list(itertools.chain.from_iterable(_items(item) for item in inside))

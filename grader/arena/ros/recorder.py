@@ -26,7 +26,7 @@ HOLD_S = 1.0
 CONNECT_S = 10.0
 RETRY_S = 0.05
 KNOCK = "_knock"
-LATCHING_S = 1.0
+LATCHING_S = 5.0
 PENDING_BYTES_MAX = 32 << 20
 """Of messages that are not yet here as a whole, all together."""
 LAST_READS_S = 0.5
@@ -177,11 +177,11 @@ class Recorder:
         return sock, header
 
     def ask_latching(self, connection):
-        """Whether the publisher latches: rospy knows it only once its constructor is through."""
+        """Return whether the publisher latches: rospy knows it only once its constructor is through."""
 
         def work():
             latching = False
-            with contextlib.suppress(ProtocolError):  # then nobody knows
+            with contextlib.suppress(ProtocolError):  # then no one knows
                 sock, header = self._subscribe(
                     self._caller_id + KNOCK, connection.topic, connection.port, LATCHING_S
                 )

@@ -17,7 +17,7 @@ def load_pythons_own_distutils():
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", DeprecationWarning)
-                import distutils.spawn  # noqa: F401, PLC0415 - by whoever asks first
+                import distutils.spawn  # noqa: F401, PLC0415 - by the first that asks
         except ImportError:  # a Python without: then it is setuptools' after all
             hack.add_shim()
 

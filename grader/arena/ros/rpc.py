@@ -10,7 +10,7 @@ import threading
 import xmlrpc.client
 
 import xmlrpc_parser
-from bounded_sockets import SOMEBODY, BoundedSocket, Caller, Pace
+from bounded_sockets import UNKNOWN_PROCESS, BoundedSocket, Caller, Pace
 from guard import shown
 from quotas import weight
 from rosgraph.network import get_address_override, get_bind_address
@@ -91,10 +91,10 @@ class Server(socketserver.ThreadingMixIn, socketserver.TCPServer):
         theirs = [number for number, who in enumerate(whose) if who == most]
         closed = [waiting[number] for number in theirs[:CLOSED_AT_ONCE]]
         detail = "opened more than {} connections to {}".format(CONNECTIONS_MAX, self.title)
-        self.guard.limit(most or SOMEBODY, detail)
+        self.guard.limit(most or UNKNOWN_PROCESS, detail)
         for request in closed:
             self._forget(request)
-            with contextlib.suppress(OSError):  # closed meanwhile
+            with contextlib.suppress(OSError):  # it was closed
                 request.shutdown(socket.SHUT_RDWR)
         return bool(closed)
 
@@ -171,7 +171,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
         self._send(code, b"")
 
     def _gone(self):
-        """Whether the other side has ended, perhaps in the middle of a call."""
+        """Return whether the other side has ended, perhaps in the middle of a call."""
         try:
             return not self.connection.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
         except BlockingIOError:
@@ -197,7 +197,7 @@ class _Handler(http.server.BaseHTTPRequestHandler):
                 self._reply(result)
 
     def _size(self):
-        """How long the body says it is."""
+        """Return how long the body says it is."""
         if self.path not in ("/", "/RPC2"):
             raise Refused(NOT_KNOWN_CODE, "a request for {}".format(shown(self.path)))
         if self.headers.get("Content-Encoding", "identity").lower() != "identity":
@@ -283,7 +283,7 @@ def _ends(request):
     try:
         return request.getpeername(), request.getsockname()
     except OSError:
-        return ("0.0.0.0", 0), ("0.0.0.0", 0)  # noqa: S104 - nobody's address
+        return ("0.0.0.0", 0), ("0.0.0.0", 0)  # noqa: S104 - no one's address
 
 
 def serve(port, answer, guard, owners, title):

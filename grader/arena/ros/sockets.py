@@ -272,4 +272,4 @@ def _target(link):
     try:
         return os.readlink(link)
     except OSError:
-        return ""  # closed meanwhile
+        return ""  # it was closed

@@ -125,7 +125,7 @@ class Wire:
                 while data and not gone:
                     data = data[os.write(self._fd, data) :]
             except BrokenPipeError:
-                gone = True  # nobody reads any more: the end of stdin says so, too
+                gone = True  # no one reads any more: the end of stdin says so, too
             with self._lock:
                 self._bytes -= size
                 self._went.notify_all()

@@ -20,8 +20,8 @@ from grader.rubric.find import rubrics_folder
 from grader.rubric.load import LoadedRubric, refuse_newer
 from grader.rubric.model import Rubric
 from grader.rubric.source import Fault, KeyPath, Source, as_map, as_maps, read_source
-from grader.suggest import did_you_mean
 from grader.untrusted_text import visible
+from grader.wording import did_you_mean
 
 HEADER = """\
 # Faulty packages for {rubric}: the reference solution with edits, and the criteria that each package must not reach.

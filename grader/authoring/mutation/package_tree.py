@@ -80,7 +80,7 @@ def write_tree(tree: Tree, folder: Path) -> None:
 
 
 def unified_diff(before: Tree, after: Tree) -> str:
-    """The changes as a unified diff; modes, line ends and moves are said in git's words."""
+    """Return the changes as a unified diff; modes, line ends and moves are said in git's words."""
     names = sorted(before.keys() | after.keys())
     return "".join(
         line
@@ -110,7 +110,7 @@ def _mode(entry: Entry) -> str:
 
 
 def _lines(entry: Entry | None) -> list[str]:
-    """The lines, each with one `\\n`; what a reader cannot see is written out."""
+    """Return the lines, each with one `\\n`; what a reader cannot see is written out."""
     if entry is None:
         return []
     text = entry.data.decode(errors="replace").replace("\r", "^M").replace("\ufeff", "<BOM>")

@@ -24,7 +24,7 @@ from grader.model.mutants import (
     SymbolicLink,
     WriteFile,
 )
-from grader.suggest import did_you_mean
+from grader.wording import did_you_mean
 
 SHOWN_PLACES = 6
 Place = Mapping[str, str | int]

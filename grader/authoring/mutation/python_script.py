@@ -50,14 +50,14 @@ class Script:
             yield node
 
     def statement(self, node: ast.AST) -> ast.stmt:
-        """The innermost statement that the node belongs to."""
+        """Return the innermost statement that the node belongs to."""
         return next(n for n in (node, *self.above(node)) if isinstance(n, ast.stmt))
 
     def function(self, node: ast.AST) -> Function | None:
         return next((n for n in self.above(node) if isinstance(n, Function)), None)
 
     def block(self, statement: ast.stmt) -> list[ast.stmt]:
-        """The list of statements that it stands in."""
+        """Return the list of statements that it stands in."""
         parent = self.parents[statement]
         blocks = [value for _, value in ast.iter_fields(parent) if isinstance(value, list)]
         return next(block for block in blocks if statement in block)
@@ -87,7 +87,7 @@ class Script:
         return min(indents - {""}, key=len, default="    ")
 
     def has_lines(self, statement: ast.stmt) -> bool:
-        """Whether its lines hold nothing else: no `;`, no `if x: y`. A comment after it counts as its own."""
+        """Return whether its lines hold nothing else: no `;`, no `if x: y`. A comment after it counts as its own."""
         start, end = self.span(statement)
         before = self.text[self.starts[statement.lineno - 1] : start]
         after = self.text[end:].partition("\n")[0].strip()

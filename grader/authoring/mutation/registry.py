@@ -60,8 +60,8 @@ OPERATORS: dict[str, Operator] = {}
 def operator(name: str, *, each: Finder, params: type[Record] = NoParams) -> Callable[[Function], Function]:
     """Put a function into `OPERATORS`. Its docstring's first line is the mistake, a line `Fits …` where it fits.
 
-    `each` finds where the operator may fit: it yields a `Place` and what is there. The function is called with what is
-    there, and with the parameters if it has any; it returns the change, or nothing where it does not fit after all.
+    `each` finds where the operator may fit: it yields a `CodePlace` and what is there. The function is called with
+    what is there, and with the parameters if it has any. It returns the change, or nothing where it does not fit.
     Raises ValueError for a name that is taken and for a docstring that lacks one of the two lines.
     """
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 from grader.authoring.mutation.python_script import Function, Script
-from grader.authoring.mutation.solution import Place, Solution
+from grader.authoring.mutation.solution import CodePlace, Solution
 
 LOGS = frozenset({"logdebug", "loginfo", "logwarn", "logerr", "logfatal"})
 STREAMS = frozenset({"stdout", "stderr"})
@@ -47,7 +47,7 @@ def calls(script: Script, *names: str) -> Iterator[ast.Call]:
 
 
 def argument(call: ast.Call, position: int, *keywords: str) -> ast.expr | None:
-    """The argument at that place, or by one of these keywords."""
+    """Return the argument at that place, or by one of these keywords."""
     if position < len(call.args):
         return call.args[position]
     return next((k.value for k in call.keywords if k.arg in keywords), None)
@@ -66,7 +66,7 @@ def literal(script: Script, node: ast.AST | None) -> ast.Constant | None:
 
 
 def text_literal(script: Script, node: ast.AST | None) -> ast.Constant | None:
-    """The same for texts that stand in one line."""
+    """Return the same for texts that stand in one line."""
     found = literal(script, node)
     whole = found is not None and isinstance(found.value, str) and found.lineno == found.end_lineno
     return found if whole else None
@@ -109,34 +109,34 @@ def _function(script: Script, node: ast.AST | None) -> Function | ast.Lambda | N
     return next((f for f in script.of(ast.FunctionDef) if f.name == last_name(node)), None)
 
 
-def script_place(script: Script, node: ast.AST | None = None, **at: str) -> Place:
+def script_place(script: Script, node: ast.AST | None = None, **at: str) -> CodePlace:
     """Return a place in the script, in the line of `node`, or else of the first edit."""
-    return Place(path=script.path, at={"script": script.path, **at}, line=getattr(node, "lineno", None))
+    return CodePlace(path=script.path, at={"script": script.path, **at}, line=getattr(node, "lineno", None))
 
 
-def each_script(solution: Solution) -> Iterator[tuple[Place, Script]]:
+def each_script(solution: Solution) -> Iterator[tuple[CodePlace, Script]]:
     """Find the scripts."""
     return ((script_place(script), script) for script in solution.scripts)
 
 
-def each_publisher(solution: Solution) -> Iterator[tuple[Place, Script, Endpoint]]:
+def each_publisher(solution: Solution) -> Iterator[tuple[CodePlace, Script, Endpoint]]:
     """Find the publishers."""
     return _each_endpoint(solution, publishers)
 
 
-def each_subscriber(solution: Solution) -> Iterator[tuple[Place, Script, Endpoint]]:
+def each_subscriber(solution: Solution) -> Iterator[tuple[CodePlace, Script, Endpoint]]:
     """Find the subscribers."""
     return _each_endpoint(solution, subscribers)
 
 
-def each_endpoint(solution: Solution) -> Iterator[tuple[Place, Script, Endpoint]]:
+def each_endpoint(solution: Solution) -> Iterator[tuple[CodePlace, Script, Endpoint]]:
     """Find the publishers and subscribers."""
     return _each_endpoint(solution, lambda script: [*publishers(script), *subscribers(script)])
 
 
 def _each_endpoint(
     solution: Solution, find: Callable[[Script], list[Endpoint]]
-) -> Iterator[tuple[Place, Script, Endpoint]]:
+) -> Iterator[tuple[CodePlace, Script, Endpoint]]:
     for script in solution.scripts:
         for endpoint in find(script):
             yield script_place(script, endpoint.call, topic=endpoint.topic), script, endpoint
@@ -156,7 +156,7 @@ def message_name(callback: Function | ast.Lambda) -> str:
 
 
 def is_speech(node: ast.AST) -> bool:
-    """Whether it prints or logs: `rospy.loginfo(…)`, `print(…)`, `sys.stdout.write(…)`."""
+    """Return whether it prints or logs: `rospy.loginfo(…)`, `print(…)`, `sys.stdout.write(…)`."""
     if not isinstance(node, ast.Call):
         return False
     if isinstance(node.func, ast.Attribute) and node.func.attr == "write":
@@ -165,13 +165,13 @@ def is_speech(node: ast.AST) -> bool:
 
 
 def speech(script: Script, inside: ast.AST | None = None) -> list[ast.Expr]:
-    """The statements that print or log, of the whole script or of one function."""
+    """Return the statements that print or log, of the whole script or of one function."""
     within = set(ast.walk(inside)) if inside is not None else None
     return [s for s in script.of(ast.Expr) if is_speech(s.value) and (within is None or s in within)]
 
 
 def loops(script: Script) -> list[ast.While]:
-    """The loops that run until ROS shuts down, or for ever."""
+    """Return the loops that run until ROS shuts down, or for ever."""
     return [
         loop
         for loop in script.of(ast.While)
@@ -181,7 +181,7 @@ def loops(script: Script) -> list[ast.While]:
 
 
 def rate_sleeps(script: Script) -> list[ast.Expr]:
-    """The statements `rate.sleep()`."""
+    """Return the statements `rate.sleep()`."""
     return [
         s
         for s in script.of(ast.Expr)
@@ -265,7 +265,7 @@ class Counter:
 
 
 def find_counter(script: Script, publisher: Endpoint) -> Counter | None:
-    """The counter that feeds an integer topic; None where nothing is counted in a way that can be read."""
+    """Return the counter that feeds an integer topic; None where nothing is counted in a way that can be read."""
     if publisher.type_name not in INTEGER_TYPES:
         return None
     names = counted_names(script, publisher)
@@ -320,7 +320,7 @@ def _compares(test: ast.expr, names: set[str]) -> bool:
 
 
 def _resets(test: ast.If | ast.IfExp, names: set[str]) -> bool:
-    """Whether one of its branches gives the counter a fixed number."""
+    """Return whether one of its branches gives the counter a fixed number."""
     if isinstance(test, ast.IfExp):
         return any(isinstance(v, ast.Constant) for v in (test.body, test.orelse))
     inner = [n for s in (*test.body, *test.orelse) for n in ast.walk(s) if isinstance(n, ast.Assign)]

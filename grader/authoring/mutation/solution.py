@@ -40,7 +40,7 @@ Change = Sequence[Edit] | bytes | Tree | None
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class CodePlace:
     """A place that an operator may change. `at` tells it from the others; without `line`, the first edit does.
 
     Positions in an XML file count bytes, those in any other file characters: `xml` is the file's document.
@@ -154,12 +154,12 @@ class Solution:
         return {name: entry for name, entry in self.tree.items() if name != self.folder + path}
 
     def edited(self, path: str, edits: Sequence[Edit]) -> Tree:
-        """The tree with edits in one text file."""
+        """Return the tree with edits in one text file."""
         text = apply_edits(self.text(path), edits)
         return self.with_data(path, text.encode(errors="surrogateescape"))
 
     def edited_xml(self, document: Document, edits: Sequence[Edit]) -> Tree:
-        """The same for XML, whose places count bytes; what the edits insert is written as UTF-8."""
+        """Return the same for XML, whose places count bytes; what the edits insert is written as UTF-8."""
         wide = [Edit(e.start, e.end, e.text.encode().decode("latin-1")) for e in edits]
         return self.with_data(document.path, apply_edits(document.text, wide).encode("latin-1"))
 
@@ -181,12 +181,12 @@ class Reference:
 
 
 def references_folder() -> Path:
-    """The folder of the reference solutions that come with the grader."""
+    """Return the folder of the reference solutions that come with the grader."""
     return rubrics_folder().parent / REFERENCES
 
 
 def find_reference(rubric: LoadedRubric) -> Reference:
-    """The rubric's reference solution. Raises UsageError where there is none.
+    """Return the rubric's reference solution. Raises UsageError where there is none.
 
     A checkout has its executable bits from git. A wheel is unpacked by installers that need not keep them: there,
     what begins with a shebang is executable.
@@ -205,14 +205,14 @@ def find_reference(rubric: LoadedRubric) -> Reference:
 
 
 def reference_at(folder: Path) -> Reference:
-    """The user's own correct package. Raises UsageError where it is no folder."""
+    """Return the user's own correct package. Raises UsageError where it is no folder."""
     if not folder.is_dir():
         raise UsageError(f"{folder} is not a folder", hint="--solution takes the folder of a correct package")
     return Reference(folder=folder)
 
 
 def load_solution(reference: Reference, package: str) -> Solution:
-    """The package of that name within the folder. Raises UsageError where it is not there."""
+    """Return the package of that name within the folder. Raises UsageError where it is not there."""
     tree = read_tree(reference.folder, modes=reference.modes)
     manifests = sorted(
         (p for p in tree if PurePosixPath(p).name == MANIFEST), key=lambda p: (p.count("/"), p)

@@ -29,7 +29,7 @@ def apply_edits(text: str, edits: Iterable[Edit]) -> str:
 
 
 def line_at(text: str, position: int) -> int:
-    """The line of a position, counted from 1."""
+    """Return the line of a position, counted from 1."""
     return text.count("\n", 0, position) + 1
 
 

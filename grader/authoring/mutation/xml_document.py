@@ -74,7 +74,7 @@ class Document:
         return self.data.decode("latin-1")
 
     def content(self, element: Element) -> str:
-        """The element's own text, without the space around it."""
+        """Return the element's own text, without the space around it."""
         end = self.data.rfind(b"</", element.inner, element.end)
         return self.data[element.inner : max(end, element.inner)].decode(errors="replace").strip()
 

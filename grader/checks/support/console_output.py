@@ -119,7 +119,7 @@ def _without_anonymous(word: re.Match[str]) -> str:
 
 
 def numbers_in(text: str) -> frozenset[int]:
-    """A line's whole numbers: `12` is not in `127` and not in `3.12`. A `-` after a letter may be a dash."""
+    """Return a line's whole numbers: `12` is not in `127` and not in `3.12`. A `-` after a letter may be a dash."""
     return frozenset(n for dashes in (False, True) for _, n in _numbers(text, dashes=dashes))
 
 
@@ -140,7 +140,7 @@ def _blanked(match: re.Match[str]) -> str:
 def places_of(
     run: Run, probes: Sequence[Probe], lines: Sequence[Line], template: str
 ) -> list[tuple[int, ...]] | None:
-    """Return for each probe where it was printed; None where so many numbers are printed that nobody can tell.
+    """Return for each probe where it was printed; None where so many numbers are printed that no one can tell.
 
     Places are offsets in all that was printed; `line_finder` gives a place's line.
     """
@@ -256,7 +256,7 @@ def _texts_of(run: Run, topic: str, nodes: Collection[str]) -> Iterator[tuple[in
 
 
 def printed_times(run: Run, process: str, texts: Collection[str], template: str) -> Counter[str]:
-    """How many times a process printed each text: by the stream, stdout, stderr or /rosout, that shows it most.
+    """Return how many times a process printed each text: by the stream, stdout, stderr or /rosout, that shows it most.
 
     Of a flood of texts, some that seem to have been printed are enough to look at.
     """

@@ -23,6 +23,9 @@ from grader.wording import plural, significant
 FLOOD_FACTOR = 3
 SYSTEMATIC_SHARE = 0.05
 STUCK_COUNT = 5
+LEAST_AFTER_START = 3
+LOST_GAP_SHARE = 0.75
+"""Of the time that lost values would have taken: a longer gap is a machine that stood still for longer."""
 SILENT_PERIODS = 20
 SILENT_NS = 500_000_000
 
@@ -59,6 +62,15 @@ class Count(Record):
         )
 
     @cached_property
+    def begins_astray(self) -> bool:
+        """Whether the first value alone is wrong: it is not what the counter comes back to, and the next one follows
+        another value than this. That is the fault of the start, and of nothing else."""
+        if len(self.values) < LEAST_AFTER_START:
+            return False
+        start = min((s.after for s in self.steps[1:] if s.change < -1), default=0)
+        return self.values[0] not in {start, self.values[1] - 1} and self.values[1] in {start, start + 1}
+
+    @cached_property
     def stuck(self) -> int:
         """How many times the last value came at the end."""
         same = 0
@@ -86,7 +98,7 @@ class Count(Record):
             return True
         if jump < 2 or self.period_ns <= 0 or self._comes_again(step):
             return False
-        return 0.75 <= (step.to_ns - step.from_ns) / self.period_ns / jump <= 4
+        return (step.to_ns - step.from_ns) / self.period_ns / jump >= LOST_GAP_SHARE
 
     def _comes_again(self, step: Step) -> bool:
         same = self._pairs[step.before, step.after]
@@ -140,9 +152,10 @@ def wrong_steps(count: Count, run: Run, *, maximum: int, rate_hz: float) -> Wron
 
 
 def judged_steps(count: Count, maximum: int) -> tuple[Step, ...]:
-    """Return all of them, without the repeats of a counter that stays at its maximum: that is the wrap's fault."""
+    """Return all of them but those of another criterion: from a first value that is wrong, which is the start's fault,
+    and the repeats of a counter that stays at its maximum, which are the wrap's."""
     stays = count.values[-1] == maximum and count.stuck > 1
-    return count.steps[: len(count.steps) - (count.stuck - 1)] if stays else count.steps
+    return count.steps[int(count.begins_astray) : len(count.steps) - (count.stuck - 1 if stays else 0)]
 
 
 def counts(run: Run, topic: str) -> tuple[Count, ...]:
@@ -170,7 +183,7 @@ def _count(channel: Channel, until_ns: int | None) -> Count | None:
 
 
 def _number(value: object) -> float | None:
-    """A number; text is none, even if it is written in digits."""
+    """Return a number; text is none, even if it is written in digits."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return value
     return None
@@ -228,7 +241,7 @@ def turns_of(count: Count, run: Run, params: WrapParams) -> Turns:
     """Where bad turns of a flood are let pass, all count as good."""
     turns = [s for s in count.steps if s.change < 0]
     good = [s for s in turns if _is_good(s, params)]
-    bad = [s for s in count.steps if _is_bad(s, params)]
+    bad = [s for s in count.steps[int(count.begins_astray) :] if _is_bad(s, params)]
     in_range = bool(bad) and params.minimum <= bad[0].after <= params.maximum
     if in_range and good and count.is_flood(run, params.rate_hz):
         # the publisher dropped values around this turn: those that came whole decide
@@ -252,7 +265,9 @@ def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: Wra
     whose = whose_turn(step, count, run, params)
     if whose == "flood":
         message = f"{params.topic} is flooded, so its publisher drops values, also around the wrap"
-        return unjudged(message, hint="first make the loop sleep, then look at the counter again")
+        return unjudged(
+            message, hint=f"first publish at {significant(params.rate_hz)} Hz, then look at the counter again"
+        )
     if whose == "lost":
         message = f"values of {params.topic} were lost around the wrap, with a gap in time"
         return inconclusive(message, hint="grade again while the machine has less to do")
@@ -297,8 +312,10 @@ def _died(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> 
     if last >= params.maximum - 1:
         message = f"the node dies at {significant(last + 1)}, where the counter should reset: {end.cause}"
         return failed(message, hint=params.reset_hint)
-    message = f"the node ended at {significant(last)}, before the counter could reset twice: {end.cause}"
-    return unjudged(message, hint=end.hint)
+    came = f"after {plural(len(count.values), 'message')}, at {significant(last)}"
+    message = f"the node ended {came}, before the counter could reset twice: {end.cause}"
+    of_its_own = end.by_itself and len(count.values) > params.maximum
+    return (failed if of_its_own else unjudged)(message, hint=end.hint)
 
 
 def _stuck(count: Count, params: WrapParams) -> Verdict | None:

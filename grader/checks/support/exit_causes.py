@@ -23,7 +23,7 @@ LIMITS = ("limit", "note")  # evidence of earlier versions has it as a note
 CAUSES = {
     "EOFError": ("it asks for input (`input()`), and a node is given none", "remove `input()`: a node runs by itself"),
     "ROSInterruptException": ("ROS was told to shut down while the node slept, and nothing caught it",
-     "call your main function in `try: … except rospy.ROSInterruptException: pass`, as talker.py does"),
+     "call your main function in `try: … except rospy.ROSInterruptException: pass`"),
     "ROSInitException": ("it uses ROS before `rospy.init_node(…)`",
      "call `rospy.init_node(…)` before the first publish, Rate or sleep"),
     "KeyboardInterrupt": ("Ctrl-C reached it in a place where nothing expects it",
@@ -39,6 +39,11 @@ CAUSES = {
 }  # fmt: skip
 # what rospy says of a slip that its exception's class does not tell of
 SLIPS = {
+    "name 'raw_input' is not defined": ("`raw_input` is of Python 2, and a node is given no input",
+     "remove `raw_input(…)`, and give its value in the code: a node must not ask for anything"),
+    **{f"name '{old}' is not defined": (f"`{old}` is of Python 2", f"write `{new}`, as Python 3 has it")
+       for old, new in {"xrange": "range", "unicode": "str", "basestring": "str", "long": "int", "unichr": "chr",
+                        "reduce": "functools.reduce", "file": "open"}.items()},
     "namespaces are not allowed in node names": ("the name in `rospy.init_node(…)` has a slash in it",
      "write the node's name without a slash"),
     "init_node() has already been called with different arguments": ("`rospy.init_node(…)` is called a second time",
@@ -128,6 +133,8 @@ class Ending(NamedTuple):
     process: str = ""
     of_machine: bool = False
     """The grading machine lacks what it needs."""
+    by_itself: bool = False
+    """Whether it came to its end as a script that has nothing more to do."""
 
     def verdict(self, kind: Callable[..., Verdict], message: str, measured: str = "") -> Verdict:
         """Return a verdict of this kind (`failed`, `unjudged`) with the ending's hint and citations, or
@@ -160,7 +167,7 @@ def _explained(life: Life, run: Run, package: PackageFacts) -> Ending:
         return Ending(f"{_signal_name(life.end.signal)} ended it", RUN_IT)
     if code == 0:
         hint = "a node has to stay alive: `rospy.spin()`, or a loop `while not rospy.is_shutdown():`"
-        return Ending("its script came to its end", hint)
+        return Ending("its script came to its end", hint, by_itself=True)
     last = next((line.line for _, line in reversed(list(run.lines(life.name))) if line.line.strip()), "")
     words = f"; its last words: {shown(last)}" if last else ""
     return Ending(f"it exited with code {code}{words}", RUN_IT)

@@ -19,7 +19,7 @@ TypeName = Annotated[str, Field(pattern=r"^[A-Za-z]\w*/[A-Za-z]\w*$")]
 
 
 def nodes_of(run: Run, process: str) -> tuple[str, ...]:
-    """The nodes of one process, or the student's all where `process` is empty or nobody noted whose they are."""
+    """The nodes of one process, or the student's all where `process` is empty or no one noted whose they are."""
     return run.student_nodes(process) if process and are_noted(run) else run.student_nodes()
 
 
@@ -46,7 +46,7 @@ def wanted_names(names: Iterable[str], anonymous: Anonymous) -> str:
 
 
 def wrong_name(names: tuple[str, ...], nodes: Iterable[str], anonymous: Anonymous) -> str:
-    """How the names of the nodes differ from those that are wanted: in themselves, or in their ending alone."""
+    """Return how the names of the nodes differ from those that are wanted: in themselves, or in their ending alone."""
     there = tuple(nodes)
     if {base_name(n) for n in there}.isdisjoint(_bases(names)):
         return f"the node is named {join_words(there)}, not {join_words(_bases(names), 'or')}"

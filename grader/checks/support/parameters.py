@@ -6,7 +6,7 @@ Maps are taken apart into their leaves (`/details/name/first`).
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import PurePosixPath
 from typing import Any, NamedTuple
@@ -30,6 +30,9 @@ SYSTEM = (
 )
 NOT_IN_FILE = "not in the file"
 PRINTED_INDENT = 4
+_BETWEEN_PARTS = re.compile(r"[,;]?\s*\n\s*|[,;]\s+")
+YAML_LINES_MAX = 2_000
+_YAML_KEY = re.compile(r"^( *)[\"']?([A-Za-z]\w{0,99})[\"']?\s*:(?:\s|$)")
 _PLACE = re.compile(r"line (\d+), column (\d+)")
 _IN_LINE = "line {line} has a tab after a name or a value, which YAML does not accept"
 _INDENT = "indent with spaces alone, two for each level"
@@ -105,6 +108,43 @@ def describe_missing(found: Mapping[str, Any], name: str) -> str:
     return f"there is no {name}" + (f"; there is {join_words(near)}" if near else "")
 
 
+def name_in_its_place(name: str, found: Iterable[str], names: Iterable[str]) -> str | None:
+    """Return the one of `found` that is there for a name that is not: nearly the same in the same map, or the same in
+    another map. It is not another of `names`."""
+    above, _, last = name.rpartition("/")
+    others = [n for n in found if n not in set(names)]
+    beside = {n.rpartition("/")[2]: n for n in others if n.rpartition("/")[0] == above}
+    longer = [n for n in beside if n.casefold().startswith(last.casefold())]
+    near = {beside[n] for n in (*near_names(last, beside), *longer)}
+    there = near or {n for n in others if n.rpartition("/")[2] == last}
+    return there.pop() if len(there) == 1 else None
+
+
+class Key(NamedTuple):
+    """A name in a YAML file: `path` is that of its parameter, `indent` how many spaces stand before it."""
+
+    path: str
+    line: int
+    indent: int
+
+
+def yaml_keys(text: str) -> tuple[Key, ...]:
+    """Return the names of a file of `name: value` lines, as far as its lines alone say it."""
+    found: list[Key] = []
+    above: list[Key] = []
+    for number, line in enumerate(text.splitlines()[:YAML_LINES_MAX], start=1):
+        match = _YAML_KEY.match(line)
+        if match is None:
+            continue
+        indent = len(match[1])
+        while above and above[-1].indent >= indent:
+            above.pop()
+        key = Key(f"{above[-1].path if above else ''}/{match[2]}", number, indent)
+        above.append(key)
+        found.append(key)
+    return tuple(found)
+
+
 class Given(NamedTuple):
     """A parameter as the grader set it before the run."""
 
@@ -121,17 +161,21 @@ def params_given(run: Run) -> dict[str, Given]:
 
 
 def is_printed(value: object, lines: Sequence[Line]) -> bool:
-    """In one line, a number as one of its own; of a list, each of its items."""
+    """In one line, a number as one of its own; of a list, each of its items, and of a text that has commas or lines, at
+    least each of its parts."""
     if isinstance(value, list | tuple):
         return all(is_printed(item, lines) for item in value)
-    text = str(value)
+    text = str(value).strip()
     edges = (r"(?<!\w)(?<!\d\.)", r"(?!\w|\.\d)") if text[-1:].isdigit() else ("", "")
     word = re.compile(re.escape(text).join(edges))
-    return any(word.search(line.text) for line in lines)
+    if any(word.search(line.text) for line in lines):
+        return True
+    parts = [part for part in _BETWEEN_PARTS.split(text) if part]
+    return len(parts) > 1 and all(is_printed(part, lines) for part in parts)
 
 
 def explain_failure(package: PackageFacts, run: Run) -> Ending | None:
-    """An error that ended the node, or its last traceback."""
+    """Return an error that ended the node, or its last traceback."""
     ended = early_end(run)
     if ended is not None and ended.end is not None and ended.end.exit_code != 0:
         end: Ending | None = explain_end(ended, run, package)

@@ -65,7 +65,7 @@ def bare(text: str) -> str:
 
 
 def shown(text: str) -> str:
-    """One line of somebody's output, without colours, what cannot be seen written out, cut to fit a report."""
+    """One line of someone's output, without colours, what cannot be seen written out, cut to fit a report."""
     return in_one_line(bare(text[:SHOWN_BEFORE_CHARS]))
 
 

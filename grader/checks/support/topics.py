@@ -110,7 +110,7 @@ def _refused(run: Run, topic: str) -> Verdict | None:
 
 
 class Losses(Record):
-    """From `at_ns` on messages of the topic are missing: `dropped` of them, or nobody knows how many (0)."""
+    """From `at_ns` on messages of the topic are missing: `dropped` of them, or no one knows how many (0)."""
 
     topic: str
     at_ns: int

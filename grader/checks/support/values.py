@@ -88,7 +88,7 @@ def fields_text(value: Mapping[str, Any]) -> str:
 
 
 def value_text(value: object) -> str:
-    """A value as `rosservice` and YAML show it."""
+    """Return a value as `rosservice` and YAML show it."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):

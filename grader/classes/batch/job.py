@@ -150,6 +150,7 @@ def _grade(job: Job, folder: Path) -> Outcome:
     options = GradeOptions(
         sandbox=job.sandbox,
         submission_id=safe_name(job.entry.id),
+        package=job.entry.package,
         static_only=job.static_only,
         tidy=False,
         find_earlier=partial(_find_complete, job),

@@ -107,7 +107,7 @@ def _submissions_below(folder: Path) -> list[Path]:
 
 
 def _is_result(folder: Path) -> bool:
-    """Whether `grade` left this of one submission, or it is its evidence alone."""
+    """Return whether `grade` left this of one submission, or it is its evidence alone."""
     return (folder / RESULT).is_file() or (folder / PACKAGE).is_file() or _has_recordings(folder / EVIDENCE)
 
 

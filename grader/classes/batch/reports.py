@@ -21,7 +21,7 @@ from grader.model.figure import Figures
 from grader.model.result import GradingResult, HandedIn, Override
 from grader.report.figures import figures_of
 from grader.report.files import render_files, write_reports
-from grader.report.forms import Shown
+from grader.report.forms import ReportInput
 from grader.report.sentences import missing_hidden
 from grader.results import EVIDENCE, RESULT, Results, read_result
 from grader.rubric.load import LoadedRubric
@@ -60,7 +60,7 @@ def write_one(folder: Path, rubric: LoadedRubric) -> GradingResult:
     result_in(folder, rubric)  # before anything is made there
     with Results(folder) as results:
         result = result_in(folder, rubric)
-        shown = Shown(
+        shown = ReportInput(
             result=result,
             rubric=rubric.rubric,
             hidden=missing_hidden(result, rubric.rubric),
@@ -80,7 +80,7 @@ def write_one(folder: Path, rubric: LoadedRubric) -> GradingResult:
 
 
 def has_result(folder: Path) -> bool:
-    """Whether `folder` holds a submission's results."""
+    """Return whether `folder` holds a submission's results."""
     return (folder / RESULT).is_file()
 
 

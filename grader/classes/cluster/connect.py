@@ -54,7 +54,7 @@ def check_address(text: str, *, insecure: bool = False) -> str:
         raise UsageError(
             f"--cluster {text}: this scheduler asks for no certificate: "
             "all who reach its port can run programs as its user",
-            hint="use tls:// (docs/how-to/cluster.md says how); where nobody else is in that network, "
+            hint="use tls:// (docs/how-to/cluster.md says how); if no one else is in that network, "
             "add --cluster-insecure",
         )
     try:
@@ -178,7 +178,7 @@ def _not_interrupted() -> Iterator[None]:
 
 
 def is_encrypted(address: str) -> bool:
-    """Whether the scheduler or worker at `address` asks for a certificate."""
+    """Return whether the scheduler or worker at `address` asks for a certificate."""
     return address.partition("://")[0] in ENCRYPTED
 
 
@@ -194,7 +194,8 @@ class Needs:
 class Recruits:
     """The workers of a cluster that can grade: each is asked once who it is, and left out by name if it differs.
 
-    `known` are the addresses of all workers, `fit` maps those that can grade to their number of threads.
+    `known` are the addresses of all workers, `fit` maps those that can grade to their number of threads. `changed` is
+    set when one has answered.
     """
 
     def __init__(
@@ -209,6 +210,7 @@ class Recruits:
         self._left_out: dict[str, str] = {}
         self._threads: dict[str, int] = {}
         self._answers: SimpleQueue[tuple[str, Answer]] = SimpleQueue()
+        self.changed = threading.Event()
         self._client, self._exchange, self._batch, self._needs, self._say = (
             client,
             exchange,
@@ -251,7 +253,7 @@ class Recruits:
             while True:
                 self._take_in(*self._answers.get_nowait())
 
-    def nobody(self, patience_s: float, goes_on: str) -> HostError:
+    def none_fit(self, patience_s: float, goes_on: str) -> HostError:
         """Return the error that no worker can grade."""
         left_out = "; ".join(self._left_out.values())
         what = f"no worker that can grade ({left_out})" if left_out else "no worker"
@@ -271,6 +273,7 @@ class Recruits:
         except Exception as error:  # noqa: BLE001 - whatever it is, it is this worker's answer
             answer = error
         self._answers.put((address, answer))
+        self.changed.set()
 
     def _take_in(self, address: str, answer: Answer) -> None:
         if address not in self._threads:
@@ -311,5 +314,5 @@ def why_not(answer: Mapping[str, str] | BaseException, needs: Needs) -> str:
 
 
 def _has_no_grader(error: BaseException) -> bool:
-    """Whether that is why a worker or scheduler could not answer. Dask sends some errors as their text."""
+    """Return whether that is why a worker or scheduler could not answer. Dask sends some errors as their text."""
     return isinstance(error, ImportError) or "ModuleNotFoundError" in str(error)

@@ -31,7 +31,7 @@ HELLO = "hello"
 BLAME_SUBMISSION = (SubmissionError.kind, PackageNotFound.kind)
 
 
-class Errand(Record):
+class GradeRequest(Record):
     """A job on its way to a worker. `exchange` is the URL for its results, `batch` names the client's batch.
 
     `seen`: the job's source is a path that the client sees.
@@ -52,14 +52,14 @@ class Parcel(Record):
 
 
 class Report(Record):
-    """What became of an errand. Without a `parcel` there are no results to put into place."""
+    """What became of a request. Without a `parcel` there are no results to put into place."""
 
     outcome: Outcome
     parcel: Parcel | None = None
 
 
 def is_machines(outcome: Outcome) -> bool:
-    """Whether it is an error that is not the submission's."""
+    """Return whether it is an error that is not the submission's."""
     return outcome.status == "error" and outcome.kind not in BLAME_SUBMISSION
 
 
@@ -79,7 +79,7 @@ class Exchange:
             if "://" in self.url:
                 files.makedirs(root, exist_ok=True)
             elif not make_folder(Path(root)):
-                raise FileExistsError("somebody else has just made it")
+                raise FileExistsError("another program has just made it")
 
     def remove(self) -> None:
         """Delete the folder and everything in it."""
@@ -114,7 +114,7 @@ class Exchange:
             files.pipe_file(f"{root}/{HELLO}", word.encode())
 
     def answers(self, word: str) -> bool:
-        """Whether the client's word is there, and a file can be written beside it."""
+        """Return whether the client's word is there, and a file can be written beside it."""
         with self._open("written") as (files, root):
             if not files.exists(f"{root}/{HELLO}") or files.cat_file(f"{root}/{HELLO}") != word.encode():
                 return False
@@ -229,5 +229,5 @@ class _Measured:
 
 
 def _refuse(parcel: Parcel, why: str) -> HostError:
-    hint = "check whether somebody else writes into the exchange"
+    hint = "check whether another program writes into the exchange"
     return HostError(f"{parcel.name} cannot be unpacked: {why}", hint=hint)

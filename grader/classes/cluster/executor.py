@@ -24,7 +24,15 @@ from typing import Any, BinaryIO
 from grader.classes.batch.job import Job, Outcome, failed
 from grader.classes.cluster import worker
 from grader.classes.cluster.connect import LOCAL, Needs, Recruits, check_address, connect, is_encrypted
-from grader.classes.cluster.exchange import Errand, Exchange, Parcel, Report, check_url, is_machines, unpack
+from grader.classes.cluster.exchange import (
+    Exchange,
+    GradeRequest,
+    Parcel,
+    Report,
+    check_url,
+    is_machines,
+    unpack,
+)
 from grader.errors import GraderError, HostError
 from grader.intake import safe_name
 from grader.results import RESULT, Results
@@ -33,7 +41,7 @@ from grader.rubric.load import needs_ros
 PATIENCE_S = 60.0
 EXCHANGE = ".grader-exchange"
 TOKEN_BYTES = 6
-LOOK_S, POLL_S = 1.0, 0.05
+LOOK_S = 1.0
 RETRIES = 2
 LOSSES = 3
 ANSWERING = 3  # times as long is waited while a worker has still to say who it is
@@ -141,6 +149,7 @@ class _Tasks:
         waiting = iter(jobs)
         try:
             while True:
+                self._recruits.changed.clear()
                 yield from self._look()
                 more = self._submit(waiting, begun)
                 if not (more or self._running or self._back):
@@ -153,7 +162,7 @@ class _Tasks:
                     if outcome is not None:
                         yield outcome
                 if not done:
-                    time.sleep(POLL_S)
+                    self._recruits.changed.wait(LOOK_S)
         finally:
             self._stop()
 
@@ -173,17 +182,18 @@ class _Tasks:
     def _hand_out(self, task: _Task) -> None:
         source = Path(task.job.entry.source)
         seen = source.is_absolute() and (source.exists() or source.is_symlink())
-        errand = Errand(job=task.job, exchange=self._exchange.url, batch=self._batch, seen=seen)
+        request = GradeRequest(job=task.job, exchange=self._exchange.url, batch=self._batch, seen=seen)
         task.workers = frozenset(self._recruits.fit)
         task.future = self._client.submit(
             worker.perform,
-            pickle.dumps(errand),
+            pickle.dumps(request),
             key=f"grade-{self._batch}-{self._count}",
             pure=False,
             retries=RETRIES,
             workers=list(task.workers),
             allow_other_workers=False,
         )
+        task.future.add_done_callback(lambda _: self._recruits.changed.set())
         self._count += 1
         self._running.append(task)
 
@@ -240,7 +250,7 @@ class _Tasks:
         if self._recruits.fit:
             self._idle_since_s = now_s
         elif now_s - self._idle_since_s > self._patience_s * (ANSWERING if self._recruits.asked else 1):
-            raise self._recruits.nobody(self._patience_s, GOES_ON)
+            raise self._recruits.none_fit(self._patience_s, GOES_ON)
 
     def _scheduler_lost(self) -> HostError:
         message = f"the connection to the scheduler at {self._recruits.address} is lost"

@@ -22,11 +22,11 @@ import pydantic
 import grader
 from grader.arena.ros_env import find_ros
 from grader.classes.batch.job import Outcome, grade_job, outcome_of_ended
-from grader.classes.cluster.exchange import Errand, Exchange, Parcel, Report, is_machines, pack
+from grader.classes.cluster.exchange import Exchange, GradeRequest, Parcel, Report, is_machines, pack
 from grader.errors import GraderError, HostError
 from grader.files import temporary_folder
 from grader.intake import safe_name
-from grader.workers import Limits, Worker, WorkerEnded
+from grader.workers import Worker, WorkerEnded, WorkerLimits
 
 WATCH_S = 1.0
 LEAVE_S = 40.0
@@ -85,10 +85,10 @@ def _digest_code() -> str:
 
 
 def perform(pickled: bytes) -> str:
-    """Grade the `Errand` in a thread of the worker, and return its `Report` as JSON. Raises HostError."""
+    """Grade the `GradeRequest` in a thread of the worker, and return its `Report` as JSON. Raises HostError."""
     from distributed import get_worker  # noqa: PLC0415 - slow to load
 
-    errand: Errand = pickle.loads(pickled)  # noqa: S301 - from the client, whose code this worker runs anyway
+    request: GradeRequest = pickle.loads(pickled)  # noqa: S301 - from the client, whose code this worker runs anyway
     worker = get_worker()
     key = worker.get_current_task()
 
@@ -97,46 +97,46 @@ def perform(pickled: bytes) -> str:
         task = worker.state.tasks.get(key)
         return task is not None and task.state != "cancelled"
 
-    return grade(errand, is_wanted).model_dump_json()
+    return grade(request, is_wanted).model_dump_json()
 
 
-def grade(errand: Errand, is_wanted: Callable[[], bool]) -> Report:
-    """Grade the errand's job and leave its results in the exchange. Raises HostError."""
-    host, source = socket.gethostname(), errand.job.entry.source
-    if errand.seen and not os.path.lexists(source):
+def grade(request: GradeRequest, is_wanted: Callable[[], bool]) -> Report:
+    """Grade the request's job and leave its results in the exchange. Raises HostError."""
+    host, source = socket.gethostname(), request.job.entry.source
+    if request.seen and not os.path.lexists(source):
         hint = "submissions that are folders or archives must lie on a path that all machines share"
         raise HostError(f"{source} cannot be seen on {host}", hint=hint)
     parcel = None
     try:
         with temporary_folder("run") as folder:
-            outcome = _grade_in(folder, errand, is_wanted)
+            outcome = _grade_in(folder, request, is_wanted)
             if is_machines(outcome):
                 outcome = outcome.model_copy(update={"message": f"{outcome.message} (on {host})"})
             if not outcome.kept and outcome.kind != "interrupted" and is_wanted():
-                parcel = _deliver(folder, errand)
+                parcel = _deliver(folder, request)
     except (GraderError, OSError) as error:
         message = getattr(error, "message", "") or str(error)
         raise HostError(f"{message} (on {host})", hint=getattr(error, "hint", "")) from error
     return Report(outcome=outcome, parcel=parcel)
 
 
-def _grade_in(folder: Path, errand: Errand, is_wanted: Callable[[], bool]) -> Outcome:
-    job = errand.job.model_copy(update={"out": folder})
-    with _processes.borrow(errand.batch) as process, _interrupt_unwanted(process, is_wanted):
+def _grade_in(folder: Path, request: GradeRequest, is_wanted: Callable[[], bool]) -> Outcome:
+    job = request.job.model_copy(update={"out": folder})
+    with _processes.borrow(request.batch) as process, _interrupt_unwanted(process, is_wanted):
         try:
             return process.run(grade_job, job)
         except WorkerEnded as error:
             return outcome_of_ended(job, error)
 
 
-def _deliver(folder: Path, errand: Errand) -> Parcel | None:
+def _deliver(folder: Path, request: GradeRequest) -> Parcel | None:
     """Put the results into the exchange; None if the job left none."""
-    name = safe_name(errand.job.entry.id)
+    name = safe_name(request.job.entry.id)
     if not (folder / name).is_dir():
         return None
     packed = folder / f"{name}.packed"
     pack(folder / name, packed)
-    return Exchange(errand.exchange).put(packed, name)
+    return Exchange(request.exchange).put(packed, name)
 
 
 @contextmanager
@@ -177,7 +177,7 @@ class _Processes:
         from grader.workers import Worker  # noqa: PLC0415 - the module loads little
 
         with self._changed:
-            process = self._idle.pop() if self._idle else Worker(Limits(idle_s=IDLE_S))
+            process = self._idle.pop() if self._idle else Worker(WorkerLimits(idle_s=IDLE_S))
             self._busy[process] = batch
         try:
             yield process

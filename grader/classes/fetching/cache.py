@@ -1,4 +1,4 @@
-"""Where mirrors are kept: in a folder of the grader's user that nobody else can enter, each used by one at a time.
+"""Where mirrors are kept: in a folder of the grader's user that no one else can enter, each used by one at a time.
 
 `<cache>/grader/repositories/<sum of the address>/` holds `lock`, `mirror.git` and `state.json`. The state is written
 when the mirror is complete, and its time of change says when the mirror was used last. `failure.json` is there where
@@ -46,7 +46,7 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Place:
+class MirrorFolder:
     """The folder of one mirror."""
 
     folder: Path
@@ -74,7 +74,7 @@ class Place:
         (self.folder / "failure.json").unlink(missing_ok=True)
 
     def failure(self) -> Failure | None:
-        """The last one, where nothing went well since."""
+        """Return the last failure, if nothing went well since."""
         try:
             data = json.loads((self.folder / "failure.json").read_bytes())
             return Failure(
@@ -87,7 +87,7 @@ class Place:
             return None
 
     def failed(self, failure: Failure) -> None:
-        """Tell whoever comes next, so that not all of them wait for a server that does not answer."""
+        """Tell the next process, so that not all of them wait for a server that does not answer."""
         with suppress(OSError):
             (self.folder / "failure.json").write_text(json.dumps(asdict(failure)), encoding="utf-8")
 
@@ -104,7 +104,7 @@ class Place:
 
 
 def cache_folder() -> Path | None:
-    """The folder for all mirrors; None where it cannot be had for this user alone."""
+    """Return the folder for all mirrors; None where it cannot be had for this user alone."""
     named = Path(os.environ.get("XDG_CACHE_HOME", ""))
     base = named if named.is_absolute() else Path(os.path.expanduser("~"), ".cache")  # noqa: PTH111 - never raises
     if not base.is_absolute():
@@ -122,12 +122,12 @@ def name_of(address: str) -> str:
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[Place]:
-    """The place of a mirror, when nobody else uses it. Raises OSError where it cannot be had or locked."""
+def locked(folder: Path) -> Iterator[MirrorFolder]:
+    """The place of a mirror, when no one else uses it. Raises OSError where it cannot be had or locked."""
     descriptor = _held(folder, wait=True)
     assert descriptor is not None  # noqa: S101 - waited for
     try:
-        yield Place(folder)
+        yield MirrorFolder(folder)
     finally:
         os.close(descriptor)
 
@@ -167,13 +167,13 @@ def _used_and_size(folder: Path) -> tuple[float, int]:
 
 
 def _removed(folder: Path) -> bool:
-    """Whether it is gone. What is in use stays."""
+    """Return whether it is gone. What is in use stays."""
     with suppress(OSError):
         descriptor = _held(folder, wait=False)
         if descriptor is None:
             return False
         try:
-            Place(folder).clear()
+            MirrorFolder(folder).clear()
             shutil.rmtree(folder)
         finally:
             os.close(descriptor)
@@ -187,7 +187,7 @@ def _held(folder: Path, *, wait: bool) -> int | None:
         with suppress(FileNotFoundError):
             folder.mkdir(mode=0o700, exist_ok=True)
             if not _is_own(folder):
-                raise PermissionError(f"{folder} is somebody else's")
+                raise PermissionError(f"{folder} belongs to another user")
             descriptor = open_lock(folder / "lock")
             try:
                 if wait:
@@ -204,7 +204,7 @@ def _held(folder: Path, *, wait: bool) -> int | None:
 
 
 def _is_own(folder: Path) -> bool:
-    """Whether that folder, made where it is missing, belongs to this user and is closed to everybody else."""
+    """Return whether that folder, made where it is missing, belongs to this user and is closed to everybody else."""
     folder.mkdir(mode=0o700, exist_ok=True)
     descriptor = os.open(folder, _FOLDER)
     try:

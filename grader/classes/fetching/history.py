@@ -95,7 +95,7 @@ def _zone(text: str | None) -> timezone:
 
 
 def limit_of(rule: Rule, entry: Entry) -> Limit | None:
-    """The time after which nothing of this entry counts; None where there is no such time."""
+    """Return the time after which nothing of this entry counts; None where there is no such time."""
     days = entry.extension_days
     more = f" (with {plural(days, 'day')} of extension)" if days else ""
     if rule.before is not None:
@@ -133,7 +133,7 @@ def not_chosen(rule: Rule, entry: Entry, at: datetime | None = None, note: str =
 def choose(
     commits: Iterable[Commit], *, rule: Rule, entry: Entry, branch: str, given: str
 ) -> tuple[Commit, HandedIn]:
-    """The commit of a branch that counts, and what to say of it. `commits` are the branch's, the newest first.
+    """Return the commit of a branch that counts, and what to say of it. `commits` are the branch's, the newest first.
 
     Raises NothingInTime where none is old enough.
     """

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
-from grader.classes.fetching.cache import Failure, Place, State, name_of
+from grader.classes.fetching.cache import Failure, MirrorFolder, State, name_of
 from grader.classes.fetching.history import Commit, read_commit
 from grader.errors import SubmissionError
 from grader.intake.credentials import split_address
@@ -126,7 +126,7 @@ class Mirror:
         (into / "FETCH_HEAD").unlink(missing_ok=True)
 
     def is_cut_off(self) -> bool:
-        """Whether history ends where its owner's clone does."""
+        """Return whether history ends where its owner's clone does."""
         return (self.path / "shallow").is_file()
 
     def _begin(self, folder: Path, *, sha256: bool) -> None:
@@ -163,7 +163,7 @@ class Mirror:
 
 
 def _is_unknown(failure: GitFailed) -> bool:
-    """Whether the server says that it does not have the commit, or does not give it."""
+    """Return whether the server says that it does not have the commit, or does not give it."""
     signs = (
         "not our ref",
         "no such remote ref",
@@ -179,7 +179,7 @@ GIT_TIMEOUT_S = 120.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Errand:
+class FetchRequest:
     """What to bring here. What was fetched after `since` (seconds since 1970) need not be fetched again."""
 
     source: Source
@@ -187,17 +187,17 @@ class Errand:
     patience: Patience
 
 
-def bring_up_to_date(place: Place, errand: Errand, room: Path) -> tuple[Mirror, Listing]:
-    """The mirror in `place`, as the server has it now, or had it after `errand.since`.
+def bring_up_to_date(place: MirrorFolder, request: FetchRequest, room: Path) -> tuple[Mirror, Listing]:
+    """The mirror in `place`, as the server has it now, or had it after `request.since`.
 
     Raises GivenUp, or GitFailed where the mirror may be damaged as well.
     """
     state = place.state()
-    mirror = Mirror(source=errand.source, path=place.mirror, room=room, git=git_in(room))
-    if state is not None and errand.since <= state.fetched_at <= time.time() + 1:
+    mirror = Mirror(source=request.source, path=place.mirror, room=room, git=git_in(room))
+    if state is not None and request.since <= state.fetched_at <= time.time() + 1:
         place.used()
         return mirror, Listing(state.listing)
-    if (failure := place.failure()) and errand.since <= failure.at <= time.time() + 1:
+    if (failure := place.failure()) and request.since <= failure.at <= time.time() + 1:
         kind = GitTimeout if failure.timeout else GitFailed
         raise GivenUp(kind(failure.said), failure.tries)
     if state is None:
@@ -213,10 +213,10 @@ def bring_up_to_date(place: Place, errand: Errand, room: Path) -> tuple[Mirror, 
         return fresh, listing, asked_at
 
     try:
-        asked, listing, asked_at = patiently(ask, errand.patience)
+        asked, listing, asked_at = patiently(ask, request.patience)
     except GivenUp as problem:
         if may_pass(problem.failure):
-            place.failed(_without_address(problem, errand.source))
+            place.failed(_without_address(problem, request.source))
         raise
     if listing.refs:
         place.complete(State(fetched_at=asked_at, listing=listing.text))
@@ -246,7 +246,7 @@ def git_in(room: Path) -> Git:
 
 
 def place_name(source: Source) -> str:
-    """The name of the mirror for a remote source."""
+    """Return the name of the mirror for a remote source."""
     return name_of(split_address(source.url)[0])
 
 

@@ -10,10 +10,10 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from grader.classes.fetching.cache import Place, cache_folder, locked, tidy_now_and_then
+from grader.classes.fetching.cache import MirrorFolder, cache_folder, locked, tidy_now_and_then
 from grader.classes.fetching.history import Commit, NothingInTime, Rule, choose, not_chosen
 from grader.classes.fetching.mirror import (
-    Errand,
+    FetchRequest,
     GivenUp,
     Listing,
     Mirror,
@@ -52,18 +52,18 @@ class Obtained:
 class Task:
     """A repository to bring here. With `uncommitted`, it is a folder in which more may lie than what counts."""
 
-    errand: Errand
+    request: FetchRequest
     entry: Entry
     rule: Rule
     uncommitted: bool = False
 
     @property
     def source(self) -> Source:
-        return self.errand.source
+        return self.request.source
 
     @property
     def patience(self) -> Patience:
-        return self.errand.patience
+        return self.request.patience
 
 
 def obtain(
@@ -90,14 +90,14 @@ def obtain(
     uncommitted = is_clone and rule.is_any
     if source.kind != "repository" and not uncommitted:
         return Obtained(source=source, handed_in=not_chosen(rule, entry))
-    errand = Errand(
+    request = FetchRequest(
         source=as_repository(source) if uncommitted else source,
         since=fetched_since or time.time(),
         patience=patience or Patience(),
     )
     try:
         with _room(workdir) as room:
-            task = Task(errand=errand, entry=entry, rule=rule, uncommitted=uncommitted)
+            task = Task(request=request, entry=entry, rule=rule, uncommitted=uncommitted)
             return _from_repository(task, room)
     except _Unreadable as unread:
         note = f"its history cannot be read, so all of the folder counts ({unread})"
@@ -142,7 +142,7 @@ def _from_repository(task: Task, room: Path) -> Obtained:
     """Raises _Unreadable for a folder with a `.git` that is not to be read."""
     try:
         here = _served(task, room)
-        return _through_mirror(replace(task, errand=replace(task.errand, source=here)), room)
+        return _through_mirror(replace(task, request=replace(task.request, source=here)), room)
     except GitTooMuch as failure:
         if task.rule.is_any:
             raise error_of(failure, task.source) from None
@@ -161,7 +161,7 @@ def _served(task: Task, room: Path) -> Source:
 
 
 def _through_mirror(task: Task, room: Path) -> Obtained:
-    """A mirror that seems to be damaged is made anew."""
+    """A mirror that seems to be damaged is made again."""
     with ExitStack() as stack:
         place = _place(task.source, room, stack)
         kept = place.state() is not None
@@ -175,7 +175,7 @@ def _through_mirror(task: Task, room: Path) -> Obtained:
         return _commit_of(place, task, room)
 
 
-def _place(source: Source, room: Path, stack: ExitStack) -> Place:
+def _place(source: Source, room: Path, stack: ExitStack) -> MirrorFolder:
     """In the cache for what is far away; in the room for what is here, and where there is no cache."""
     folder = cache_folder() if source.remote else None
     if folder is not None:
@@ -186,11 +186,11 @@ def _place(source: Source, room: Path, stack: ExitStack) -> Place:
             pass
     alone = room / "mirror"
     alone.mkdir()
-    return Place(alone)
+    return MirrorFolder(alone)
 
 
-def _commit_of(place: Place, task: Task, room: Path) -> Obtained:
-    mirror, listing = bring_up_to_date(place, task.errand, room)
+def _commit_of(place: MirrorFolder, task: Task, room: Path) -> Obtained:
+    mirror, listing = bring_up_to_date(place, task.request, room)
     wanted = choose_ref(listing.refs, task.source.ref, given=task.source.given)
     tip = patiently(lambda: mirror.commit(listing, wanted), task.patience)
     if tip is None:
@@ -224,7 +224,7 @@ def _chosen(
 
 
 def branch_of(listing: Listing, ref: str | None, wanted: Wanted) -> str | None:
-    """The branch whose commits are looked at; None where somebody chose a tag or a commit."""
+    """The branch whose commits are looked at; None where someone chose a tag or a commit."""
     refs = listing.refs
     if ref is None or ref == "HEAD":
         name = (listing.head if wanted.refspec == "HEAD" else wanted.refspec) or "HEAD"

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from grader.classes.fetching.cache import cache_folder, locked, tidy_now_and_then
-from grader.classes.fetching.mirror import Errand, GivenUp, Patience, bring_up_to_date, place_name
+from grader.classes.fetching.mirror import FetchRequest, GivenUp, Patience, bring_up_to_date, place_name
 from grader.classes.fetching.obtain import source_of
 from grader.errors import GraderError
 from grader.files import temporary_folder
@@ -44,7 +44,7 @@ class Prefetch:
             self._threads.append(thread)
 
     def wait(self, timeout_s: float | None = None) -> bool:
-        """Whether all entries were looked at within that time."""
+        """Return whether all entries were looked at within that time."""
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         for thread in self._threads:
             thread.join(None if deadline is None else max(0.0, deadline - time.monotonic()))
@@ -74,16 +74,16 @@ class Prefetch:
                 self.failed += good is False
 
     def _fetch(self, entry: Entry, room: Path) -> bool | None:
-        """Whether the mirror is up to date; None where none is needed, or none can be kept."""
+        """Return whether the mirror is up to date; None where none is needed, or none can be kept."""
         source = source_of(entry)
         folder = cache_folder() if source.remote else None
         if folder is None:
             return None
         tidy_now_and_then(folder)
-        errand = Errand(source=source, since=self._since, patience=self._patience)
+        request = FetchRequest(source=source, since=self._since, patience=self._patience)
         try:
             with locked(folder / place_name(source)) as place:
-                bring_up_to_date(place, errand, room)
+                bring_up_to_date(place, request, room)
         except (GraderError, GitFailed, GivenUp, OSError):
             return False
         return True

@@ -87,7 +87,7 @@ def entry_identity(entry: Entry, platform: Platform) -> Identity:
     identity.sure |= {(kind, key(entry.id)) for kind in ("platform", "number", "login")}
     identity.name = _turned(key(entry.name)) or identity.name
     if any(kind == "platform" and text in identity.name.split() for kind, text in identity.sure):
-        identity.name = ""  # `Participant 123` is nobody's name
+        identity.name = ""  # `Participant 123` is no one's name
     return identity
 
 

@@ -30,7 +30,7 @@ MOODLE_MAX = 100.0
 def fresh(
     platform: Platform, marks: Sequence[Mark], wanted: Sequence[Wanted], columns: Sequence[str]
 ) -> Made:
-    """The lines of the file, and remarks. `columns` are the roster's further ones."""
+    """Return the lines of the file, and remarks. `columns` are the roster's further ones."""
     made: dict[Platform, Callable[[Sequence[Mark], Sequence[Wanted], _Roster], Made]] = {
         "canvas": _canvas,
         "moodle": _moodle,
@@ -49,7 +49,7 @@ class _Roster:
         return any(kind in wanted for kind in self.known.values())
 
     def text(self, entry: Entry, *wanted: Kind) -> str:
-        """The first field that says any of these."""
+        """Return the first field that says any of these."""
         for kind in wanted:
             for column, found in self.known.items():
                 if found == kind and entry.extra.get(column):

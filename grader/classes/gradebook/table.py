@@ -47,7 +47,7 @@ AFTER = ("comment", "error")
 
 
 def header(book: Book) -> tuple[str, ...]:
-    """The columns' names: each is there once, whatever criteria and the roster's columns are called."""
+    """Return the columns' names: each is there once, whatever criteria and the roster's columns are called."""
     taken = {*BEFORE, *AFTER}
     names = list(BEFORE)
     for name, kind in [

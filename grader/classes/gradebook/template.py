@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -20,6 +19,7 @@ from grader.classes.gradebook.matching import (
 )
 from grader.classes.gradebook.platforms import Mark, Wanted
 from grader.classes.gradebook.table import harmless, number_text
+from grader.classes.roster.table import delimiter_of, encoding_of
 from grader.errors import UsageError
 from grader.wording import first_few
 
@@ -44,7 +44,7 @@ class _Work:
 def fill_template(
     template: Path, platform: Platform, marks: Sequence[Mark], wanted: Sequence[Wanted], *, named: bool
 ) -> tuple[bytes, list[str]]:
-    """The export with the points of whoever is found in it, every other byte as it was; and remarks.
+    """Return the export with the points of the students found in it, every other byte as it was; and remarks.
 
     Raises UsageError where the file is none of this platform's exports, or where it is not clear which column is ours.
     """
@@ -159,7 +159,7 @@ def _fill(work: _Work, record: Record, mark: Mark) -> None:
 def _left(
     work: _Work, students: Sequence[Record], theirs: Sequence[Identity], taken: set[int]
 ) -> Iterator[str]:
-    """Whoever is in the export only."""
+    """Yield a remark for each student who is in the export only."""
     for place, (record, identity) in enumerate(zip(students, theirs, strict=True)):
         fields = _fields(record, work)
         named = [fields[name] for name, kind in work.known.items() if kind != "section" and fields.get(name)]
@@ -241,11 +241,6 @@ def _others(header: Sequence[str], known: dict[str, Kind]) -> str:
 
 
 BYTES_MAX = 64 << 20
-_MARKS = (
-    (codecs.BOM_UTF8, "utf-8"),
-    (codecs.BOM_UTF16_LE, "utf-16-le"),
-    (codecs.BOM_UTF16_BE, "utf-16-be"),
-)
 _EXPORT = "export it from the platform as CSV, and do not save it from a spreadsheet"
 
 
@@ -288,7 +283,7 @@ class Sheet:
         return text
 
     def to_bytes(self) -> bytes:
-        """The whole file."""
+        """Return the whole file."""
         text = "".join(self.delimiter.join(record.cells) + record.end for record in self.records)
         return self.mark + text.encode(self.encoding)
 
@@ -303,13 +298,12 @@ def read_sheet(path: Path) -> Sheet:
         ) from error
     if not data or data.startswith(b"PK\x03\x04"):
         raise UsageError(f"{path}: this is no export as CSV", hint=_EXPORT)
-    mark, encoding = next(((mark, name) for mark, name in _MARKS if data.startswith(mark)), (b"", "utf-8"))
+    mark, encoding = encoding_of(data)
     try:
         text = data[len(mark) :].decode(encoding)
     except UnicodeDecodeError as error:
         raise UsageError(f"{path}: no {encoding.upper()} text", hint=_EXPORT) from error
-    first = re.sub(r'"[^"]*"', "", re.split(r"[\r\n]", text, maxsplit=1)[0])
-    delimiter = max((",", ";", "\t"), key=first.count)
+    delimiter = delimiter_of(re.split(r"[\r\n]", text, maxsplit=1)[0])
     sheet = Sheet(
         path=path,
         mark=mark,

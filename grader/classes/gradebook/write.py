@@ -80,7 +80,7 @@ OPTIONAL = {
 
 
 def write_csv(book: Book, rows: Iterable[Row], target: Path) -> None:
-    """UTF-8 without a mark, as programs read it; whoever has Excel takes the workbook."""
+    """UTF-8 without a mark, as programs read it; the workbook is for Excel."""
     with whole_file(target) as path, path.open("w", encoding="utf-8", newline="") as file:
         file.write(csv_line(header(book)))
         file.writelines(csv_line(list(cells(book, row))) for row in rows)

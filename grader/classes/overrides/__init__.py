@@ -19,7 +19,7 @@ from grader.rubric.faults import model_faults, shown
 from grader.rubric.load import refuse_newer
 from grader.rubric.model import Rubric
 from grader.rubric.source import Fault, Form, Source, as_map, read_source
-from grader.suggest import did_you_mean
+from grader.wording import did_you_mean
 
 FILE = "overrides.yaml"
 SCHEMA_KEY, SCHEMA = "schema", str(OVERRIDES)
@@ -118,7 +118,7 @@ class _Reading:
 
 
 def _given(value: object) -> object:
-    """Without what was left empty, as in a form that somebody has begun to fill in."""
+    """Without what was left empty, as in a form that someone has begun to fill in."""
     if not isinstance(value, dict):
         return value
     return {

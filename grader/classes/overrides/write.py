@@ -52,7 +52,7 @@ def _alone(path: Path) -> Iterator[None]:
     except OSError as error:
         raise unwritable(path, error) from error
     try:
-        with suppress(OSError):  # a file system without locks: whoever shares it has to know what they do
+        with suppress(OSError):  # a file system without locks: its users must not write at the same time
             _wait(descriptor, path)
         yield
     finally:
@@ -241,7 +241,7 @@ class Splice(NamedTuple):
 
 
 def spliced(text: str, splices: Iterable[Splice]) -> str:
-    """The text with all of these made; they do not overlap."""
+    """Return the text with all of these made; they do not overlap."""
     for start, end, piece in sorted(splices, reverse=True):
         text = text[:start] + piece + text[end:]
     return text

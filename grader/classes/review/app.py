@@ -45,7 +45,7 @@ from grader.wording import number
 
 
 class _Pages(Flask):
-    """Flask with our templates' rules: nobody's text becomes markup, and what hides or steers is written out."""
+    """Flask with our templates' rules: no one's text becomes markup, and what hides or steers is written out."""
 
     jinja_options = {  # noqa: RUF012 - as Flask has it
         "finalize": environment().finalize,
@@ -56,9 +56,9 @@ class _Pages(Flask):
 
 
 def create_app(review: ReviewSession, *, port: int, token: str, author: str) -> Flask:
-    """The application for `review`, to be reached at 127.0.0.1 and that port by those who know the token.
+    """Return the application for `review`, to be reached at 127.0.0.1 and that port by those who know the token.
 
-    `author` stands beside decisions until somebody says another name in the page.
+    `author` stands beside decisions until someone says another name in the page.
     """
     app = _Pages(__name__, static_folder=None)
     app.extensions["review"] = review
@@ -156,7 +156,7 @@ class _Views:
         return sent(file, "application/octet-stream", download=f"{item.key}-{name}")
 
     def look(self) -> Response:
-        """The style of all pages."""
+        """Return the style of all pages."""
         return Response(style() + _own("review.css"), mimetype="text/css")
 
     def script(self) -> Response:
@@ -290,7 +290,7 @@ def sent(file: BinaryIO | None, mimetype: str, *, download: str = "") -> Respons
 
 
 def with_code(response: Response, code: int) -> Response:
-    """The same answer with another code."""
+    """Return the same answer with another code."""
     response.status_code = code
     return response
 

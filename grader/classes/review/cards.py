@@ -21,7 +21,7 @@ MANUAL = "manual"
 
 @dataclass(frozen=True, kw_only=True)
 class Draft:
-    """What a form was sent with and what became of it. In a `conflict` somebody else decided meanwhile; `error` says
+    """What a form was sent with and what became of it. In a `conflict` someone else has decided since; `error` says
     what is wrong with what was sent, `saved` when it was written."""
 
     points: str = ""
@@ -93,7 +93,7 @@ class Cards:
 
 
 def cards(row: Row, rubric: Rubric, decided: Mapping[str, Override], drafts: Mapping[str, Draft]) -> Cards:
-    """The cards of a submission."""
+    """Return the cards of a submission."""
     found = [card(row, rubric, name, decided, drafts) for name in (c.id for c in row.result.criteria)]
     whole = row.result.error is None
     mine = [c for c in found if c.override is not None]

@@ -27,7 +27,7 @@ FRAMED = (
     "sandbox allow-scripts; default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; "
     "form-action 'none'; base-uri 'none'; frame-ancestors 'self'"
 )
-"""Of a student's report, whatever it says of itself: it reaches nothing, asks nobody, and has an origin of its own."""
+"""Of a student's report, whatever it says of itself: it reaches nothing, asks no one, and has an origin of its own."""
 HEADERS = {
     "Cache-Control": "no-store",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -38,7 +38,7 @@ HEADERS = {
 
 
 def guard(app: Flask, *, port: int, token: str) -> None:
-    """Let nobody in but who came with the token. All other requests are answered 403, whatever they ask for."""
+    """Let no one in but who came with the token. All other requests are answered 403, whatever they ask for."""
     app.config.update(
         SECRET_KEY=secrets.token_bytes(32),
         SESSION_COOKIE_NAME=f"grader-review-{port}",  # cookies do not tell ports apart
@@ -76,7 +76,7 @@ def _enter(token: str) -> AnyResponse:
 
 
 def _check_form() -> None:
-    """Whether a request that changes something comes from a page of ours."""
+    """Return whether a request that changes something comes from a page of ours."""
     origin = request.headers.get("Origin")
     if origin is not None and origin != f"http://{request.headers['Host'].lower()}":
         raise Forbidden("This form does not belong to this page.")
@@ -112,7 +112,7 @@ def open_report(folder: Path, name: str) -> BinaryIO | None:
 
 
 def open_evidence(folder: Path, name: str) -> BinaryIO | None:
-    """A file of the evidence; None where there is none, or it is no file."""
+    """Return a file of the evidence; None where there is none, or it is no file."""
     return _open(folder, (EVIDENCE,), name) if NAME.fullmatch(name) else None
 
 

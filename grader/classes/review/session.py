@@ -65,7 +65,7 @@ class ReviewSession:
         self._books_behind = False
 
     def start(self) -> None:
-        """Begin to follow; what was decided while nobody reviewed is looked at first."""
+        """Begin to follow; what was decided while no one reviewed is looked at first."""
         self.background.start()
         self.background.changed()
 
@@ -107,7 +107,7 @@ class ReviewSession:
         return waits
 
     def result(self, item: Item, overrides: Overrides) -> GradingResult | None:
-        """A submission's result as it counts with these overrides; None where it has none."""
+        """Return a submission's result as it counts with these overrides; None where it has none."""
         result = read_result(self.path / item.key) if item.gradable else None
         if (
             result is None
@@ -124,7 +124,7 @@ class ReviewSession:
         return self.background.trouble or "its report follows in a moment" if pending else ""
 
     def batch_runs(self) -> bool:
-        """Whether a batch works in the folder just now."""
+        """Return whether a batch works in the folder just now."""
         if self.submissions.batch().run.state != "running" or self._writing.locked():
             return False
         try:
@@ -203,7 +203,7 @@ class ReviewSession:
         write_run(self.path, written.run.model_copy(update={"ended_at": run.ended_at}))
 
     def _catch_up(self) -> None:
-        """Find what was decided, or settled, while nobody reviewed or just before a review was killed."""
+        """Find what was decided, or settled, while no one reviewed or just before a review was killed."""
         batch = self.submissions.batch()
         behind = set(self._all_behind(self.overrides()))
         written = stamp_of(self.path / GRADEBOOK)
@@ -226,7 +226,7 @@ class ReviewSession:
 
     @staticmethod
     def _behind(item: Item, result: GradingResult, overrides: Overrides) -> bool:
-        """Whether a result says something else than `overrides.yaml`."""
+        """Return whether a result says something else than `overrides.yaml`."""
         known = {criterion.id for criterion in result.criteria}
         given = {k: v for k, v in overrides.get(item.entry.id, {}).items() if k in known}
         return given != {o.criterion: plain(o) for o in result.overrides}
@@ -236,10 +236,10 @@ LOCK = ".review.lock"
 
 
 class Conflict(Exception):
-    """Somebody else decided meanwhile: `now` is what stands there, None for nothing."""
+    """Someone else has decided since: `now` is what stands there, None for nothing."""
 
     def __init__(self, now: Override | None) -> None:
-        super().__init__("decided meanwhile")
+        super().__init__("someone else has decided since")
         self.now = now
 
 
@@ -254,7 +254,7 @@ def plain(override: Override) -> Override:
 
 
 def alike(one: Override | None, other: Override | None) -> bool:
-    """Whether both say the same, whenever it was said."""
+    """Return whether both say the same, whenever it was said."""
     if one is None or other is None:
         return one is other
     return one.model_copy(update={"date": None}) == other.model_copy(update={"date": None})
@@ -268,7 +268,7 @@ def reviewing(path: Path) -> Iterator[None]:
     except OSError as error:
         raise unwritable(path / LOCK, error) from error
     try:
-        with suppress(OSError):  # a file system without locks: whoever shares it has to know what they do
+        with suppress(OSError):  # a file system without locks: its users must not write at the same time
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield
     finally:

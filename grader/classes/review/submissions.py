@@ -30,7 +30,7 @@ Stamp = tuple[int, int, int] | None
 @dataclass(frozen=True, kw_only=True)
 class Item:
     """One submission in the list. `key` names its folder and stands in addresses, `kinds` are the filters that show it,
-    `open` counts the criteria that nobody has decided, by status."""
+    `open` counts the criteria that no one has decided, by status."""
 
     key: str
     entry: Entry
@@ -56,7 +56,7 @@ class Item:
         )
 
     def fits(self, kind: str, words: str) -> bool:
-        """Whether a filter shows it and its id, name or group has these words."""
+        """Return whether a filter shows it and its id, name or group has these words."""
         entry = self.entry
         return kind in self.kinds and words.casefold() in f"{entry.id} {entry.name} {entry.group}".casefold()
 
@@ -71,7 +71,7 @@ class Submissions:
         self._items: dict[str, tuple[object, Item]] = {}
 
     def batch(self) -> BatchFolder:
-        """The batch's folder as `run.json` says now. Raises UsageError where that cannot be read."""
+        """Return the batch's folder as `run.json` says now. Raises UsageError where that cannot be read."""
         stamp = stamp_of(self.path / RUN)
         with self._lock:
             if self._run is None or self._run[0] != stamp:
@@ -83,12 +83,12 @@ class Submissions:
         return tuple(self._item(batch) for batch in _each(self.batch()))
 
     def item(self, key: str) -> Item | None:
-        """The submission of that folder; None where the class has none."""
+        """Return the submission of that folder; None where the class has none."""
         found = self._one(key)
         return self._item(found) if found else None
 
     def row(self, key: str) -> Row | None:
-        """The same with its result; one of status `error` stands for a result that is not there."""
+        """Return the same with its result; one of status `error` stands for a result that is not there."""
         found = self._one(key)
         return next(found.rows()) if found else None
 
@@ -172,7 +172,7 @@ WORDS_CHARS = 100
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class Navigation:
     """`shown` are the submissions that the filter `kind` and the words `q` show, `counts` how many each filter has.
 
     `before` and `after` are the keys of the neighbours of the submission one is at, empty where there is none; it need
@@ -195,8 +195,8 @@ class Place:
         return {name: value for name, value in given.items() if value}
 
 
-def place_of(items: Sequence[Item], asked: Mapping[str, str], *, at: str = "") -> Place:
-    """The place that an address or a form asks for; what it asks for and is not known is left out."""
+def place_of(items: Sequence[Item], asked: Mapping[str, str], *, at: str = "") -> Navigation:
+    """Return the place that an address or a form asks for; what it asks for and is not known is left out."""
     kind = asked.get("show", ALL)
     kind = kind if kind in FILTERS else ALL
     q = asked.get("q", "").strip()[:WORDS_CHARS]
@@ -205,7 +205,7 @@ def place_of(items: Sequence[Item], asked: Mapping[str, str], *, at: str = "") -
     ahead = {item.key for item in items[:here]} if here > 0 else set()
     left = [item.key for item in shown if item.key in ahead]
     right = [item.key for item in shown if item.key not in ahead and item.key != at]
-    return Place(
+    return Navigation(
         kind=kind,
         q=q,
         shown=shown,

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from grader.classes.roster.allowed_sources import OWN_FOLDER, Local
@@ -23,20 +24,25 @@ from grader.model.batch import Entry, Roster
 __all__ = ["Entry", "Local", "Roster", "read_roster"]
 
 
+SOURCES: tuple[tuple[Callable[[Path], bool], Callable[[Path, Local], Roster]], ...] = (
+    (Path.is_dir, from_folder),
+    (lambda path: path.suffix.lower() in {".json", ".ndjson", ".jsonl"}, from_gitlab),
+)
+"""The kinds of rosters: whether a path is one, and what reads it. A new kind is one file here and one line. Any other
+path is a table; `exports.py` recognises those of GitHub Classroom."""
+
+
 def read_roster(path: Path, local: Local = OWN_FOLDER) -> Roster:
     """Every submission that the roster names, and every fault that it has, in the order of lines.
 
-    `path` is a CSV file with the columns `id,source[,ref][,name][,group][,submitted_at][,extension_days]`, an export of
-    GitHub Classroom (CSV) or of a GitLab group (the JSON of its projects), or a folder with a submission in each of its
-    entries. `local` says which paths of this machine it may name: any other is a fault, and nothing there is opened.
+    `path` is a CSV file with the columns `id,source[,ref][,package][,name][,group][,submitted_at][,extension_days]`, an
+    export of GitHub Classroom (CSV) or of a GitLab group (the JSON of its projects), or a folder with a submission
+    in each of its entries. `local` says which paths of this machine it may name: any other is a fault, and nothing
+    there is opened.
     Raises UsageError where it is none of these, or names no submission at all.
     """
-    if path.is_dir():
-        roster = from_folder(path, local)
-    elif path.suffix.lower() in {".json", ".ndjson", ".jsonl"}:
-        roster = from_gitlab(path, local)
-    else:
-        roster = _from_table(path, local)
+    read = next((read for fits, read in SOURCES if fits(path)), _from_table)
+    roster = read(path, local)
     if not roster.entries and not roster.faults:
         raise UsageError(
             f"{path}: no submission in it", hint="each is a row with id and source, or an entry of a folder"

@@ -111,7 +111,7 @@ def _address_fault(source: str) -> str:
 
 
 def whole_source(source: str, base: Path) -> str:
-    """The same for whoever stands in another folder: a path becomes absolute."""
+    """Return the same source for a process in another folder: a path becomes absolute."""
     if _ADDRESS.match(source) and not _is_there(source, base):
         return source
     return str(base.absolute() / os.path.expanduser(source))  # noqa: PTH111 - Path.expanduser raises without a home
@@ -128,7 +128,7 @@ def _shown(source: str) -> str:
 
 
 def _is_there(source: str, base: Path) -> bool:
-    """Whether a path is, with or without the `@ref` behind it."""
+    """Return whether a path is, with or without the `@ref` behind it."""
     ends = [len(source), *(at.start() for at in re.finditer("@", source))]
     home = [os.path.expanduser(source[:end]) for end in ends[:20] if end]  # noqa: PTH111 - as above
     return any(os.path.lexists(base / path) for path in home)

@@ -14,7 +14,7 @@ from pathlib import Path
 from grader.classes.roster.allowed_sources import Local, ref_fault, source_fault, whole_source
 from grader.classes.roster.table import Row, Table
 from grader.errors import UsageError
-from grader.intake.names import brief, encodable, safe_name
+from grader.intake.names import brief, encodable, is_package_name, safe_name
 from grader.model.batch import Entry, Roster, RosterFault
 
 
@@ -50,6 +50,8 @@ def _faults(fields: dict[str, str], base: Path, local: Local) -> Iterator[str]:
         "ref": ref_fault(fields.get("ref", "")),
     }
     yield from (f"{name}: {fault}" for name, fault in said.items() if fault)
+    if (package := fields.get("package", "")) and not is_package_name(package):
+        yield f"package: {brief(package)} cannot be a package's name"
     submitted_at, extension = fields.get("submitted_at", ""), fields.get("extension_days", "")
     if submitted_at and (fault := time_fault(submitted_at)):
         yield f"submitted_at: {brief(submitted_at)} {fault}"
@@ -62,6 +64,7 @@ def _entry(fields: dict[str, str], extra: dict[str, str], where: str, base: Path
         id=fields["id"],
         source=whole_source(fields["source"], base),
         ref=fields.get("ref") or None,
+        package=fields.get("package", ""),
         name=fields.get("name", ""),
         group=fields.get("group", ""),
         submitted_at=parse_time(fields.get("submitted_at", "")),
@@ -117,7 +120,7 @@ def id_faults(submission_id: str) -> Iterator[str]:
 
 
 def columns_of(entries: Iterable[Entry | None]) -> tuple[str, ...]:
-    """The names of all further columns, in the order in which they turn up."""
+    """Return the names of all further columns, in the order in which they turn up."""
     return tuple(dict.fromkeys(name for entry in entries if entry for name in entry.extra))
 
 
@@ -127,7 +130,7 @@ def _key(submission_id: str) -> str:
 
 
 REQUIRED = ("id", "source")
-OPTIONAL = ("ref", "name", "group", "submitted_at", "extension_days")
+OPTIONAL = ("ref", "package", "name", "group", "submitted_at", "extension_days")
 KNOWN = (*REQUIRED, *OPTIONAL)
 NEARLY = 0.82
 
@@ -203,7 +206,7 @@ def time_fault(text: str) -> str:
 
 
 def parse_days(text: str) -> float | None:
-    """A number of days from 0 to ten years, with a point or a comma. None for what is none."""
+    """Return a number of days from 0 to ten years, with a point or a comma. None for what is none."""
     days = float(text.replace(",", ".")) if _DAYS.fullmatch(text) else None
     return days if days is not None and days <= EXTENSION_DAYS_MAX else None
 

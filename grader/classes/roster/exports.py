@@ -27,7 +27,7 @@ _ROSTER = {"identifier", "github_username", "github_id"}
 
 
 def is_classroom(table: Table) -> bool:
-    """Whether GitHub Classroom made it."""
+    """Return whether GitHub Classroom made it."""
     return {"student_repository_url", "github_username"} <= set(table.columns)
 
 

@@ -115,9 +115,12 @@ def _delimiter(lines: Sequence[str]) -> tuple[str, int]:
     """What stands between fields, and how many lines come before the header: Excel may say `sep=;` in the first."""
     if lines and (said := _SEPARATOR.fullmatch(lines[0])):
         return said[1], 1
-    header = next((line for line in lines if line.strip()), "")
-    plain = re.sub(r'"[^"]*"', "", header)
-    return max(DELIMITERS, key=plain.count), 0
+    return delimiter_of(next((line for line in lines if line.strip()), "")), 0
+
+
+def delimiter_of(header: str) -> str:
+    """Return what stands between the cells of a table, by the line that names its columns."""
+    return max(DELIMITERS, key=re.sub(r'"[^"]*"', "", header).count)
 
 
 def _text(path: Path) -> str:
@@ -135,10 +138,11 @@ def _text(path: Path) -> str:
 
 
 _MARKS = (  # the longer ones first: UTF-32's begins with UTF-16's
-    (codecs.BOM_UTF32_LE, "utf-32"),
-    (codecs.BOM_UTF32_BE, "utf-32"),
-    (codecs.BOM_UTF16_LE, "utf-16"),
-    (codecs.BOM_UTF16_BE, "utf-16"),
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+    (codecs.BOM_UTF8, "utf-8"),
 )
 _WORKBOOKS = {b"PK\x03\x04": "an Excel or LibreOffice workbook", b"\xd0\xcf\x11\xe0": "an old Excel workbook"}
 _SAVE = "save it as CSV UTF-8 (in Excel: 'CSV UTF-8', not 'CSV')"
@@ -149,18 +153,21 @@ def text_of(data: bytes, path: Path) -> str:
     workbook = next((what for magic, what in _WORKBOOKS.items() if data.startswith(magic)), None)
     if workbook:
         raise UsageError(f"{path}: this is {workbook}, no CSV", hint=_SAVE)
-    encoding = _encoding(data)
+    mark, encoding = encoding_of(data)
     try:
-        return data.decode(encoding)
+        return data[len(mark) :].decode(encoding)
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
-        named = encoding.removesuffix("-sig").removesuffix("-le").removesuffix("-be").upper()
+        named = encoding.removesuffix("-le").removesuffix("-be").upper()
         raise UsageError(f"{path}:{line}: no {named} text", hint=_SAVE) from error
 
 
-def _encoding(data: bytes) -> str:
-    """By the mark at the beginning; UTF-16 without one has a zero in every second byte of plain text."""
-    marked = next((name for mark, name in _MARKS if data.startswith(mark)), None)
+def encoding_of(data: bytes) -> tuple[bytes, str]:
+    """Return the byte-order mark that a text begins with (or none) and its encoding, UTF-8 if nothing tells.
+
+    UTF-16 without a mark has a zero in every second byte of plain text.
+    """
+    marked = next(((mark, name) for mark, name in _MARKS if data.startswith(mark)), None)
     if marked:
         return marked
     head = data[:1000]
@@ -170,5 +177,5 @@ def _encoding(data: bytes) -> str:
             and head[start::2].count(0) > len(head) * 0.4
             and head[1 - start :: 2].count(0) == 0
         ):
-            return name
-    return "utf-8-sig"
+            return b"", name
+    return b"", "utf-8"

@@ -8,16 +8,16 @@ from pathlib import Path
 
 from grader.errors import HostError, SubmissionError, UsageError
 from grader.files import atomic_write, temporary_folder
-from grader.intake import Limits as IntakeLimits
+from grader.intake import IntakeLimits
 from grader.intake.archive import unpack
 from grader.model.record import Record
 from grader.model.similarity import Lines, Pair, Similarity
 from grader.report.text import csv_text, json_text
-from grader.workers import Limits, Worker, WorkerEnded
+from grader.workers import Worker, WorkerEnded, WorkerLimits
 
 THRESHOLD = 0.8
 INSTALL = "pip install 'ros-lab-grader[similarity]'"
-LIMITS = Limits(memory_bytes=6 << 30, cpu_s=1800, wall_s=1800)
+LIMITS = WorkerLimits(memory_bytes=6 << 30, cpu_s=1800, wall_s=1800)
 REASON_CHARS = 200
 HEAD = (
     "a", "name_a", "b", "name_b", "similarity_a_percent", "similarity_b_percent", "lines_a", "lines_b", "files"
@@ -44,7 +44,7 @@ def compare(
 ) -> Similarity:
     """Return which submissions are nearly the same. `folders` are their folders of results, by id.
 
-    What is in `starter` (folders, archives, single files) is nobody's own. Two of one group (`groups` by id) are not
+    What is in `starter` (folders, archives, single files) is no one's own. Two of one group (`groups` by id) are not
     named. `threshold` is the share (0 to 1) of the one's own code that is in the other, `jobs` how many are read side
     by side.
 

@@ -27,11 +27,11 @@ from grader.classes.similarity.sources import Language, Source, read_starter, re
 from grader.classes.similarity.tutorials import TUTORIALS
 from grader.errors import GraderError
 from grader.model.similarity import NotCompared
-from grader.workers import Limits, WorkerEnded
+from grader.workers import WorkerEnded, WorkerLimits
 
 FILE_S = 5.0
 """Of the processor's time, like `cpu_s`: a busy machine leaves no file out."""
-LIMITS = Limits(memory_bytes=2 << 30, cpu_s=30.0, wall_s=300.0)
+LIMITS = WorkerLimits(memory_bytes=2 << 30, cpu_s=30.0, wall_s=300.0)
 ENVIRONMENT = {
     "MPLBACKEND": "Agg",
     "OMP_NUM_THREADS": "1",
@@ -64,7 +64,7 @@ _LAID_ASIDE = (token.Comment.Single, token.Comment.Multiline, token.Comment.Hash
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class CodeSource:
     """What to read: the folder of a submission's results, or starter code. Without a folder, the tutorials' code."""
 
     name: str = ""
@@ -85,7 +85,7 @@ class Text:
 class Fingerprints:
     """Those of a place's files, and which files could not be read."""
 
-    place: Place
+    place: CodeSource
     texts: tuple[Text, ...] = ()
     left_out: tuple[NotCompared, ...] = ()
 
@@ -94,7 +94,7 @@ class _TooLong(Exception):
     """A file took too long."""
 
 
-def read_place(place: Place) -> Fingerprints:
+def read_place(place: CodeSource) -> Fingerprints:
     """Return the fingerprints of a place's programs. This runs in a worker with `LIMITS` and `ENVIRONMENT`."""
     if place.folder is None:
         return read_files(place, TUTORIALS)
@@ -114,18 +114,18 @@ def read_place(place: Place) -> Fingerprints:
     return leave_out(place, reason)
 
 
-def reading_ended(place: Place, _: WorkerEnded) -> Fingerprints:
+def reading_ended(place: CodeSource, _: WorkerEnded) -> Fingerprints:
     """Return what there is of a place whose worker ended."""
     return leave_out(place, "reading it took too long or too much memory")
 
 
-def leave_out(place: Place, reason: str) -> Fingerprints:
+def leave_out(place: CodeSource, reason: str) -> Fingerprints:
     """Return that nothing of the place is compared."""
     return Fingerprints(place=place, left_out=(NotCompared(id=place.name, reason=reason),))
 
 
 def read_files(
-    place: Place, files: tuple[Source, ...], left_out: tuple[NotCompared, ...] = ()
+    place: CodeSource, files: tuple[Source, ...], left_out: tuple[NotCompared, ...] = ()
 ) -> Fingerprints:
     """Return the fingerprints of these files, each within `FILE_S`."""
     tried = [_try_read(place.name, file) for file in files]
@@ -212,7 +212,7 @@ def _lexer(language: Language) -> Lexer:
 
 
 def _removed(offsets: Numbers, size: int) -> Numbers:
-    """How many characters are left out before each sign: `filter_code` notes it where it leaves some out."""
+    """Return how many characters are left out before each sign: `filter_code` notes it where it leaves some out."""
     rows = offsets[1:][offsets[1:, 0] >= 0]
     if not len(rows):
         return np.zeros(size, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""What submissions have in common: which fingerprints are nobody's own, and for two submissions what they share."""
+"""What submissions have in common: which fingerprints are no one's own, and for two submissions what they share."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from grader.classes.similarity.comparison import Request
 from grader.classes.similarity.fingerprints import (
     ENVIRONMENT,
     LIMITS,
+    CodeSource,
     Fingerprints,
     Marks,
     Numbers,
-    Place,
     Text,
     covered,
     leave_out,
@@ -35,7 +35,7 @@ STARTER_NOTES = 20
 LARGE_CLUSTER = 6
 NO_PROGRAM = "holds no program in Python or C++"
 COMMON_FROM = 6
-"""Submissions a class must have before what most of them share counts as nobody's own."""
+"""Submissions a class must have before what most of them share counts as no one's own."""
 MATRIX_COLUMNS = 4096
 CANDIDATES_MAX = 20_000
 NEAR = 0.25
@@ -88,9 +88,9 @@ class _Class:
 def read_all(request: Request) -> _Class:
     """Read submissions, starter code and tutorials, `request.jobs` at a time, each in a worker."""
     places = [
-        Place(),
-        *(Place(folder=folder, is_starter=True) for folder in request.starter),
-        *(Place(name=name, folder=folder) for name, folder in request.folders.items()),
+        CodeSource(),
+        *(CodeSource(folder=folder, is_starter=True) for folder in request.starter),
+        *(CodeSource(name=name, folder=folder) for name, folder in request.folders.items()),
     ]
     found, held = _Class(), 0
     for one in run_each(
@@ -172,7 +172,7 @@ def _notes(request: Request, count: int, found: Sequence[Sequence[str]], *, cut:
 
 @dataclass(frozen=True, kw_only=True)
 class Own:
-    """One file without what is nobody's own: `prints` and `signs` mark what is left of the text's."""
+    """One file without what is no one's own: `prints` and `signs` mark what is left of the text's."""
 
     text: Text
     prints: Marks

@@ -1,4 +1,4 @@
-"""What everyone writes who has read ROS's first tutorial: a talker and a listener. It is nobody's own.
+"""What everyone writes who has read ROS's first tutorial: a talker and a listener. It is no one's own.
 
 Names and texts do not matter to the comparison, only the order of what is done.
 """

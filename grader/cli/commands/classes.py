@@ -16,6 +16,7 @@ from grader.cli.options import (
     RUBRIC,
     STATIC,
     JsonFlag,
+    PackageOption,
     SandboxOption,
     count,
     percent,
@@ -56,6 +57,7 @@ def batch(
             "write results to DIR/<id>/, with gradebook.csv and results.jsonl (default: ./grader-results)",
         ),
     ] = None,
+    package: PackageOption = None,
     jobs: Annotated[
         int | None,
         Option("--jobs", "N", "how many at a time (default: four per core, with --static one)", count),
@@ -109,7 +111,7 @@ def batch(
         from grader.rubric.load import load_rubric
     loaded = load_rubric(rubric)
     local = batches.allowed_folders(allow_local, remote_only=remote_only)
-    named = read_roster(roster, local)
+    named = batches.with_package(read_roster(roster, local), package or "")
     options = BatchOptions(
         out=out or DEFAULT_OUT,
         jobs=jobs or batches.default_jobs(loaded, static=static),

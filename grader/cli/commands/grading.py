@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from grader.cli.declare import INSTRUCTORS, Argument, Option, command, loading
-from grader.cli.options import RUBRIC, JsonFlag, SandboxOption, count
+from grader.cli.options import RUBRIC, JsonFlag, PackageOption, SandboxOption, count
 from grader.errors import ExitCode, UsageError
 
 DEFAULT_OUT = Path("grader-results")
@@ -25,6 +25,7 @@ def grade(
         Option("--out", "DIR", "write results to DIR/<submission id>/ (default: ./grader-results)"),
     ] = None,
     submission_id: Annotated[str | None, Option("--id", "NAME", "the submission's id")] = None,
+    package: PackageOption = None,
     sandbox: SandboxOption = "auto",
     as_json: JsonFlag = False,
 ) -> ExitCode:
@@ -41,7 +42,11 @@ def grade(
     folder = out or DEFAULT_OUT
     check_writable(folder)
     options = pipeline.GradeOptions(
-        sandbox=sandbox, submission_id=submission_id, static_only=False, keep_hidden=True
+        sandbox=sandbox,
+        submission_id=submission_id,
+        package=package or "",
+        static_only=False,
+        keep_hidden=True,
     )
     if not is_recording(Path(source)):
         warn_without_sandbox(sandbox, loaded)
@@ -83,7 +88,9 @@ def record(
     else:
         loaded = rubric_to_record(package or only_package(source), script, launch, seconds)
     check_writable(out)
-    options = pipeline.GradeOptions(sandbox=sandbox, submission_id=None, static_only=False, keep_hidden=True)
+    options = pipeline.GradeOptions(
+        sandbox=sandbox, package=package or "", static_only=False, keep_hidden=True
+    )
     warn_without_sandbox(sandbox)
     with open_progress() as progress:
         files = pipeline.record(source, loaded, out, options, progress)

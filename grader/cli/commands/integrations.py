@@ -20,6 +20,7 @@ ASSUME_EXECUTABLE = Flag(
 CI_VARIABLES = """variables, all optional:
   GRADER_LAB        a lab's id or a rubric's file (default: the lab for packages of that name)
   GRADER_PATH       the package's folder (default: .)
+  GRADER_PACKAGE    the name of the package to grade, whatever the lab calls it (default: the lab's)
   GRADER_PASS_MARK  points, or a percentage of the visible points: 60% (default: the rubric's)
   GRADER_FAIL_ON    any of below-pass-mark, not-graded, inconclusive (default: all), or never
   GRADER_STATIC     true: check the files only and run nothing

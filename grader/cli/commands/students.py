@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from grader.cli.declare import STUDENTS, Argument, Flag, Option, command, loading
-from grader.cli.options import RUBRIC, STATIC, JsonFlag, SandboxOption
+from grader.cli.options import RUBRIC, STATIC, JsonFlag, PackageOption, SandboxOption
 from grader.errors import ExitCode, UsageError
 
 
@@ -14,6 +14,7 @@ def check(
     *,
     path: Annotated[str, Argument("PATH", "your package's folder (default: this folder)")] = ".",
     rubric: Annotated[str | None, RUBRIC] = None,
+    package: PackageOption = None,
     static: Annotated[bool, STATIC] = False,
     staged: Annotated[
         bool,
@@ -64,8 +65,14 @@ def check(
         from grader.cli.select_rubric import choose_all
         from grader.pipeline import GradeOptions
     keep_files = watch or out is not None
-    options = GradeOptions(sandbox=sandbox, static_only=static, keep_hidden=False, files=keep_files)
-    chosen = choose_all(Path(path), rubric)
+    options = GradeOptions(
+        sandbox=sandbox,
+        package=package or "",
+        static_only=static,
+        keep_hidden=False,
+        files=keep_files,
+    )
+    chosen = choose_all(Path(path), rubric, package or "")
     if fix:
         from grader.cli.fixing import fix_packages
 
@@ -106,7 +113,7 @@ def doctor(*, as_json: JsonFlag = False) -> ExitCode:
         from grader.cli.output import say_json
     rows = machine.diagnose()
     if as_json:
-        say_json([row.model_dump() for row in rows])
+        say_json([row.model_dump(by_alias=True) for row in rows])
     else:
         machine.print_rows(rows, sys.stdout)
     return ExitCode.NOT_GRADED if any(row.state == "missing" for row in rows) else ExitCode.PASSED

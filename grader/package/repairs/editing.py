@@ -9,18 +9,21 @@ import os
 import re
 import secrets
 import stat
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
+from typing import BinaryIO
 
-from grader.files import open_untrusted
+from grader.files import atomic_write, open_untrusted
 from grader.model.repair import Repair, RepairKind
 from grader.package.reading import LEFT_OUT
 from grader.portable import BINARY, CLOEXEC, DIRECTORY, NOFOLLOW, READ
 
 TEXT_BYTES_MAX = 64_000
 """Larger files are no student's work, and are left as they are."""
+HAS_DIR_FD = os.open in os.supports_dir_fd
 BOM = b"\xef\xbb\xbf"
 UTF16 = (b"\xff\xfe", b"\xfe\xff")
 MANIFEST, CMAKE = "package.xml", "CMakeLists.txt"
@@ -34,11 +37,30 @@ class NotRepairable(ValueError):
 def read_data(folder: Path, file: str, limit_bytes: int = TEXT_BYTES_MAX) -> bytes | None:
     """Return a file's bytes; None for what is no regular file inside the folder, or too large."""
     try:
-        with open_untrusted(folder, *parts_of(file)) as stream:
+        with _opened(folder, file) as stream:
             data = stream.read(limit_bytes + 1)
     except (OSError, ValueError):
         return None
     return data if len(data) <= limit_bytes else None
+
+
+def _opened(folder: Path, file: str) -> BinaryIO:
+    if HAS_DIR_FD:
+        return open_untrusted(folder, *parts_of(file))
+    return open_untrusted(_without_links(folder, file))
+
+
+def _without_links(folder: Path, file: str) -> Path:
+    """Return the path on Windows, which opens nothing relative to a folder. Raises NotRepairable."""
+    path = folder.joinpath(*parts_of(file))
+    if any(place.is_symlink() for place in (path, *path.parents) if place.is_relative_to(folder)):
+        raise NotRepairable(f"{file} is behind a link")
+    return path
+
+
+def _set_mode(stream: BinaryIO, mode: int) -> None:
+    if sys.platform != "win32":
+        os.fchmod(stream.fileno(), mode)
 
 
 def parts_of(file: str) -> tuple[str, ...]:
@@ -168,6 +190,9 @@ def _opened_parent(folder: Path, file: str) -> Iterator[tuple[int, str]]:
 
 def write_data(folder: Path, file: str, data: bytes, *, mode: int | None = None) -> None:
     """Replace a file whole, its mode kept unless another is given. Raises OSError or NotRepairable."""
+    if not HAS_DIR_FD:
+        atomic_write(_without_links(folder, file), data, public=True)
+        return
     with _opened_parent(folder, file) as (parent, name):
         was = os.stat(name, dir_fd=parent, follow_symlinks=False)
         if not stat.S_ISREG(was.st_mode):
@@ -178,7 +203,7 @@ def write_data(folder: Path, file: str, data: bytes, *, mode: int | None = None)
             with os.fdopen(os.open(beside, flags, 0o600, dir_fd=parent), "wb") as stream:
                 stream.write(data)
                 stream.flush()
-                os.fchmod(stream.fileno(), stat.S_IMODE(was.st_mode) if mode is None else mode)
+                _set_mode(stream, stat.S_IMODE(was.st_mode) if mode is None else mode)
                 os.fsync(stream.fileno())
             os.rename(beside, name, src_dir_fd=parent, dst_dir_fd=parent)
         except BaseException:
@@ -190,7 +215,7 @@ def write_data(folder: Path, file: str, data: bytes, *, mode: int | None = None)
 def is_executable(folder: Path, file: str) -> bool:
     """Return whether its owner may execute the file on this disk, whatever git has of it."""
     try:
-        with open_untrusted(folder, *parts_of(file)) as stream:
+        with _opened(folder, file) as stream:
             return bool(os.fstat(stream.fileno()).st_mode & stat.S_IXUSR)
     except (OSError, ValueError):
         return False
@@ -201,12 +226,12 @@ def make_executable(folder: Path, file: str) -> None:
 
     A file that has another name elsewhere gets a copy: its bits would change there too.
     """
-    with open_untrusted(folder, *parts_of(file)) as stream:
+    with _opened(folder, file) as stream:
         was = os.fstat(stream.fileno())
         mode = stat.S_IMODE(was.st_mode)
         mode |= (mode & 0o444) >> 2
         if was.st_nlink == 1:
-            os.fchmod(stream.fileno(), mode)
+            _set_mode(stream, mode)
             return
     data = read_data(folder, file)
     if data is None:
@@ -219,6 +244,14 @@ def rename_file(folder: Path, repair: Repair) -> None:
     old, new = repair.before, repair.after
     if PurePosixPath(old).parent != PurePosixPath(new).parent:
         raise NotRepairable(f"{new} lies in another folder")
+    if HAS_DIR_FD:
+        _rename(folder, old, new)
+    else:
+        _without_links(folder, old).rename(_without_links(folder, new))  # refused where there is one already
+    rename_everywhere(folder, PurePosixPath(old).name, PurePosixPath(new).name)
+
+
+def _rename(folder: Path, old: str, new: str) -> None:
     with _opened_parent(folder, old) as (parent, name):
         target = parts_of(new)[-1]
         if not stat.S_ISREG(os.stat(name, dir_fd=parent, follow_symlinks=False).st_mode):
@@ -228,7 +261,6 @@ def rename_file(folder: Path, repair: Repair) -> None:
             if not os.path.samestat(found, os.stat(name, dir_fd=parent, follow_symlinks=False)):
                 raise NotRepairable(f"there is a {new} already")
         os.rename(name, target, src_dir_fd=parent, dst_dir_fd=parent)
-    rename_everywhere(folder, PurePosixPath(old).name, PurePosixPath(new).name)
 
 
 def rename_everywhere(folder: Path, old: str, new: str) -> None:

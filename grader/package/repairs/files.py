@@ -22,6 +22,7 @@ from grader.package.repairs.editing import (
     rename_word,
 )
 from grader.package.repairs.wanted import Wanted, is_near
+from grader.portable import MODES_ON_DISK
 from grader.wording import join_words
 
 SHEBANG = "#!/usr/bin/env python3"
@@ -34,7 +35,8 @@ def repair_files(files: Files, scripts: Iterable[SourceFile]) -> None:
     """Find what keeps the scripts from being started or read: bit, line ends, first line, mark, encoding."""
     for script in scripts:
         if script.executable is False:
-            in_git = script.mode_source == "git" and is_executable(files.folder, script.path)
+            on_disk = not MODES_ON_DISK or is_executable(files.folder, script.path)
+            in_git = script.mode_source == "git" and on_disk
             command = f"{'git update-index --chmod=+x' if in_git else 'chmod +x'} {script.path}"
             message = f"{script.path} is not executable"
             files.add(Repair(kind="executable-bit", file=script.path, message=message, fix=command))

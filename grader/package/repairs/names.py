@@ -33,18 +33,17 @@ def repair_script_names(files: Files, file: str, names: Sequence[Name], wanted: 
     node = next((name.value for name in names if name.role == "node"), "")
     asked_of = {"node": wanted.nodes, "publisher": wanted.topics, "subscriber": wanted.topics}
     branches = [f"/{'/'.join(branch)}" for branch in _branches(wanted)]
-    slips = []
     for role in ROLES:
         asked = asked_of.get(role, branches)
         given = [name for name in names if name.role == role]
         used = {_resolved(name, node) for name in given}
         absent = [w for w in asked if _bare(w, role) not in used]
-        for name in given:
+        for name in dict.fromkeys(given):
             right = next((w for w in absent if _is_slip(name, w, node)), "")
             if right and _resolved(name, node) not in {_bare(w, role) for w in asked}:
-                slips.append((name, right))
-    for name, right in dict.fromkeys(slips):
-        _replace_literal(files, file, name, _literal(name, right, node), right)
+                literal = _literal(name, right, node)
+                _replace_literal(files, file, name, literal, right)
+                node = literal if role == "node" else node
 
 
 def _bare(name: str, role: str) -> str:

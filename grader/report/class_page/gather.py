@@ -158,7 +158,7 @@ _WORDS = re.compile(r"[^\W_]+")
 
 
 def salt_in(folder: Path) -> bytes:
-    """The folder's own secret: pages made with it call everybody the same each time. Made where there is none.
+    """Return the folder's own secret: pages made with it call everybody the same each time. Made where there is none.
 
     Raises OutputError where it cannot be written.
     """
@@ -175,7 +175,7 @@ def salt_in(folder: Path) -> bytes:
 
 
 def order(ids: Sequence[str], salt: bytes) -> list[int]:
-    """The places of `ids`, shuffled: the same for the same salt."""
+    """Return the places of `ids`, shuffled: the same for the same salt."""
     keyed = [hashlib.blake2b(name.encode("utf-8", "surrogatepass"), key=salt).digest() for name in ids]
     return sorted(range(len(ids)), key=lambda place: keyed[place])
 
@@ -204,7 +204,7 @@ class Names:
         self._sources.update(set(_words(entry.source, entry.ref or "")))
 
     def told(self) -> frozenset[str]:
-        """The words that could tell somebody: of sources not those that most have (`home`, `submissions`)."""
+        """Return the words that could tell someone: of sources not those that most have (`home`, `submissions`)."""
         most = max(1, self._count // 2)
         return frozenset(self._own).union(word for word, times in self._sources.items() if times <= most)
 

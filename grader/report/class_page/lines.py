@@ -104,7 +104,7 @@ def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInf
 
 
 def link_to(one: Line) -> str:
-    """The submission's report; empty where it has none."""
+    """Return the submission's report; empty where it has none."""
     return f"{quote(one.folder, safe='', errors='replace')}/{REPORT}" if one.folder else ""
 
 

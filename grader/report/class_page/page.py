@@ -119,7 +119,7 @@ def _listed(run: BatchRun, found: Sequence[Diagnosis]) -> tuple[list[Listed], li
 
 
 def _columns(lines: Sequence[Line]) -> Iterator[tuple[str, str]]:
-    """The table's, as the script knows them and as they are called; what nobody has is left out."""
+    """The table's, as the script knows them and as they are called; what no one has is left out."""
     yield "id", "Submission"
     if any(one.name for one in lines):
         yield "name", "Name"

@@ -130,7 +130,7 @@ def _bins(points: Iterable[float], most: float) -> tuple[Bin, ...]:
 
 
 def histogram(found: Spread) -> Markup:
-    """The bins as bars, each with its number above it and its points below."""
+    """Return the bins as bars, each with its number above it and its points below."""
     bins = found.bins
     highest = max(one.count for one in bins)
     step = (WIDTH - 2 * LEFT) / len(bins)
@@ -158,7 +158,7 @@ def histogram(found: Spread) -> Markup:
 
 
 def _scale(bins: Sequence[Bin], step: float) -> list[Markup]:
-    """The line below the bars, and where each second or fifth bar begins."""
+    """Return the line below the bars, and where each second or fifth bar begins."""
     every = 1 if len(bins) <= 10 else 2
     y = HEIGHT - BOTTOM
     line = svg.element("path", d=f"M{LEFT} {y}H{WIDTH - LEFT}", class_="axis")
@@ -280,7 +280,7 @@ def _cells(lines: Sequence[Line], row: int, columns: Sequence[Sequence[int]], st
 
 
 def _shade(letters: Sequence[str]) -> str:
-    """`q0` where nobody lost anything, to `q5` where all did."""
+    """`q0` where no one lost anything, to `q5` where all did."""
     lost = sum(letter in "afb" for letter in letters)
     return f"q{-(-5 * lost // len(letters))}"
 

@@ -16,7 +16,7 @@ from grader.untrusted_text import line
 
 
 def again(run: BatchRun, out: Path, only: str = "", *, static: bool | None = None) -> Markup:
-    """The batch once more, from any folder; `only` as `--only` has it. `static` if not as it was."""
+    """Return the batch once more, from any folder; `only` as `--only` has it. `static` if not as it was."""
     roster = Path(run.roster)
     words = ["grader", "batch", str(roster.absolute() if roster.exists() else roster)]
     words += ["--rubric", run.rubric_source or run.rubric.id, "--out", str(out.absolute())]

@@ -22,7 +22,7 @@ def short(text: object, letters: int = LINE_LETTERS) -> str:
 
 
 def named(text: object) -> str:
-    """The name of a topic, a node or a file."""
+    """Return the name of a topic, a node or a file."""
     return short(text, NAME_LETTERS)
 
 

@@ -278,7 +278,7 @@ ROWS_MAX = 60
 
 
 def heard_figures(run: Run, params: HearsParams) -> Iterator[HeardFigure]:
-    """Nothing where nobody can tell what was printed of what."""
+    """Nothing where no one can tell what was printed of what."""
     probes = probes_on(run, params.topic)
     lines = printed_lines(run)
     places = places_of(run, probes, lines, params.template) if probes else None

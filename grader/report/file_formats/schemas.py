@@ -35,7 +35,7 @@ ROOTS: dict[str, type[Record]] = {
 
 
 def schema_of(name: str) -> Schema:
-    """The schema of the newest version of the format `name` (a key of `FORMATS`).
+    """Return the schema of the newest version of the format `name` (a key of `FORMATS`).
 
     Of what graders write, it leaves room for keys of later ones, as this grader's reader does. Of evidence it describes
     an object with a key for each JSON channel: a message on `/grader/host` is a value of the key `/grader/host`.
@@ -83,12 +83,13 @@ def _field_docstrings(record: type[Record]) -> dict[str, str]:
         for node, text in pairwise(definition.body):
             match node, text:
                 case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
-                    texts[name.removesuffix("_")] = inspect.cleandoc(words).replace("\n", " ")
+                    key = record.model_fields[name].serialization_alias or name.removesuffix("_")
+                    texts[key] = inspect.cleandoc(words).replace("\n", " ")
     return texts
 
 
 def _of(record: type[Record]) -> Callable[[], Schema]:
-    """A file that holds this record. What tells its version is always written."""
+    """Return a file that holds this record. What tells its version is always written."""
 
     def make() -> Schema:
         schema = record.model_json_schema(by_alias=True)

@@ -103,7 +103,7 @@ class Drawer:
         )
 
     def _room(self, lines: tuple[ConsoleLine, ...]) -> tuple[int, int]:
-        """How many of the first and of the last lines are shown."""
+        """Return how many of the first and of the last lines are shown."""
         first, last = len(lines), 0
         if len(lines) > CONSOLE_FIRST + CONSOLE_LAST:
             first, last = CONSOLE_FIRST, CONSOLE_LAST

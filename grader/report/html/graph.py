@@ -21,7 +21,7 @@ Place = tuple[float, float, float]
 
 
 def graph_plot(figure: GraphFigure, name: str) -> Markup | None:
-    """The drawing; None for one that nobody could read: then the list beside it says all."""
+    """Return the drawing; None for one that no one could read: then the list beside it says all."""
     vertices = [f"n{node}" for node in figure.nodes] + [f"t{topic}" for topic in figure.topics]
     if not vertices or len(vertices) > MOST or not figure.edges:
         return None
@@ -73,7 +73,7 @@ def _width(vertex: str, figure: GraphFigure) -> float:
 
 
 def _places(layers: Layers, figure: GraphFigure) -> tuple[dict[str, Place], tuple[float, float]]:
-    """The middle and the width of each vertex, and the size of the whole."""
+    """Return the middle and the width of each vertex, and the size of the whole."""
     tallest = max(len(column) for column in layers.columns)
     places: dict[str, Place] = {}
     left = EDGE
@@ -169,7 +169,7 @@ def layered(vertices: Sequence[Vertex], arrows: Sequence[Arrow]) -> Layers:
 
 
 def is_bend(vertex: Vertex) -> bool:
-    """Whether it is only a place that an arrow passes."""
+    """Return whether it is only a place that an arrow passes."""
     return vertex.startswith("\0")
 
 

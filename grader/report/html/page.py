@@ -365,7 +365,7 @@ class Maker:
 
 
 def prose(text: str) -> Markup:
-    """A text with what stands between backticks as code."""
+    """Return a text with what stands between backticks as code."""
     parts = CODE.split(text)
     return Markup("").join(
         Markup("<code>{}</code>").format(part) if i % 2 else escape(part) for i, part in enumerate(parts)

@@ -294,7 +294,7 @@ def _over_time(figure: RateFigure, name: str) -> Markup:
 
 
 def _top(rates: Sequence[float], figure: RateFigure) -> float:
-    """The highest rate, but not where a few messages that came together would flatten all others."""
+    """Return the highest rate, but not where a few messages that came together would flatten all others."""
     most = TOO_FAR * max(figure.high_hz, figure.mean_hz or 0.0)
     return 1.2 * max(figure.high_hz, figure.mean_hz or 0.0, min(max(rates), most))
 

@@ -1,4 +1,4 @@
-"""What every page shares: templates in which nobody's text becomes markup, the look, and what a page may load."""
+"""What every page shares: templates in which no one's text becomes markup, the look, and what a page may load."""
 
 from __future__ import annotations
 
@@ -35,24 +35,24 @@ def environment() -> Environment:
 
 
 def own_file(name: str) -> str:
-    """The text of a file beside this one."""
+    """Return the text of a file beside this one."""
     return files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
 @cache
 def style() -> Markup:
-    """The look of all pages, for a `<style>`."""
+    """Return the look of all pages, for a `<style>`."""
     return Markup(_unindented(own_file("style.css")))  # noqa: S704 - ours
 
 
 @cache
 def script(name: str) -> Markup:
-    """A script of ours, for a `<script>`; `policy` has to name it."""
+    """Return a script of ours, for a `<script>`; `policy` has to name it."""
     return Markup(own_file(name))  # noqa: S704 - ours
 
 
 def policy(*scripts: str) -> str:
-    """The Content-Security-Policy of a page that loads nothing and runs these scripts alone."""
+    """Return the Content-Security-Policy of a page that loads nothing and runs these scripts alone."""
     digests = (base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in scripts)
     allowed = " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
     return (

@@ -32,7 +32,7 @@ def escaped(words: str) -> Markup:
 
 
 def path(points: Iterable[tuple[float, float]]) -> str:
-    """A line through the points, for `d`."""
+    """Return a line through the points, for `d`."""
     return "M" + "L".join(f"{short(x)} {short(y)}" for x, y in points)
 
 
@@ -42,7 +42,7 @@ def dots(points: Iterable[tuple[float, float]]) -> str:
 
 
 def drawing(name: str, size: tuple[float, float], title: str, words: str, *children: Markup) -> Markup:
-    """The whole `<svg>`: an image to those who cannot see it, with its title and what it shows in words.
+    """Return the whole `<svg>`: an image to those who cannot see it, with its title and what it shows in words.
 
     `name` is unique on the page.
     """
@@ -62,7 +62,7 @@ def drawing(name: str, size: tuple[float, float], title: str, words: str, *child
 
 
 def short(value: float) -> str:
-    """A coordinate: tenths of a pixel."""
+    """Return a coordinate: tenths of a pixel."""
     return number(value, 1)
 
 
@@ -99,7 +99,7 @@ class Frame:
         return self.height - BOTTOM
 
     def x(self, value: float) -> float:
-        """The pixel of a value; one outside of the frame lies on its edge."""
+        """Return the pixel of a value; one outside of the frame lies on its edge."""
         share = (value - self.x_low) / ((self.x_high - self.x_low) or 1.0)
         return LEFT + min(max(share, 0.0), 1.0) * (self.right - LEFT)
 
@@ -109,7 +109,7 @@ class Frame:
         return self.bottom - min(max(share, 0.0), 1.0) * (self.bottom - TOP)
 
     def box(self, x: tuple[float, float], y: tuple[float, float], **attributes: str | float) -> Markup:
-        """A rectangle between values, at least a pixel wide and high."""
+        """Return a rectangle between values, at least a pixel wide and high."""
         left, right = self.x(x[0]), self.x(x[1])
         top, bottom = self.y(y[1]), self.y(y[0])
         return element(

@@ -6,7 +6,7 @@ import math
 import re
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 from markupsafe import Markup
@@ -182,7 +182,6 @@ def test_edges_to_what_is_not_shown_are_left_out():
 VERTICES = st.integers(1, 12).map(lambda count: [f"n{i}" for i in range(count)])
 
 
-@settings(max_examples=100)
 @given(st.data())
 def test_layers_lead_to_the_right_and_hold_every_vertex_once(data):
     vertices = data.draw(VERTICES)
@@ -248,7 +247,6 @@ def test_hostile_names_stay_text():
 FINITE = st.floats(0, 1e6, allow_nan=False)
 
 
-@settings(max_examples=60)
 @given(st.lists(st.tuples(FINITE, FINITE), min_size=1, max_size=30), st.one_of(st.none(), FINITE))
 def test_any_rate_can_be_drawn(points, mean_hz):
     figure = RateFigure(

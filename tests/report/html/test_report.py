@@ -403,6 +403,7 @@ def test_a_picture_that_cannot_be_drawn_costs_no_report():
     assert "This picture could not be drawn" in text
 
 
+@pytest.mark.full
 def test_the_templates_are_loaded_only_when_a_report_is_written():
     code = "import sys, grader.pipeline, grader.cli.main; print('jinja2' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -209,7 +209,7 @@ class Background:
     """The field's colour, from the parameter server. `params` has `has`, `get` (None where there is none) and `set`.
 
     Noetic and late Melodic read the node's private parameters, releases before them those of the node's namespace.
-    Here both are read: a private one that somebody has set first, then one of the namespace.
+    Here both are read: a private one that someone has set first, then one of the namespace.
     """
 
     def __init__(self, params):
@@ -243,7 +243,7 @@ class Pace:
     faster than the wall's.
 
     Time that passes while the clock stands still for over a second is counted on the wall's clock, as for a simulated
-    clock that nobody drives.
+    clock that no one drives.
     """
 
     def __init__(self, step_s):
@@ -253,7 +253,7 @@ class Pace:
         self._owed_s = 0.0
 
     def due(self, clock_s, wall_s):
-        """How many steps are due now."""
+        """Return how many steps are due now."""
         if self._last_s is None:
             self._last_s, self._moved_s = clock_s, wall_s
         passed_s = clock_s - self._last_s

@@ -88,7 +88,7 @@ class Simulator:
         self._one_at_a_time = threading.Lock()
         rospy.loginfo("Starting turtlesim with node name %s", rospy.get_name())
         self._appear(self._world.reset())
-        # Not before the turtle is there: a reset that comes in meanwhile would make it a second time.
+        # Not before the turtle is there: a reset that comes in before would make it a second time.
         self._offer("clear", Empty, self._on_clear)
         self._offer("reset", Empty, self._on_reset)
         self._offer("spawn", srv.Spawn, self._on_spawn)
@@ -130,7 +130,7 @@ class Simulator:
 
     def _appear(self, name):
         turtle = self._world.turtles[name]
-        if name in self._endpoints:  # after a reset: whoever is connected stays so
+        if name in self._endpoints:  # after a reset: existing connections stay
             self._endpoints[name].turtle = turtle
         else:
             self._endpoints[name] = Endpoints(name, turtle, self._lock)

@@ -9,24 +9,24 @@ from pathlib import PurePosixPath
 
 from grader.authoring.mutation.package_tree import Tree
 from grader.authoring.mutation.registry import operator
-from grader.authoring.mutation.solution import CMAKE, MANIFEST, Place, Solution
+from grader.authoring.mutation.solution import CMAKE, MANIFEST, CodePlace, Solution
 
 OTHER_FOLDER = {"src": "scripts", "scripts": "src"}
 TELLING = (".py", ".sh", ".launch", ".yaml", ".yml")
 PYTHON = re.compile(r"python(?:\d(?:\.\d+)?)?$")
 
 
-def _files(solution: Solution) -> Iterator[tuple[Place, Solution, str]]:
-    return ((Place(path=path, at={"file": path}), solution, path) for path in solution.files)
+def _files(solution: Solution) -> Iterator[tuple[CodePlace, Solution, str]]:
+    return ((CodePlace(path=path, at={"file": path}), solution, path) for path in solution.files)
 
 
-def _programs(solution: Solution) -> Iterator[tuple[Place, Solution, str]]:
-    return ((Place(path=path, at={"script": path}), solution, path) for path in solution.programs)
+def _programs(solution: Solution) -> Iterator[tuple[CodePlace, Solution, str]]:
+    return ((CodePlace(path=path, at={"script": path}), solution, path) for path in solution.programs)
 
 
-def _contents(solution: Solution) -> Iterator[tuple[Place, bytes]]:
+def _contents(solution: Solution) -> Iterator[tuple[CodePlace, bytes]]:
     for path in solution.programs:
-        yield Place(path=path, at={"script": path}, line=1), solution.entry(path).data
+        yield CodePlace(path=path, at={"script": path}, line=1), solution.entry(path).data
 
 
 @operator("bit-removed", each=_programs)

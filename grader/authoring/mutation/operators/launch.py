@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pydantic import Field
 
 from grader.authoring.mutation.registry import Finder, operator
-from grader.authoring.mutation.solution import Place, Solution
+from grader.authoring.mutation.solution import CodePlace, Solution
 from grader.authoring.mutation.text_edits import Edit, misspelt_name, whole_lines
 from grader.authoring.mutation.xml_document import Document, Element
 from grader.model.record import Record
@@ -26,31 +26,31 @@ class RemapParams(Record):
 def _elements(tag: str, *needed: str, named: bool = True) -> Finder:
     """Return a finder of the elements with this tag and these attributes."""
 
-    def find(solution: Solution) -> Iterator[tuple[Place, Document, Element]]:
+    def find(solution: Solution) -> Iterator[tuple[CodePlace, Document, Element]]:
         for document in solution.launch_files:
             for element in document.elements(tag):
                 if set(needed) <= element.attributes.keys():
                     name = element.attributes.get("name") or element.attributes.get("type") or tag
                     at = {"file": document.path, **({tag: name} if named else {})}
                     line = document.line(element)
-                    yield Place(path=document.path, at=at, line=line, xml=document), document, element
+                    yield CodePlace(path=document.path, at=at, line=line, xml=document), document, element
 
     return find
 
 
-def _documents(solution: Solution) -> Iterator[tuple[Place, Document]]:
+def _documents(solution: Solution) -> Iterator[tuple[CodePlace, Document]]:
     for document in solution.launch_files:
-        yield Place(path=document.path, at={"file": document.path}, xml=document), document
+        yield CodePlace(path=document.path, at={"file": document.path}, xml=document), document
 
 
 def _matches(pattern: re.Pattern[str], *endings: str) -> Finder:
     """Return a finder of what fits the pattern in files with these endings."""
 
-    def find(solution: Solution) -> Iterator[tuple[Place, str, re.Match[str]]]:
+    def find(solution: Solution) -> Iterator[tuple[CodePlace, str, re.Match[str]]]:
         for path in (path for path in solution.files if path.endswith(endings)):
             text = solution.text(path)
             for match in pattern.finditer(text):
-                yield Place(path=path, at={"file": path}), text, match
+                yield CodePlace(path=path, at={"file": path}), text, match
 
     return find
 

@@ -21,7 +21,7 @@ from grader.authoring.mutation.rospy_code import (
     sources,
     speech,
 )
-from grader.authoring.mutation.solution import Place, Solution
+from grader.authoring.mutation.solution import CodePlace, Solution
 from grader.authoring.mutation.text_edits import Edit, misspelt_literal, texts_in
 from grader.model.record import Record
 
@@ -32,7 +32,7 @@ TIMES = {"rospy.Time.now()": "rospy.Time(1700000000)", "rospy.get_rostime()": "r
 NANOSECONDS = "rospy.Time.now().to_nsec()"
 
 
-def _messages(solution: Solution) -> Iterator[tuple[Place, Script, list[ast.expr]]]:
+def _messages(solution: Solution) -> Iterator[tuple[CodePlace, Script, list[ast.expr]]]:
     """Find the publishers, each with the expressions that its messages are made of."""
     for place, script, publisher in each_publisher(solution):
         yield script_place(script, topic=str(place.at["topic"])), script, sources(script, publisher)
@@ -90,7 +90,7 @@ class EarlyParams(Record):
     by: int = Field(default=28, ge=2)
 
 
-def _counters(solution: Solution) -> Iterator[tuple[Place, Script, Counter]]:
+def _counters(solution: Solution) -> Iterator[tuple[CodePlace, Script, Counter]]:
     """Find the integer topics that are fed by a counter."""
     for script in solution.scripts:
         for publisher in publishers(script):
@@ -212,7 +212,7 @@ def _callbacks(*types: str) -> Finder:
     With the callback come the name of its message and the statements that print or log.
     """
 
-    def find(solution: Solution) -> Iterator[tuple[Place, Script, Function, str, list[ast.Expr]]]:
+    def find(solution: Solution) -> Iterator[tuple[CodePlace, Script, Function, str, list[ast.Expr]]]:
         for place, script, subscriber in each_subscriber(solution):
             callback = subscriber.callback
             message = message_name(callback) if isinstance(callback, Function) else ""

@@ -21,14 +21,14 @@ from grader.authoring.mutation.rospy_code import (
     speech,
     text_literal,
 )
-from grader.authoring.mutation.solution import Place, Solution
+from grader.authoring.mutation.solution import CodePlace, Solution
 from grader.authoring.mutation.text_edits import Edit, apply_edits, misspelt_literal, texts_in
 from grader.model.record import Record
 
 # ---- names
 
 
-def _init_nodes(solution: Solution) -> Iterator[tuple[Place, Script, ast.Call]]:
+def _init_nodes(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Call]]:
     for script in solution.scripts:
         for call in calls(script, "init_node"):
             yield script_place(script, call), script, call
@@ -87,7 +87,7 @@ class EndsParams(Record):
     turns: int = Field(default=30, ge=1)
 
 
-def _lives(solution: Solution) -> Iterator[tuple[Place, Script, ast.While | ast.Expr]]:
+def _lives(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.While | ast.Expr]]:
     """Find the loops that run until shutdown; in scripts without any, the calls of `spin`."""
     for script in solution.scripts:
         statements = (script.statement(call) for call in calls(script, "spin"))
@@ -148,7 +148,7 @@ class LevelParams(Record):
     level: Literal["debug", "info", "warn", "error", "fatal"] = "warn"
 
 
-def _logs(solution: Solution) -> Iterator[tuple[Place, Script, ast.Expr, ast.Call]]:
+def _logs(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Expr, ast.Call]]:
     """Find what is printed or logged. A place has the first words, as they are in the source."""
     for script in solution.scripts:
         for statement in speech(script):
@@ -305,7 +305,7 @@ def missing_module(script: Script) -> list[Edit]:
 
 @operator("asks-for-input", each=each_script)
 def asks_for_input(script: Script) -> list[Edit]:
-    """Waits for somebody to press Enter before it makes its node.
+    """Waits for someone to press Enter before it makes its node.
 
     Fits every Python script that makes a node.
     """

@@ -9,7 +9,7 @@ from cmake_parser.ast import Command, Token
 
 from grader.authoring.mutation.package_tree import Tree
 from grader.authoring.mutation.registry import Finder, operator
-from grader.authoring.mutation.solution import CMAKE, MANIFEST, Place, Solution
+from grader.authoring.mutation.solution import CMAKE, MANIFEST, CodePlace, Solution
 from grader.authoring.mutation.text_edits import Edit, whole_lines
 from grader.authoring.mutation.xml_document import Document, Element
 
@@ -22,24 +22,24 @@ DEPENDENCIES = ("depend", "build_depend", "build_export_depend", "exec_depend", 
 def _calls(*names: str, wanted: Callable[[Command], bool] = lambda _: True) -> Finder:
     """Return a finder of the calls of these commands."""
 
-    def find(solution: Solution) -> Iterator[tuple[Place, str, Command]]:
+    def find(solution: Solution) -> Iterator[tuple[CodePlace, str, Command]]:
         for command in solution.cmake_calls(*names):
             if wanted(command):
-                yield Place(path=CMAKE, at={}, line=command.line), solution.text(CMAKE), command
+                yield CodePlace(path=CMAKE, at={}, line=command.line), solution.text(CMAKE), command
 
     return find
 
 
-def _last_command(solution: Solution) -> Iterator[tuple[Place, Command]]:
-    return ((Place(path=CMAKE, at={}, line=command.line), command) for command in solution.cmake[-1:])
+def _last_command(solution: Solution) -> Iterator[tuple[CodePlace, Command]]:
+    return ((CodePlace(path=CMAKE, at={}, line=command.line), command) for command in solution.cmake[-1:])
 
 
-def _installed(solution: Solution) -> Iterator[tuple[Place, str, Command, list[Token], Token]]:
+def _installed(solution: Solution) -> Iterator[tuple[CodePlace, str, Command, list[Token], Token]]:
     """Find the scripts that catkin_install_python() names: each with its call and the call's scripts."""
     for command in solution.cmake_calls("catkin_install_python"):
         scripts = [a for a in command.args if a.value.endswith(".py")]
         for script in scripts:
-            place = Place(path=CMAKE, at={"script": script.value}, line=command.line)
+            place = CodePlace(path=CMAKE, at={"script": script.value}, line=command.line)
             yield place, solution.text(CMAKE), command, scripts, script
 
 
@@ -146,16 +146,16 @@ def install_elsewhere(_text: str, command: Command) -> list[Edit]:
 def _elements(*tags: str) -> Finder:
     """Return a finder of the first element of package.xml that has one of these tags."""
 
-    def find(solution: Solution) -> Iterator[tuple[Place, Document, Element]]:
+    def find(solution: Solution) -> Iterator[tuple[CodePlace, Document, Element]]:
         if (manifest := solution.manifest) is not None:
             for element in manifest.elements(*tags)[:1]:
                 line = manifest.line(element)
-                yield Place(path=MANIFEST, at={}, line=line, xml=manifest), manifest, element
+                yield CodePlace(path=MANIFEST, at={}, line=line, xml=manifest), manifest, element
 
     return find
 
 
-def _dependencies(solution: Solution) -> Iterator[tuple[Place, Document, list[Element]]]:
+def _dependencies(solution: Solution) -> Iterator[tuple[CodePlace, Document, list[Element]]]:
     """Find the packages that are depended on, each with its elements."""
     if (manifest := solution.manifest) is None:
         return
@@ -163,12 +163,12 @@ def _dependencies(solution: Solution) -> Iterator[tuple[Place, Document, list[El
     for element in manifest.elements(*DEPENDENCIES):
         by_name.setdefault(manifest.content(element), []).append(element)
     for name in sorted(by_name.keys() - {"catkin", ""}):
-        yield Place(path=MANIFEST, at={"dependency": name}, xml=manifest), manifest, by_name[name]
+        yield CodePlace(path=MANIFEST, at={"dependency": name}, xml=manifest), manifest, by_name[name]
 
 
-def _package(solution: Solution) -> Iterator[tuple[Place, Solution]]:
+def _package(solution: Solution) -> Iterator[tuple[CodePlace, Solution]]:
     if MANIFEST in solution.files:
-        yield Place(path=MANIFEST, at={}), solution
+        yield CodePlace(path=MANIFEST, at={}), solution
 
 
 @operator("dependency-dropped", each=_dependencies)

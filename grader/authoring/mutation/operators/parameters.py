@@ -10,7 +10,7 @@ import yaml
 from grader.authoring.mutation.python_script import Script
 from grader.authoring.mutation.registry import Finder, operator
 from grader.authoring.mutation.rospy_code import argument, calls, script_place, text_literal
-from grader.authoring.mutation.solution import Place, Solution
+from grader.authoring.mutation.solution import CodePlace, Solution
 from grader.authoring.mutation.text_edits import Edit, misspelt_name, whole_lines
 
 Leaf = tuple[str, yaml.ScalarNode, yaml.ScalarNode]
@@ -55,17 +55,17 @@ def _line_end(text: str, value: yaml.ScalarNode) -> int:
     return end if end >= 0 else len(text)
 
 
-def _yaml_files(solution: Solution) -> Iterator[tuple[Place, list[Leaf]]]:
+def _yaml_files(solution: Solution) -> Iterator[tuple[CodePlace, list[Leaf]]]:
     for path in solution.files:
         if path.endswith(YAML):
-            yield Place(path=path, at={"file": path}), own_lines(solution.text(path))
+            yield CodePlace(path=path, at={"file": path}), own_lines(solution.text(path))
 
 
-def _yaml_keys(solution: Solution) -> Iterator[tuple[Place, str, yaml.ScalarNode, yaml.ScalarNode]]:
+def _yaml_keys(solution: Solution) -> Iterator[tuple[CodePlace, str, yaml.ScalarNode, yaml.ScalarNode]]:
     for path in solution.files:
         text = solution.text(path)
         for name, key, value in own_lines(text) if path.endswith(YAML) else ():
-            place = Place(path=path, at={"file": path, "key": name}, line=key.start_mark.line + 1)
+            place = CodePlace(path=path, at={"file": path, "key": name}, line=key.start_mark.line + 1)
             yield place, text, key, value
 
 
@@ -112,7 +112,7 @@ def yaml_key_misspelt(_text: str, key: yaml.ScalarNode, _value: yaml.ScalarNode)
 def _accesses(function: str) -> Finder:
     """Return a finder of calls of `get_param` or `set_param` whose parameter is written out."""
 
-    def find(solution: Solution) -> Iterator[tuple[Place, Script, ast.Call, ast.Constant]]:
+    def find(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Call, ast.Constant]]:
         for script in solution.scripts:
             for call in calls(script, function):
                 name = text_literal(script, argument(call, 0, "param_name"))
@@ -122,7 +122,7 @@ def _accesses(function: str) -> Finder:
     return find
 
 
-def _reads(solution: Solution) -> Iterator[tuple[Place, Script, ast.expr, yaml.Node]]:
+def _reads(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.expr, yaml.Node]]:
     """Find the expressions that read a value of the package's YAML files."""
     values = {n: v for f in solution.files if f.endswith(YAML) for n, _, v in leaves(solution.text(f))}
     for script in solution.scripts:

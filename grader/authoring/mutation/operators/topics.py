@@ -29,7 +29,7 @@ from grader.authoring.mutation.rospy_code import (
     sources,
     targets,
 )
-from grader.authoring.mutation.solution import Place, Solution
+from grader.authoring.mutation.solution import CodePlace, Solution
 from grader.authoring.mutation.text_edits import Edit, misspelt_name
 from grader.model.record import Record
 
@@ -255,13 +255,13 @@ def _number(node: ast.AST | None) -> float:
     return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else 0.0
 
 
-def _paces(solution: Solution) -> Iterator[tuple[Place, Script, Pace]]:
+def _paces(solution: Solution) -> Iterator[tuple[CodePlace, Script, Pace]]:
     for script in solution.scripts:
         for pace in paces(script):
             yield script_place(script, pace.node), script, pace
 
 
-def _turns(solution: Solution) -> Iterator[tuple[Place, Script, Pace, list[ast.stmt]]]:
+def _turns(solution: Solution) -> Iterator[tuple[CodePlace, Script, Pace, list[ast.stmt]]]:
     """Find what a loop or a timer's callback does in each turn, without the sleep, and the script's first pace."""
     for script in solution.scripts:
         names = {last_name(a) for call in calls(script, "Timer") if (a := argument(call, 1, "callback"))}
@@ -320,7 +320,7 @@ def burst(script: Script, pace: Pace, turn: list[ast.stmt], params: BurstParams)
     return [slower, script.wrap(turn, f"for _ in range({params.count}):")]
 
 
-def _rate_sleeps(solution: Solution) -> Iterator[tuple[Place, Script, ast.Expr]]:
+def _rate_sleeps(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Expr]]:
     for script in solution.scripts:
         for statement in rate_sleeps(script):
             yield script_place(script, statement), script, statement

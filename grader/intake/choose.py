@@ -1,0 +1,242 @@
+"""Chooses the lab's package among those that were found, and says what is there instead where it is not."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+from grader.errors import PackageNotFound
+from grader.intake.find import BUILD_SPACES, MANIFEST, WORKSPACE_MARKS, Candidate, manifest_name, named_at
+from grader.intake.names import brief, encodable, is_archive_name, listing, printable
+from grader.intake.tree import NO_CONTENT, is_there, walk
+
+COPIES_LOOKED_AT, FOLDERS_OF_A_COPY = 50, 300
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted:
+    """The package that the lab asks for, and the names of the `files` that it asks for in it.
+
+    `asked` is the name of the package to grade in its place, from `--package`, or "".
+    """
+
+    name: str
+    files: frozenset[str] = frozenset()
+    asked: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    package: Candidate
+    hints: tuple[str, ...]
+
+
+def choose(candidates: list[Candidate], wanted: Wanted) -> Choice | None:
+    """Return the lab's package: by its manifest's name, by that in other case, by its folder's name, in this order.
+
+    What catkin does not see (a marker file, no manifest) comes after all that it does see. Last comes the only name
+    that is nearly right. With `wanted.asked`, only that name counts.
+    """
+    packages = [c for c in candidates if c.has_manifest]
+    seen = [c for c in packages if c.ignored_by is None]
+    ignored = [c for c in packages if c.ignored_by is not None]
+    bare = [c for c in candidates if not c.has_manifest]
+    if wanted.asked:
+        groups = ([c for c in group if c.name == wanted.asked] for group in (seen, ignored, bare))
+        return next((_best(group, wanted) for group in groups if group), None)
+    for group in (seen, ignored):
+        for fits in (_named, _named_alike, _in_folder):
+            matches = [c for c in group if fits(c, wanted.name)]
+            if matches:
+                return _best(matches, wanted)
+    bare = [c for c in bare if _in_folder(c, wanted.name) and not any(_below(p, c) for p in packages)]
+    if bare:  # A workspace of the lab's name has `src/` too; the package in it has the CMakeLists.txt.
+        return _best([c for c in bare if c.has_cmake] or bare, wanted)
+    near = [c for c in seen if c.manifest is not None and _is_slip(c.manifest, wanted.name)]
+    return _best(near, wanted) if len({c.manifest for c in near}) == 1 else None
+
+
+def _named(candidate: Candidate, wanted: str) -> bool:
+    return candidate.manifest == wanted
+
+
+def _named_alike(candidate: Candidate, wanted: str) -> bool:
+    return candidate.manifest is not None and candidate.manifest.casefold() == wanted.casefold()
+
+
+def _in_folder(candidate: Candidate, wanted: str) -> bool:
+    """By the folder's name; a repository that was downloaded as a zip adds its branch."""
+    folder = candidate.folder.name.casefold()
+    return wanted.casefold() in (folder, re.sub(r"-(main|master)$", "", folder))
+
+
+def _below(inner: Candidate, outer: Candidate) -> bool:
+    return inner is not outer and (outer.path == "." or inner.path.startswith(f"{outer.path}/"))
+
+
+def _is_slip(name: str, wanted: str) -> bool:
+    """Return whether `name` is `wanted` but for capitals, `-` and `_`, and one letter.
+
+    Digits are no letters: `lab2` is another lab's package than `lab1`.
+    """
+    one, other = (re.sub(r"[\s_-]", "", text.casefold()) for text in (name, wanted))
+    digits = [re.sub(r"\D", "", text) for text in (one, other)]
+    return bool(one) and digits[0] == digits[1] and _one_edit(one, other)
+
+
+def _one_edit(one: str, other: str) -> bool:
+    """Return whether at most one letter has to be added, taken away, changed, or put before its neighbour."""
+    start = next(
+        (i for i, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other))
+    )
+    rest, rest_other = one[start:], other[start:]
+    swapped = rest[:2] == rest_other[:2][::-1] and rest[2:] == rest_other[2:]
+    return swapped or rest[1:] == rest_other[1:] or rest[1:] == rest_other or rest == rest_other[1:]
+
+
+def _best(matches: list[Candidate], wanted: Wanted) -> Choice:
+    """Of several copies, return the one that catkin sees, then the one with most of the lab's files, then the nearest
+    to the root; at one depth, a folder that is named like the package goes first."""
+
+    def key(c: Candidate) -> tuple[bool, int, bool, int, bool, bytes]:
+        files = -_count_files(c.folder, wanted.files) if len(looked_at) > 1 else 0
+        is_named = c.folder.name == (wanted.asked or wanted.name)
+        return not _in_workspace(c), files, "src" not in _above(c), c.depth, not is_named, os.fsencode(c.path)
+
+    looked_at = sorted(matches, key=lambda c: (not _in_workspace(c), c.depth))[:COPIES_LOOKED_AT]
+    chosen, *others = sorted(looked_at, key=key)
+    hints = [hint for hint in (_name_hint(chosen, wanted), _ignored_hint(chosen)) if hint]
+    if others:
+        rest = listing([c.path for c in others])
+        name = printable(wanted.asked or wanted.name)
+        hints.append(f"{name} is there more than once: {printable(chosen.path)} is graded, {rest} is not")
+    return Choice(package=chosen, hints=tuple(hints))
+
+
+def _above(candidate: Candidate) -> list[str]:
+    return candidate.path.split("/")[:-1]
+
+
+def _in_workspace(candidate: Candidate) -> bool:
+    """Return whether it lies below the `src/` of a workspace: one with catkin's marks, or the submission itself."""
+    parts = _above(candidate)
+    root = candidate.folder.parents[len(parts)] if parts else candidate.folder
+    for number, part in enumerate(parts):
+        workspace = root.joinpath(*parts[:number])
+        if part == "src" and (number == 0 or any(is_there(workspace / mark) for mark in WORKSPACE_MARKS)):
+            return True
+    return False
+
+
+def _count_files(folder: Path, names: frozenset[str]) -> int:
+    """Return how many of the lab's files are there by name, in whatever folder of the package."""
+    found: set[str] = set()
+    if names:
+        for below in islice(walk(folder, tolerant=True), FOLDERS_OF_A_COPY):
+            below.folders[:] = [name for name in below.folders if name not in NO_CONTENT]
+            found |= names & {entry.name for entry in below.others}
+    return len(found)
+
+
+def _name_hint(chosen: Candidate, lab: Wanted) -> str:
+    folder, wanted = printable(chosen.folder.name), lab.name
+    if not chosen.has_manifest:
+        return f"the folder {folder} has no {MANIFEST}: it was taken for the package {wanted} by its name"
+    if chosen.manifest is None:
+        return f"no name can be read from the {MANIFEST} in {folder}: the folder's name was taken instead"
+    if chosen.manifest in (wanted, lab.asked):
+        return ""
+    name = printable(chosen.manifest)
+    if _named_alike(chosen, wanted) or not _in_folder(chosen, wanted):
+        return f"the package is named {name} in its {MANIFEST}, the lab asks for exactly {wanted}"
+    return f"the folder {folder} was taken for {wanted}, but its {MANIFEST} names the package {name}"
+
+
+def _ignored_hint(chosen: Candidate) -> str:
+    if chosen.ignored_by is None:
+        return ""
+    marker = printable(chosen.ignored_by)
+    return f"catkin does not see the package, because of the file {marker}: delete that file"
+
+
+def not_found(
+    root: Path, candidates: list[Candidate], wanted: Wanted, git_links: tuple[str, ...]
+) -> PackageNotFound:
+    """Return the error for a submission without the package; it says what is there instead, and what to do."""
+    packages = [c for c in candidates if c.has_manifest]
+    names = sorted({c.name for c in packages})
+    here = f"packages here: {listing(names)}" if names else f"no {MANIFEST} was found"
+    name = printable(wanted.asked or wanted.name)
+    return PackageNotFound(
+        f"there is no package {name} in this submission; {here}",
+        hint=_where_it_went(root, wanted.asked or wanted.name, git_links) or _rename(root, packages, wanted),
+    )
+
+
+def _rename(root: Path, packages: list[Candidate], wanted: Wanted) -> str:
+    seen = {c.name: c for c in reversed(packages) if c.ignored_by is None and encodable(c.path)}
+    if wanted.asked and packages:
+        return "Give one of these names with --package, or leave it out."
+    if not seen:
+        name = printable(wanted.asked or wanted.name)
+        return f"It is the folder whose {MANIFEST} says <name>{name}</name>: was it handed in (and pushed)?"
+    name, only = next(iter(seen.items()))
+    named = named_at(only.folder, root=root)
+    if len(seen) > 1 or named is None:
+        return (
+            f"Was it handed in (and pushed)? If it is one of these, rename that to {wanted.name} "
+            f"(<name> in its {MANIFEST}), or grade it with --package NAME."
+        )
+    manifest = MANIFEST if only.path == "." else f"{only.path}/{MANIFEST}"
+    return (
+        f"Rename to {wanted.name} (<name>{brief(name)}</name> in {brief(manifest)}, line {named[1]}; "
+        f'then in project(…) and each pkg="…"), '
+        f"or grade it with --package {shlex.quote(brief(name))}."
+    )
+
+
+def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:
+    """What students do to a package so that it is there and cannot be seen."""
+    links = [path for path in git_links if path.rpartition("/")[2].casefold() == wanted.casefold()]
+    if not links and not _has_files(root):
+        links = list(git_links)
+    if links:
+        path = printable(links[0])
+        return (
+            f"{path} is only a pointer to another repository, its files are not in this one: "
+            f"delete {path}/.git, `git rm --cached {path}`, `git add {path}`, commit and push."
+        )
+    for folder in walk(root, tolerant=True):
+        folder.folders[:] = [name for name in folder.folders if name not in NO_CONTENT]
+        files = {entry.name for entry in folder.others}
+        if MANIFEST in files and manifest_name(root / folder.path, root=root) == wanted:
+            return _hidden_place(folder.path)
+        for entry in folder.others:
+            if entry.name == wanted and entry.is_symlink():
+                return f"{printable(folder.inside(wanted))} is a link: hand in the folder itself."
+        packed = [entry.name for entry in folder.others if is_archive_name(entry.name)]
+        if packed and folder.path == ".":
+            return f"{printable(packed[0])} lies here: unpack it, or give that file."
+    return ""
+
+
+def _hidden_place(path: str) -> str:
+    parts = path.split("/")
+    made = next((part for part in parts if part in BUILD_SPACES or part.startswith(".")), None)
+    if made:
+        return (
+            f"{printable(path)} is only a copy in {printable(made)}/: hand in the package itself, from src/."
+        )
+    return f"{printable(path)} lies below another {MANIFEST}, where catkin never looks: move it out."
+
+
+def _has_files(root: Path) -> bool:
+    for folder in walk(root, tolerant=True):
+        folder.folders[:] = [name for name in folder.folders if name not in NO_CONTENT]
+        if folder.others:
+            return True
+    return False
