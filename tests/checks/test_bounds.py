@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 
 from grader.arena.limits import RunLimits
-from grader.checks.build import _first_error
+from grader.checks.support.build_errors import first_error
 from grader.checks.support.console_output import console_log, printed_lines, printed_times
 from grader.checks.support.exit_causes import _refused_name, tracebacks
 from grader.checks.support.launch import died, finished, name_pattern, refusal
@@ -16,6 +16,7 @@ from grader.checks.support.processes import lives
 from grader.checks.support.text import NAMES_MAX, near_names
 from grader.evidence.events import ConsoleLine, ProcessEvent
 from grader.evidence.run import Run
+from grader.judging.facts import NO_PACKAGE
 from grader.model.package import LaunchNode
 
 LINE_CHARS = 4096
@@ -70,7 +71,7 @@ def test_words_of_roslaunch(part: str) -> None:
 @pytest.mark.full
 @pytest.mark.parametrize("part", ["a", "aError", "a:1:", "CMake Error at a", "Error", "error "])
 def test_errors_of_a_build(part: str) -> None:
-    assert cpu_s_of(lambda: _first_error(lines_of(part))) < CPU_S
+    assert cpu_s_of(lambda: first_error(lines_of(part), NO_PACKAGE)) < CPU_S
 
 
 @pytest.mark.full

@@ -50,7 +50,7 @@ def test_result_has_exactly_the_fixed_keys_in_order():
     assert list(data["criteria"][0]) == CRITERION_KEYS
     assert list(data["submission"]) == ["id", "source", "commit", "digest", "package"]
     assert data["criteria"][1]["citations"] == [
-        {"file": "src/numeric_talker.py", "line": 17, "column": None, "source": ""},
+        {"file": "src/numeric_talker.py", "line": 17},
         {
             "evidence": "real.mcap",
             "topic": "/chatter",
