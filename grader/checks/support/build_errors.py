@@ -120,15 +120,16 @@ def _goes_on(words: Sequence[str]) -> bool:
     return words[-1].endswith(":") or (words[:3] == ["The", "source", "directory"] and words[-1][-1] != ".")
 
 
-def _missing_package(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
+def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequence[str]) -> Explained:
     name = found[1]
-    if name in known_packages():
+    near = get_close_matches(name, (*ALWAYS_THERE, *known_packages()), 1, ONE_EDIT)
+    declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
+    if name in known_packages() or (name in declared and not near):
         return Explained(
             f"it needs the package {name}, which this grading machine lacks",
             install_hint(name, lines),
             of_machine=True,
         )
-    near = get_close_matches(name, (*ALWAYS_THERE, *known_packages()), 1, ONE_EDIT)
     meant = f"write {near[0]}" if near else "correct its name or remove it"
     hint = (
         f"{meant} in find_package(…) and in package.xml; a package of your own must be pushed with this one"
