@@ -205,7 +205,7 @@ def next_look_s(live: RunState, until: Until, now_s: float) -> float:
     """Return how long nothing can change by time alone."""
     until = _patient(live, until)
     looks = [live.started_s + until.limit_s, live.started_s + until.first_message_s]
-    looks += [live.last_start_s + until.first_message_s]
+    looks += [live.last_start_s + until.silent_s + live.lost_s]
     for seen in live.topics.values():
         looks += [
             seen.first_s + (until.window_s or 0),
@@ -295,7 +295,8 @@ def _heard(live: RunState, until: Until, now_s: float) -> bool:
 
 def _is_starting(live: RunState, until: Until, now_s: float) -> bool:
     """Return whether a process may yet become a node: on a busy machine, its imports alone can take many seconds."""
-    return bool(live.running - live.registered) and now_s <= live.last_start_s + until.first_message_s
+    patience_s = until.silent_s + live.lost_s
+    return bool(live.running - live.registered) and now_s <= live.last_start_s + patience_s
 
 
 def _silent(live: RunState, until: Until, now_s: float) -> str:

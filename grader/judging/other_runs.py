@@ -110,14 +110,14 @@ def judged_on_copy(
 
 
 def concerns(repair: Repair, criterion: Criterion, rubric: Rubric, verdict: Verdict, *, built: bool) -> bool:
-    """Return whether the criterion may depend on what was repaired: its files cite it, or its run uses the file.
+    """Return whether the criterion may depend on what was repaired: it cites the file, or its run uses it. What the
+    files of the build lack stays lost, though: the criteria of these files ask for just that.
 
     `built` is whether the package was built without the repair, or not even with it.
     """
     if criterion.scenario is not None:
         return is_used_by(rubric.scenarios[criterion.scenario], repair, rubric, built=built)
-    cited = any(getattr(citation, "file", None) == repair.file for citation in verdict.citations)
-    return cited or repair.kind in EVERYWHERE
+    return repair.kind == "package-name" or (repair.kind not in OF_BUILDS and _cites(verdict, repair))
 
 
 def is_used_by(scenario: Scenario, repair: Repair, rubric: Rubric, *, built: bool) -> bool:
@@ -146,19 +146,32 @@ def _charges(
     better: Collection[str],
     needs: Mapping[str, tuple[Repair, ...]],
 ) -> dict[Repair, set[str]]:
-    """Return for each repair the criterion that asks for what was wrong: by its name where a name was wrong, else the
-    first that failed by itself. What others require comes first."""
+    """Return for each repair the criterion that asks for what was wrong: one of the files, else by its name where a
+    name was wrong, else the first that failed by itself. What others require comes first."""
     charges: dict[Repair, set[str]] = {}
     by_id = {c.id: c for c in rubric.criteria}
     order = TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order()
     criteria = [by_id[name] for name in order if name in better]
     for repair in dict.fromkeys(one for repairs in needs.values() for one in repairs):
+        asking = [c.id for c in rubric.criteria if c.scenario is None and _asks_for(first[c.id], repair)]
+        if asking:
+            charges[repair] = {asking[0]}
+            continue
         possible = [c for c in criteria if repair in needs[c.id]]
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
         failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
         counting = [c for c in (*named, *failing, *possible) if c.points > 0]
         charges[repair] = {counting[0].id} if counting else set()
     return charges
+
+
+def _cites(verdict: Verdict, repair: Repair) -> bool:
+    return any(getattr(citation, "file", None) == repair.file for citation in verdict.citations)
+
+
+def _asks_for(verdict: Verdict, repair: Repair) -> bool:
+    """Return whether a criterion of the files is lost by what was repaired."""
+    return verdict.status.is_lost and verdict.status is not Status.BLOCKED and _cites(verdict, repair)
 
 
 def _names(criterion: Criterion, repair: Repair) -> bool:

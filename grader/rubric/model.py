@@ -111,7 +111,7 @@ class Until(Record):
     A run gives up when no message came within `first_message_s`, when all that is waited for has been silent for
     `silent_s`, when nothing in the graph has changed for the longer of the two while a connection is waited for, or
     after `limit_s`. `alive_s`, silence and quiet do not count while a process may still become a node: until it is one,
-    or `first_message_s` after its start. Where others fill the machine, `first_message_s` and `limit_s` are longer by
+    or `silent_s` after its start. Where others fill the machine, this, `first_message_s` and `limit_s` are longer by
     what they take. With no condition at all it is watched for `limit_s`.
     """
 

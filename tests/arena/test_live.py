@@ -84,9 +84,9 @@ def test_a_process_that_is_no_node_yet_is_waited_for(
     done = find_outcome(live, until, now_s)
     assert done is not None
     assert done[0] == outcome
-    live.running, live.last_start_s = {"node", "late"}, 2.0
+    live.running, live.last_start_s = {"node", "late"}, 6.0
     assert find_outcome(live, until, now_s) is None
-    assert find_outcome(live, until, 2.1 + until.first_message_s) is not None
+    assert find_outcome(live, until, 6.1 + until.silent_s) is not None
 
 
 def test_what_is_sent_has_longer_to_be_printed_where_others_fill_the_machine() -> None:
