@@ -180,7 +180,7 @@ class Attack(Record):
     after: Literal["none", "static", "full"] = "none"
     machine_mb: int | None = None
     installed: bool = False
-    wall_s: Annotated[float, Field(gt=0, le=200)] = 45
+    wall_s: Annotated[float, Field(gt=0, le=200)] = 150
     finding: str | None = None
 
     @property
