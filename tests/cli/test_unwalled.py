@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
 
 import pytest
@@ -19,7 +20,7 @@ COMMANDS = {
     "grade": (["grade", SOLUTION, "--rubric", LAB, "--out", "o"], GRADE),
     "check": (["check", SOLUTION, "--rubric", LAB], GRADE),
     "ci": (["ci", "gitlab"], GRADE),
-    "batch": (["batch", "roster.csv", "--rubric", LAB, "--out", "o"], "grader.classes.batch.run.run_batch"),
+    "batch": (["batch", "roster.csv", "--rubric", LAB, "--out", "o"], "grader.cli.batches.run_batch"),
     "record": (["record", SOLUTION, "--rubric", LAB, "--out", "o"], "grader.pipeline.record"),
     "rubric new": (["rubric", "new", "--from", SOLUTION], "grader.authoring.propose.propose_rubric"),
     "rubric test": (["rubric", "test", LAB], "grader.cli.mutants.run_test"),
@@ -28,7 +29,12 @@ COMMANDS = {
 
 @pytest.fixture
 def _begins(tmp_path: Path, monkeypatch) -> None:
-    """Nothing is graded: what begins then says so."""
+    """Nothing is graded: what begins then says so.
+
+    What takes these functions' names at its import is imported before, or it would keep the stand-ins for later tests.
+    """
+    for module in ("grader.cli.batches", "grader.cli.mutants", "grader.authoring.propose"):
+        importlib.import_module(module)
 
     def begin(*_args: object, **_more: object) -> None:
         raise HostError("it has begun")
