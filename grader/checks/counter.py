@@ -212,7 +212,8 @@ def _wrong(count: Count, found: Wrong, params: StepParams) -> Verdict | None:
         kinds: dict[float, str] = {0: "repeats a value", -1: "goes back"}
         message = join_words(dict.fromkeys(kinds.get(s.change, "skips values") for s in found.own))
     hint = "add one to the counter in one place only, once in each turn of the loop"
-    return failed(f"the counter {message}: {place}", hint=hint)
+    verdict = failed(f"the counter {message}: {place}", hint=hint)
+    return verdict.once() if count.is_single(found.own) else verdict
 
 
 def _flooded(skips: int, params: StepParams) -> Verdict:

@@ -53,6 +53,8 @@ def seen_twice(
         elif one.timing and other.status.is_lost:
             update = {"citations": one.citations + other.citations}
             verdicts[criterion.id] = one.model_copy(update=update)
+        elif one.timing and other.status.is_open:
+            verdicts[criterion.id] = other
     return verdicts
 
 

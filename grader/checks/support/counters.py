@@ -100,6 +100,10 @@ class Count(Record):
             return False
         return (step.to_ns - step.from_ns) / self.period_ns / jump >= LOST_GAP_SHARE
 
+    def is_single(self, steps: Sequence[Step]) -> bool:
+        """Return whether these are jumps that one run's timing could have made: few, and none that comes again."""
+        return all(s.change > 1 and not self._comes_again(s) for s in steps)
+
     def _comes_again(self, step: Step) -> bool:
         same = self._pairs[step.before, step.after]
         return same > 1 or self._jumps > SYSTEMATIC_SHARE * len(self.steps) + 1
@@ -271,7 +275,10 @@ def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: Wra
     if whose == "lost":
         message = f"values of {params.topic} were lost around the wrap, with a gap in time"
         return inconclusive(message, hint="grade again while the machine has less to do")
-    return failed(bad_turn_message(step, turns, params), hint=params.reset_hint)
+    verdict = failed(bad_turn_message(step, turns, params), hint=params.reset_hint)
+    in_range = params.minimum <= step.after <= params.maximum
+    alone = in_range and sum(_is_bad(s, params) for s in turns) == 1 and any(_is_good(s, params) for s in turns)
+    return verdict.once() if alone else verdict
 
 
 def whose_turn(step: Step, count: Count, run: Run, params: WrapParams) -> Literal["program", "flood", "lost"]:
@@ -337,7 +344,8 @@ def _silent(count: Count, run: Run, package: PackageFacts, params: WrapParams) -
     found = [t for one in lives(run) for t in process_tracebacks(run, one.name)]
     cause = f": {explain_traceback(found[-1], package).cause}" if found else ""
     message = f"the node stops publishing after {significant(count.values[-1])}, while it lives on{cause}"
-    return failed(message, hint=params.reset_hint)
+    verdict = failed(message, hint=params.reset_hint)
+    return verdict if found else verdict.once()
 
 
 def _too_few(count: Count, good: list[Step], run: Run, params: WrapParams) -> Verdict:
