@@ -196,7 +196,9 @@ def _bursts(found: Rhythm, outside: list[int], even: bool, params: RateParams) -
     share = f"{len(outside)} of {len(found.gaps_ns)} gaps are far from {1 / params.rate_hz:g} s"
     kind = "in bursts" if found.comes_in_bursts else "unevenly"
     message = f"{params.topic} comes {kind}: {hertz(found.mean_hz)} on average, but {share}"
-    return failed(message, hint="publish one message in each turn of the loop, and sleep once in each turn").once()
+    return failed(
+        message, hint="publish one message in each turn of the loop, and sleep once in each turn"
+    ).once()
 
 
 def _wrong_mean(found: Rhythm, params: RateParams) -> Verdict:

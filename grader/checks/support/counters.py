@@ -277,7 +277,9 @@ def _bad_turn(step: Step, turns: list[Step], count: Count, run: Run, params: Wra
         return inconclusive(message, hint="grade again while the machine has less to do")
     verdict = failed(bad_turn_message(step, turns, params), hint=params.reset_hint)
     in_range = params.minimum <= step.after <= params.maximum
-    alone = in_range and sum(_is_bad(s, params) for s in turns) == 1 and any(_is_good(s, params) for s in turns)
+    alone = (
+        in_range and sum(_is_bad(s, params) for s in turns) == 1 and any(_is_good(s, params) for s in turns)
+    )
     return verdict.once() if alone else verdict
 
 
