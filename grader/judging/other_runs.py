@@ -19,7 +19,7 @@ from grader.model.verdict import Status, Verdict, failed
 from grader.rubric.model import Criterion, Rubric, Scenario
 from grader.wording import join_words
 
-PACKAGE_RUN, REPAIRS = "package", "repairs"
+PACKAGE_RUN, REPAIRS, BUILD = "package", "repairs", "build"
 NAMES = {"topic-name", "node-name", "parameter-name", "file-name", "package-name", "launch-type"}
 OF_BUILDS = {"build-line", "manifest-line"}
 """These explain nothing but the build and the files, unless something is run that the build makes."""
@@ -131,8 +131,8 @@ def concerns(
     *,
     built: bool,
 ) -> bool:
-    """Return whether the criterion may depend on what was repaired: its run uses it, or it or what blocks it cites the
-    file. What the files of the build lack stays lost, though: the criteria of these files ask for just that.
+    """Return whether the criterion may depend on what was repaired: its run or build uses it, or it, or what blocks it,
+    cites the file. What the files of the build lack stays lost, though: the criteria of these files ask for just that.
 
     `found` is what each criterion came to without the repair, `built` whether what is run was built without it, or
     needs no build.
@@ -140,6 +140,8 @@ def concerns(
     if criterion.scenario is not None:
         return is_used_by(rubric.scenarios[criterion.scenario], repair, rubric, built=built)
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
+        return True
+    if criterion.check == BUILD and repair.kind in OF_BUILDS:
         return True
     if found[criterion.id].blocked_by:
         return any(_asks_for(found[name], repair) for name in criterion.requires)
