@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from grader.checks.build import CATKIN_MAKE
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
-from grader.model.repair import Repair, place_of
+from grader.model.repair import Repair, advice_of, place_of
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import Status, Verdict, failed
 from grader.rubric.model import Criterion, Rubric, Scenario
@@ -242,7 +242,7 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
         verdict = failed(
             message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
         )
-    return verdict.model_copy(update={"hint": "; ".join(f"{place_of(one)}: {one.fix}" for one in repairs)})
+    return verdict.model_copy(update={"hint": "; ".join(advice_of(one) for one in repairs)})
 
 
 def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:

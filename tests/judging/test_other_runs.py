@@ -157,6 +157,13 @@ def test_a_line_of_the_build_costs_the_build_alone_where_scripts_are_run() -> No
     assert (found["chatter"].points, found["rate"].points) == (0, 10)
 
 
+def test_a_line_that_is_missing_is_added_below_its_neighbour() -> None:
+    spin = TABS.model_copy(
+        update={"before": "import rospy", "after": "import rospy\nimport sys", "fix": "import sys"}
+    )
+    assert judged(DIED, GOOD_RUN, spin)["node"].hint == "src/numeric_talker.py: below line 7 add import sys"
+
+
 def test_a_criterion_that_passes_on_the_copy_needs_no_hint() -> None:
     found = judged(DIED, GOOD_RUN, TABS)
     assert (found["rate"].status.value, found["rate"].hint) == ("partial", "")
