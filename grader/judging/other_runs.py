@@ -23,6 +23,8 @@ NAMES = {"topic-name", "node-name", "parameter-name", "file-name", "package-name
 EVERYWHERE = {"build-line", "manifest-line", "package-name"}
 OF_BUILDS = {"build-line", "manifest-line"}
 """These explain nothing but the build and the files, where the package as handed in was built."""
+OF_STARTS = {"executable-bit", "shebang", "launch-type"}
+"""A script that another one imports needs none of these."""
 SHARES = {1.0: "all", 0.5: "half"}
 
 Runs = dict[str, Run]
@@ -104,7 +106,7 @@ def judged_on_copy(
         charged = tuple(one for one in needed if criterion.id in charges.get(one, ()))
         share = min(rubric.share_of(one.kind) for one in needed)
         if charged:
-            verdicts[criterion.id] = _charge(verdict, copy, charged[0])
+            verdicts[criterion.id] = _charge(verdict, copy, charged)
         else:
             verdicts[criterion.id] = _share(copy, needed, share)
         uses[criterion.id] = Repaired(repairs=charged or needed, share=share, charged=bool(charged))
@@ -130,6 +132,8 @@ def is_used_by(scenario: Scenario, repair: Repair, rubric: Rubric, *, built: boo
         return True
     name = PurePosixPath(repair.file).name
     started = {PurePosixPath(s.script).name for s in scenario.start if s.script}
+    if repair.kind in OF_STARTS:
+        return name in started
     every = {PurePosixPath(s.script).name for one in rubric.scenarios.values() for s in one.start if s.script}
     return name in started or name not in every
 
@@ -138,7 +142,8 @@ def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], crit
     """Return whether the copy shows no more of a lost criterion than the package as it is."""
     one, copy = first[criterion.id], on_copy[criterion.id]
     if copy.status.is_lost and copy.score <= one.score:
-        return not one.unjudged or copy.unjudged
+        another = copy.cause not in {"", one.cause}
+        return not one.unjudged or (copy.unjudged and not another)
     return copy.status is Status.ERROR
 
 
@@ -193,19 +198,21 @@ def _texts(value: object) -> Iterator[str]:
             yield from _texts(item)
 
 
-def _charge(verdict: Verdict, copy: Verdict, repair: Repair) -> Verdict:
-    """Return the loss, with the repair that was seen to help as its hint."""
+def _charge(verdict: Verdict, copy: Verdict, repairs: tuple[Repair, ...]) -> Verdict:
+    """Return the loss, with the repairs that were seen to help as its hint."""
     if verdict.status is Status.BLOCKED:
+        message = "; ".join(repair.message for repair in repairs)
         verdict = failed(
-            repair.message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
+            message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
         )
-    return verdict.model_copy(update={"hint": f"{place_of(repair)}: {repair.fix}"})
+    return verdict.model_copy(update={"hint": "; ".join(f"{place_of(one)}: {one.fix}" for one in repairs)})
 
 
 def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:
-    where = join_words([place_of(repair) for repair in repairs])
+    where = join_words(dict.fromkeys(place_of(repair) for repair in repairs))
     earned = SHARES.get(share, f"{share:.0%}")
     score = copy.score * share
     status = Status.PARTIAL if share < 1 and copy.status is Status.PASS else copy.status
-    message = f"judged on a copy with {where} repaired: {earned} of the points; {copy.message}"
+    share_words = f": {earned} of the points" if copy.score > 0 else ""
+    message = f"judged on a copy with {where} repaired{share_words}; {copy.message}"
     return copy.model_copy(update={"status": status, "score": score, "message": message})

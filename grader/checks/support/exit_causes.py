@@ -19,6 +19,10 @@ from grader.wording import seconds
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
 RACE = "publish() to a closed topic"
+ROS_2 = {"rclpy", "rclcpp", "ament_index_python", "launch_ros", "ros2cli", "rosidl_runtime_py"}
+ARGUMENT_HINT = (
+    "give the value in the code, or take a default where `len(sys.argv)` is 1: a lab starts it by its name"
+)
 LIMITS = ("limit", "note")  # evidence of earlier versions has it as a note
 CAUSES = {
     "EOFError": ("it asks for input (`input()`), and a node is given none", "remove `input()`: a node runs by itself"),
@@ -30,6 +34,7 @@ CAUSES = {
      "loop with `while not rospy.is_shutdown():` and sleep with `rospy.Rate`"),
     "ModuleNotFoundError": ("", "check the spelling of the import; a message package is imported as `std_msgs.msg`"),
     "ImportError": ("", "check the spelling of the import: the message types are at http://wiki.ros.org/std_msgs"),
+    "ResourceNotFound": ("there is no such ROS package", "remove `roslib.load_manifest(…)`: catkin needs no such line"),
     "NameError": ("", "check the spelling, and that it is imported or assigned before it is used"),
     "ROSSerializationException": ("", "publish a value that fits the message's type"),
     "SerializationError": ("", "publish a value that fits the message's type"),
@@ -63,8 +68,11 @@ _LIBRARY = ("/dist-packages/", "/site-packages/", "/usr/lib/python", "<frozen", 
 
 
 class Frame(NamedTuple):
+    """A line of a file, and its source where Python printed it."""
+
     file: str
     line: int
+    source: str = ""
 
     @property
     def in_library(self) -> bool:
@@ -104,6 +112,8 @@ def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
         elif frame and (first is not None or bare[index]):
             first = index if first is None else first
             frames.append(Frame(frame[1], int(frame[2])))
+        elif frames and not frames[-1].source and line.startswith("    "):
+            frames[-1] = frames[-1]._replace(source=line.strip())
         elif first is not None and line and not line[0].isspace():
             last = _LAST.match(line)
             if last:
@@ -140,7 +150,8 @@ class Ending(NamedTuple):
         """Return a verdict of this kind (`failed`, `unjudged`) with the ending's hint and citations, or
         `inconclusive` where the machine is at fault."""
         kind = inconclusive if self.of_machine else kind
-        return kind(message, measured=measured, hint=self.hint, citations=self.citations)
+        verdict = kind(message, measured=measured, hint=self.hint, citations=self.citations)
+        return verdict.model_copy(update={"cause": self.cause})
 
 
 def explain_early_end(package: PackageFacts, run: Run) -> Ending | None:
@@ -202,7 +213,7 @@ def _refused_name(life: Life, run: Run) -> Ending | None:
 def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     """One traceback, with the line of the student's own file where it names one."""
     place = _place(found, package)
-    slip = next((known for said, known in SLIPS.items() if said in found.message), None)
+    slip = _slip(found)
     cause, hint = slip or CAUSES.get(found.kind, ("", "fix the line that is named"))
     if lacking := _lacking(found, package):
         where = f" ({place.file}, line {place.line})" if place else ""
@@ -217,12 +228,27 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     return Ending(text, hint, (place,) if place else ())
 
 
+def _slip(found: Traceback) -> tuple[str, str] | None:
+    """Return the cause and the hint of a known slip, by what was said, by the module and by the line itself."""
+    if known := next((known for said, known in SLIPS.items() if said in found.message), None):
+        return known
+    module = _NO_MODULE.search(found.message)
+    if module and module[1] in ROS_2:
+        return f"{module[1]} is of ROS 2", "this lab is for ROS 1: write the node with rospy"
+    source = found.own_frames[-1].source if found.own_frames else ""
+    if found.kind == "IndexError" and "argv" in source:
+        return "it reads an argument of the command line, and is started without any", ARGUMENT_HINT
+    return None
+
+
 def _lacking(found: Traceback, package: PackageFacts) -> str:
     """Return the module that exists and that this machine lacks; "" for a name that is the student's own affair."""
     match = _NO_MODULE.search(found.message) if found.kind == "ModuleNotFoundError" else None
-    name = match[1] if match else ""
+    # roslib.load_manifest, which rosbuild needed, asks for the ROS package itself
+    name = found.message if found.kind == "ResourceNotFound" else match[1] if match else ""
     own = {package.name, *(f.path.rpartition("/")[2].removesuffix(".py") for f in package.files)}
-    return name if name in known_packages() and name not in own else ""
+    declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
+    return name if name not in own and (name in known_packages() or name in declared) else ""
 
 
 def process_tracebacks(
