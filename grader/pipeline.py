@@ -277,6 +277,8 @@ def record_other_runs(
         recorder.repeat(doubtful, evidence / copies.REPEATED)
     if scenarios:
         with copies.repaired_copy(submission, repairs) as copy:
+            if copy is None:
+                return bool(doubtful)
             again = make_recorder(
                 copy,
                 read_facts(copy, Silence()),

@@ -13,19 +13,17 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from grader.files import temporary_folder
-from grader.judging.other_runs import is_used_by
+from grader.judging.other_runs import DONE_BEFORE_RUNS, is_used_by
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress, Silence, StepState
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
 from grader.model.submission import Submission
-from grader.package.repairs import apply_repair, find_repairs, wanted_of
+from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
 from grader.rubric.model import Rubric
 
 REPAIRED, REPEATED = "repaired-1", "repeated-1"
 REPAIRS_MAX = 4
-DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding"}
-"""The arena repairs these in whatever it runs, so they alone are no reason for a copy."""
 
 
 def choose_repairs(
@@ -57,8 +55,9 @@ def choose_repairs(
 
 
 @contextmanager
-def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator[Submission]:
-    """Return the submission with a repaired copy of its package, there for as long as the block runs."""
+def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator[Submission | None]:
+    """Return the submission with a repaired copy of its package, there for as long as the block runs; None where a file
+    turns out to be none that can be repaired."""
     package = submission.package
     with temporary_folder("repaired") as folder:
         copy = folder / package.folder.name
@@ -67,7 +66,11 @@ def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator
         )
         executable = dict(package.executable)
         for repair in repairs:
-            apply_repair(copy, repair)
+            try:
+                apply_repair(copy, repair)
+            except (NotRepairable, OSError):
+                yield None
+                return
             if repair.kind == "executable-bit":
                 executable[repair.file] = True
             elif repair.kind == "file-name" and repair.before in executable:

@@ -23,8 +23,8 @@ NAMES = {"topic-name", "node-name", "parameter-name", "file-name", "package-name
 EVERYWHERE = {"build-line", "manifest-line", "package-name"}
 OF_BUILDS = {"build-line", "manifest-line"}
 """These explain nothing but the build and the files, where the package as handed in was built."""
-OF_STARTS = {"executable-bit", "shebang", "launch-type"}
-"""A script that another one imports needs none of these."""
+DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding"}
+"""The arena repairs these in whatever it starts itself, so there they are no reason for a loss."""
 SHARES = {1.0: "all", 0.5: "half"}
 
 Runs = dict[str, Run]
@@ -121,7 +121,11 @@ def concerns(repair: Repair, criterion: Criterion, rubric: Rubric, verdict: Verd
     """
     if criterion.scenario is not None:
         return is_used_by(rubric.scenarios[criterion.scenario], repair, rubric, built=built)
-    return repair.kind == "package-name" or (repair.kind not in OF_BUILDS and _cites(verdict, repair))
+    if repair.kind == "package-name":
+        return _cites(verdict, repair) or bool(
+            (_words(repair.before) - _words(repair.after)) & _words(verdict.message)
+        )
+    return repair.kind not in OF_BUILDS and _cites(verdict, repair)
 
 
 def is_used_by(scenario: Scenario, repair: Repair, rubric: Rubric, *, built: bool) -> bool:
@@ -132,8 +136,8 @@ def is_used_by(scenario: Scenario, repair: Repair, rubric: Rubric, *, built: boo
         return True
     name = PurePosixPath(repair.file).name
     started = {PurePosixPath(s.script).name for s in scenario.start if s.script}
-    if repair.kind in OF_STARTS:
-        return name in started
+    if repair.kind in {*DONE_BEFORE_RUNS, "launch-type"}:
+        return False
     every = {PurePosixPath(s.script).name for one in rubric.scenarios.values() for s in one.start if s.script}
     return name in started or name not in every
 
@@ -183,8 +187,12 @@ def _asks_for(verdict: Verdict, repair: Repair) -> bool:
 
 def _names(criterion: Criterion, repair: Repair) -> bool:
     """Return whether the criterion asks for the name that the repair puts in place."""
-    new = set(re.findall(r"[\w.-]+", repair.after)) - set(re.findall(r"[\w.-]+", repair.before))
+    new = _words(repair.after) - _words(repair.before)
     return any(text.strip("/").rpartition("/")[2] in new for text in _texts(criterion.parameters))
+
+
+def _words(text: str) -> set[str]:
+    return set(re.findall(r"[\w.-]+", text))
 
 
 def _texts(value: object) -> Iterator[str]:
