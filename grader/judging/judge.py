@@ -17,7 +17,7 @@ from grader.judging.facts import Facts, try_facts
 from grader.judging.other_runs import judged_on_copy, repairs_of, seen_twice, split_runs, was_built
 from grader.judging.summary import round_half_up
 from grader.model.result import CriterionResult, Repaired
-from grader.model.verdict import Status, Verdict, inconclusive
+from grader.model.verdict import Citation, FileCitation, Status, Verdict, inconclusive
 from grader.rubric.model import Criterion, Rubric
 
 MANUAL = "manual"
@@ -166,9 +166,14 @@ class Requirements:
         beside = (
             found.cause not in {"", verdict.cause} and self._criteria[required].scenario == criterion.scenario
         )
-        if beside and not set(verdict.citations) & set(found.citations):
+        if beside and not _lines(verdict) & _lines(found):
             return False
         return verdict.status.is_lost and (verdict.unjudged or not repaired)
+
+
+def _lines(verdict: Verdict) -> set[Citation]:
+    """Return the lines of files that the verdict cites."""
+    return {one for one in verdict.citations if isinstance(one, FileCitation) and one.line is not None}
 
 
 def _cause(verdict: Verdict) -> str:
