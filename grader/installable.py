@@ -1,4 +1,4 @@
-"""ROS packages and Python modules that exist but need not be on the grading machine: then the machine lacks them."""
+"""ROS packages, Python modules and messages that exist but need not be on the grading machine: then the machine lacks them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from pathlib import Path
 
 _TABLE = Path(__file__).with_name("installable.txt")
 PIP = "pip:"
+ON_THE_MACHINE = "on the grading machine: "
+"""How every hint begins that only who keeps the machine can follow: grading again changes nothing before."""
 _PREFIX = re.compile(r"/opt/ros/([a-z]+)\b")
 
 
@@ -19,6 +21,15 @@ def known_packages() -> dict[str, tuple[str, ...]]:
     rows = _TABLE.read_text(encoding="utf-8").splitlines()
     words = (row.split() for row in rows if row and not row.startswith("#"))
     return {name: tuple(rest) for name, *rest in words}
+
+
+@cache
+def known_messages() -> tuple[str, ...]:
+    """Return the names of ROS Noetic's own message types (`sensor_msgs/JointState`)."""
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - hundreds of types, for a rare mistake
+
+    names = get_typestore(Stores.ROS1_NOETIC).fielddefs
+    return tuple(name.replace("/msg/", "/") for name in names if "/msg/" in name)
 
 
 def install_hint(name: str, lines: Iterable[str] = ()) -> str:
@@ -33,4 +44,4 @@ def install_hint(name: str, lines: Iterable[str] = ()) -> str:
         what = f"apt-get install {' '.join(packages)}"
     else:
         what = f"apt-get install ros-{ros or 'noetic'}-{name.replace('_', '-')}, from ROS's own repository"
-    return f"on the grading machine: {what}, then grade again"
+    return f"{ON_THE_MACHINE}{what}, then grade again"

@@ -177,6 +177,8 @@ def _charges(
 
 
 def _cites(verdict: Verdict, repair: Repair) -> bool:
+    if repair.kind == "executable-bit" and repair.fix not in verdict.hint:
+        return False  # the build installs what runs the script, bit or not
     return any(getattr(citation, "file", None) == repair.file for citation in verdict.citations)
 
 
@@ -213,6 +215,8 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: tuple[Repair, ...]) -> Ver
         verdict = failed(
             message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
         )
+    if copy.status.is_lost and verdict.hint:
+        return verdict  # the repair brings up another fault, so it is not the advice
     return verdict.model_copy(update={"hint": "; ".join(f"{place_of(one)}: {one.fix}" for one in repairs)})
 
 

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 from grader.checks.support.processes import Life, early_end, lives
 from grader.checks.support.scripts import path_in_package
-from grader.checks.support.text import shown
+from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
-from grader.installable import install_hint, known_packages
+from grader.installable import install_hint, known_messages, known_packages
 from grader.model.package import PackageFacts
 from grader.model.verdict import FileCitation, Verdict, inconclusive
-from grader.wording import seconds
+from grader.wording import join_words, seconds
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
@@ -61,6 +61,7 @@ _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
 _NO_MODULE = re.compile(r"No module named '(\w+)'$")
+_NO_TYPE = re.compile(r"cannot import name '(\w+)' from '(\w+)\.msg'")
 HEADING = "Traceback (most recent call last):"
 _FRAME = re.compile(r'^\s+File "([^"]+)", line (\d+)')
 _LAST = re.compile(r"^([A-Za-z_][\w.]*)(?:: ?(.*))?$")
@@ -232,6 +233,8 @@ def _slip(found: Traceback) -> tuple[str, str] | None:
     """Return the cause and the hint of a known slip, by what was said, by the module and by the line itself."""
     if known := next((known for said, known in SLIPS.items() if said in found.message), None):
         return known
+    if wrong := _NO_TYPE.match(found.message):
+        return _other_types(wrong[1], wrong[2])
     module = _NO_MODULE.search(found.message)
     if module and module[1] in ROS_2:
         return f"{module[1]} is of ROS 2", "this lab is for ROS 1: write the node with rospy"
@@ -239,6 +242,17 @@ def _slip(found: Traceback) -> tuple[str, str] | None:
     if found.kind == "IndexError" and "argv" in source:
         return "it reads an argument of the command line, and is started without any", ARGUMENT_HINT
     return None
+
+
+def _other_types(name: str, package: str) -> tuple[str, str] | None:
+    """Return which packages of ROS have the message, or what the one that was asked has that is spelt alike."""
+    pairs = [one.split("/") for one in known_messages()]
+    having = [other for other, message in pairs if message == name]
+    near = near_names(name, [message for other, message in pairs if other == package])
+    if having:
+        lines = join_words([f"from {other}.msg import {name}" for other in having], "or")
+        return f"{package} has no {name}, {join_words(having)} has", lines
+    return (f"{package} has {near[0]}", f"from {package}.msg import {near[0]}") if near else None
 
 
 def _lacking(found: Traceback, package: PackageFacts) -> str:
