@@ -1,4 +1,4 @@
-"""ROS packages, Python modules and messages that exist but need not be on the grading machine: then the machine lacks them."""
+"""ROS packages, Python modules and messages that exist, though perhaps not on the grading machine, which then lacks them."""
 
 from __future__ import annotations
 

@@ -276,7 +276,7 @@ def record_other_runs(
     doubtful = sorted(judged.doubtful - set(scenarios))
     if doubtful:
         recorder.repeat(doubtful, evidence / copies.REPEATED)
-    if scenarios:
+    if repairs:
         with copies.repaired_copy(submission, repairs) as copy:
             if copy is None:
                 return bool(doubtful)
@@ -294,7 +294,7 @@ def record_other_runs(
                 again.record_all(lambda: None)
                 judge_recorded(again, evidence, rubric)
             recorder.recording.add(again.recording)
-    return bool(doubtful or scenarios)
+    return bool(doubtful or repairs)
 
 
 def judge_recorded(recorder: Recorder | StaticRecorder, evidence: Path, rubric: LoadedRubric) -> Judged:

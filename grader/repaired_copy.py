@@ -13,13 +13,15 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from grader.files import temporary_folder
-from grader.judging.other_runs import DONE_BEFORE_RUNS, is_used_by
+from grader.judging.other_runs import DONE_BEFORE_RUNS, concerns, is_used_by, needs_build
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress, Silence, StepState
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
 from grader.model.submission import Submission
+from grader.package.manifest import parse_manifest
 from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
+from grader.package.repairs.editing import MANIFEST, read_data
 from grader.rubric.model import Rubric
 
 REPAIRED, REPEATED = "repaired-1", "repeated-1"
@@ -36,22 +38,31 @@ def choose_repairs(
 ) -> tuple[tuple[Repair, ...], tuple[str, ...]]:
     """Return the repairs to try together, and the scenarios to run with them: those that lost a mark.
 
-    Both are empty where nothing was lost in a run, or no mechanical repair could be the reason. `built` is whether the
-    package was built as it is.
+    The copy is built even where there is nothing to run, if that could unblock a criterion of the files. There are no
+    repairs where nothing was lost in a run or blocked, or none could be the reason. `built` is whether the package was
+    built as it is.
     """
     lost = {c.scenario for c in criteria if c.status.is_lost and c.scenario is not None}
-    if not lost:
+    blocked = {c.id for c in criteria if c.blocked_by and c.scenario is None}
+    if not lost and not blocked:
         return (), ()
     found = find_repairs(submission.package.folder, facts, wanted_of(rubric))
     counting = [one for one in found if rubric.share_of(one.kind) > 0]
     chosen = [one for one in counting if one.kind not in DONE_BEFORE_RUNS][:REPAIRS_MAX]
+    built, by_id = built or not needs_build(facts), {c.id: c for c in criteria}
     scenarios = {
         name
         for name in lost
         if any(is_used_by(rubric.scenarios[name], one, rubric, built=built) for one in chosen)
     }
+    unblocks = any(
+        concerns(one, c, rubric, by_id, built=built)
+        for c in rubric.criteria
+        if c.id in blocked
+        for one in chosen
+    )
     before = [one for one in counting if one.kind in DONE_BEFORE_RUNS]
-    return ((*before, *chosen), tuple(sorted(scenarios))) if scenarios else ((), ())
+    return ((*before, *chosen), tuple(sorted(scenarios))) if scenarios or unblocks else ((), ())
 
 
 @contextmanager
@@ -75,7 +86,9 @@ def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator
                 executable[repair.file] = True
             elif repair.kind == "file-name" and repair.before in executable:
                 executable[repair.after] = executable.pop(repair.before)
-        repaired = package.model_copy(update={"folder": copy, "executable": executable})
+        manifest, _ = parse_manifest(read_data(copy, MANIFEST) or b"")
+        name = manifest.name if manifest is not None else package.name
+        repaired = package.model_copy(update={"name": name, "folder": copy, "executable": executable})
         yield submission.model_copy(update={"package": repaired})
 
 

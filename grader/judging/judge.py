@@ -14,7 +14,14 @@ from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
 from grader.judging.facts import Facts, try_facts
-from grader.judging.other_runs import judged_on_copy, repairs_of, seen_twice, split_runs, was_built
+from grader.judging.other_runs import (
+    judged_on_copy,
+    needs_build,
+    repairs_of,
+    seen_twice,
+    split_runs,
+    was_built,
+)
 from grader.judging.summary import round_half_up
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import Citation, FileCitation, Status, Verdict, inconclusive
@@ -53,9 +60,11 @@ def judge_all_runs(
         verdicts = seen_twice(rubric, verdicts, again, repeated.keys())
     uses: dict[str, Repaired] = {}
     if repaired:
-        on_copy = judge_runs(rubric, {**first, **repaired}, checks)
-        repairs, build_repaired = repairs_of(rubric, repaired), not was_built(first) and was_built(repaired)
-        verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs, built=not build_repaired)
+        copy = {**first, **repaired}
+        on_copy, repairs = judge_runs(rubric, copy, checks), repairs_of(rubric, repaired)
+        needed = needs_build(try_facts(rubric, copy).package)
+        built = not needed or was_built(first) or not was_built(repaired)
+        verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs, built=built)
     results = (result_of(c, verdicts[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
     return Judgement(tuple(results), doubtful)
 
@@ -191,7 +200,8 @@ def result_of(
     criterion: Criterion, verdict: Verdict, digits: int, repaired: Repaired | None = None
 ) -> CriterionResult:
     """Return the report's line of a criterion, with the points of its verdict."""
-    lost = verdict.status.is_lost or verdict.status is Status.INCONCLUSIVE
+    earned = repaired is not None and not repaired.charged and verdict.score >= repaired.share
+    lost = (verdict.status.is_lost or verdict.status is Status.INCONCLUSIVE) and not earned
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,

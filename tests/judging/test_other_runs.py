@@ -113,3 +113,49 @@ def test_what_was_seen_once_costs_nothing() -> None:
     assert "seen once and not again" in node.message
     (node,) = judge(rubric(alone), {**runs, "repeated-1/talker": runs["talker"]})
     assert (node.status.value, node.points) == ("fail", 0)
+
+
+def test_a_missing_call_is_charged_where_no_name_is_wrong() -> None:
+    flooded = {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 500, "rate_hz": 500}]}
+    call = TABS.model_copy(update={"kind": "missing-call", "message": "rate.sleep is named but not called"})
+    found = judged(flooded, GOOD_RUN, call, TOPIC)
+    assert found["chatter"].hint == f"src/numeric_talker.py line 9: {TOPIC.fix}"
+    assert (found["rate"].status.value, found["rate"].message) == ("fail", call.message)
+
+
+def test_two_faults_of_one_criterion_are_both_its_hint() -> None:
+    quote = TABS.model_copy(update={"line": 12, "fix": "print('x')"})
+    found = judged(DIED, GOOD_RUN, TABS, quote)
+    assert found["node"].hint == (
+        "src/numeric_talker.py line 7: indent every line with four spaces; "
+        "src/numeric_talker.py line 12: print('x')"
+    )
+
+
+def test_a_private_name_is_charged_where_the_rubric_asks_for_it() -> None:
+    private = TOPIC.model_copy(update={"before": "pub = rospy.Publisher('~chatter', String)"})
+    found = judged(DIED, GOOD_RUN, TABS, private)
+    assert (found["node"].points, found["chatter"].points) == (0, 0)
+
+
+def test_what_the_arena_repairs_before_it_runs_is_charged_to_no_run() -> None:
+    mark = Repair(
+        kind="byte-order-mark", file="src/numeric_talker.py", message="a mark", fix="save it without"
+    )
+    misspelt = {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 61}]}
+    found = judged(misspelt, GOOD_RUN, mark, TOPIC)
+    assert (found["chatter"].points, found["rate"].points) == (0, 10)
+    assert found["chatter"].repaired is not None
+    assert found["chatter"].repaired.repairs == (TOPIC,)
+
+
+def test_a_line_of_the_build_costs_the_build_alone_where_scripts_are_run() -> None:
+    line = Repair(kind="build-line", file="CMakeLists.txt", line=3, message="open", fix="close it")
+    misspelt = {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 61}]}
+    found = judged(misspelt, GOOD_RUN, line, TOPIC)
+    assert (found["chatter"].points, found["rate"].points) == (0, 10)
+
+
+def test_a_criterion_that_passes_on_the_copy_needs_no_hint() -> None:
+    found = judged(DIED, GOOD_RUN, TABS)
+    assert (found["rate"].status.value, found["rate"].hint) == ("partial", "")
