@@ -1,4 +1,4 @@
-"""ROS packages, Python modules and messages that exist, though perhaps not on the grading machine, which then lacks them."""
+"""ROS packages, Python modules and messages that exist: where the grading machine has them not, it lacks them."""
 
 from __future__ import annotations
 
