@@ -185,7 +185,8 @@ def _shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
 def _rosrun_answer(build: Run, path: str) -> str:
     """The line that tells of what `rosrun` said to the file as handed in, where the build's recording has it."""
     names = {f"rosrun {path}", f"rosrun {PurePosixPath(path).name}"}
-    lines = [c.line for _, c in build.console if c.process in names and c.line.strip()]
+    said = (c.line for _, c in build.console if c.process in names and c.line.strip())
+    lines = [line for line in said if "parsing manifest" not in line]
     telling = (line for words in TELLING for line in lines if words in line)
     answer = next(telling, lines[-1] if lines else "")
     return f"; rosrun answers: {shown(answer)}" if answer else ""

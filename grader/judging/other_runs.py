@@ -109,11 +109,11 @@ def judged_on_copy(
     }
     charges = _charges(rubric, first, better, needs)
     for criterion in rubric.criteria:
-        needed = needs[criterion.id]
+        charged = tuple(one for one in repairs if criterion.id in charges.get(one, ()))
+        needed = needs[criterion.id] or charged
         if criterion.id not in better or not needed:
             continue
         verdict, copy = first[criterion.id], on_copy[criterion.id]
-        charged = tuple(one for one in needed if criterion.id in charges.get(one, ()))
         share = min(rubric.share_of(one.kind) for one in needed) if criterion.points else 1.0
         if charged:
             verdicts[criterion.id] = _charge(verdict, copy, charged)
@@ -142,32 +142,38 @@ def concerns(
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
         wrong = _words(repair.before) - _words(repair.after)
         return bool(wrong & _words(found[criterion.id].message)) or _cites(found[criterion.id], repair)
-    blocking = found[criterion.id].blocked_by
-    if blocking:
-        return _asks_for(found[blocking], repair)
+    if found[criterion.id].blocked_by:
+        return any(_asks_for(found[name], repair) for name in criterion.requires)
     return repair.kind not in OF_BUILDS | SEEN_IN_RUNS and _cites(found[criterion.id], repair)
 
 
 def is_used_by(scenario: Scenario, repair: Repair, rubric: Rubric, *, built: bool) -> bool:
     """Return whether the scenario runs the repaired file, as far as the rubric says. A launch file may run any."""
     name, launches = PurePosixPath(repair.file).name, any(start.launch for start in scenario.start)
-    every = {PurePosixPath(s.script).name for one in rubric.scenarios.values() for s in one.start if s.script}
+    known = any(name in _started(one) for one in rubric.scenarios.values())
     if repair.kind in DONE_BEFORE_RUNS:
-        return launches and name not in every
+        return launches and not known
     if repair.kind in OF_BUILDS:
         return not built or any(start.built for start in scenario.start)
-    if launches or repair.kind == "package-name":
+    if repair.kind == "package-name" and repair.file in OF_PACKAGES:
         return True
-    started = {PurePosixPath(s.script).name for s in scenario.start if s.script}
-    return repair.kind != "launch-type" and (name in started or name not in every)
+    if name in _started(scenario):
+        return True
+    if name.endswith((".launch", ".launch.xml")):
+        return launches and not known
+    return repair.kind != "launch-type" and (launches or not known)
+
+
+def _started(scenario: Scenario) -> set[str]:
+    """The names of the files that the scenario starts."""
+    return {PurePosixPath(path).name for s in scenario.start for path in (s.script, s.launch) if path}
 
 
 def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], criterion: Criterion) -> bool:
     """Return whether the copy shows no more of a lost criterion than the package as it is."""
     one, copy = first[criterion.id], on_copy[criterion.id]
     if copy.status.is_lost and copy.score <= one.score:
-        another = copy.cause not in {"", one.cause}
-        return not one.unjudged or (copy.unjudged and not another)
+        return not one.unjudged or (copy.unjudged and copy.cause == one.cause)
     return copy.status is Status.ERROR
 
 

@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from typing import Any
 
+from grader.evidence.run import Run
 from grader.judging import judge
 from grader.judging.judge import judge_all_runs
 from grader.model.repair import Repair
@@ -159,3 +160,32 @@ def test_a_line_of_the_build_costs_the_build_alone_where_scripts_are_run() -> No
 def test_a_criterion_that_passes_on_the_copy_needs_no_hint() -> None:
     found = judged(DIED, GOOD_RUN, TABS)
     assert (found["rate"].status.value, found["rate"].hint) == ("partial", "")
+
+
+def test_a_build_that_the_manifest_blocks_is_judged_on_the_copy() -> None:
+    tag = Repair(
+        kind="manifest-line",
+        file="package.xml",
+        line=5,
+        before="<description>x",
+        after="<description>x</description>",
+        message="<description> is never closed",
+        fix="<description>x</description>",
+    )
+    asked = rubric(
+        {"id": "manifest", "check": "manifest", "with": {"name": "lab1"}},
+        {"id": "build", "check": "build", "requires": ["manifest"]},
+    )
+    fault = {"line": 9, "kind": "XMLSyntaxError", "message": "tag", "cause": "`<description>` is still open"}
+    runs = built({"manifest": None, "manifest_fault": fault}, exit_code=1)
+    assert [c.status.value for c in judge(asked, runs)] == ["fail", "blocked"]
+    copy = built({"manifest": {}}, exit_code=0)["package"]
+    about = {**copy.metadata, "repairs": json.dumps([tag.model_dump()])}
+    manifest, build = judge(asked, {**runs, "repaired-1/package": replace(copy, metadata=about)})
+    assert (manifest.points, manifest.hint) == (0, f"package.xml line 5: {tag.fix}")
+    assert (build.status.value, build.points, build.hint) == ("partial", 5, "")
+
+
+def built(package: dict[str, Any], *, exit_code: int) -> dict[str, Run]:
+    made = {"name": "catkin_make", "role": "build", "exit_s": 3, "exit_code": exit_code}
+    return build_runs({"runs": {"package": {"package": package, "processes": [made]}}})
