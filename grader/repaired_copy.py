@@ -20,7 +20,7 @@ from grader.model.repair import Repair
 from grader.model.result import CriterionResult
 from grader.model.submission import Submission
 from grader.package.manifest import parse_manifest
-from grader.package.repairs import apply_repair, find_repairs, wanted_of
+from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.editing import MANIFEST, read_data
 from grader.rubric.model import Rubric
 
@@ -63,8 +63,9 @@ def choose_repairs(
 
 
 @contextmanager
-def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator[Submission]:
-    """Return the submission with a repaired copy of its package, there for as long as the block runs."""
+def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator[Submission | None]:
+    """Return the submission with a repaired copy of its package, there for as long as the block runs; None where a file
+    turns out to be none that can be repaired."""
     package = submission.package
     with temporary_folder("repaired") as folder:
         copy = folder / package.folder.name
@@ -73,7 +74,11 @@ def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator
         )
         executable = dict(package.executable)
         for repair in repairs:
-            apply_repair(copy, repair)
+            try:
+                apply_repair(copy, repair)
+            except (NotRepairable, OSError):
+                yield None
+                return
             if repair.kind == "executable-bit":
                 executable[repair.file] = True
             elif repair.kind == "file-name" and repair.before in executable:

@@ -12,6 +12,7 @@ from grader.checks.support.exit_causes import CAUSES, SYNTAX
 from grader.checks.support.scripts import (
     PYTHON,
     add_hint,
+    can_be_moved,
     chmod_hint,
     find_script,
     installed,
@@ -31,7 +32,6 @@ RIGHT_SHEBANG = "#!/usr/bin/env python3"
 TELLING = ("Couldn't find", "import: command not found", "No such file or directory")
 UNPARSED = (*SYNTAX, "ValueError")
 """What Python says of a file that it cannot parse; other faults are of the reading."""
-C_SOURCES = {".c", ".cc", ".cpp", ".cxx", ".h", ".hpp"}
 
 
 class ExecutableParams(Record):
@@ -146,7 +146,7 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     wanted = PurePosixPath(path)
     near = [names[n] for n in near_names(wanted.name, names)]
     near += [p for n, p in names.items() if n == wanted.stem and p not in near]
-    movable = [p for p in near if PurePosixPath(p).suffix not in C_SOURCES]
+    movable = [p for p in near if can_be_moved(p, path)]
     scripts = [p for n, p in names.items() if n.endswith(".py")]
     seen = f"; there is {join_words(near)}" if near else ""
     return unjudged(

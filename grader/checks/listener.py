@@ -17,7 +17,7 @@ from grader.checks.support.console_output import (
 )
 from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.processes import lives, not_started
-from grader.checks.support.text import VALUE, in_words, near_names, shown
+from grader.checks.support.text import OTHER_WORDS_SHARE, VALUE, in_words, near_names, shown
 from grader.checks.support.topics import cite, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -30,7 +30,6 @@ CALLBACK_HINT = (
     "print the message's .data in the callback, without a condition and nothing slow beside it; "
     "end with rospy.spin()"
 )
-OTHER_WORDS_SHARE = 0.5
 """Of the points, for a message that is printed, but not in the handout's words."""
 
 

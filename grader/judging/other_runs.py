@@ -26,7 +26,7 @@ OF_BUILDS = {"build-line", "manifest-line"}
 SEEN_IN_RUNS = {"missing-import", "missing-call", "topic-name", "node-name", "parameter-name"}
 """These are lost in runs, so no criterion of the files asks for them."""
 DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding"}
-"""The arena repairs these in whatever it runs, so no run is lost by them."""
+"""The arena repairs these in the scripts that the rubric starts, so no run of those is lost by them."""
 MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
 OF_PACKAGES = {"package.xml", "CMakeLists.txt"}
 SHARES = {1.0: "all", 0.5: "half"}
@@ -140,7 +140,8 @@ def concerns(
     if criterion.scenario is not None:
         return is_used_by(rubric.scenarios[criterion.scenario], repair, rubric, built=built)
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
-        return True
+        wrong = _words(repair.before) - _words(repair.after)
+        return bool(wrong & _words(found[criterion.id].message)) or _cites(found[criterion.id], repair)
     if criterion.check == BUILD and repair.kind in OF_BUILDS:
         return True
     if found[criterion.id].blocked_by:
@@ -150,19 +151,19 @@ def concerns(
 
 def is_used_by(scenario: Scenario, repair: Repair, rubric: Rubric, *, built: bool) -> bool:
     """Return whether the scenario runs the repaired file, as far as the rubric says. A launch file may run any."""
+    name, launches = PurePosixPath(repair.file).name, any(start.launch for start in scenario.start)
+    known = any(name in _started(one) for one in rubric.scenarios.values())
     if repair.kind in DONE_BEFORE_RUNS:
-        return False
+        return launches and not known
     if repair.kind in OF_BUILDS:
         return not built or any(start.built for start in scenario.start)
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
         return True
-    name, launches = PurePosixPath(repair.file).name, any(start.launch for start in scenario.start)
     if name in _started(scenario):
         return True
-    known = any(name in _started(one) for one in rubric.scenarios.values())
     if name.endswith((".launch", ".launch.xml")):
         return launches and not known
-    return launches or not known
+    return repair.kind != "launch-type" and (launches or not known)
 
 
 def _started(scenario: Scenario) -> set[str]:
@@ -174,7 +175,7 @@ def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], crit
     """Return whether the copy shows no more of a lost criterion than the package as it is."""
     one, copy = first[criterion.id], on_copy[criterion.id]
     if copy.status.is_lost and copy.score <= one.score:
-        return not one.unjudged or copy.unjudged
+        return not one.unjudged or (copy.unjudged and copy.cause == one.cause)
     return copy.status is Status.ERROR
 
 
@@ -208,6 +209,8 @@ def _charges(
 
 
 def _cites(found: Verdict | CriterionResult, repair: Repair) -> bool:
+    if repair.kind == "executable-bit" and repair.fix not in found.hint:
+        return False  # the build installs what runs the script, bit or not
     return any(getattr(citation, "file", None) == repair.file for citation in found.citations)
 
 
@@ -222,6 +225,10 @@ def _names(criterion: Criterion, repair: Repair) -> bool:
     before, after = (set(re.findall(r"[\w.~/-]*\w", text)) for text in (repair.before, repair.after))
     new = {word.rpartition("/")[2] for word in after - before}
     return any(text.strip("/").rpartition("/")[2] in new for text in _texts(criterion.parameters))
+
+
+def _words(text: str) -> set[str]:
+    return set(re.findall(r"[\w.-]+", text))
 
 
 def _texts(value: object) -> Iterator[str]:
@@ -242,11 +249,13 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
         verdict = failed(
             message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
         )
+    if copy.status.is_lost and verdict.hint:
+        return verdict  # the repair brings up another fault, so it is not the advice
     return verdict.model_copy(update={"hint": "; ".join(advice_of(one) for one in repairs)})
 
 
 def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:
-    where = join_words([place_of(repair) for repair in repairs])
+    where = join_words(dict.fromkeys(place_of(repair) for repair in repairs))
     earned = SHARES.get(share, f"{share:.0%}")
     score = copy.score * share
     status = Status.PARTIAL if share < 1 and copy.status is Status.PASS else copy.status

@@ -519,3 +519,17 @@ def test_a_hostile_source_costs_its_own_repairs(source: str, tmp_path: Path) -> 
     found = [repair for repair in repair_all(folder) if repair.file == TALKER]
     assert [repair.kind for repair in found] == ["topic-name"]
     assert (folder / "src" / "talker.py").read_text() == SCRIPT
+
+
+def test_a_renamed_launch_file_is_repaired_further(tmp_path: Path) -> None:
+    """By its old path, and a package's wrong name is one repair however often it stands in the file."""
+    nodes = LAUNCH.replace("</launch>", LAUNCH.splitlines()[1].replace("talker", "listener") + "\n</launch>")
+    wrong: dict[str, str | bytes | None] = {
+        "launch/lab.launch": None,
+        "launch/la_b.launch": nodes.replace('pkg="lab"', 'pkg="laab"'),
+    }
+    folder = package(tmp_path, wrong)
+    found = repair_all(folder, WANTED.model_copy(update={"launch_files": ("lab.launch",)}))
+    assert [one.kind for one in found] == ["file-name", "package-name"]
+    assert found[1].fix == 'write pkg="lab" for pkg="laab"'
+    assert (folder / "launch" / "lab.launch").read_text() == nodes

@@ -16,6 +16,7 @@ from grader.model.verdict import FileCitation
 
 ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
 ONE_EDIT = 0.88
+UNKNOWN_COMMAND = "Unknown CMake command"
 FIRST_ERROR_HINT = "run catkin_make in a fresh clone and fix the first error that it prints"
 _CMAKE_ERROR = re.compile(
     r"^CMake Error(?: at (?P<file>[^:()]+):(?P<line>\d+) \((?P<call>\w+)\))?:?\s*(?P<text>.*)"
