@@ -135,6 +135,8 @@ def assert_consistent(result: GradingResult, rubric: Rubric) -> None:
     fixes = {(one.file, one.line, one.fix) for _, found in used for one in found.repairs}
     assert len({(file, line) for file, line, _ in fixes}) == len(fixes)
     hints = [c.hint for c in result.criteria if c.status.is_lost]
-    assert {name for hint in hints for name in re.findall(r'pkg="([\w-]+)"', hint)} <= {rubric.package}
+    assert {name for hint in hints for name in re.findall(r'(?<!for )pkg="([\w-]+)"', hint)} <= {
+        rubric.package
+    }
     first = {name for hint in hints for name in re.findall(r"^fix ([\w-]+) first$", hint)}
     assert first <= lost(result)
