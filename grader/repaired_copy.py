@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from grader.files import temporary_folder
-from grader.judging.other_runs import DONE_BEFORE_RUNS, concerns, is_used_by, needs_build
+from grader.judging.other_runs import BUILD, DONE_BEFORE_RUNS, concerns, is_used_by, needs_build
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress, Silence, StepState
 from grader.model.repair import Repair
@@ -43,24 +43,21 @@ def choose_repairs(
     built as it is.
     """
     lost = {c.scenario for c in criteria if c.status.is_lost and c.scenario is not None}
-    blocked = {c.id for c in criteria if c.blocked_by and c.scenario is None}
+    by_id = {c.id: c for c in criteria}
+    of_files = [c for c in rubric.criteria if c.scenario is None and by_id[c.id].status.is_lost]
+    blocked = [c for c in of_files if by_id[c.id].blocked_by or c.check == BUILD]
     if not lost and not blocked:
         return (), ()
     found = find_repairs(submission.package.folder, facts, wanted_of(rubric))
     counting = [one for one in found if rubric.share_of(one.kind) > 0]
     chosen = [one for one in counting if one.kind not in DONE_BEFORE_RUNS][:REPAIRS_MAX]
-    built, by_id = built or not needs_build(facts), {c.id: c for c in criteria}
+    built = built or not needs_build(facts)
     scenarios = {
         name
         for name in lost
         if any(is_used_by(rubric.scenarios[name], one, rubric, built=built) for one in chosen)
     }
-    unblocks = any(
-        concerns(one, c, rubric, by_id, built=built)
-        for c in rubric.criteria
-        if c.id in blocked
-        for one in chosen
-    )
+    unblocks = any(concerns(one, c, rubric, by_id, built=built) for c in blocked for one in chosen)
     before = [one for one in counting if one.kind in DONE_BEFORE_RUNS]
     return ((*before, *chosen), tuple(sorted(scenarios))) if scenarios or unblocks else ((), ())
 

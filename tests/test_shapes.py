@@ -24,7 +24,6 @@ SHORTER = "mcr2-basic-comms/"
 QUICK = (
     "eyantra-ros-basics/yaml-key-misspelt+bit-removed",
     "leeds-comp3631-lab1/manifest-malformed+no-shebang",
-    "mcr2-basic-comms/manifest-renamed+launch-type-without-py",
 )
 ROUNDS_MAX = 3
 

@@ -13,13 +13,13 @@ from pydantic import ValidationError
 from grader.checks.build import CATKIN_MAKE
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
-from grader.model.repair import Repair, place_of
+from grader.model.repair import Repair, advice_of, place_of
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import Status, Verdict, failed
 from grader.rubric.model import Criterion, Rubric, Scenario
 from grader.wording import join_words
 
-PACKAGE_RUN, REPAIRS = "package", "repairs"
+PACKAGE_RUN, REPAIRS, BUILD = "package", "repairs", "build"
 NAMES = {"topic-name", "node-name", "parameter-name", "file-name", "package-name", "launch-type"}
 OF_BUILDS = {"build-line", "manifest-line"}
 """These explain nothing but the build and the files, unless something is run that the build makes."""
@@ -131,8 +131,8 @@ def concerns(
     *,
     built: bool,
 ) -> bool:
-    """Return whether the criterion may depend on what was repaired: its run uses it, or it or what blocks it cites the
-    file. What the files of the build lack stays lost, though: the criteria of these files ask for just that.
+    """Return whether the criterion may depend on what was repaired: its run or build uses it, or it, or what blocks it,
+    cites the file. What the files of the build lack stays lost, though: the criteria of these files ask for just that.
 
     `found` is what each criterion came to without the repair, `built` whether what is run was built without it, or
     needs no build.
@@ -142,6 +142,8 @@ def concerns(
     if repair.kind == "package-name" and repair.file in OF_PACKAGES:
         wrong = _words(repair.before) - _words(repair.after)
         return bool(wrong & _words(found[criterion.id].message)) or _cites(found[criterion.id], repair)
+    if criterion.check == BUILD and repair.kind in OF_BUILDS:
+        return True
     if found[criterion.id].blocked_by:
         return any(_asks_for(found[name], repair) for name in criterion.requires)
     return repair.kind not in OF_BUILDS | SEEN_IN_RUNS and _cites(found[criterion.id], repair)
@@ -249,7 +251,7 @@ def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdi
         )
     if copy.status.is_lost and verdict.hint:
         return verdict  # the repair brings up another fault, so it is not the advice
-    return verdict.model_copy(update={"hint": "; ".join(f"{place_of(one)}: {one.fix}" for one in repairs)})
+    return verdict.model_copy(update={"hint": "; ".join(advice_of(one) for one in repairs)})
 
 
 def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:

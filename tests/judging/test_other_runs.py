@@ -6,12 +6,15 @@ import json
 from dataclasses import replace
 from typing import Any
 
+import pytest
+
 from grader.evidence.run import Run
 from grader.judging import judge
 from grader.judging.judge import judge_all_runs
+from grader.judging.other_runs import is_used_by
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
-from tests.judging.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, rubric
+from tests.judging.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, SCENARIO, rubric
 from tests.support.timeline import build_runs
 
 DIED = {"processes": [{"name": "talker", "exit_s": 0.3, "exit_code": 1}], "outcome": "ended"}
@@ -157,6 +160,13 @@ def test_a_line_of_the_build_costs_the_build_alone_where_scripts_are_run() -> No
     assert (found["chatter"].points, found["rate"].points) == (0, 10)
 
 
+def test_a_line_that_is_missing_is_added_below_its_neighbour() -> None:
+    spin = TABS.model_copy(
+        update={"before": "import rospy", "after": "import rospy\nimport sys", "fix": "import sys"}
+    )
+    assert judged(DIED, GOOD_RUN, spin)["node"].hint == "src/numeric_talker.py: below line 7 add import sys"
+
+
 def test_a_criterion_that_passes_on_the_copy_needs_no_hint() -> None:
     found = judged(DIED, GOOD_RUN, TABS)
     assert (found["rate"].status.value, found["rate"].hint) == ("partial", "")
@@ -189,3 +199,22 @@ def test_a_build_that_the_manifest_blocks_is_judged_on_the_copy() -> None:
 def built(package: dict[str, Any], *, exit_code: int) -> dict[str, Run]:
     made = {"name": "catkin_make", "role": "build", "exit_s": 3, "exit_code": exit_code}
     return build_runs({"runs": {"package": {"package": package, "processes": [made]}}})
+
+
+@pytest.mark.parametrize(
+    ("file", "runs"),
+    [
+        ("src/numeric_talker.py", {"talker", "lab", "other"}),
+        ("src/helper.py", {"talker", "lab", "other"}),
+        ("launch/lab.launch", {"lab"}),
+        ("launch/included.launch", {"lab", "other"}),
+    ],
+)
+def test_a_repair_concerns_the_runs_that_use_its_file(file: str, runs: set[str]) -> None:
+    launched = {
+        name: {**SCENARIO, "start": [{"name": "all", "launch": f"{name}.launch"}]}
+        for name in ("lab", "other")
+    }
+    asked = rubric(*ALL, scenarios={"talker": SCENARIO, **launched})
+    name = Repair(kind="node-name", file=file, line=1, before="a", after="b", message="m", fix="b")
+    assert {s for s, one in asked.scenarios.items() if is_used_by(one, name, asked, built=True)} == runs

@@ -17,7 +17,7 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from grader.files import atomic_write, open_untrusted
-from grader.model.repair import Repair, RepairKind
+from grader.model.repair import Repair, RepairKind, added_lines
 from grader.package.reading import LEFT_OUT
 from grader.portable import BINARY, CLOEXEC, DIRECTORY, NOFOLLOW, READ
 
@@ -141,12 +141,6 @@ def changed_lines(before: str, after: str) -> tuple[int, str, str]:
         start, end = (start - 1, end) if start else (start, end - 1)
     first, last = old[start : len(old) - end], new[start : len(new) - end]
     return start + 1, "\n".join(first), "\n".join(last)
-
-
-def added_lines(before: str, after: str) -> str:
-    """Return the lines that are new, in one line."""
-    old = before.split("\n")
-    return "; ".join(line.strip() for line in after.split("\n") if line not in old and line.strip())
 
 
 # ---- on the disk
