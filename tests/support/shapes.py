@@ -80,6 +80,8 @@ REWORDED = (
     "private-topic",
 )
 """Those whose repair is right in other words than the reference solution's."""
+UNDECIDED = ("turtle-square", ("topic-misspelt", "sleep-without-brackets"))
+"""Drives in a flood that ends the recording early, so most criteria stay inconclusive."""
 LAST = ("crlf", "byte-order-mark")
 """These change lines that others change too, so they come after them."""
 
@@ -91,7 +93,7 @@ def shapes() -> dict[str, tuple[str, Tree]]:
     for lab in labs():
         for number, operators in enumerate(COMBINATIONS):
             tree = _combined(lab, operators, number)
-            if tree is not None:
+            if tree is not None and (lab, operators) != UNDECIDED:
                 found[f"{lab}/{'+'.join(operators)}"] = (lab, tree)
     return found
 
