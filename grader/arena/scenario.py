@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from itertools import count
@@ -13,10 +13,11 @@ from typing import Any, TypeAlias
 
 from grader.arena.admission import Admission, Leave
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.run_state import describe_wait, find_outcome, next_look_s
-from grader.arena.scenario_inputs import OVER, advertisement, call_services, make_shots, publication, settings
+from grader.arena.run_state import describe_wait, find_outcome, next_look_s, waits
+from grader.arena.scenario_inputs import OVER, make_shots, settings
 from grader.arena.session import ArenaSession
 from grader.arena.static_recorder import RunCost
+from grader.arena.steps import StepRunner, Tell
 from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
@@ -26,14 +27,12 @@ from grader.rubric.model import Param, Scenario, Start
 CLOCK_STEP_S = 0.05
 UNFOLLOWED_S = 2.0
 UNFOLLOWED_HZ = 15.0
-SUBSCRIBE_S = 6.0
 REGISTERED_S = 1.0
 HEARD_SETTLE_S = 0.3
 GRAPH_EVERY_S, GRAPH_S = 0.25, 5.0
 STARTING_S = 1.5
 EXPECTED_HZ = 10.0
 
-Tell = Callable[[str], None]
 CTRL_C_S = 5.0
 LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
 TERM_S = 2.0
@@ -55,6 +54,7 @@ def expected_s(scenario: Scenario) -> float:
         / (scenario.warp if scenario.clock == "warped" else 1)
     )
     probing = sum(shot.pause_s for shot in make_shots(scenario.probes))
+    probing += sum(step.lasts_s for step in scenario.steps)
     watched = max(until.window_s or 0, until.alive_s or 0, until.quiet_s or 0)
     return STARTING_S + watched + messages + probing
 
@@ -107,18 +107,19 @@ async def _run(
     if scenario.clock == "warped":
         arena.send(do="warp", warp=scenario.warp, step_s=CLOCK_STEP_S)
     set_params(scenario.params, arena)
-    for topic, probe in {probe.topic: probe for probe in scenario.probes}.items():
-        arena.send(do="advertise", fields=advertisement(probe) | {"topic": topic})
-    arena.live.started_s = time.monotonic()
-    for start, spec in starts:
-        if start.after is not None:
-            await _await_node(start.after, scenario, arena, tell)
-        arena.start(spec)
-    if scenario.probes:
-        await _send_probes(scenario, arena, tell)
-    if scenario.calls:
-        await call_services(scenario, arena, tell)
-    return await _observe(scenario, arena, tell)
+    async with StepRunner(scenario, arena, tell) as runner:
+        runner.advertise()
+        arena.live.started_s = time.monotonic()
+        for start, spec in starts:
+            if start.after is not None:
+                await _await_node(start.after, scenario, arena, tell)
+            arena.start(spec)
+        await runner.run()
+        if scenario.steps:
+            arena.live.steps_over(time.monotonic())
+            if arena.live.running and not waits(scenario.until):
+                return "complete", ""
+        return await _observe(scenario, arena, tell)
 
 
 async def _await_node(process: str, scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:
@@ -136,26 +137,6 @@ async def _await_node(process: str, scenario: Scenario, arena: ArenaSession, tel
         if left_s <= 0:
             return
         await arena.wait(lambda: process in live.ended, left_s)
-
-
-async def _send_probes(scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:
-    """Once the student's node has subscribed to every topic, or has had its time to."""
-    topics = {probe.topic for probe in scenario.probes}
-    live = arena.live
-    tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
-    await arena.wait(lambda: bool(live.subscribed) or not live.running, scenario.until.first_message_s)
-    await arena.wait(
-        lambda: topics <= live.subscribed or not live.running, SUBSCRIBE_S if live.subscribed else 0.0
-    )
-    tell("sending it messages")
-    for shot in make_shots(scenario.probes):
-        if not live.running:
-            return
-        if shot.topic in live.subscribed:
-            if shot.word is not None:
-                live.sent(shot.word, time.monotonic())
-            arena.send(do="publish", **publication(shot))
-            await asyncio.sleep(shot.pause_s)
 
 
 async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple[str, str]:

@@ -6,6 +6,7 @@ import asyncio
 import re
 import secrets
 import signal
+import struct
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -26,6 +27,9 @@ from grader.evidence.run import is_grader_node
 from grader.evidence.writer import EvidenceChannel, EvidenceWriter
 
 ARENA = Path(__file__).parent / "ros"
+CLOCK = "/clock"
+TIME = struct.Struct("<II")
+NS = 1_000_000_000
 ROSOUT = ("/usr/lib/rosout/rosout", "lib/rosout/rosout")
 LOG_FOLDER = ("/bin/sh", "-c", 'mkdir -p "$ROS_HOME/log" && exec "$0"')
 READY_S = 15.0
@@ -84,6 +88,7 @@ class ArenaSession:
         self._frames = FrameReader()
         self._calls = 0
         self._answers: dict[int, dict[str, Any]] = {}
+        self._clock_ns = 0
 
     async def __aenter__(self) -> Self:
         argv = [self.place.ros.python, "-s", "-B", str(ARENA)]
@@ -232,6 +237,9 @@ class ArenaSession:
         channel = self._channels[frame.channel]
         for data in frame.datas:
             channel.evidence.message(frame.time_ns, data)
+        if frame.datas and channel.topic == CLOCK and is_grader_node(channel.callerid):
+            secs, nsecs = TIME.unpack(frame.datas[-1])
+            self._clock_ns = secs * NS + nsecs
         if frame.datas and not is_grader_node(channel.callerid):
             own = channel.callerid not in self.live.helper_nodes
             self.live.message(channel.topic, len(frame.datas), time.monotonic(), active=own)
@@ -284,7 +292,7 @@ class ArenaSession:
         if status == "ready":
             self._ready = True
         elif status == "subscribed" and not is_grader_node(fields["subscriber"]):
-            self.live.subscribed.add(fields["topic"])
+            self.live.subscribers.setdefault(fields["topic"], set()).add(fields["subscriber"])
         elif status == "answer":
             self._answers[fields["id"]] = fields
         elif status == "graph":
@@ -309,6 +317,10 @@ class ArenaSession:
             max_rss_bytes=fields["max_rss_bytes"],
         )
         self._writer.event("/grader/process", self._now_ns(), event)
+
+    def ros_now_ns(self) -> int:
+        """Return the time of the run's nodes: `/clock` where there is one."""
+        return self._clock_ns or self._now_ns()
 
     def _now_ns(self) -> int:
         return self._offset_ns + time.monotonic_ns()

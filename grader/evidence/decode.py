@@ -179,6 +179,22 @@ def md5sum(type: str) -> str:  # noqa: A002 - ROS's own word
 
 
 @lru_cache(maxsize=1)
+def known_packages() -> dict[str, tuple[str, ...]]:
+    """Return the names of ROS Noetic's own message types by package."""
+    found: dict[str, list[str]] = {}
+    for full in _noetic().fielddefs:
+        package, _, name = full.partition("/msg/")
+        found.setdefault(package, []).append(name)
+    return {package: tuple(sorted(names)) for package, names in found.items()}
+
+
+def is_ros_type(type: str) -> bool:  # noqa: A002 - ROS's own word
+    """Return whether ROS Noetic itself has a message type of that name."""
+    package, _, name = type.partition("/")
+    return name in known_packages().get(package, ())
+
+
+@lru_cache(maxsize=1)
 def _noetic() -> Typestore:
     return get_typestore(Stores.ROS1_NOETIC)
 
@@ -267,7 +283,7 @@ class ServiceType:
         parts = _DIVIDER.split(text)
         if len(parts) != 2:
             raise ValueError(f"{type}: a service has a request and a response with one line --- between them")
-        request, response = (_with_parts(type, part, find_text) for part in parts)
+        request, response = (full_definition(type, part, find_text) for part in parts)
         self._request = Encoder(f"{type}Request", request)
         self._response = Decoder(f"{type}Response", response)
 
@@ -280,8 +296,8 @@ class ServiceType:
         return self._response.decode(data)
 
 
-def _with_parts(type_: str, text: str, find_text: FindText) -> str:
-    """Return the text with a `MSG:` part for each type that it needs."""
+def full_definition(type_: str, text: str, find_text: FindText) -> str:
+    """Return a type's text with a `MSG:` part for each type that it needs. Raises ValueError where one is nowhere."""
     package = type_.partition("/")[0]
     parts: dict[str, str] = {}
     waiting = _needed(text, package)

@@ -125,12 +125,13 @@ class ActorEvent(Record):
     `publish`: `value` is the field `data` as sent, or a map of the message's fields. `param`: `topic` is the
     parameter's name, `value` what it was set to. `call`: `topic` is the service, `value` the request's fields;
     `answer`: the response's fields, or None and the reason in `detail`. `open`: the stand-in for the program `actor`
-    was started with the arguments `value`. `refused`: `actor`, a process where it is known, else a node, was not
+    was started with the arguments `value`. `wait`: a step waited for the topic or node `topic`, or for a time; `detail`
+    says whether it came. `refused`: `actor`, a process where it is known, else a node, was not
     allowed what `detail` says; `limit`: it reached a limit. At most 50 of each in a run, equal ones once.
     """
 
     action: Literal[
-        "publish", "clock", "interrupt", "param", "call", "answer", "open", "note", "refused", "limit"
+        "publish", "clock", "interrupt", "param", "call", "answer", "open", "note", "refused", "limit", "wait"
     ]
     """What was done."""
     actor: str

@@ -1,0 +1,235 @@
+"""What the grader does in a run once the processes are started: probes, calls, and the scenario's steps, one by one.
+
+Messages are made here, from the text of their types, and go to the arena as bytes. Each deed is an event of
+`/grader/actor`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from itertools import count
+from typing import TYPE_CHECKING, Any
+
+from typing_extensions import Self
+
+from grader.arena.scenario_inputs import make_shots
+from grader.arena.session import NS, ArenaSession
+from grader.errors import ArenaError
+from grader.evidence.events import ActorEvent
+from grader.rubric.model import Call, Publish, Scenario, Step, Wait
+from grader.wording import plural
+
+if TYPE_CHECKING:
+    from grader.evidence.message_values import MessageType
+
+Tell = Callable[[str], None]
+ANSWER_S = 10.0
+SUBSCRIBE_S = 6.0
+
+
+class StepRunner:
+    """Does the probes, calls and steps of one run. Inside the context, what has gone to the background goes on."""
+
+    def __init__(self, scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:
+        self._scenario = scenario
+        self._arena = arena
+        self._live = arena.live
+        self._tell = tell
+        self._types: dict[str, MessageType] = {}
+        self._deaf: set[str] = set()
+        self._background: list[asyncio.Task[None]] = []
+        self._endless: list[asyncio.Task[None]] = []
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        for task in (*self._background, *self._endless):
+            task.cancel()
+            with suppress(asyncio.CancelledError, ArenaError):  # the run itself meets the same error
+                await task
+
+    def advertise(self) -> None:
+        """Say on which topics there will be messages, before anything is started."""
+        for probe in self._scenario.probes:
+            self._advertise(probe.topic, probe.type, latched=False)
+        for step in self._scenario.steps:
+            if step.publish is not None:
+                self._advertise(step.publish.topic, step.publish.type, latched=step.publish.latched)
+
+    async def run(self) -> None:
+        """Return when all is done, but for what lasts as long as the run."""
+        if self._scenario.probes:
+            await self._probe()
+        steps = (*(Step(call=call) for call in self._scenario.calls), *self._scenario.steps)
+        for step in steps:
+            if not self._live.running:
+                break
+            await self._do(step)
+        await asyncio.gather(*self._background)
+
+    async def _do(self, step: Step) -> None:
+        if step.publish is not None:
+            await self._publish(step.publish)
+        if step.wait is not None:
+            await self._wait(step.wait)
+        if step.call is not None:
+            await self._call(step.call)
+
+    # --- Messages ----------------------------------------------------------------------------------------------------
+
+    def _advertise(self, topic: str, type_: str, *, latched: bool) -> None:
+        from grader.evidence.message_values import MessageType  # noqa: PLC0415 - numpy, which not every run needs
+
+        if topic in self._types:
+            return
+        try:
+            found = MessageType(type_, self._message_text)
+        except ValueError as error:
+            self._note("note", topic, f"the grader cannot publish {type_}: {error}")
+            return
+        self._types[topic] = found
+        fields = {"type": type_, "md5sum": found.md5sum, "definition": found.definition, "latching": latched}
+        self._arena.send(do="advertise", fields={"topic": topic, **fields})
+
+    def _message_text(self, type_: str) -> str | None:
+        return self._arena.place.type_text(type_, "msg")
+
+    def _send(self, topic: str, value: object, index: int, total: int | None) -> None:
+        """Send and note one message. Raises ValueError where the value does not fit."""
+        from grader.evidence.message_values import Moment  # noqa: PLC0415 - as above
+
+        type_, moment = self._types[topic], Moment(index, total, self._arena.ros_now_ns())
+        data, shown = type_.encode(value, moment), type_.shown(value, moment)
+        if isinstance(shown, str | int) and not isinstance(shown, bool):
+            self._live.sent(str(shown), time.monotonic())
+        record = {"action": "publish", "actor": "grader", "topic": topic, "type": type_.type, "value": shown}
+        self._arena.send(do="publish", topic=topic, data=base64.b64encode(data).decode(), record=record)
+
+    async def _probe(self) -> None:
+        """Once the student's node has subscribed to every topic, or has had its time to."""
+        live, topics = self._live, {probe.topic for probe in self._scenario.probes}
+        self._tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
+        patience_s = self._scenario.until.first_message_s
+        await self._arena.wait(lambda: bool(live.subscribed & topics) or not live.running, patience_s)
+        patience_s = SUBSCRIBE_S if live.subscribed & topics else 0.0
+        await self._arena.wait(lambda: topics <= live.subscribed or not live.running, patience_s)
+        self._tell("sending it messages")
+        for shot in make_shots(self._scenario.probes):
+            if not live.running:
+                return
+            if shot.topic in live.subscribed and shot.topic in self._types:
+                self._send(shot.topic, shot.value, 0, 1)
+                await asyncio.sleep(shot.pause_s)
+
+    async def _publish(self, publish: Publish) -> None:
+        if publish.topic not in self._types:
+            return  # said when it was to be advertised
+        if publish.background:
+            tasks = self._endless if publish.total is None else self._background
+            tasks.append(asyncio.ensure_future(self._stream(publish)))
+        else:
+            await self._stream(publish)
+
+    async def _stream(self, publish: Publish) -> None:
+        topic, total, values = publish.topic, publish.total, publish.in_turn
+        if not publish.latched and not await self._has_subscriber(topic):
+            return
+        self._tell(f"publishing on {topic}")
+        due_ns = self._arena.ros_now_ns()
+        for index in count() if total is None else range(total):
+            if not self._live.running:
+                return
+            try:
+                self._send(topic, values[index % len(values)], index, total)
+            except ValueError as error:
+                self._note("note", topic, f"the grader cannot publish {publish.type}: {error}")
+                return
+            due_ns = max(due_ns + round(NS / publish.rate_hz), self._arena.ros_now_ns())
+            await self._until(due_ns)
+
+    async def _has_subscriber(self, topic: str) -> bool:
+        """Wait for one, once for each topic."""
+        live = self._live
+        if topic not in live.subscribed and topic not in self._deaf:
+            self._tell(f"waiting for a subscriber on {topic}")
+            settled = live.subscribed & self._types.keys() and live.running <= live.registered
+            patience_s = SUBSCRIBE_S if settled else self._scenario.until.first_message_s
+            await self._arena.wait(lambda: topic in live.subscribed or not live.running, patience_s)
+        if topic in live.subscribed:
+            self._deaf.discard(topic)
+            return True
+        self._deaf.add(topic)
+        self._note("note", topic, "nothing was published: no node has subscribed")
+        return False
+
+    # --- Waiting -----------------------------------------------------------------------------------------------------
+
+    async def _until(self, time_ns: int) -> None:
+        """Until it is so late by the run's clock; by the wall's, where that stands still."""
+        left_s = max(0.0, (time_ns - self._arena.ros_now_ns()) / NS)
+        await self._arena.wait(lambda: self._arena.ros_now_ns() >= time_ns, left_s)
+
+    async def _wait(self, wait: Wait) -> None:
+        live, limit_s = self._live, wait.limit_s or self._scenario.until.first_message_s
+        if wait.seconds is not None:
+            self._tell(f"waiting for {wait.seconds:g} s")
+            await self._until(self._arena.ros_now_ns() + round(wait.seconds * NS))
+            self._note("wait", None, f"{wait.seconds:g} s have passed")
+            return
+        name = wait.topic or wait.node or ""
+        self._tell(f"waiting for {name}")
+        wanted = wait.messages + (live.topics[name].count if wait.new else 0)
+
+        def is_there() -> bool:
+            return live.topics[name].count >= wanted if wait.topic else name in live.here
+
+        await self._arena.wait(lambda: is_there() or not live.running, limit_s)
+        what = plural(wait.messages, "message") if wait.topic else "the node"
+        there = is_there()
+        self._note("wait", name, f"{what} came" if there else f"{what} did not come within {limit_s:g} s")
+
+    # --- Services ----------------------------------------------------------------------------------------------------
+
+    async def _call(self, call: Call) -> None:
+        """Call the service once it is offered; request and answer are events."""
+        arena, live, service = self._arena, self._live, call.service
+        self._tell(f"waiting for the service {service}")
+        patience_s = self._scenario.until.first_message_s
+        await arena.wait(lambda: service in live.services or not live.running, patience_s)
+        if service in live.services:
+            await arena.wait(lambda: not live.running, call.delay_s)
+            self._tell(f"calling {service}")
+            await self._ask(call)
+
+    async def _ask(self, call: Call) -> None:
+        from grader.evidence.decode import ServiceType  # noqa: PLC0415 - numpy, which not every run needs
+
+        try:
+            text = self._arena.place.type_text(call.type, "srv") or ""
+            type_ = ServiceType(call.type, text, self._message_text)
+            data = base64.b64encode(type_.encode_request(call.request)).decode()
+        except ValueError as error:
+            self._answer(call, None, f"the grader could not call it: {error}")
+            return
+        about = {"topic": call.service, "type": call.type, "value": call.request}
+        record = {"action": "call", "actor": "grader", **about}
+        answer = await self._arena.call(
+            ANSWER_S, service=call.service, type=call.type, data=data, record=record
+        )
+        if "data" not in answer:
+            self._answer(call, None, answer["error"])
+            return
+        value = type_.decode_response(base64.b64decode(answer["data"]))
+        self._answer(call, value, "" if value is not None else f"the answer is no {call.type}")
+
+    def _answer(self, call: Call, value: object, detail: str) -> None:
+        about = {"topic": call.service, "type": call.type, "value": value, "detail": detail}
+        self._arena.note(ActorEvent(action="answer", actor="grader", **about))
+
+    def _note(self, action: Any, topic: str | None, detail: str) -> None:  # noqa: ANN401 - one of ActorEvent's words
+        self._arena.note(ActorEvent(action=action, actor="grader", topic=topic, detail=detail))

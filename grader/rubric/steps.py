@@ -1,0 +1,125 @@
+"""Faults of a scenario's steps that their records' types cannot say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from grader.rubric.model import STEP_S_MAX, Step
+from grader.rubric.source import Fault, KeyPath, as_map, as_maps
+from grader.wording import did_you_mean
+
+KINDS = tuple(Step.model_fields)
+RUN_S_MAX = 2 * STEP_S_MAX
+WAITS = ("seconds", "topic", "node")
+
+
+def given_steps(scenario: dict[str, Any], kind: str) -> list[dict[str, Any]]:
+    """Return what the scenario's steps of one kind (`publish`) say."""
+    return [as_map(step[kind]) for _, step in as_maps(scenario.get("steps")) if kind in step]
+
+
+def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield the faults of one scenario's steps."""
+    types: dict[str, str] = {}
+    for index, step in as_maps(scenario.get("steps")):
+        at = (*path, "steps", index)
+        given = [kind for kind in KINDS if step.get(kind) is not None]
+        if len(given) != 1:
+            yield at, f"give one of {_one_of(KINDS)}: {_found(given)}"
+        if "publish" in given:
+            yield from _publish((*at, "publish"), as_map(step["publish"]), types)
+        if "wait" in given:
+            yield from _wait((*at, "wait"), as_map(step["wait"]))
+        if "call" in given:
+            yield from slash((*at, "call", "service"), as_map(step["call"]).get("service"), "a service")
+    lasting_s = sum(_seconds(step) for _, step in as_maps(scenario.get("steps")))
+    if lasting_s > RUN_S_MAX:
+        yield (*path, "steps"), f"last {lasting_s:g} s together, at most {RUN_S_MAX} s"
+
+
+def _one_of(names: tuple[str, ...]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _found(given: list[str]) -> str:
+    return f"{' and '.join(given)} are there" if given else "none is there"
+
+
+def _seconds(step: dict[str, Any]) -> float:
+    """Return how long a step lasts at least, where that is given."""
+    publish, wait = as_map(step.get("publish")), as_map(step.get("wait"))
+    lasting = publish.get("duration_s"), wait.get("seconds")
+    return sum(s for s in lasting if isinstance(s, int | float))
+
+
+def _publish(at: KeyPath, publish: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
+    """`types` are those of the topics that earlier steps publish on."""
+    topic, kind = publish.get("topic"), publish.get("type")
+    yield from slash((*at, "topic"), topic, "a topic")
+    if ("value" in publish) == bool(publish.get("values")):
+        yield at, "give one of value and values"
+    if publish.get("count") is not None and publish.get("duration_s") is not None:
+        yield at, "give count or duration_s, not both"
+    if not isinstance(topic, str) or not isinstance(kind, str) or "/" not in kind:
+        return
+    if types.setdefault(topic, kind) != kind:
+        yield (*at, "type"), f"an earlier step publishes {types[topic]} on {topic}"
+    values = publish.get("values")
+    listed = enumerate(values) if isinstance(values, list) else ()
+    places: list[tuple[KeyPath, Any]] = [((*at, "values", index), value) for index, value in listed]
+    places += [((*at, "value"), publish["value"])] if "value" in publish else []
+    yield from misfits((*at, "type"), kind, places, endless=_is_endless(publish))
+
+
+def _is_endless(publish: dict[str, Any]) -> bool:
+    return (
+        publish.get("background") is True
+        and publish.get("count") is None
+        and publish.get("duration_s") is None
+    )
+
+
+def misfits(
+    at: KeyPath, kind: str, values: list[tuple[KeyPath, Any]], *, endless: bool = False
+) -> Iterator[Fault]:
+    """Yield what does not fit the type, where it is one of ROS's own: no other is known before a run.
+
+    `at` is the place of the type.
+    """
+    from grader.evidence.decode import known_packages  # noqa: PLC0415 - slow to load, and few rubrics need it
+    from grader.evidence.message_values import FIRST, MessageType  # noqa: PLC0415 - as above
+
+    package, _, name = kind.partition("/")
+    names = known_packages().get(package)
+    if names is None:
+        return
+    if name not in names:
+        yield (
+            at,
+            f"ROS Noetic has no message type {kind}{did_you_mean(kind, [f'{package}/{n}' for n in names])}",
+        )
+        return
+    message_type, moment = MessageType(kind), FIRST._replace(total=None if endless else 1)
+    for place, value in values:
+        if wrong := message_type.misfit(value, moment):
+            yield place, wrong
+
+
+def _wait(at: KeyPath, wait: dict[str, Any]) -> Iterator[Fault]:
+    given = [key for key in WAITS if wait.get(key) is not None]
+    if len(given) != 1:
+        yield at, f"give one of {_one_of(WAITS)}: {_found(given)}"
+    for key in ("messages", "new"):
+        if key in wait and "topic" not in given:
+            yield (*at, key), "is for a topic"
+    if wait.get("limit_s") is not None and "seconds" in given:
+        yield (*at, "limit_s"), "is for a topic or a node"
+    yield from slash((*at, "topic"), wait.get("topic"), "a topic")
+    yield from slash((*at, "node"), wait.get("node"), "a node's name")
+
+
+def slash(path: KeyPath, name: object, what: str) -> Iterator[Fault]:
+    """Yield a fault for a name that does not begin with a slash."""
+    if isinstance(name, str) and not name.startswith("/"):
+        yield path, f'{what} begins with a slash: "/{name}"'
