@@ -242,6 +242,7 @@ class ProcessEnvironment:
             else None,
             "script": None,
             "repairs": [],
+            "stdin": False,
             **more,
         }
 

@@ -37,7 +37,7 @@ class TopicSeen:
 class RunState:
     """The state that conditions look at. `running` and `ended` are the student's processes, `helpers` the grader's own
     programs that run beside them, `registered` the processes of which a node has registered, `here` the nodes that are
-    registered now. `lost_s` is what others
+    registered now, `owners` the processes of all nodes so far. `lost_s` is what others
     took of the run's time while they filled the machine: so much longer a node is waited for."""
 
     started_s: float = 0.0
@@ -48,6 +48,7 @@ class RunState:
     nodes: set[str] = field(default_factory=set)
     helper_nodes: set[str] = field(default_factory=set)
     here: frozenset[str] = frozenset()
+    owners: dict[str, str] = field(default_factory=dict)
     registered: set[str] = field(default_factory=set)
     registered_s: float = 0.0
     last_start_s: float = 0.0
@@ -117,6 +118,7 @@ class RunState:
         if set(processes.values()) & self.running - self.registered:
             self.registered_s = now_s
         self.registered |= set(processes.values())
+        self.owners.update(processes)
         self.helper_nodes |= {n for n in nodes if processes.get(n) in self.helpers}
         own = {n for n in nodes if n not in self.helper_nodes}
         if own - self.nodes:
@@ -132,6 +134,24 @@ class RunState:
     def connections(self, topics: Iterable[str], now_s: float) -> None:
         """The topics over which nodes are connected now; since when is kept."""
         self.connected_s = {topic: self.connected_s.get(topic, now_s) for topic in topics}
+
+    def started(self, process: str, now_s: float, *, helper: bool) -> None:
+        """A process was started, for the first time or again."""
+        (self.helpers if helper else self.running).add(process)
+        self.ended.discard(process)
+        self.registered.discard(process)
+        self.last_start_s = now_s
+
+    def exited(self, process: str, now_s: float) -> None:
+        """A process is gone, and with it its subscribers."""
+        self.helpers.discard(process)
+        for nodes in self.subscribers.values():
+            nodes.difference_update([node for node in nodes if self.owners.get(node) == process])
+        self.subscribers = {topic: nodes for topic, nodes in self.subscribers.items() if nodes}
+        if process in self.running:
+            self.running.remove(process)
+            self.ended.add(process)
+            self.active(now_s)
 
     def steps_over(self, now_s: float) -> None:
         """From now on, what is waited for has its time to come."""

@@ -9,7 +9,6 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
-from typing import Any, TypeAlias
 
 from grader.arena.admission import Admission, Leave
 from grader.arena.process_environment import ProcessEnvironment
@@ -17,7 +16,7 @@ from grader.arena.run_state import describe_wait, find_outcome, next_look_s, wai
 from grader.arena.scenario_inputs import OVER, make_shots, settings
 from grader.arena.session import ArenaSession
 from grader.arena.static_recorder import RunCost
-from grader.arena.steps import StepRunner, Tell
+from grader.arena.steps import CTRL_C_S, LAUNCH_CTRL_C_S, TERM_S, Spec, StepRunner, Tell
 from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
@@ -33,16 +32,10 @@ GRAPH_EVERY_S, GRAPH_S = 0.25, 5.0
 STARTING_S = 1.5
 EXPECTED_HZ = 10.0
 
-CTRL_C_S = 5.0
-LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
-TERM_S = 2.0
 HELD_S = 0.1
 UP_S, SETTLE_S = 5.0, 0.2
 """A process is up when its nodes have registered and nothing changes for a moment; some never are."""
 BUILT_PROGRAMS_MAX = 20
-
-Spec: TypeAlias = dict[str, Any]
-"""What the arena needs to start a process (`ProcessEnvironment.spec`)."""
 
 
 def expected_s(scenario: Scenario) -> float:
@@ -80,6 +73,8 @@ async def run_scenario(
     warp = scenario.warp if scenario.clock == "warped" else 1.0
     numbers = count()
     starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place, numbers)]
+    typed_to = {step.type.process for step in scenario.steps if step.type is not None}
+    starts = [(start, spec | {"stdin": start.name in typed_to}) for start, spec in starts]
     with EvidenceWriter(path, scenario=name, clock=scenario.clock, warp=warp, metadata=metadata) as writer:
         session = ArenaSession(place, writer, last_run=last_run, on_lateness=admission.note_lateness)
         if not any(spec["role"] == "student" for _, spec in starts):
@@ -89,7 +84,8 @@ async def run_scenario(
             session.live.rate(rates)
             async with admission.start() as leave, session as arena:
                 arena.course(ScenarioEvent(event="begin"))
-                async with release_when_up(leave, {spec["name"] for _, spec in starts}, arena):
+                at_once = {spec["name"] for start, spec in starts if start.name not in scenario.started_later}
+                async with release_when_up(leave, at_once, arena):
                     outcome, detail = await _run(scenario, starts, arena, tell)
                 await stop(scenario.start, arena, warped=scenario.clock == "warped")
                 await arena.finish()
@@ -107,17 +103,19 @@ async def _run(
     if scenario.clock == "warped":
         arena.send(do="warp", warp=scenario.warp, step_s=CLOCK_STEP_S)
     set_params(scenario.params, arena)
-    async with StepRunner(scenario, arena, tell) as runner:
+    async with StepRunner(scenario, starts, arena, tell) as runner:
         runner.advertise()
         arena.live.started_s = time.monotonic()
         for start, spec in starts:
+            if start.name in scenario.started_later:
+                continue
             if start.after is not None:
                 await _await_node(start.after, scenario, arena, tell)
             arena.start(spec)
         await runner.run()
         if scenario.steps:
             arena.live.steps_over(time.monotonic())
-            if arena.live.running and not waits(scenario.until):
+            if runner.stopped_all or (arena.live.running and not waits(scenario.until)):
                 return "complete", ""
         return await _observe(scenario, arena, tell)
 

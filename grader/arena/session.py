@@ -123,14 +123,18 @@ class ArenaSession:
         self._process.send(command)
 
     def start(self, spec: dict[str, Any]) -> None:
-        (self.live.helpers if spec["role"] == "grader" else self.live.running).add(spec["name"])
-        self.live.last_start_s = time.monotonic()
+        self.live.started(spec["name"], time.monotonic(), helper=spec["role"] == "grader")
+        self.exit_codes.pop(spec["name"], None)
+        self._killed.starting(spec["name"])
         self.send(do="start", spec=spec)
 
-    async def interrupt(self, name: str, *, int_s: float, term_s: float) -> None:
-        """Ctrl-C; TERM after `int_s`, KILL after another `term_s`. Returns when the process has ended."""
+    async def interrupt(self, name: str, *, int_s: float, term_s: float, action: str = "interrupt") -> None:
+        """Ctrl-C; TERM after `int_s`, KILL after another `term_s`. Returns when the process has ended.
+
+        `action` is how the evidence calls it: with `kill`, it is KILL at once.
+        """
         self._killed.stopping(name)
-        self.send(do="interrupt", name=name, int_s=int_s, term_s=term_s)
+        self.send(do="interrupt", name=name, int_s=int_s, term_s=term_s, action=action)
         await self.wait(lambda: name in self.exit_codes, int_s + term_s + END_S)
 
     def course(self, event: ScenarioEvent) -> None:
@@ -281,11 +285,7 @@ class ArenaSession:
         self.exit_codes[name] = record["exit_code"]
         if self._master or record["role"] != "student":  # what a build only tries out may end as it likes
             self._killed.ended(record)
-        self.live.helpers.discard(name)
-        if name in self.live.running:
-            self.live.running.remove(name)
-            self.live.ended.add(name)
-            self.live.active(time.monotonic())
+        self.live.exited(name, time.monotonic())
 
     def _status(self, fields: dict[str, Any]) -> None:
         status = fields["status"]
@@ -348,6 +348,10 @@ class Killed:
     def stopping(self, name: str) -> None:
         """From now on it is the grader who ends it."""
         self._stopping.add(name)
+
+    def starting(self, name: str) -> None:
+        """From now on it ends by itself again."""
+        self._stopping.discard(name)
 
     def limited(self, name: str) -> None:
         self._limited.add(name)

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from typing_extensions import Self
 
@@ -20,7 +20,7 @@ from grader.arena.scenario_inputs import make_shots
 from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent
-from grader.rubric.model import Call, Publish, Scenario, Step, Wait
+from grader.rubric.model import Call, Publish, Scenario, Start, Step, Typed, Wait
 from grader.wording import plural
 
 if TYPE_CHECKING:
@@ -29,13 +29,24 @@ if TYPE_CHECKING:
 Tell = Callable[[str], None]
 ANSWER_S = 10.0
 SUBSCRIBE_S = 6.0
+CTRL_C_S = 5.0
+LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
+TERM_S = 2.0
+
+Spec: TypeAlias = dict[str, Any]
+"""What the arena needs to start a process (`ProcessEnvironment.spec`)."""
 
 
 class StepRunner:
     """Does the probes, calls and steps of one run. Inside the context, what has gone to the background goes on."""
 
-    def __init__(self, scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:
+    def __init__(
+        self, scenario: Scenario, starts: list[tuple[Start, Spec]], arena: ArenaSession, tell: Tell
+    ) -> None:
         self._scenario = scenario
+        self._starts = starts
+        self._stopped: set[str] = set()
+        self._may_start = False
         self._arena = arena
         self._live = arena.live
         self._tell = tell
@@ -66,8 +77,9 @@ class StepRunner:
         if self._scenario.probes:
             await self._probe()
         steps = (*(Step(call=call) for call in self._scenario.calls), *self._scenario.steps)
-        for step in steps:
-            if not self._live.running:
+        for index, step in enumerate(steps):
+            self._may_start = any(left.start or left.restart for left in steps[index:])
+            if self._is_over():
                 break
             await self._do(step)
         await asyncio.gather(*self._background)
@@ -79,6 +91,21 @@ class StepRunner:
             await self._wait(step.wait)
         if step.call is not None:
             await self._call(step.call)
+        if step.type is not None:
+            self._type(step.type)
+        if name := step.stop or step.kill or step.restart:
+            await self._stop(name, "kill" if step.kill else "stop")
+        if name := step.start or step.restart:
+            self._start(name)
+
+    def _is_over(self) -> bool:
+        """Whether nothing of the student's runs any more, nor will."""
+        return not self._live.running and not self._may_start
+
+    @property
+    def stopped_all(self) -> bool:
+        """Whether steps have stopped all that ran."""
+        return not self._live.running and self._live.ended <= self._stopped
 
     # --- Messages ----------------------------------------------------------------------------------------------------
 
@@ -172,14 +199,15 @@ class StepRunner:
     async def _until(self, time_ns: int) -> None:
         """Until it is so late by the run's clock; by the wall's, where that stands still."""
         left_s = max(0.0, (time_ns - self._arena.ros_now_ns()) / NS)
-        await self._arena.wait(lambda: self._arena.ros_now_ns() >= time_ns, left_s)
+        await self._arena.wait(lambda: self._arena.ros_now_ns() >= time_ns or self._is_over(), left_s)
 
     async def _wait(self, wait: Wait) -> None:
         live, limit_s = self._live, wait.limit_s or self._scenario.until.first_message_s
         if wait.seconds is not None:
             self._tell(f"waiting for {wait.seconds:g} s")
             await self._until(self._arena.ros_now_ns() + round(wait.seconds * NS))
-            self._note("wait", None, f"{wait.seconds:g} s have passed")
+            if not self._is_over():
+                self._note("wait", None, f"{wait.seconds:g} s have passed")
             return
         name = wait.topic or wait.node or ""
         self._tell(f"waiting for {name}")
@@ -188,10 +216,37 @@ class StepRunner:
         def is_there() -> bool:
             return live.topics[name].count >= wanted if wait.topic else name in live.here
 
-        await self._arena.wait(lambda: is_there() or not live.running, limit_s)
+        await self._arena.wait(lambda: is_there() or self._is_over(), limit_s)
         what = plural(wait.messages, "message") if wait.topic else "the node"
         there = is_there()
         self._note("wait", name, f"{what} came" if there else f"{what} did not come within {limit_s:g} s")
+
+    # --- Processes ---------------------------------------------------------------------------------------------------
+
+    def _start(self, name: str) -> None:
+        for spec in self._specs(name):
+            self._note("start", None, spec["name"])
+            self._stopped.discard(spec["name"])
+            self._arena.start(spec)
+
+    async def _stop(self, name: str, action: str) -> None:
+        self._tell(f"stopping {name}")
+        int_s = LAUNCH_CTRL_C_S if any(s.launch for s, _ in self._starts if s.name == name) else CTRL_C_S
+        for spec in self._specs(name):
+            process = spec["name"]
+            if process in self._live.running | self._live.helpers:
+                self._stopped.add(process)
+                await self._arena.interrupt(process, int_s=int_s, term_s=TERM_S, action=action)
+
+    def _type(self, typed: Typed) -> None:
+        data = base64.b64encode(f"{typed.line}\n".encode()).decode()
+        for spec in self._specs(typed.process):
+            process = spec["name"]
+            record = {"action": "type", "actor": "grader", "detail": process, "value": typed.line}
+            self._arena.send(do="type", name=process, data=data, record=record)
+
+    def _specs(self, name: str) -> list[Spec]:
+        return [spec for start, spec in self._starts if start.name == name]
 
     # --- Services ----------------------------------------------------------------------------------------------------
 

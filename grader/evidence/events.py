@@ -125,13 +125,29 @@ class ActorEvent(Record):
     `publish`: `value` is the field `data` as sent, or a map of the message's fields. `param`: `topic` is the
     parameter's name, `value` what it was set to. `call`: `topic` is the service, `value` the request's fields;
     `answer`: the response's fields, or None and the reason in `detail`. `open`: the stand-in for the program `actor`
-    was started with the arguments `value`. `wait`: a step waited for the topic or node `topic`, or for a time; `detail`
-    says whether it came. `refused`: `actor`, a process where it is known, else a node, was not
+    was started with the arguments `value`. `refused`: `actor`, a process where it is known, else a node, was not
     allowed what `detail` says; `limit`: it reached a limit. At most 50 of each in a run, equal ones once.
+    Of steps: `wait` waited for the topic or node `topic`, or for a time, and `detail` says whether it came; `start`,
+    `stop` (Ctrl-C) and `kill` have the process in `detail` (`interrupt` is the run's end), and so has `type`, with the
+    line that went to its standard input in `value`.
     """
 
     action: Literal[
-        "publish", "clock", "interrupt", "param", "call", "answer", "open", "note", "refused", "limit", "wait"
+        "publish",
+        "clock",
+        "interrupt",
+        "param",
+        "call",
+        "answer",
+        "open",
+        "note",
+        "refused",
+        "limit",
+        "wait",
+        "start",
+        "stop",
+        "kill",
+        "type",
     ]
     """What was done."""
     actor: str

@@ -17,6 +17,7 @@ NAME_PATTERN = r"^[a-z][a-z0-9-]*$"
 PROGRAM_PATTERN = r"^[A-Za-z][\w-]*/[\w.-]+$"
 TYPE_PATTERN = r"^[A-Za-z]\w*/[A-Za-z]\w*$"
 MESSAGES_MAX = 10_000
+LINE_CHARS_MAX = 1_000
 STEP_S_MAX = 600
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 StepSeconds = Annotated[float, Field(gt=0, le=STEP_S_MAX)]
@@ -154,8 +155,18 @@ class Wait(Record):
     limit_s: StepSeconds | None = None
 
 
+class Typed(Record):
+    """A line on the standard input of a process. Only processes that a step types to have one."""
+
+    process: Name
+    line: Annotated[str, Field(max_length=LINE_CHARS_MAX)]
+
+
 class Step(Record):
     """One thing that the grader does in a run, after the probes, the calls and the steps before it. Give one key.
+
+    `start`, `stop` (Ctrl-C), `kill` (SIGKILL) and `restart` (stop and start) name one of the scenario's `start`. What
+    a step starts before anything else names it is not started with the others.
 
     What it did is in the evidence (`/grader/actor`). When no student's process runs any more, and no later step starts
     one, the steps that are left are left out.
@@ -164,6 +175,11 @@ class Step(Record):
     publish: Publish | None = None
     wait: Wait | None = None
     call: Call | None = None
+    start: Name | None = None
+    stop: Name | None = None
+    kill: Name | None = None
+    restart: Name | None = None
+    type: Typed | None = None
 
     @property
     def lasts_s(self) -> float:
@@ -224,6 +240,16 @@ class Scenario(Record):
     calls: tuple[Call, ...] = ()
     steps: tuple[Step, ...] = ()
     until: Annotated[Until, Field(default_factory=lambda: Until(messages={}))]
+
+    @property
+    def started_later(self) -> frozenset[str]:
+        """The names of those that a step starts first."""
+        first: dict[str, str] = {}
+        for step in self.steps:
+            named = {"start": step.start, "": step.stop or step.kill or step.restart}
+            for kind, name in named.items():
+                first.setdefault(name or "", kind)
+        return frozenset(name for name, kind in first.items() if name and kind)
 
     @property
     def digest(self) -> str:

@@ -11,6 +11,7 @@ from grader.wording import did_you_mean
 
 KINDS = tuple(Step.model_fields)
 RUN_S_MAX = 2 * STEP_S_MAX
+PROCESS_STEPS = ("start", "stop", "kill", "restart")
 WAITS = ("seconds", "topic", "node")
 
 
@@ -22,6 +23,7 @@ def given_steps(scenario: dict[str, Any], kind: str) -> list[dict[str, Any]]:
 def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     """Yield the faults of one scenario's steps."""
     types: dict[str, str] = {}
+    yield from _processes(path, scenario)
     for index, step in as_maps(scenario.get("steps")):
         at = (*path, "steps", index)
         given = [kind for kind in KINDS if step.get(kind) is not None]
@@ -104,6 +106,29 @@ def misfits(
     for place, value in values:
         if wrong := message_type.misfit(value, moment):
             yield place, wrong
+
+
+def _processes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield the faults of steps that start, stop or type to a process."""
+    starts = {str(start.get("name")): start for _, start in as_maps(scenario.get("start"))}
+    runs: dict[str, bool] = {}
+    for index, step in as_maps(scenario.get("steps")):
+        for kind in (*PROCESS_STEPS, "type"):
+            key = (kind,) if kind in PROCESS_STEPS else (kind, "process")
+            name = as_map(step.get(kind)).get("process") if kind == "type" else step.get(kind)
+            if not isinstance(name, str):
+                continue
+            at = (*path, "steps", index, *key)
+            if name not in starts:
+                yield at, f'there is no start "{name}"{did_you_mean(name, starts)}'
+            elif kind == "type" and not {"script", "program", "launch"} & starts[name].keys():
+                yield at, f'"{name}" is no script, program or launch file'
+            elif kind == "start" and runs.get(name, False):
+                yield at, f'"{name}" runs already: stop it before, or restart it'
+            elif kind in {"stop", "kill"} and not runs.get(name, True):
+                yield at, f'"{name}" does not run: an earlier step has stopped it'
+            if kind != "type":
+                runs[name] = kind in {"start", "restart"}
 
 
 def _wait(at: KeyPath, wait: dict[str, Any]) -> Iterator[Fault]:

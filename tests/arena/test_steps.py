@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from grader.checks.support.processes import lives, observed_until_ns
 from grader.evidence.run import Run
 from grader.rubric.model import Scenario, Start, Until
 from tests.arena.support import SCRIPT, make_place, printed, run
@@ -20,17 +21,19 @@ ECHO = (
     + "rospy.init_node('echo')\npub = rospy.Publisher('echo', Float64, queue_size=10)\n"
     + "rospy.Subscriber('speed', Float64, lambda m: pub.publish(m.data * 2))\n"
     + "rospy.Subscriber('scan', LaserScan, lambda m: print(len(m.ranges), max(m.ranges), min(m.ranges)))\n"
-    + "rospy.Subscriber('beat', Header, lambda m: print('late', abs((rospy.Time.now() - m.stamp).to_sec()) > 1))\n"
+    + "rospy.Subscriber('beat', Header, lambda m: None)\n"
     + "rospy.spin()\n"
 )
 
 
-def _run(tmp_path: Path, files: dict[str, str], steps: list[dict[str, Any]], **more: Any) -> Run:
+def _run(
+    tmp_path: Path, files: dict[str, str], steps: list[dict[str, Any]], *, sandbox: str = "auto", **more: Any
+) -> Run:
     """Do the steps with each of the scripts, which are processes by their names."""
     start = tuple(Start(name=Path(file).stem, script=file) for file in files if file.endswith(".py"))
     about = {"title": "steps", "start": start, "until": Until(messages={}, first_message_s=10), **more}
     scenario = Scenario.model_validate({**about, "steps": steps})
-    with make_place(files) as place:
+    with make_place(files, sandbox=sandbox) as place:
         return run(place, scenario, tmp_path / "run.mcap")
 
 
@@ -54,7 +57,6 @@ def test_messages_that_change_and_what_is_waited_for(tmp_path: Path, clock: str)
             {"publish": {**speed, "rate_hz": 10, "duration_s": 2}},
             {"wait": {"topic": "/echo", "messages": 20}},
             {"publish": {"topic": "/scan", "type": "sensor_msgs/LaserScan", "value": scan, "count": 1}},
-            {"publish": {"topic": "/nobody", "type": "std_msgs/Bool", "value": True, "count": 1}},
             {"wait": {"node": "/echo"}},
             {"wait": {"seconds": 1}},
             {"wait": {"topic": "/echo", "new": True, "limit_s": 0.2}},
@@ -64,15 +66,80 @@ def test_messages_that_change_and_what_is_waited_for(tmp_path: Path, clock: str)
     (echo,) = seen.student_channels("/echo")
     assert echo.data == pytest.approx([2 * n / 19 for n in range(20)])
     assert "360 inf 0.5" in printed(seen, "echo")
-    assert set(printed(seen, "echo")) - {"360 inf 0.5"} == {"late False"}
+    beats = [
+        (t / 1e9, e.value["stamp"]) for t, e in seen.actors if e.action == "publish" and e.topic == "/beat"
+    ]
+    (begun_s, first), (over_s, last) = beats[0], beats[-1]
+    faster = (last["secs"] - first["secs"] + (last["nsecs"] - first["nsecs"]) / 1e9) / (over_s - begun_s)
+    assert faster > 3 if clock == "warped" else 0.9 < faster < 1.1
     published = [(t, e.value) for t, e in seen.actors if e.action == "publish" and e.topic == "/speed"]
     assert [value for _, value in published] == pytest.approx([n / 19 for n in range(20)])
     if clock == "real":
         gaps_s = [(b - a) / 1e9 for (a, _), (b, _) in pairwise(published)]
         assert sum(gaps_s) / len(gaps_s) == pytest.approx(0.1, rel=0.1)
-    assert ("/nobody", None, "nothing was published: no node has subscribed") in _did(seen, "note")
     assert [detail for _, _, detail in _did(seen, "wait")] == [
         "20 messages came", "the node came", "1 s have passed", "1 message did not come within 0.2 s",
     ]  # fmt: skip
     assert seen.outcome is not None
     assert seen.outcome.outcome == "complete"
+
+
+TALKER = (
+    NODE
+    + "import sys, threading\nfrom std_msgs.msg import Int32\nrospy.init_node('talker')\n"
+    + "pub = rospy.Publisher('count', Int32, queue_size=10)\nrate = rospy.Rate(20)\n"
+    + "threading.Thread(target=lambda: [print('typed', l.strip()) for l in sys.stdin], daemon=True).start()\n"
+    + "for n in range(10000):\n    if rospy.is_shutdown():\n        break\n    pub.publish(n)\n    rate.sleep()\n"
+)
+LISTENER = (
+    NODE
+    + "from std_msgs.msg import Int32, String\nrospy.init_node('listener')\n"
+    + "rospy.Subscriber('words', String, lambda m: print('heard', m.data))\nrospy.spin()\n"
+)
+
+
+@pytest.mark.parametrize("sandbox", ["auto", "none"])
+def test_processes_are_started_stopped_killed_and_typed_to(tmp_path: Path, sandbox: str) -> None:
+    words = {"topic": "/words", "type": "std_msgs/String"}
+    seen = _run(
+        tmp_path,
+        {"scripts/talker.py": TALKER, "scripts/listener.py": LISTENER},
+        [
+            {"wait": {"topic": "/count", "messages": 5}},
+            {"publish": {**words, "topic": "/unheard", "value": "nothing"}},
+            {"type": {"process": "talker", "line": "hello there"}},
+            {"start": "listener"},
+            {"wait": {"node": "/listener", "limit_s": 20}},
+            {"publish": {**words, "value": "first"}},
+            {"kill": "talker"},
+            {"restart": "listener"},
+            {"publish": {**words, "value": "second"}},
+            {"start": "talker"},
+            {"wait": {"topic": "/count", "messages": 5, "new": True}},
+            {"stop": "talker"},
+        ],
+        sandbox=sandbox,
+        until=Until(messages={}, first_message_s=5),
+    )
+    assert [line for line in printed(seen, "talker") if line.startswith("typed")] == ["typed hello there"]
+    assert [line for line in printed(seen, "listener") if "heard" in line] == ["heard first", "heard second"]
+    assert ("/unheard", None, "nothing was published: no node has subscribed") in _did(seen, "note")
+    talker, listener, again, last = lives(seen)
+    assert (talker.name, listener.name, again.name, last.name) == ("talker", "listener", "listener", "talker")
+    stops = [(one.end.stopped_by, one.by_step, one.ended_early) for one in lives(seen) if one.end is not None]
+    assert stops == [("KILL", True, False), ("INT", True, False), ("INT", False, False), ("INT", True, False)]
+    deeds = [(e.action, e.detail) for _, e in seen.actors if e.action in {"start", "stop", "kill"}]
+    assert deeds == [
+        ("start", "listener"), ("kill", "talker"), ("stop", "listener"), ("start", "listener"), ("start", "talker"),
+        ("stop", "talker"),
+    ]  # fmt: skip
+    assert observed_until_ns(seen) == again.interrupt_ns
+    assert seen.outcome is not None
+    assert seen.outcome.outcome == "complete"
+
+
+def test_a_run_whose_process_has_ended_does_no_more_steps(tmp_path: Path) -> None:
+    seen = _run(tmp_path, {"scripts/short.py": SCRIPT + "print('over')\n"}, [{"wait": {"seconds": 60}}] * 3)
+    assert seen.outcome is not None
+    assert seen.outcome.outcome == "ended"
+    assert (seen.end_ns - seen.start_ns) / 1e9 < 40

@@ -33,6 +33,9 @@ def _with_steps(folder: Path, *steps: str) -> Path:
         "{wait: {topic: /cmd_vel, messages: 3, new: true, limit_s: 5}}",
         "{wait: {node: /talker}}",
         "{call: {service: /reset, type: std_srvs/Empty}}",
+        "{stop: talker}, {start: talker}, {kill: talker}",
+        "{start: talker}, {restart: talker}",
+        "{type: {process: talker, line: '3.5'}}",
     ],
 )
 def test_sound_steps(step: str, tmp_path: Path) -> None:
@@ -85,6 +88,9 @@ def test_what_is_not_finite_stays_as_it_is_written(tmp_path: Path) -> None:
         ("{wait: {}}", ".wait: give one of seconds, topic and node: none is there"),
         ("{wait: {seconds: 1, new: true}}", ".wait.new: is for a topic"),
         ("{wait: {node: talker}}", '.wait.node: a node\'s name begins with a slash: "/talker"'),
+        ("{stop: taker}", '.stop: there is no start "taker" (did you mean "talker"?)'),
+        ("{type: {process: taker, line: a}}", '.type.process: there is no start "taker" (did you mean'),
+        ("{type: {process: talker, line: 5}}", ".type.line: must be text, not 5: put it in quotes"),
         (
             "{call: {service: reset, type: std_srvs/Empty}}",
             '.call.service: a service begins with a slash: "/reset"',
@@ -105,6 +111,29 @@ def test_steps_that_last_too_long_or_mix_types(tmp_path: Path) -> None:
     assert any(
         "steps[4].publish.type: an earlier step publishes std_msgs/Int8 on /go" in line for line in found
     ), found
+
+
+@pytest.mark.parametrize(
+    ("steps", "fault"),
+    [
+        ("{start: talker}, {start: talker}", '[1].start: "talker" runs already'),
+        ("{stop: talker}, {kill: talker}", '[1].kill: "talker" does not run'),
+    ],
+)
+def test_processes_that_cannot_be_started_or_stopped(steps: str, fault: str, tmp_path: Path) -> None:
+    assert any(f"scenarios.real.steps{fault}" in line for line in faults(_with_steps(tmp_path, steps)))
+
+
+@pytest.mark.parametrize(
+    ("steps", "later"),
+    [
+        ([{"start": "a"}, {"stop": "b"}], {"a"}),
+        ([{"stop": "a"}, {"start": "a"}], set()),
+        ([{"restart": "a"}], set()),
+    ],
+)
+def test_what_a_step_starts_is_not_started_before(steps: list[dict[str, str]], later: set[str]) -> None:
+    assert Scenario.model_validate({"title": "a", "steps": steps}).started_later == later
 
 
 @pytest.mark.parametrize(
