@@ -20,7 +20,7 @@ from grader.arena.scenario_inputs import make_shots
 from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent
-from grader.rubric.model import Call, Publish, Scenario, Start, Step, Typed, Wait
+from grader.rubric.model import Call, Publish, Scenario, Start, Step, Transform, Typed, Wait
 from grader.wording import plural
 
 if TYPE_CHECKING:
@@ -51,6 +51,7 @@ class StepRunner:
         self._live = arena.live
         self._tell = tell
         self._types: dict[str, MessageType] = {}
+        self._fixed: dict[str, Any] = {}
         self._deaf: set[str] = set()
         self._background: list[asyncio.Task[None]] = []
         self._endless: list[asyncio.Task[None]] = []
@@ -69,8 +70,8 @@ class StepRunner:
         for probe in self._scenario.probes:
             self._advertise(probe.topic, probe.type, latched=False)
         for step in self._scenario.steps:
-            if step.publish is not None:
-                self._advertise(step.publish.topic, step.publish.type, latched=step.publish.latched)
+            if (sent := step.published) is not None:
+                self._advertise(sent.topic, sent.type, latched=sent.latched)
 
     async def run(self) -> None:
         """Return when all is done, but for what lasts as long as the run."""
@@ -85,8 +86,14 @@ class StepRunner:
         await asyncio.gather(*self._background)
 
     async def _do(self, step: Step) -> None:
-        if step.publish is not None:
-            await self._publish(step.publish)
+        if step.transform is not None and step.transform.static:
+            self._static(step.transform)
+        elif (sent := step.published) is not None:
+            await self._publish(sent)
+        if step.set_param is not None:
+            about = step.set_param
+            record = {"action": "set_param", "actor": "grader", "topic": about.name, "value": about.value}
+            self._arena.send(do="set_param", name=about.name, value=about.value, record=record)
         if step.wait is not None:
             await self._wait(step.wait)
         if step.call is not None:
@@ -162,6 +169,20 @@ class StepRunner:
         else:
             await self._stream(publish)
 
+    def _static(self, transform: Transform) -> None:
+        """A latched topic keeps its last message only: each holds all that were sent."""
+        sent = transform.published
+        self._fixed[transform.child] = sent.value["transforms"][0]
+        self._try_send(sent, {"transforms": list(self._fixed.values())}, 0, 1)
+
+    def _try_send(self, publish: Publish, value: object, index: int, total: int | None) -> bool:
+        try:
+            self._send(publish.topic, value, index, total)
+        except ValueError as error:
+            self._note("note", publish.topic, f"the grader cannot publish {publish.type}: {error}")
+            return False
+        return True
+
     async def _stream(self, publish: Publish) -> None:
         topic, total, values = publish.topic, publish.total, publish.in_turn
         if not publish.latched and not await self._has_subscriber(topic):
@@ -169,12 +190,9 @@ class StepRunner:
         self._tell(f"publishing on {topic}")
         due_ns = self._arena.ros_now_ns()
         for index in count() if total is None else range(total):
-            if not self._live.running:
-                return
-            try:
-                self._send(topic, values[index % len(values)], index, total)
-            except ValueError as error:
-                self._note("note", topic, f"the grader cannot publish {publish.type}: {error}")
+            if not self._live.running or not self._try_send(
+                publish, values[index % len(values)], index, total
+            ):
                 return
             due_ns = max(due_ns + round(NS / publish.rate_hz), self._arena.ros_now_ns())
             await self._until(due_ns)
@@ -263,18 +281,22 @@ class StepRunner:
 
     async def _ask(self, call: Call) -> None:
         from grader.evidence.decode import ServiceType  # noqa: PLC0415 - numpy, which not every run needs
+        from grader.evidence.message_values import MessageType, Moment  # noqa: PLC0415 - as above
 
         try:
             text = self._arena.place.type_text(call.type, "srv") or ""
             type_ = ServiceType(call.type, text, self._message_text)
-            data = base64.b64encode(type_.encode_request(call.request)).decode()
+            request = MessageType(f"{call.type}Request", full=type_.request)
+            moment = Moment(0, 1, self._arena.ros_now_ns())
+            data, shown = request.encode(call.request, moment), request.shown(call.request, moment)
         except ValueError as error:
             self._answer(call, None, f"the grader could not call it: {error}")
             return
-        about = {"topic": call.service, "type": call.type, "value": call.request}
+        about = {"topic": call.service, "type": call.type, "value": shown}
         record = {"action": "call", "actor": "grader", **about}
+        encoded = base64.b64encode(data).decode()
         answer = await self._arena.call(
-            ANSWER_S, service=call.service, type=call.type, data=data, record=record
+            ANSWER_S, service=call.service, type=call.type, data=encoded, record=record
         )
         if "data" not in answer:
             self._answer(call, None, answer["error"])

@@ -272,7 +272,8 @@ _PARTS_MAX = 100
 
 
 class ServiceType:
-    """Encodes requests and decodes responses of one service type, from the text of its `.srv` file (wiki.ros.org/srv).
+    """Decodes responses of one service type, from the text of its `.srv` file (wiki.ros.org/srv). `request` is the full
+    definition of its requests.
 
     `find_text` returns the text of messages that ROS Noetic's own packages do not have.
 
@@ -284,12 +285,8 @@ class ServiceType:
         if len(parts) != 2:
             raise ValueError(f"{type}: a service has a request and a response with one line --- between them")
         request, response = (full_definition(type, part, find_text) for part in parts)
-        self._request = Encoder(f"{type}Request", request)
+        self.request = request
         self._response = Decoder(f"{type}Response", response)
-
-    def encode_request(self, value: Mapping[str, Any]) -> bytes:
-        """The request's bytes; fields that `value` leaves out are zero. Raises ValueError where it does not fit."""
-        return self._request.encode(value)
 
     def decode_response(self, data: bytes) -> Value:
         """The response's fields, None where the bytes do not fit."""

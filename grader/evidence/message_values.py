@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, TypeGuard
 
-from grader.evidence.decode import Encoder, FindText, definition, full_definition, is_ros_type, md5sum
+from grader.evidence.decode import Encoder, FindText, definition, full_definition, is_ros_type
 from grader.evidence.definitions import MAX_DEFINITION_BYTES, PRIMITIVES, Field, parse, sections_of
 from grader.wording import did_you_mean
 
@@ -21,6 +21,8 @@ NOT_FINITE = {".inf": math.inf, "+.inf": math.inf, "-.inf": -math.inf, ".nan": m
 """As YAML writes them. A rubric's data holds them as text, as JSON has no other form for them."""
 CLOCKS = ("time", "duration")
 ENDS = ("from", "to")
+QUATERNION, ANGLES = "geometry_msgs/Quaternion", "rpy_deg"
+"""Wherever a quaternion is asked for, `{rpy_deg: [roll, pitch, yaw]}` can stand."""
 FORMS = frozenset({*ENDS, "each", "repeat", "count", "except"})
 """What stands in the place of a value, and is none itself."""
 OTHER_TEXTS = {"tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms\n"}
@@ -43,23 +45,22 @@ FIRST = Moment(0, 1, 0)
 
 
 class MessageType:
-    """A message type with its definition and its MD5 sum. `find_text` returns the text of a `.msg` file.
+    """A message type with its definition and its MD5 sum. `find_text` returns the text of a `.msg` file, `full` is a
+    definition with all its parts.
 
     Raises ValueError where the type is nowhere, or its text is no definition.
     """
 
-    def __init__(self, type: str, find_text: FindText = lambda _: None) -> None:  # noqa: A002 - ROS's own word
-        text = None if is_ros_type(type) else find_text(type) or OTHER_TEXTS.get(type)
+    def __init__(self, type: str, find_text: FindText = lambda _: None, *, full: str | None = None) -> None:  # noqa: A002 - ROS's own word
         self.type = type
-        if text is None:
-            self.definition, self.md5sum = definition(type), md5sum(type)
-        else:
-            if len(text) > MAX_DEFINITION_BYTES:
-                raise ValueError(f"{type}: its definition is too long")
-            self.definition = full_definition(type, text, find_text)
-            self.md5sum = md5_of(type, self.definition)
+        self.definition = _definition(type, find_text) if full is None else full
+        self._types = parse(type, self.definition)  # its reasons are better than the next one's
         self._encoder = Encoder(type, self.definition)
-        self._types = parse(type, self.definition)
+
+    @property
+    def md5sum(self) -> str:
+        """As `rosmsg md5` gives it."""
+        return md5_of(self.type, self.definition)
 
     def encode(self, value: object, moment: Moment = FIRST) -> bytes:
         """Return the message's bytes. Raises ValueError where the value does not fit."""
@@ -82,6 +83,15 @@ class MessageType:
         return found if _is_fields(value, found) else found["data"]
 
 
+def _definition(type_: str, find_text: FindText) -> str:
+    text = None if is_ros_type(type_) else find_text(type_) or OTHER_TEXTS.get(type_)
+    if text is None:
+        return definition(type_)
+    if len(text) > MAX_DEFINITION_BYTES:
+        raise ValueError(f"{type_}: its definition is too long")
+    return full_definition(type_, text, find_text)
+
+
 class _Filling:
     """Follows a value along its type. `shown` leaves what JSON cannot hold, or would be long, as it is written."""
 
@@ -92,6 +102,8 @@ class _Filling:
 
     def fields(self, type_: str, value: object) -> dict[str, Any]:
         known = {field.name: field for field in self._types[type_]}
+        if type_ == QUATERNION and isinstance(value, Mapping) and set(value) == {ANGLES}:
+            value = self._quaternion(value[ANGLES])
         if not _is_fields(value, known):
             if list(known) != ["data"]:
                 raise ValueError(f"{type_} is made of fields ({', '.join(known)}), not {value!r}")
@@ -100,6 +112,20 @@ class _Filling:
             if name not in known:
                 raise ValueError(f"{type_} has no field {name}{did_you_mean(str(name), known)}")
         return {name: self._field(known[name], item) for name, item in value.items()}
+
+    def _quaternion(self, angles_deg: object) -> dict[str, float]:
+        """Return x, y, z, w for roll, pitch and yaw, as tf's `quaternion_from_euler` does."""
+        found = [self._one("float64", angle) for angle in angles_deg] if isinstance(angles_deg, list) else []
+        if len(found) != len("rpy") or not all(isinstance(a, int | float) for a in found):
+            raise ValueError(f"{ANGLES} are three numbers, roll, pitch and yaw, not {angles_deg!r}")
+        half = [math.radians(angle) / 2 for angle in found]
+        (cr, cp, cy), (sr, sp, sy) = map(math.cos, half), map(math.sin, half)
+        return {
+            "x": sr * cp * cy - cr * sp * sy,
+            "y": cr * sp * cy + sr * cp * sy,
+            "z": cr * cp * sy - sr * sp * cy,
+            "w": cr * cp * cy + sr * sp * sy,
+        }
 
     def _field(self, field: Field, value: object) -> Any:  # noqa: ANN401 - a message's value
         if not field.array:

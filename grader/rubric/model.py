@@ -18,6 +18,7 @@ PROGRAM_PATTERN = r"^[A-Za-z][\w-]*/[\w.-]+$"
 TYPE_PATTERN = r"^[A-Za-z]\w*/[A-Za-z]\w*$"
 MESSAGES_MAX = 10_000
 LINE_CHARS_MAX = 1_000
+TF_TYPE = "tf2_msgs/TFMessage"
 STEP_S_MAX = 600
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 StepSeconds = Annotated[float, Field(gt=0, le=STEP_S_MAX)]
@@ -155,6 +156,51 @@ class Wait(Record):
     limit_s: StepSeconds | None = None
 
 
+class SetParam(Record):
+    """A parameter that is set in the middle of a run, on the parameter server."""
+
+    name: Annotated[str, Field(min_length=1)]
+    value: Any
+
+
+class Transform(Record):
+    """Where the frame `child` is in the frame `parent`, on `/tf`; with `static`, latched on `/tf_static`.
+
+    `translation` is x, y, z in metres, `rotation_deg` roll, pitch and yaw in degrees, as tf's are. Each may be a number
+    that changes, `{from: 0, to: 90}`. It is sent as `publish` sends: `rate_hz`, `count` or `duration_s`, `background`.
+    """
+
+    parent: Annotated[str, Field(min_length=1)]
+    child: Annotated[str, Field(min_length=1)]
+    translation: Annotated[tuple[Any, ...], Field(min_length=3, max_length=3)] = (0, 0, 0)
+    rotation_deg: Annotated[tuple[Any, ...], Field(min_length=3, max_length=3)] = (0, 0, 0)
+    static: bool = False
+    rate_hz: Annotated[float, Field(gt=0, le=100)] = 20.0
+    count: Annotated[int, Field(ge=1, le=MESSAGES_MAX)] | None = None
+    duration_s: StepSeconds | None = None
+    background: bool = False
+
+    @property
+    def published(self) -> Publish:
+        """The same as messages: in the place of the quaternion, `rpy_deg`."""
+        about = {
+            "header": {"stamp": "now", "frame_id": self.parent},
+            "child_frame_id": self.child,
+            "transform": {
+                "translation": dict(zip("xyz", self.translation, strict=True)),
+                "rotation": {"rpy_deg": list(self.rotation_deg)},
+            },
+        }
+        sending = self.model_dump(include={"rate_hz", "count", "duration_s", "background"})
+        return Publish(
+            topic="/tf_static" if self.static else "/tf",
+            type=TF_TYPE,
+            value={"transforms": [about]},
+            latched=self.static,
+            **sending,
+        )
+
+
 class Typed(Record):
     """A line on the standard input of a process. Only processes that a step types to have one."""
 
@@ -180,12 +226,20 @@ class Step(Record):
     kill: Name | None = None
     restart: Name | None = None
     type: Typed | None = None
+    set_param: SetParam | None = None
+    transform: Transform | None = None
+
+    @property
+    def published(self) -> Publish | None:
+        """What it publishes, if it does."""
+        return self.transform.published if self.transform is not None else self.publish
 
     @property
     def lasts_s(self) -> float:
         """About how long it takes where all is as it should be."""
-        if self.publish is not None and not self.publish.background:
-            return (self.publish.total or 0) / self.publish.rate_hz
+        sent = self.published
+        if sent is not None and not sent.background:
+            return (sent.total or 0) / sent.rate_hz
         return (self.wait.seconds or 0.0) if self.wait is not None else 0.0
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from grader.rubric.model import STEP_S_MAX, Step
+from grader.rubric.faults import model_faults
+from grader.rubric.model import STEP_S_MAX, Step, Transform
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps
 from grader.wording import did_you_mean
 
@@ -33,6 +34,10 @@ def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
             yield from _publish((*at, "publish"), as_map(step["publish"]), types)
         if "wait" in given:
             yield from _wait((*at, "wait"), as_map(step["wait"]))
+        if "set_param" in given:
+            yield from _set_param((*at, "set_param"), as_map(step["set_param"]))
+        if "transform" in given:
+            yield from _transform((*at, "transform"), as_map(step["transform"]))
         if "call" in given:
             yield from slash((*at, "call", "service"), as_map(step["call"]).get("service"), "a service")
     lasting_s = sum(_seconds(step) for _, step in as_maps(scenario.get("steps")))
@@ -50,7 +55,7 @@ def _found(given: list[str]) -> str:
 
 def _seconds(step: dict[str, Any]) -> float:
     """Return how long a step lasts at least, where that is given."""
-    publish, wait = as_map(step.get("publish")), as_map(step.get("wait"))
+    publish, wait = as_map(step.get("publish") or step.get("transform")), as_map(step.get("wait"))
     lasting = publish.get("duration_s"), wait.get("seconds")
     return sum(s for s in lasting if isinstance(s, int | float))
 
@@ -90,13 +95,13 @@ def misfits(
     `at` is the place of the type.
     """
     from grader.evidence.decode import known_packages  # noqa: PLC0415 - slow to load, and few rubrics need it
-    from grader.evidence.message_values import FIRST, MessageType  # noqa: PLC0415 - as above
+    from grader.evidence.message_values import FIRST, OTHER_TEXTS, MessageType  # noqa: PLC0415 - as above
 
     package, _, name = kind.partition("/")
-    names = known_packages().get(package)
-    if names is None:
+    names = known_packages().get(package, ())
+    if not names and kind not in OTHER_TEXTS:
         return
-    if name not in names:
+    if names and name not in names:
         yield (
             at,
             f"ROS Noetic has no message type {kind}{did_you_mean(kind, [f'{package}/{n}' for n in names])}",
@@ -106,6 +111,25 @@ def misfits(
     for place, value in values:
         if wrong := message_type.misfit(value, moment):
             yield place, wrong
+
+
+def _set_param(at: KeyPath, param: dict[str, Any]) -> Iterator[Fault]:
+    yield from slash((*at, "name"), param.get("name"), "a parameter")
+    if param.get("value", "") is None or param.get("value") in (".inf", "-.inf", ".nan"):
+        yield (*at, "value"), "is no value that the parameter server takes"
+
+
+def _transform(at: KeyPath, transform: dict[str, Any]) -> Iterator[Fault]:
+    if transform.get("static") is True:
+        for key in ("rate_hz", "count", "duration_s", "background"):
+            if key in transform:
+                yield (*at, key), "is not for a static transform: it is sent once, and stays"
+    elif transform.get("count") is not None and transform.get("duration_s") is not None:
+        yield at, "give count or duration_s, not both"
+    if model_faults(Transform, transform):
+        return  # said elsewhere
+    sent = Transform.model_validate(transform).published
+    yield from misfits(at, sent.type, [(at, sent.value)], endless=sent.total is None)
 
 
 def _processes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:

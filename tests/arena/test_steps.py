@@ -143,3 +143,43 @@ def test_a_run_whose_process_has_ended_does_no_more_steps(tmp_path: Path) -> Non
     assert seen.outcome is not None
     assert seen.outcome.outcome == "ended"
     assert (seen.end_ns - seen.start_ns) / 1e9 < 40
+
+
+FRAMES = (
+    NODE
+    + "from std_srvs.srv import SetBool, SetBoolResponse\nrospy.init_node('frames')\n"
+    + "for topic in ('/tf', '/tf_static'):\n"
+    + "    rospy.Subscriber(topic, rospy.AnyMsg, lambda m, t=topic: print(t, m._buff[0]))\n"
+    + "rospy.Service('turn', SetBool, lambda r: SetBoolResponse(r.data, str(rospy.get_param('/gain'))))\nrospy.spin()\n"
+)
+
+
+def test_transforms_parameters_and_calls_in_time(tmp_path: Path) -> None:
+    moving = {"parent": "map", "child": "base", "rotation_deg": [0, 0, {"from": 0, "to": 90}]}
+    turn = {"service": "/turn", "type": "std_srvs/SetBool"}
+    seen = _run(
+        tmp_path,
+        {"scripts/frames.py": FRAMES},
+        [
+            {"transform": {"parent": "base", "child": "laser", "translation": [0.2, 0, 0], "static": True}},
+            {"transform": {"parent": "base", "child": "camera", "rotation_deg": [0, 90, 0], "static": True}},
+            {"transform": {**moving, "duration_s": 0.5}},
+            {"set_param": {"name": "/gain", "value": 2}},
+            {"call": {**turn, "request": {"data": True}}},
+            {"set_param": {"name": "/gain", "value": 3}},
+            {"call": turn},
+        ],
+    )
+    told = printed(seen, "frames")
+    assert told.count("/tf 1") == 10
+    assert "/tf_static 2" in told
+    (fixed,) = (c for c in seen.channels if c.topic == "/tf_static")
+    (moved,) = (c for c in seen.channels if c.topic == "/tf")
+    assert fixed.latching
+    assert [t["child_frame_id"] for t in fixed.values[-1]["transforms"]] == ["laser", "camera"]
+    rotations = [value["transforms"][0]["transform"]["rotation"] for value in moved.values]
+    assert (rotations[0]["z"], rotations[0]["w"]) == (0.0, 1.0)
+    assert (rotations[-1]["z"], rotations[-1]["w"]) == pytest.approx((0.5**0.5, 0.5**0.5))
+    assert [v["message"] for _, v, _ in _did(seen, "answer")] == ["2", "3"]
+    assert [(name, value) for name, value, _ in _did(seen, "set_param")] == [("/gain", 2), ("/gain", 3)]
+    assert not _did(seen, "param")

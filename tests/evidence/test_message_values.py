@@ -37,6 +37,11 @@ def test_md5_sums_of_all_types_of_ros() -> None:
     assert [name for name in names if md5_of(name, definition(name)) != md5sum(name)] == []
 
 
+def test_a_request_without_fields() -> None:
+    assert MessageType("lab/ResetRequest", full="\n").encode({}) == b""
+    assert MessageType("lab/ResetRequest", full="").encode({}) == b""
+
+
 def test_tf_is_known_everywhere() -> None:
     assert MessageType("tf2_msgs/TFMessage").md5sum == "94810edda583a504dfda3829e70d7eec"
 
@@ -56,6 +61,20 @@ def test_a_type_of_the_student_s_own() -> None:
 def test_stamps(written: object, nanoseconds: int) -> None:
     stamp = _sent("std_msgs/Header", {"stamp": written})["stamp"]
     assert stamp["secs"] * 10**9 + stamp["nsecs"] == nanoseconds
+
+
+@pytest.mark.parametrize(
+    ("angles", "xyzw"),
+    [
+        ([0, 0, 0], (0, 0, 0, 1)),
+        ([90, 0, 0], (0.5**0.5, 0, 0, 0.5**0.5)),
+        ([0, 0, 180], (0, 0, 1, 0)),
+        ([30, 20, 10], (0.2392983, 0.1893082, 0.0381346, 0.9515485)),
+    ],
+)
+def test_angles_in_the_place_of_a_quaternion(angles: list[float], xyzw: tuple[float, ...]) -> None:
+    got = _sent("geometry_msgs/Pose", {"orientation": {"rpy_deg": angles}})["orientation"]
+    assert [got[axis] for axis in "xyzw"] == pytest.approx(xyzw, abs=1e-6)
 
 
 def test_a_scan_of_repeated_ranges() -> None:
@@ -121,6 +140,7 @@ def test_what_the_evidence_shows_is_json_and_short() -> None:
             '"2-3" is no span of 0 to 2',
         ),
         ("sensor_msgs/Imu", {"orientation_covariance": [1]}, "orientation_covariance holds 9, not 1"),
+        ("geometry_msgs/Pose", {"orientation": {"rpy_deg": [1, 2]}}, "rpy_deg are three numbers"),
         ("lab/Reading", {"parts": [1]}, "parts holds 3, not 1"),
     ],
 )

@@ -36,6 +36,9 @@ def _with_steps(folder: Path, *steps: str) -> Path:
         "{stop: talker}, {start: talker}, {kill: talker}",
         "{start: talker}, {restart: talker}",
         "{type: {process: talker, line: '3.5'}}",
+        "{set_param: {name: /gain, value: [1, 2.5]}}",
+        "{transform: {parent: map, child: base, translation: [1, {from: 0, to: 2}, 0], duration_s: 2}}",
+        "{transform: {parent: base, child: laser, rotation_deg: [0, 0, 180], static: true}}",
     ],
 )
 def test_sound_steps(step: str, tmp_path: Path) -> None:
@@ -88,6 +91,23 @@ def test_what_is_not_finite_stays_as_it_is_written(tmp_path: Path) -> None:
         ("{wait: {}}", ".wait: give one of seconds, topic and node: none is there"),
         ("{wait: {seconds: 1, new: true}}", ".wait.new: is for a topic"),
         ("{wait: {node: talker}}", '.wait.node: a node\'s name begins with a slash: "/talker"'),
+        ("{set_param: {name: gain, value: 1}}", '.set_param.name: a parameter begins with a slash: "/gain"'),
+        (
+            "{set_param: {name: /gain, value: .inf}}",
+            ".set_param.value: is no value that the parameter server takes",
+        ),
+        (
+            "{transform: {parent: a, child: b, translation: [1, 2]}}",
+            ".transform.translation: needs at least 3, has 2",
+        ),
+        (
+            "{transform: {parent: a, child: b, static: true, count: 2}}",
+            ".transform.count: is not for a static",
+        ),
+        (
+            "{transform: {parent: a, child: b, translation: [far, 0, 0]}}",
+            ".transform: 'far' is no float64",
+        ),
         ("{stop: taker}", '.stop: there is no start "taker" (did you mean "talker"?)'),
         ("{type: {process: taker, line: a}}", '.type.process: there is no start "taker" (did you mean'),
         ("{type: {process: talker, line: 5}}", ".type.line: must be text, not 5: put it in quotes"),
