@@ -8,6 +8,7 @@ import secrets
 import signal
 import struct
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +30,7 @@ from grader.evidence.writer import EvidenceChannel, EvidenceWriter
 ARENA = Path(__file__).parent / "ros"
 CLOCK = "/clock"
 TIME = struct.Struct("<II")
+WATCHED_MAX = 20
 NS = 1_000_000_000
 ROSOUT = ("/usr/lib/rosout/rosout", "lib/rosout/rosout")
 LOG_FOLDER = ("/bin/sh", "-c", 'mkdir -p "$ROS_HOME/log" && exec "$0"')
@@ -89,6 +91,7 @@ class ArenaSession:
         self._calls = 0
         self._answers: dict[int, dict[str, Any]] = {}
         self._clock_ns = 0
+        self._watched: dict[str, deque[bytes]] = {}
 
     async def __aenter__(self) -> Self:
         argv = [self.place.ros.python, "-s", "-B", str(ARENA)]
@@ -136,6 +139,10 @@ class ArenaSession:
         self._killed.stopping(name)
         self.send(do="interrupt", name=name, int_s=int_s, term_s=term_s, action=action)
         await self.wait(lambda: name in self.exit_codes, int_s + term_s + END_S)
+
+    def watch(self, topic: str) -> deque[bytes]:
+        """Return where the latest messages on a topic will be, as they come."""
+        return self._watched.setdefault(topic, deque(maxlen=WATCHED_MAX))
 
     def course(self, event: ScenarioEvent) -> None:
         self._writer.event("/grader/scenario", self._now_ns(), event)
@@ -246,6 +253,8 @@ class ArenaSession:
             self._clock_ns = secs * NS + nsecs
         if frame.datas and not is_grader_node(channel.callerid):
             own = channel.callerid not in self.live.helper_nodes
+            if channel.topic in self._watched:
+                self._watched[channel.topic].extend(frame.datas)
             self.live.message(channel.topic, len(frame.datas), time.monotonic(), active=own)
             self.live.arrived(channel.topic, len(frame.datas), frame.time_ns)
 

@@ -20,10 +20,11 @@ from grader.arena.scenario_inputs import make_shots
 from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent
-from grader.rubric.model import Call, Publish, Scenario, Start, Step, Transform, Typed, Wait
+from grader.rubric.model import Action, Call, Publish, Scenario, Start, Step, Transform, Typed, Wait
 from grader.wording import plural
 
 if TYPE_CHECKING:
+    from grader.evidence.decode import FindText
     from grader.evidence.message_values import MessageType
 
 Tell = Callable[[str], None]
@@ -32,6 +33,11 @@ SUBSCRIBE_S = 6.0
 CTRL_C_S = 5.0
 LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
 TERM_S = 2.0
+GOAL_ID = "actionlib_msgs/GoalID"
+GOAL_STATUS = (
+    "PENDING", "ACTIVE", "PREEMPTED", "SUCCEEDED", "ABORTED", "REJECTED", "PREEMPTING", "RECALLING", "RECALLED", "LOST",
+)  # fmt: skip
+"""By number (actionlib_msgs/GoalStatus)."""
 
 Spec: TypeAlias = dict[str, Any]
 """What the arena needs to start a process (`ProcessEnvironment.spec`)."""
@@ -45,6 +51,8 @@ class StepRunner:
     ) -> None:
         self._scenario = scenario
         self._starts = starts
+        self._results: dict[str, MessageType] = {}
+        self._goals = 0
         self._stopped: set[str] = set()
         self._may_start = False
         self._arena = arena
@@ -72,6 +80,8 @@ class StepRunner:
         for step in self._scenario.steps:
             if (sent := step.published) is not None:
                 self._advertise(sent.topic, sent.type, latched=sent.latched)
+            if step.action is not None:
+                self._advertise_action(step.action)
 
     async def run(self) -> None:
         """Return when all is done, but for what lasts as long as the run."""
@@ -98,6 +108,8 @@ class StepRunner:
             await self._wait(step.wait)
         if step.call is not None:
             await self._call(step.call)
+        if step.action is not None:
+            await self._act(step.action)
         if step.type is not None:
             self._type(step.type)
         if name := step.stop or step.kill or step.restart:
@@ -116,13 +128,13 @@ class StepRunner:
 
     # --- Messages ----------------------------------------------------------------------------------------------------
 
-    def _advertise(self, topic: str, type_: str, *, latched: bool) -> None:
+    def _advertise(self, topic: str, type_: str, *, latched: bool, find_text: FindText | None = None) -> None:
         from grader.evidence.message_values import MessageType  # noqa: PLC0415 - numpy, which not every run needs
 
         if topic in self._types:
             return
         try:
-            found = MessageType(type_, self._message_text)
+            found = MessageType(type_, find_text or self._message_text)
         except ValueError as error:
             self._note("note", topic, f"the grader cannot publish {type_}: {error}")
             return
@@ -133,15 +145,18 @@ class StepRunner:
     def _message_text(self, type_: str) -> str | None:
         return self._arena.place.type_text(type_, "msg")
 
-    def _send(self, topic: str, value: object, index: int, total: int | None) -> None:
-        """Send and note one message. Raises ValueError where the value does not fit."""
+    def _send(
+        self, topic: str, value: object, index: int, total: int | None, deed: dict[str, Any] | None = None
+    ) -> None:
+        """Send one message, and note it as `deed`. Raises ValueError where the value does not fit."""
         from grader.evidence.message_values import Moment  # noqa: PLC0415 - as above
 
         type_, moment = self._types[topic], Moment(index, total, self._arena.ros_now_ns())
         data, shown = type_.encode(value, moment), type_.shown(value, moment)
         if isinstance(shown, str | int) and not isinstance(shown, bool):
             self._live.sent(str(shown), time.monotonic())
-        record = {"action": "publish", "actor": "grader", "topic": topic, "type": type_.type, "value": shown}
+        about = deed or {"action": "publish", "topic": topic, "type": type_.type, "value": shown}
+        record = {"actor": "grader", **about}
         self._arena.send(do="publish", topic=topic, data=base64.b64encode(data).decode(), record=record)
 
     async def _probe(self) -> None:
@@ -303,6 +318,67 @@ class StepRunner:
             return
         value = type_.decode_response(base64.b64decode(answer["data"]))
         self._answer(call, value, "" if value is not None else f"the answer is no {call.type}")
+
+    # --- Actions (wiki.ros.org/actionlib/DetailedDescription) ---------------------------------------------------------
+
+    def _advertise_action(self, action: Action) -> None:
+        from grader.evidence.message_values import MessageType, action_texts  # noqa: PLC0415 - as above
+
+        try:
+            text = self._arena.place.type_text(action.type, "action")
+            texts = action_texts(action.type, text) if text is not None else {}
+
+            def find_text(type_: str) -> str | None:
+                return texts.get(type_) or self._message_text(type_)
+
+            self._results[action.type] = MessageType(f"{action.type}ActionResult", find_text)
+        except ValueError as error:
+            self._note("note", action.name, f"the grader cannot use {action.type}: {error}")
+            return
+        goal, cancel = f"{action.name}/goal", f"{action.name}/cancel"
+        self._advertise(goal, f"{action.type}ActionGoal", latched=False, find_text=find_text)
+        self._advertise(cancel, GOAL_ID, latched=False)
+        self._arena.watch(f"{action.name}/result")
+
+    async def _act(self, action: Action) -> None:
+        goal, cancel = f"{action.name}/goal", f"{action.name}/cancel"
+        if goal not in self._types or not (
+            await self._has_subscriber(goal) and await self._has_subscriber(cancel)
+        ):
+            return
+        self._goals += 1
+        name = f"grader-{self._goals}"
+        value = {"header": {"stamp": "now"}, "goal_id": {"stamp": "now", "id": name}, "goal": action.goal}
+        about = {"topic": action.name, "type": action.type}
+        try:
+            self._send(goal, value, 0, 1, {"action": "goal", **about, "value": action.goal})
+        except ValueError as error:
+            self._note("note", action.name, f"the grader cannot send the goal: {error}")
+            return
+        self._tell(f"waiting for the result of {action.name}")
+        left_s, found = action.limit_s, None
+        if action.cancel_after_s is not None:
+            found = await self._result(action, name, action.cancel_after_s)
+            if found is None:
+                self._send(cancel, {"id": name}, 0, 1, {"action": "cancel", **about})
+        found = found or await self._result(action, name, left_s)
+        value_, detail = found or (None, f"no result within {left_s:g} s")
+        self._arena.note(ActorEvent(action="result", actor="grader", **about, value=value_, detail=detail))
+
+    async def _result(self, action: Action, name: str, limit_s: float) -> tuple[Any, str] | None:
+        """Return the result of that goal and the word for its status."""
+        type_, came = self._results[action.type], self._arena.watch(f"{action.name}/result")
+
+        def own() -> dict[str, Any] | None:
+            values = (type_.decode(data) for data in came)
+            return next((v for v in values if v and v["status"]["goal_id"]["id"] == name), None)
+
+        await self._arena.wait(lambda: own() is not None or self._is_over(), limit_s)
+        found = own()
+        if found is None:
+            return None
+        status = found["status"]["status"]
+        return found["result"], GOAL_STATUS[status] if status < len(GOAL_STATUS) else f"status {status}"
 
     def _answer(self, call: Call, value: object, detail: str) -> None:
         about = {"topic": call.service, "type": call.type, "value": value, "detail": detail}

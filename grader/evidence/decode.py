@@ -264,7 +264,7 @@ def _checked(base: str, value: Value) -> Value:
 FindText = Callable[[str], str | None]
 """From a message type to the text of its `.msg` file, None where there is none."""
 
-_DIVIDER = re.compile(r"^---\s*$", re.MULTILINE)
+DIVIDER = re.compile(r"^---\s*$", re.MULTILINE)
 _TYPE = re.compile(r"^\s*([A-Za-z][\w/]*)\s*(?:\[\d*\])?\s+[A-Za-z]\w*\s*$", re.ASCII)
 _BUILT_IN = {*PRIMITIVES, "byte", "char", "time", "duration"}
 _RULE = "=" * 80
@@ -281,7 +281,7 @@ class ServiceType:
     """
 
     def __init__(self, type: str, text: str, find_text: FindText = lambda _: None) -> None:  # noqa: A002 - ROS's own word
-        parts = _DIVIDER.split(text)
+        parts = DIVIDER.split(text)
         if len(parts) != 2:
             raise ValueError(f"{type}: a service has a request and a response with one line --- between them")
         request, response = (full_definition(type, part, find_text) for part in parts)

@@ -129,7 +129,9 @@ class ActorEvent(Record):
     allowed what `detail` says; `limit`: it reached a limit. At most 50 of each in a run, equal ones once.
     Of steps: `set_param` is `param` in the middle of the run. `wait` waited for the topic or node `topic`, or for a
     time, and `detail` says whether it came. `start`, `stop` (Ctrl-C) and `kill` have the process in `detail`
-    (`interrupt` is the run's end), and so has `type`, with the line that went to its standard input in `value`.
+    (`interrupt` is the run's end), and so has `type`, with the line that went to its standard input in `value`. `goal`,
+    `cancel` and `result` are an action's: `topic` is its name, `detail` the word for the result's status (`SUCCEEDED`),
+    or why there is none.
     """
 
     action: Literal[
@@ -149,6 +151,9 @@ class ActorEvent(Record):
         "kill",
         "type",
         "set_param",
+        "goal",
+        "cancel",
+        "result",
     ]
     """What was done."""
     actor: str

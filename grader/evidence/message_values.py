@@ -11,7 +11,15 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, TypeGuard
 
-from grader.evidence.decode import Encoder, FindText, definition, full_definition, is_ros_type
+from grader.evidence.decode import (
+    DIVIDER,
+    Decoder,
+    Encoder,
+    FindText,
+    definition,
+    full_definition,
+    is_ros_type,
+)
 from grader.evidence.definitions import MAX_DEFINITION_BYTES, PRIMITIVES, Field, parse, sections_of
 from grader.wording import did_you_mean
 
@@ -21,6 +29,12 @@ NOT_FINITE = {".inf": math.inf, "+.inf": math.inf, "-.inf": -math.inf, ".nan": m
 """As YAML writes them. A rubric's data holds them as text, as JSON has no other form for them."""
 CLOCKS = ("time", "duration")
 ENDS = ("from", "to")
+ACTION_PARTS = {
+    "Goal": "actionlib_msgs/GoalID goal_id",
+    "Result": "actionlib_msgs/GoalStatus status",
+    "Feedback": "actionlib_msgs/GoalStatus status",
+}
+"""Of an `.action` file in their order, each with what its message holds beside it."""
 QUATERNION, ANGLES = "geometry_msgs/Quaternion", "rpy_deg"
 """Wherever a quaternion is asked for, `{rpy_deg: [roll, pitch, yaw]}` can stand."""
 FORMS = frozenset({*ENDS, "each", "repeat", "count", "except"})
@@ -62,6 +76,10 @@ class MessageType:
         """As `rosmsg md5` gives it."""
         return md5_of(self.type, self.definition)
 
+    def decode(self, data: bytes) -> Any:  # noqa: ANN401 - a message's value
+        """Return the fields of a message; None where the bytes do not fit."""
+        return Decoder(self.type, self.definition).decode(data)
+
     def encode(self, value: object, moment: Moment = FIRST) -> bytes:
         """Return the message's bytes. Raises ValueError where the value does not fit."""
         return self._encoder.encode(_Filling(self._types, moment, shown=False).fields(self.type, value))
@@ -90,6 +108,22 @@ def _definition(type_: str, find_text: FindText) -> str:
     if len(text) > MAX_DEFINITION_BYTES:
         raise ValueError(f"{type_}: its definition is too long")
     return full_definition(type_, text, find_text)
+
+
+def action_texts(type_: str, text: str) -> dict[str, str]:
+    """Return the texts of the messages that an action consists of, from that of its `.action` file, as genaction makes
+    them (wiki.ros.org/actionlib). Raises ValueError for a text that is none.
+    """
+    parts = DIVIDER.split(text)
+    if len(parts) != len(ACTION_PARTS):
+        raise ValueError(
+            f"{type_}: an action has a goal, a result and a feedback with a line --- between them"
+        )
+    name, found = type_.partition("/")[2], {}
+    for (part, about), lines in zip(ACTION_PARTS.items(), parts, strict=True):
+        found[f"{type_}{part}"] = lines + "\n"
+        found[f"{type_}Action{part}"] = f"Header header\n{about}\n{name}{part} {part.lower()}\n"
+    return found
 
 
 class _Filling:

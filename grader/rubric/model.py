@@ -156,6 +156,20 @@ class Wait(Record):
     limit_s: StepSeconds | None = None
 
 
+class Action(Record):
+    """A goal for an action server (actionlib), once it listens, until its result comes.
+
+    `type` is that of the `.action` file: `lab6/Count`. `cancel_after_s` cancels the goal so long after it was sent,
+    where no result has come by then. Without a result within `limit_s`, the run goes on.
+    """
+
+    name: str
+    type: Annotated[str, Field(pattern=TYPE_PATTERN)]
+    goal: Annotated[dict[str, Any], Field(default_factory=dict)]
+    cancel_after_s: StepSeconds | None = None
+    limit_s: StepSeconds = 30.0
+
+
 class SetParam(Record):
     """A parameter that is set in the middle of a run, on the parameter server."""
 
@@ -221,6 +235,7 @@ class Step(Record):
     publish: Publish | None = None
     wait: Wait | None = None
     call: Call | None = None
+    action: Action | None = None
     start: Name | None = None
     stop: Name | None = None
     kill: Name | None = None

@@ -36,6 +36,8 @@ def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
             yield from _wait((*at, "wait"), as_map(step["wait"]))
         if "set_param" in given:
             yield from _set_param((*at, "set_param"), as_map(step["set_param"]))
+        if "action" in given:
+            yield from slash((*at, "action", "name"), as_map(step["action"]).get("name"), "an action")
         if "transform" in given:
             yield from _transform((*at, "transform"), as_map(step["transform"]))
         if "call" in given:

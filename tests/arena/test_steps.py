@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from grader.checks.support.processes import lives, observed_until_ns
+from grader.evidence.message_values import MessageType, action_texts
 from grader.evidence.run import Run
 from grader.rubric.model import Scenario, Start, Until
 from tests.arena.support import SCRIPT, make_place, printed, run
@@ -183,3 +184,46 @@ def test_transforms_parameters_and_calls_in_time(tmp_path: Path) -> None:
     assert [v["message"] for _, v, _ in _did(seen, "answer")] == ["2", "3"]
     assert [(name, value) for name, value, _ in _did(seen, "set_param")] == [("/gain", 2), ("/gain", 3)]
     assert not _did(seen, "param")
+
+
+COUNT = "int32 target\n---\nint32 total\nstring words\n---\nfloat32 share\n"
+SERVER = (
+    NODE
+    + "from genpy.dynamic import generate_dynamic\nfrom actionlib_msgs.msg import GoalID\nrospy.init_node('server')\n"
+    + "Goal = generate_dynamic('lab/CountActionGoal', {goal!r})['lab/CountActionGoal']\n"
+    + "Result = generate_dynamic('lab/CountActionResult', {result!r})['lab/CountActionResult']\n"
+    + "pub = rospy.Publisher('count/result', Result, queue_size=10)\n"
+    + "def end(name, status, total):\n    result = Result()\n    result.status.goal_id.id = name\n"
+    + "    result.status.status = status\n    result.result.total = total\n    pub.publish(result)\n"
+    + "def goal(message):\n    if message.goal.target > 0:\n"
+    + "        end('another', 3, 0)\n        end(message.goal_id.id, 3, message.goal.target)\n"
+    + "rospy.Subscriber('count/cancel', GoalID, lambda m: end(m.id, 2, -1))\n"
+    + "rospy.Subscriber('count/goal', Goal, goal)\nrospy.spin()\n"
+)
+
+
+def test_goals_have_results_and_can_be_cancelled(tmp_path: Path) -> None:
+    find = action_texts("lab/Count", COUNT).get
+    goal, result = (MessageType(f"lab/CountAction{part}", find).definition for part in ("Goal", "Result"))
+    about = {"name": "/count", "type": "lab/Count"}
+    seen = _run(
+        tmp_path,
+        {"scripts/server.py": SERVER.format(goal=goal, result=result), "action/Count.action": COUNT},
+        [
+            {"action": {**about, "goal": {"target": 5}}},
+            {"action": {**about, "goal": {"target": -1}, "cancel_after_s": 0.5}},
+            {"action": {**about, "goal": {"targt": 1}}},
+            {"action": {**about, "goal": {"target": -1}, "limit_s": 0.2}},
+        ],
+    )
+    results = [(value and value["total"], detail) for _, value, detail in _did(seen, "result")]
+    assert results == [(5, "SUCCEEDED"), (-1, "PREEMPTED"), (None, "no result within 0.2 s")]
+    assert [value for _, value, _ in _did(seen, "goal")] == [{"target": 5}, {"target": -1}, {"target": -1}]
+    assert len(_did(seen, "cancel")) == 1
+    assert any("no field targt" in detail for _, _, detail in _did(seen, "note"))
+
+
+def test_an_action_that_the_package_lacks_is_noted(tmp_path: Path) -> None:
+    steps = [{"action": {"name": "/count", "type": "lab/Count"}}]
+    seen = _run(tmp_path, {"scripts/frames.py": FRAMES}, steps)
+    assert ["the grader cannot use lab/Count" in detail for _, _, detail in _did(seen, "note")] == [True]

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from grader.evidence.decode import Decoder, definition, known_packages, md5sum
-from grader.evidence.message_values import MessageType, Moment, md5_of
+from grader.evidence.decode import Decoder, definition, full_definition, known_packages, md5sum
+from grader.evidence.message_values import MessageType, Moment, action_texts, md5_of
 
 NOW_NS = 1_700_000_000_250_000_000
 OWN = {
@@ -35,6 +35,16 @@ def test_md5_sums_of_all_types_of_ros() -> None:
     names = [f"{p}/{n}" for p, names in known_packages().items() if p != "builtin_interfaces" for n in names]
     assert len(names) > 100
     assert [name for name in names if md5_of(name, definition(name)) != md5sum(name)] == []
+
+
+def test_the_messages_of_an_action() -> None:
+    texts = action_texts("actionlib/Test", "int32 goal\n---\nint32 result\n---\nint32 feedback\n")
+    assert len(texts) == 6
+    for name, text in texts.items():
+        full = full_definition(name, text, texts.get)
+        assert md5_of(name, full) == md5sum(name)
+    with pytest.raises(ValueError, match="lab/Test: an action has a goal, a result and a feedback"):
+        action_texts("lab/Test", "int32 goal\n---\nint32 result\n")
 
 
 def test_a_request_without_fields() -> None:

@@ -37,6 +37,7 @@ def _with_steps(folder: Path, *steps: str) -> Path:
         "{start: talker}, {restart: talker}",
         "{type: {process: talker, line: '3.5'}}",
         "{set_param: {name: /gain, value: [1, 2.5]}}",
+        "{action: {name: /count, type: lab/Count, goal: {target: 5}, cancel_after_s: 2}}",
         "{transform: {parent: map, child: base, translation: [1, {from: 0, to: 2}, 0], duration_s: 2}}",
         "{transform: {parent: base, child: laser, rotation_deg: [0, 0, 180], static: true}}",
     ],
@@ -91,6 +92,7 @@ def test_what_is_not_finite_stays_as_it_is_written(tmp_path: Path) -> None:
         ("{wait: {}}", ".wait: give one of seconds, topic and node: none is there"),
         ("{wait: {seconds: 1, new: true}}", ".wait.new: is for a topic"),
         ("{wait: {node: talker}}", '.wait.node: a node\'s name begins with a slash: "/talker"'),
+        ("{action: {name: count, type: lab/Count}}", '.action.name: an action begins with a slash: "/count"'),
         ("{set_param: {name: gain, value: 1}}", '.set_param.name: a parameter begins with a slash: "/gain"'),
         (
             "{set_param: {name: /gain, value: .inf}}",
