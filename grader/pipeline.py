@@ -356,6 +356,7 @@ def make_recorder(
         facts,
         scenarios,
         evidence,
+        beside=rubric.path.parent,
         rates=rates_of(rubric.rubric),
         mode=options.sandbox,
         progress=progress,

@@ -63,11 +63,12 @@ async def run_scenario(
     rates: tuple[RateBounds, ...] = (),
     admission: Admission | None = None,
     last_run: bool = False,
+    beside: Path | None = None,
 ) -> RunCost:
     """Record the scenario at `path`. An arena that fails still leaves evidence, with the outcome `host`.
 
     Processes are started when `admission` lets them: others wait until they are up. A window in which nothing but
-    `rates` is to be seen ends when they are clear.
+    `rates` is to be seen ends when they are clear. `beside` is the rubric's folder.
     """
     admission = admission or Admission(None)
     warp = scenario.warp if scenario.clock == "warped" else 1.0
@@ -86,7 +87,7 @@ async def run_scenario(
                 arena.course(ScenarioEvent(event="begin"))
                 at_once = {spec["name"] for start, spec in starts if start.name not in scenario.started_later}
                 async with release_when_up(leave, at_once, arena):
-                    outcome, detail = await _run(scenario, starts, arena, tell)
+                    outcome, detail = await _run(scenario, starts, arena, tell, beside)
                 await stop(scenario.start, arena, warped=scenario.clock == "warped")
                 await arena.finish()
                 arena.course(ScenarioEvent(event="end", outcome=outcome, detail=detail))
@@ -96,14 +97,14 @@ async def run_scenario(
 
 
 async def _run(
-    scenario: Scenario, starts: list[tuple[Start, Spec]], arena: ArenaSession, tell: Tell
+    scenario: Scenario, starts: list[tuple[Start, Spec]], arena: ArenaSession, tell: Tell, beside: Path | None
 ) -> tuple[str, str]:
     tell("starting the managed roscore")
     await arena.wait(lambda: arena.rosout_up, 3.0)
     if scenario.clock == "warped":
         arena.send(do="warp", warp=scenario.warp, step_s=CLOCK_STEP_S)
     set_params(scenario.params, arena)
-    async with StepRunner(scenario, starts, arena, tell) as runner:
+    async with StepRunner(scenario, starts, arena, tell, beside=beside) as runner:
         runner.advertise()
         arena.live.started_s = time.monotonic()
         for start, spec in starts:

@@ -9,23 +9,26 @@ from __future__ import annotations
 import asyncio
 import base64
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from contextlib import suppress
+from dataclasses import replace
 from itertools import count
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from typing_extensions import Self
 
 from grader.arena.scenario_inputs import make_shots
 from grader.arena.session import NS, ArenaSession
-from grader.errors import ArenaError
+from grader.errors import ArenaError, EvidenceError
 from grader.evidence.events import ActorEvent
-from grader.rubric.model import Action, Call, Publish, Scenario, Start, Step, Transform, Typed, Wait
+from grader.rubric.model import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
 from grader.wording import plural
 
 if TYPE_CHECKING:
     from grader.evidence.decode import FindText
     from grader.evidence.message_values import MessageType
+    from grader.evidence.run import Channel
 
 Tell = Callable[[str], None]
 ANSWER_S = 10.0
@@ -33,6 +36,8 @@ SUBSCRIBE_S = 6.0
 CTRL_C_S = 5.0
 LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
 TERM_S = 2.0
+NOT_PLAYED = frozenset({"/clock", "/rosout", "/rosout_agg"})
+"""Where none is named: they are the run's own."""
 GOAL_ID = "actionlib_msgs/GoalID"
 GOAL_STATUS = (
     "PENDING", "ACTIVE", "PREEMPTED", "SUCCEEDED", "ABORTED", "REJECTED", "PREEMPTING", "RECALLING", "RECALLED", "LOST",
@@ -47,18 +52,28 @@ class StepRunner:
     """Does the probes, calls and steps of one run. Inside the context, what has gone to the background goes on."""
 
     def __init__(
-        self, scenario: Scenario, starts: list[tuple[Start, Spec]], arena: ArenaSession, tell: Tell
+        self,
+        scenario: Scenario,
+        starts: list[tuple[Start, Spec]],
+        arena: ArenaSession,
+        tell: Tell,
+        *,
+        beside: Path | None = None,
     ) -> None:
         self._scenario = scenario
         self._starts = starts
         self._results: dict[str, MessageType] = {}
         self._goals = 0
+        self._beside = beside or Path()
+        self._bags: dict[str, tuple[Channel, ...]] = {}
         self._stopped: set[str] = set()
         self._may_start = False
         self._arena = arena
         self._live = arena.live
         self._tell = tell
         self._types: dict[str, MessageType] = {}
+        self._md5sums: dict[str, str] = {}
+        self._announced: set[str] = set()
         self._fixed: dict[str, Any] = {}
         self._deaf: set[str] = set()
         self._background: list[asyncio.Task[None]] = []
@@ -82,6 +97,8 @@ class StepRunner:
                 self._advertise(sent.topic, sent.type, latched=sent.latched)
             if step.action is not None:
                 self._advertise_action(step.action)
+            if step.play is not None:
+                self._advertise_bag(step.play)
 
     async def run(self) -> None:
         """Return when all is done, but for what lasts as long as the run."""
@@ -108,8 +125,13 @@ class StepRunner:
             await self._wait(step.wait)
         if step.call is not None:
             await self._call(step.call)
+        if step.play is not None:
+            await self._begin(self._play(step.play), background=step.play.background)
         if step.action is not None:
             await self._act(step.action)
+        await self._do_to_process(step)
+
+    async def _do_to_process(self, step: Step) -> None:
         if step.type is not None:
             self._type(step.type)
         if name := step.stop or step.kill or step.restart:
@@ -138,9 +160,20 @@ class StepRunner:
         except ValueError as error:
             self._note("note", topic, f"the grader cannot publish {type_}: {error}")
             return
+        if self._md5sums.setdefault(topic, found.md5sum) != found.md5sum:
+            self._note(
+                "note", topic, f"the grader cannot publish {type_}: a recording has another type there"
+            )
+            return
         self._types[topic] = found
-        fields = {"type": type_, "md5sum": found.md5sum, "definition": found.definition, "latching": latched}
-        self._arena.send(do="advertise", fields={"topic": topic, **fields})
+        about = {"type": type_, "md5sum": found.md5sum, "definition": found.definition}
+        self._announce(topic, {**about, "latching": latched})
+
+    def _announce(self, topic: str, fields: dict[str, Any]) -> None:
+        """Advertise it to the master, once."""
+        if topic not in self._announced:
+            self._announced.add(topic)
+            self._arena.send(do="advertise", fields={"topic": topic, **fields})
 
     def _message_text(self, type_: str) -> str | None:
         return self._arena.place.type_text(type_, "msg")
@@ -178,11 +211,7 @@ class StepRunner:
     async def _publish(self, publish: Publish) -> None:
         if publish.topic not in self._types:
             return  # said when it was to be advertised
-        if publish.background:
-            tasks = self._endless if publish.total is None else self._background
-            tasks.append(asyncio.ensure_future(self._stream(publish)))
-        else:
-            await self._stream(publish)
+        await self._begin(self._stream(publish), background=publish.background, endless=publish.total is None)
 
     def _static(self, transform: Transform) -> None:
         """A latched topic keeps its last message only: each holds all that were sent."""
@@ -226,6 +255,61 @@ class StepRunner:
         self._deaf.add(topic)
         self._note("note", topic, "nothing was published: no node has subscribed")
         return False
+
+    async def _begin(
+        self, work: Coroutine[Any, Any, None], *, background: bool, endless: bool = False
+    ) -> None:
+        if not background:
+            await work
+            return
+        (self._endless if endless else self._background).append(asyncio.ensure_future(work))
+
+    # --- Recordings --------------------------------------------------------------------------------------------------
+
+    def _advertise_bag(self, play: Play) -> None:
+        """The recording's topics, each by its first channel; a type that a topic has already stays."""
+        from grader.evidence.message_values import md5_of  # noqa: PLC0415 - numpy, which not every run needs
+        from grader.evidence.reader import load_run  # noqa: PLC0415 - few runs play anything
+
+        if play.bag not in self._bags:
+            try:
+                found = load_run(self._beside / play.bag).channels
+                self._bags[play.bag] = tuple(
+                    replace(c, md5sum=c.md5sum or md5_of(c.type, c.definition)) for c in found
+                )
+            except (EvidenceError, ValueError) as error:
+                raise ArenaError(f"{play.bag} cannot be played: {error}") from error
+        for channel in self._played(play):
+            if self._md5sums.setdefault(channel.topic, channel.md5sum) == channel.md5sum:
+                about = {"type": channel.type, "md5sum": channel.md5sum, "definition": channel.definition}
+                self._announce(channel.topic, {**about, "latching": channel.latching})
+
+    def _played(self, play: Play) -> list[Channel]:
+        wanted = set(play.topics)
+        return [
+            channel
+            for channel in self._bags[play.bag]
+            if (channel.topic in wanted if wanted else channel.topic not in NOT_PLAYED)
+        ]
+
+    async def _play(self, play: Play) -> None:
+        channels = [c for c in self._played(play) if self._md5sums[c.topic] == c.md5sum]
+        messages = sorted((m.log_time_ns, c.topic, m.data) for c in channels for m in c.messages)
+        topics = {channel.topic for channel in channels}
+        self._tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
+        patience_s = self._scenario.until.first_message_s
+        await self._arena.wait(lambda: bool(topics & self._live.subscribed) or self._is_over(), patience_s)
+        if not topics & self._live.subscribed:
+            self._note("note", play.bag, "nothing was played: no node has subscribed")
+            return
+        self._note("play", play.bag, f"{plural(len(messages), 'message')} on {', '.join(sorted(topics))}")
+        self._tell(f"playing {play.bag}")
+        begun_ns = self._arena.ros_now_ns()
+        for time_ns, topic, data in messages:
+            await self._until(begun_ns + round((time_ns - messages[0][0]) / play.speed))
+            if not self._live.running:
+                return
+            self._arena.send(do="publish", topic=topic, data=base64.b64encode(data).decode(), record=None)
 
     # --- Waiting -----------------------------------------------------------------------------------------------------
 

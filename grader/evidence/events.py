@@ -131,7 +131,7 @@ class ActorEvent(Record):
     time, and `detail` says whether it came. `start`, `stop` (Ctrl-C) and `kill` have the process in `detail`
     (`interrupt` is the run's end), and so has `type`, with the line that went to its standard input in `value`. `goal`,
     `cancel` and `result` are an action's: `topic` is its name, `detail` the word for the result's status (`SUCCEEDED`),
-    or why there is none.
+    or why there is none. `play`: the recording `topic` was played; its messages are on their topics.
     """
 
     action: Literal[
@@ -154,6 +154,7 @@ class ActorEvent(Record):
         "goal",
         "cancel",
         "result",
+        "play",
     ]
     """What was done."""
     actor: str

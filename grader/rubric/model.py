@@ -170,6 +170,19 @@ class Action(Record):
     limit_s: StepSeconds = 30.0
 
 
+class Play(Record):
+    """A recording (`.bag` or `.mcap`, 20 MB at most) beside the rubric, with its messages as they are, stamps too.
+
+    `topics` are those that are played, all but `/clock` and `/rosout` where none is given; `speed` 2 is twice as fast.
+    With `background`, the next steps begin at once. Playing begins once a node has subscribed to one of the topics.
+    """
+
+    bag: Annotated[str, Field(min_length=1)]
+    topics: tuple[str, ...] = ()
+    speed: Annotated[float, Field(gt=0, le=100)] = 1.0
+    background: bool = False
+
+
 class SetParam(Record):
     """A parameter that is set in the middle of a run, on the parameter server."""
 
@@ -243,6 +256,7 @@ class Step(Record):
     type: Typed | None = None
     set_param: SetParam | None = None
     transform: Transform | None = None
+    play: Play | None = None
 
     @property
     def published(self) -> Publish | None:

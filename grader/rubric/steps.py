@@ -3,22 +3,56 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+from grader.errors import EvidenceError
 from grader.rubric.faults import model_faults
 from grader.rubric.model import STEP_S_MAX, Step, Transform
-from grader.rubric.source import Fault, KeyPath, as_map, as_maps
+from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
 from grader.wording import did_you_mean
 
 KINDS = tuple(Step.model_fields)
 RUN_S_MAX = 2 * STEP_S_MAX
 PROCESS_STEPS = ("start", "stop", "kill", "restart")
+NAMED = {
+    "publish": ("topic", "a topic"),
+    "call": ("service", "a service"),
+    "action": ("name", "an action"),
+    "set_param": ("name", "a parameter"),
+}
+"""The key of a step that is a name of ROS's."""
+NOT_FINITE = (".inf", "-.inf", ".nan")
 WAITS = ("seconds", "topic", "node")
 
 
 def given_steps(scenario: dict[str, Any], kind: str) -> list[dict[str, Any]]:
     """Return what the scenario's steps of one kind (`publish`) say."""
     return [as_map(step[kind]) for _, step in as_maps(scenario.get("steps")) if kind in step]
+
+
+def played_bags(rubric: dict[str, Any]) -> dict[KeyPath, dict[str, Any]]:
+    """Return what steps play, by the place in the rubric where the recording is named."""
+    return {
+        ("scenarios", name, "steps", index, "play", "bag"): as_map(step["play"])
+        for name, scenario in as_map(rubric.get("scenarios")).items()
+        for index, step in as_maps(as_map(scenario).get("steps"))
+        if "play" in step
+    }
+
+
+def bag_faults(path: KeyPath, file: Path, play: dict[str, Any]) -> Iterator[Fault]:
+    """Yield what is wrong with a recording that a step plays. `path` is the place of its name."""
+    from grader.evidence.reader import load_run  # noqa: PLC0415 - few rubrics play anything
+
+    try:
+        topics = {channel.topic for channel in load_run(file).channels}
+    except EvidenceError as error:
+        yield path, f"cannot be played: {error.message}"
+        return
+    for number, topic in as_texts(play.get("topics")):
+        if topic not in topics:
+            yield (*path[:-1], "topics", number), f"{file.name} has no {topic}{did_you_mean(topic, topics)}"
 
 
 def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
@@ -30,21 +64,28 @@ def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
         given = [kind for kind in KINDS if step.get(kind) is not None]
         if len(given) != 1:
             yield at, f"give one of {_one_of(KINDS)}: {_found(given)}"
-        if "publish" in given:
-            yield from _publish((*at, "publish"), as_map(step["publish"]), types)
-        if "wait" in given:
-            yield from _wait((*at, "wait"), as_map(step["wait"]))
-        if "set_param" in given:
-            yield from _set_param((*at, "set_param"), as_map(step["set_param"]))
-        if "action" in given:
-            yield from slash((*at, "action", "name"), as_map(step["action"]).get("name"), "an action")
-        if "transform" in given:
-            yield from _transform((*at, "transform"), as_map(step["transform"]))
-        if "call" in given:
-            yield from slash((*at, "call", "service"), as_map(step["call"]).get("service"), "a service")
+        for kind in given:
+            yield from _faults_of((*at, kind), kind, as_map(step[kind]), types)
     lasting_s = sum(_seconds(step) for _, step in as_maps(scenario.get("steps")))
     if lasting_s > RUN_S_MAX:
         yield (*path, "steps"), f"last {lasting_s:g} s together, at most {RUN_S_MAX} s"
+
+
+def _faults_of(at: KeyPath, kind: str, given: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
+    if kind in NAMED:
+        key, what = NAMED[kind]
+        yield from slash((*at, key), given.get(key), what)
+    if kind == "publish":
+        yield from _publish(at, given, types)
+    elif kind == "wait":
+        yield from _wait(at, given)
+    elif kind == "set_param" and (given.get("value", "") is None or given.get("value") in NOT_FINITE):
+        yield (*at, "value"), "is no value that the parameter server takes"
+    elif kind == "transform":
+        yield from _transform(at, given)
+    elif kind == "play":
+        for number, topic in as_texts(given.get("topics")):
+            yield from slash((*at, "topics", number), topic, "a topic")
 
 
 def _one_of(names: tuple[str, ...]) -> str:
@@ -65,7 +106,6 @@ def _seconds(step: dict[str, Any]) -> float:
 def _publish(at: KeyPath, publish: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
     """`types` are those of the topics that earlier steps publish on."""
     topic, kind = publish.get("topic"), publish.get("type")
-    yield from slash((*at, "topic"), topic, "a topic")
     if ("value" in publish) == bool(publish.get("values")):
         yield at, "give one of value and values"
     if publish.get("count") is not None and publish.get("duration_s") is not None:
@@ -113,12 +153,6 @@ def misfits(
     for place, value in values:
         if wrong := message_type.misfit(value, moment):
             yield place, wrong
-
-
-def _set_param(at: KeyPath, param: dict[str, Any]) -> Iterator[Fault]:
-    yield from slash((*at, "name"), param.get("name"), "a parameter")
-    if param.get("value", "") is None or param.get("value") in (".inf", "-.inf", ".nan"):
-        yield (*at, "value"), "is no value that the parameter server takes"
 
 
 def _transform(at: KeyPath, transform: dict[str, Any]) -> Iterator[Fault]:

@@ -13,6 +13,7 @@ from grader.evidence.message_values import MessageType, action_texts
 from grader.evidence.run import Run
 from grader.rubric.model import Scenario, Start, Until
 from tests.arena.support import SCRIPT, make_place, printed, run
+from tests.evidence.bags import Topic, write_bag
 
 pytestmark = pytest.mark.ros
 NODE = SCRIPT + "import rospy\n"
@@ -35,7 +36,7 @@ def _run(
     about = {"title": "steps", "start": start, "until": Until(messages={}, first_message_s=10), **more}
     scenario = Scenario.model_validate({**about, "steps": steps})
     with make_place(files, sandbox=sandbox) as place:
-        return run(place, scenario, tmp_path / "run.mcap")
+        return run(place, scenario, tmp_path / "run.mcap", beside=tmp_path)
 
 
 def _did(seen: Run, action: str) -> list[tuple[str | None, Any, str]]:
@@ -227,3 +228,18 @@ def test_an_action_that_the_package_lacks_is_noted(tmp_path: Path) -> None:
     steps = [{"action": {"name": "/count", "type": "lab/Count"}}]
     seen = _run(tmp_path, {"scripts/frames.py": FRAMES}, steps)
     assert ["the grader cannot use lab/Count" in detail for _, _, detail in _did(seen, "note")] == [True]
+
+
+def test_a_recording_is_played(tmp_path: Path) -> None:
+    words = Topic("/words", "std_msgs/String", [f"word {n}" for n in range(5)])
+    write_bag(tmp_path / "words.bag", words, Topic("/clock", "rosgraph_msgs/Clock", [{}]))
+    seen = _run(
+        tmp_path,
+        {"scripts/listener.py": LISTENER},
+        [{"play": {"bag": "words.bag", "speed": 0.5}}, {"wait": {"seconds": 0.5}}],
+    )
+    assert printed(seen, "listener") == [f"heard word {n}" for n in range(5)]
+    (sent,) = (c for c in seen.channels if c.topic == "/words")
+    assert (sent.times_ns[-1] - sent.times_ns[0]) / 1e9 == pytest.approx(0.8, abs=0.15)
+    assert "/clock" not in {c.topic for c in seen.channels}
+    assert _did(seen, "play") == [("words.bag", None, "5 messages on /words")]

@@ -7,11 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from grader.integrations.bundle import Bundle, add_lab
 from grader.rubric.consistency import scenario_faults
 from grader.rubric.faults import model_faults
 from grader.rubric.load import load_rubric
 from grader.rubric.model import Publish, Scenario, Step
 from grader.rubric.source import RUBRIC, source_of
+from tests.evidence.bags import Topic, write_bag
 from tests.rubric.samples import faults, spoiled
 
 SCAN = '{topic: /scan, type: sensor_msgs/LaserScan, value: {ranges: {repeat: .inf, count: 8, except: {"2-3": .nan}}}}'
@@ -144,6 +146,44 @@ def test_steps_that_last_too_long_or_mix_types(tmp_path: Path) -> None:
 )
 def test_processes_that_cannot_be_started_or_stopped(steps: str, fault: str, tmp_path: Path) -> None:
     assert any(f"scenarios.real.steps{fault}" in line for line in faults(_with_steps(tmp_path, steps)))
+
+
+WORDS = Topic("/words", "std_msgs/String", ["one", "two"])
+
+
+def test_a_recording_belongs_to_the_rubric(tmp_path: Path) -> None:
+    path = _with_steps(tmp_path, "{play: {bag: words.bag, topics: [/words]}}")
+    write_bag(tmp_path / "words.bag", WORDS)
+    before = load_rubric(str(path)).digest
+    (tmp_path / "words.bag").unlink()
+    write_bag(tmp_path / "words.bag", WORDS._replace(values=["one", "three"]))
+    assert load_rubric(str(path)).digest != before
+
+
+def test_a_recording_goes_with_the_rubric_to_a_platform(tmp_path: Path) -> None:
+    write_bag(tmp_path / "words.bag", WORDS)
+    rubric = load_rubric(str(_with_steps(tmp_path, "{play: {bag: words.bag}}")))
+    bundle = Bundle()
+    add_lab(bundle, rubric, "lab")
+    assert "lab/words.bag" in [path for path, _, _ in bundle.entries()]
+
+
+@pytest.mark.parametrize(
+    ("play", "fault"),
+    [
+        ("bag: none.bag", ".bag: none.bag cannot be read beside the rubric: No such file"),
+        ("bag: ../words.bag", ".bag: must name a recording beside the rubric, like bags/corridor.bag"),
+        ("bag: lab.yaml", ".bag: must name a recording beside the rubric"),
+        ("bag: odd.bag", ".bag: cannot be played: "),
+        ("bag: words.bag, topics: [/word]", '.topics[0]: words.bag has no /word (did you mean "/words"?)'),
+        ("bag: words.bag, topics: [words]", '.topics[0]: a topic begins with a slash: "/words"'),
+    ],
+)
+def test_recordings_that_cannot_be_played(play: str, fault: str, tmp_path: Path) -> None:
+    write_bag(tmp_path / "words.bag", WORDS)
+    (tmp_path / "odd.bag").write_bytes(b"#ROSBAG V2.0\nodd")
+    found = faults(_with_steps(tmp_path, f"{{play: {{{play}}}}}"))
+    assert any(line.startswith(f"{AT}.play{fault}") for line in found), found
 
 
 @pytest.mark.parametrize(

@@ -172,7 +172,8 @@ class Arena:
 
     def _publish(self, command):
         self._actor.publish(command["topic"], base64.b64decode(command["data"]))
-        self._wire.event("/grader/actor", command["record"])
+        if command["record"]:
+            self._wire.event("/grader/actor", command["record"])
 
     def _set_param(self, command):
         self._master.setParam(self._actor.caller_id, command["name"], command["value"])
