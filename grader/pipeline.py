@@ -359,6 +359,7 @@ def make_recorder(
         facts,
         scenarios,
         evidence,
+        beside=rubric.path.parent,
         rates=rates_of(rubric.rubric),
         mode=options.sandbox,
         progress=progress,
@@ -378,9 +379,9 @@ def keep_recordings(
 
 
 def import_later(rubric: LoadedRubric) -> None:
-    """Import modules before they are needed. Only probes need ROS's own message types, hundreds of them."""
-    probes = any(scenario.probes for scenario in rubric.rubric.scenarios.values())
-    for name in (*LATER, *([ROS_TYPES] if probes else [])):
+    """Import modules before they are needed. Only probes and steps need ROS's own message types, hundreds of them."""
+    sends = any(scenario.probes or scenario.steps for scenario in rubric.rubric.scenarios.values())
+    for name in (*LATER, *([ROS_TYPES] if sends else [])):
         import_module(name)
 
 

@@ -187,7 +187,11 @@ def _explained(life: Life, run: Run, package: PackageFacts) -> Ending:
 
 def explain_error(package: PackageFacts, run: Run) -> Ending | None:
     """Return the last traceback of the student's processes before Ctrl-C; None where there is none."""
-    found = [t for one in lives(run) for t in process_tracebacks(run, one.name, before_ns=one.interrupt_ns)]
+    found = [
+        t
+        for one in lives(run)
+        for t in process_tracebacks(run, one.name, after_ns=one.start_ns, before_ns=one.interrupt_ns)
+    ]
     return explain_traceback(found[-1], package) if found else None
 
 

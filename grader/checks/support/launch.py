@@ -322,7 +322,7 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
     found = [
         t
         for one in lives(run)
-        for t in process_tracebacks(run, one.name, before_ns=one.interrupt_ns)
+        for t in process_tracebacks(run, one.name, after_ns=one.start_ns, before_ns=one.interrupt_ns)
         if script is None
         or any(PurePosixPath(f.file).name == PurePosixPath(script.path).name for f in t.frames)
     ]
