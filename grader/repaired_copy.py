@@ -19,7 +19,7 @@ from grader.model.progress import Progress, Silence, StepState
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
 from grader.model.submission import Submission
-from grader.package.repairs import apply_repair, find_repairs, wanted_of
+from grader.package.repairs import apply_repair, find_repairs, name_after, wanted_of
 from grader.rubric.model import Rubric
 
 REPAIRED, REPEATED = "repaired-1", "repeated-1"
@@ -65,14 +65,16 @@ def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator
         shutil.copytree(
             package.folder, copy, symlinks=True, ignore=_left_out(package.folder, package.left_out)
         )
-        executable = dict(package.executable)
+        executable, name = dict(package.executable), package.name
         for repair in repairs:
             apply_repair(copy, repair)
+            if repair.kind == "package-name":
+                name = name_after(repair) or name
             if repair.kind == "executable-bit":
                 executable[repair.file] = True
             elif repair.kind == "file-name" and repair.before in executable:
                 executable[repair.after] = executable.pop(repair.before)
-        repaired = package.model_copy(update={"folder": copy, "executable": executable})
+        repaired = package.model_copy(update={"folder": copy, "executable": executable, "name": name})
         yield submission.model_copy(update={"package": repaired})
 
 

@@ -89,7 +89,11 @@ def judged_on_copy(
     """
     verdicts, uses = dict(first), dict[str, Repaired]()
     better = {
-        c.id for c in rubric.criteria if first[c.id].status.is_lost and not _is_worse(first, on_copy, c)
+        c.id
+        for c in rubric.criteria
+        if first[c.id].status.is_lost
+        and not _is_worse(first, on_copy, c)
+        and not _of_build(first, c, repairs)
     }
     needs = {
         c.id: tuple(one for one in repairs if concerns(one, c, rubric, first[c.id], built=built))
@@ -140,6 +144,13 @@ def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], crit
     if copy.status.is_lost and copy.score <= one.score:
         return not one.unjudged or copy.unjudged
     return copy.status is Status.ERROR
+
+
+def _of_build(first: Mapping[str, Verdict], criterion: Criterion, repairs: tuple[Repair, ...]) -> bool:
+    """Return whether a criterion of the files asks for what one of the repairs wrote into a file of the build."""
+    return criterion.scenario is None and any(
+        one.kind in OF_BUILDS and _asks_for(first[criterion.id], one) for one in repairs
+    )
 
 
 def _charges(
