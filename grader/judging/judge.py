@@ -13,6 +13,7 @@ from grader.checks.all_runs import NotRecorded
 from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
+from grader.judging.advice import add_advice
 from grader.judging.facts import Facts, try_facts
 from grader.judging.other_runs import judged_on_copy, repairs_of, seen_twice, split_runs, was_built
 from grader.judging.summary import round_half_up
@@ -46,25 +47,24 @@ def judge_all_runs(
 ) -> Judgement:
     """Judge the first runs, then what repeated runs and a repaired copy say besides."""
     first, repeated, repaired = split_runs(runs)
-    verdicts = judge_runs(rubric, first, checks)
+    facts = try_facts(rubric, first)
+    verdicts = judge_facts(rubric, facts, checks)
     doubtful = frozenset(c.scenario for c in rubric.criteria if verdicts[c.id].timing and c.scenario)
     if repeated:
-        again = judge_runs(rubric, {**first, **repeated}, checks)
+        again = judge_facts(rubric, try_facts(rubric, {**first, **repeated}), checks)
         verdicts = seen_twice(rubric, verdicts, again, repeated.keys())
     uses: dict[str, Repaired] = {}
     if repaired:
-        on_copy = judge_runs(rubric, {**first, **repaired}, checks)
+        on_copy = judge_facts(rubric, try_facts(rubric, {**first, **repaired}), checks)
         repairs, build_repaired = repairs_of(rubric, repaired), not was_built(first) and was_built(repaired)
         verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs, built=not build_repaired)
-    results = (result_of(c, verdicts[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
-    return Judgement(tuple(results), doubtful)
+    results = tuple(result_of(c, verdicts[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
+    advised = results if facts.package is None else add_advice(results, facts.package, rubric)
+    return Judgement(advised, doubtful)
 
 
-def judge_runs(
-    rubric: Rubric, runs: Mapping[str, Run], checks: Mapping[str, Check] = CHECKS
-) -> dict[str, Verdict]:
+def judge_facts(rubric: Rubric, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> dict[str, Verdict]:
     """Return the verdict of each criterion by its id."""
-    facts = try_facts(rubric, runs)
     criteria = {c.id: c for c in rubric.criteria}
     requirements = Requirements(rubric, checks)
     for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():
