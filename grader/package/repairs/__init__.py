@@ -37,7 +37,6 @@ __all__ = [
     "Wanted",
     "apply_repair",
     "find_repairs",
-    "name_after",
     "wanted_of",
 ]
 
@@ -100,19 +99,9 @@ def _repaired(data: bytes, repair: Repair) -> bytes:
 
 
 def _rename_package(folder: Path, repair: Repair) -> None:
-    old, new = _name_in(repair.before), name_after(repair)
+    old, new = (re.search(r"<name>\s*([\w-]+)", text) for text in (repair.before, repair.after))
     if old and new:
-        rename_everywhere(folder, old, new)
-
-
-def name_after(repair: Repair) -> str:
-    """Return the package's name where the repair changes it in the manifest, else ""."""
-    return _name_in(repair.after) if repair.file == MANIFEST else ""
-
-
-def _name_in(text: str) -> str:
-    found = re.search(r"<name>\s*([\w-]+)", text)
-    return found[1] if found else ""
+        rename_everywhere(folder, old[1], new[1])
 
 
 def _scripts(
