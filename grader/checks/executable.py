@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from grader.checks.build import CATKIN_MAKE
 from grader.checks.registry import check
-from grader.checks.support.exit_causes import CAUSES, SYNTAX
+from grader.checks.support.exit_causes import SYNTAX, syntax_hint
 from grader.checks.support.scripts import (
     PYTHON,
     add_hint,
@@ -67,7 +67,7 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
         file without running it, and says which line it does not understand.
 
     How to fix
-        `chmod +x <file>`, then `git update-index --chmod=+x <file>` and push; write `#!/usr/bin/env
+        `chmod +x <file>`, then `git add --chmod=+x <file>`, commit and push; write `#!/usr/bin/env
         python3` as the very first line; `dos2unix <file>` for a file from Windows. `ls -lF` shows
         executable files with a `*`. `python3 -m py_compile <file>` shows a syntax error: fix that line, or
         the one above it.
@@ -113,7 +113,7 @@ def _unparsed(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -> Verd
     where = f"line {fault.line}" if fault.line else "cannot be parsed"
     others = f"; besides, it {' and '.join(o.why for o in obstacles)}" if obstacles else ""
     fixes = [
-        CAUSES.get(fault.kind, ("", "save the file as plain UTF-8 text"))[1],
+        syntax_hint(fault),
         *(o.fix for o in obstacles),
     ]
     source = f", {where}: {shown(fault.source.strip())}" if fault.source.strip() else ""

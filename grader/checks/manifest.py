@@ -198,7 +198,7 @@ def _unreadable(fault: Fault | None) -> Verdict:
     return failed(
         f"{fault.file}{line} cannot be read: {fault.cause or fault.message}",
         measured=fault.message,
-        hint="open the file at that line and close or correct the element",
+        hint=fault.fix or "open the file at that line and close or correct the element",
         citations=(fault.place,),
     )
 

@@ -13,6 +13,7 @@ from grader.checks.all_runs import NotRecorded
 from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
+from grader.judging.advice import add_advice
 from grader.judging.facts import Facts, try_facts
 from grader.judging.other_runs import (
     judged_on_copy,
@@ -53,27 +54,26 @@ def judge_all_runs(
 ) -> Judgement:
     """Judge the first runs, then what repeated runs and a repaired copy say besides."""
     first, repeated, repaired = split_runs(runs)
-    verdicts = judge_runs(rubric, first, checks)
+    facts = try_facts(rubric, first)
+    verdicts = judge_facts(rubric, facts, checks)
     doubtful = frozenset(c.scenario for c in rubric.criteria if verdicts[c.id].timing and c.scenario)
     if repeated:
-        again = judge_runs(rubric, {**first, **repeated}, checks)
+        again = judge_facts(rubric, try_facts(rubric, {**first, **repeated}), checks)
         verdicts = seen_twice(rubric, verdicts, again, repeated.keys())
     uses: dict[str, Repaired] = {}
     if repaired:
-        copy = {**first, **repaired}
-        on_copy, repairs = judge_runs(rubric, copy, checks), repairs_of(rubric, repaired)
-        needed = needs_build(try_facts(rubric, copy).package)
+        of_copy = try_facts(rubric, {**first, **repaired})
+        on_copy, repairs = judge_facts(rubric, of_copy, checks), repairs_of(rubric, repaired)
+        needed = needs_build(of_copy.package)
         built = not needed or was_built(first) or not was_built(repaired)
         verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs, built=built)
-    results = (result_of(c, verdicts[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
-    return Judgement(tuple(results), doubtful)
+    results = tuple(result_of(c, verdicts[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
+    advised = results if facts.package is None else add_advice(results, facts.package, rubric)
+    return Judgement(advised, doubtful)
 
 
-def judge_runs(
-    rubric: Rubric, runs: Mapping[str, Run], checks: Mapping[str, Check] = CHECKS
-) -> dict[str, Verdict]:
+def judge_facts(rubric: Rubric, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> dict[str, Verdict]:
     """Return the verdict of each criterion by its id."""
-    facts = try_facts(rubric, runs)
     criteria = {c.id: c for c in rubric.criteria}
     requirements = Requirements(rubric, checks)
     for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():

@@ -12,7 +12,7 @@ from grader.checks.support.scripts import path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
 from grader.installable import install_hint, known_messages, known_packages
-from grader.model.package import PackageFacts
+from grader.model.package import Fault, PackageFacts
 from grader.model.verdict import FileCitation, Verdict, inconclusive
 from grader.wording import join_words, seconds
 
@@ -39,7 +39,7 @@ CAUSES = {
     "ROSSerializationException": ("", "publish a value that fits the message's type"),
     "SerializationError": ("", "publish a value that fits the message's type"),
     "SyntaxError": ("", "fix that line, or the one above it"),
-    "IndentationError": ("", "indent every line with four spaces"),
+    "IndentationError": ("", "indent every block by four spaces, and all lines of a block alike"),
     "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
 }  # fmt: skip
 # what rospy says of a slip that its exception's class does not tell of
@@ -57,6 +57,16 @@ SLIPS = {
      "the message gets a different number of values than it has fields",
      'one value for each field; put a number into text with `%`: `publish("… %s" % value)`, not by a comma'),
 }  # fmt: skip
+# of a line that Python cannot parse: what its cause speaks of, and how the line is written instead
+_REWRITES = (
+    ("typographic quote|no-break space|special space",
+     ((r"[\u2018-\u201b]", "'"), (r"[\u201c-\u201f]", '"'), (r"[\u00a0\u2000-\u200a\u202f\u3000]", " "))),
+    ("`print` needs brackets", ((r"^(\s*)print\s+([^>(\s].*[^,\s])\s*$", r"\1print(\2)"),)),
+    ("`except Error as name:`", ((r"^(\s*except\s+[\w.]+)\s*,\s*(\w+\s*:)", r"\1 as \2"),)),
+    ("a colon `:` is missing", ((r"\s*$", ":"),)),
+    ("to compare, write `==`", ((r"(?<![=!<>])=(?!=)", "=="),)),
+    ("`elif`, not `else if`", ((r"\belse\s+if\b", "elif"),)),
+)  # fmt: skip
 _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
@@ -98,6 +108,29 @@ class Traceback(NamedTuple):
     def own_frames(self) -> tuple[Frame, ...]:
         """Those outside Python's and ROS's own code, the innermost last."""
         return tuple(f for f in self.frames if not f.in_library)
+
+
+def syntax_hint(fault: Fault) -> str:
+    """Return how to repair a file that Python cannot parse: the line as it has to be where that is known."""
+    where = f"line {fault.line}: " if fault.line else ""
+    if bracket := re.match(r"the bracket `(.)`|(a bracket)", fault.cause):
+        closing = {"(": "`)`", "[": "`]`", "{": "`}`"}.get(bracket[1], "the bracket that closes it")
+        return f"{where}write {closing} at the end of what is opened there"
+    if right := _rewritten(fault):
+        return f"{where}write `{shown(right)}`"
+    return fault.fix or CAUSES.get(fault.kind, ("", "save the file as plain UTF-8 text"))[1]
+
+
+def _rewritten(fault: Fault) -> str:
+    """Return the faulty line put right; "" where that is not sure, as beside a comment or a text with other quotes."""
+    source = fault.source.strip()
+    rules = next((rules for told, rules in _REWRITES if re.search(told, fault.cause)), ())
+    if "#" in source or ";" in source or (re.search("['\"]", source) and "quote" in fault.cause):
+        return ""
+    right = source
+    for pattern, new in rules:
+        right = re.sub(pattern, new, right, count=0 if len(rules) > 1 else 1)
+    return right if right != source else ""
 
 
 def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
@@ -227,7 +260,8 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     source = package.file(place.file) if place and found.kind in SYNTAX else None
     if place is not None and source is not None and source.python_fault is not None:
         cause = source.python_fault.cause or cause
-        place = source.python_fault.place if source.python_fault.line == place.line else place
+        hint = syntax_hint(source.python_fault)
+        place = source.python_fault.place
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(found.text)}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else ())

@@ -89,8 +89,9 @@ def add_hint(path: str) -> str:
     return f"write {path}, then git add, commit and push it"
 
 
-def chmod_hint(path: str) -> str:
-    return f"chmod +x {path}, then git update-index --chmod=+x {path}, commit and push"
+def chmod_hint(*paths: str) -> str:
+    files = " ".join(paths)
+    return f"chmod +x {files}, then git add --chmod=+x {files}, commit and push"
 
 
 def cmake_calls(package: PackageFacts, *names: str) -> tuple[CMakeCall, ...]:
