@@ -18,11 +18,11 @@ from typing import Any, TypeAlias
 
 from grader.arena.control_groups import Cgroups
 from grader.arena.limits import RunLimits
-from grader.arena.ros_env import RosInstallation
 from grader.arena.sandbox_files import HOME, SHIMS, STANDINS
 from grader.errors import HostError
 from grader.host_programs import find_host_program
 from grader.model.record import Record
+from grader.ros_env import RosInstallation
 
 Word: TypeAlias = "str | dict[str, Any]"
 """An argument, or what the arena puts into its place (`ros/launching.py`)."""

@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
-from grader.checks.registry import check
+from grader.checks.registry import Refers, check
 from grader.checks.support.exit_causes import HEADING, Traceback, explain_end, explain_traceback, tracebacks
 from grader.checks.support.nodes import GlobalName, TypeName, plain_type
 from grader.checks.support.processes import life_of
@@ -28,7 +28,7 @@ class ServiceParams(Record):
     """`service` with its slash, `type` as `rosservice type` gives it (`std_srvs/Trigger`)."""
 
     service: GlobalName
-    type: TypeName
+    type: Annotated[TypeName, Refers("service")]
 
 
 class ServiceAnswersParams(Record):

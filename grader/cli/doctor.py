@@ -17,7 +17,6 @@ from typing import IO
 from rich.table import Table
 from rich.text import Text
 
-from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
 from grader.arena.sandbox_files import missing_packages
 from grader.cli.host_support import Row, platform_rows, sandbox_rows
 from grader.errors import RosMissing
@@ -25,6 +24,7 @@ from grader.host_programs import HOST_ENV, LISTS, find_host_program
 from grader.portable import cores, system, user_id
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible
+from grader.ros_env import INSTALL_HINT, RosInstallation, find_ros
 
 STYLES = {"ok": "green", "limited": "yellow", "missing": "red"}
 PROGRAMS = {"git": "git", "cmake": "cmake", "make": "make", "c++": "g++"}
