@@ -63,8 +63,8 @@ ALLOWED = {
     "integrations": BASE | {"faults", "files", "intake", "pipeline", "report", "results", "rubric"},
     "cli": {
         *BASE, "arena", "authoring", "checks", "classes", "evidence", "faults", "files", "integrations", "intake",
-        "host_programs", "judging", "package", "pipeline", "report", "results", "ros_env", "ros_packages", "rubric",
-        "student"
+        "host_programs", "installable", "judging", "package", "pipeline", "report", "results", "ros_env",
+        "ros_packages", "rubric", "student"
     },
     "__main__": {"cli"},
 }  # fmt: skip

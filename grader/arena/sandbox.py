@@ -161,6 +161,14 @@ def _system(ros: RosInstallation) -> list[Word]:
     return argv
 
 
+def is_shown(path: Path, ros: RosInstallation) -> bool:
+    """Return whether a sandbox shows this path of the machine: its own `/tmp` and `/dev/shm` lie over the machine's."""
+    shown = [Path("/usr"), *(Path(prefix).resolve() for prefix in ros.prefixes)]
+    hidden = [Path("/tmp"), Path("/dev/shm"), Path(HOME)]  # noqa: S108 - the sandbox's own
+    real = path.resolve()
+    return any(real.is_relative_to(p) for p in shown) and not any(real.is_relative_to(p) for p in hidden)
+
+
 @lru_cache(maxsize=1)
 def _counts_by_namespace() -> bool:
     version = re.match(r"(\d+)\.(\d+)", platform.release())
