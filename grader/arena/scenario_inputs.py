@@ -15,7 +15,7 @@ import yaml
 
 from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.session import ArenaSession
-from grader.evidence.events import ActorEvent
+from grader.evidence.events import MISFIT, ActorEvent
 from grader.files import read_untrusted
 from grader.rubric.model import Call, Param, Probe, Scenario
 
@@ -317,21 +317,23 @@ async def _offered(service: str, arena: ArenaSession, patience_s: float) -> bool
 async def _call(call: Call, arena: ArenaSession) -> None:
     from grader.evidence.decode import ServiceType  # noqa: PLC0415 - numpy, which not every run needs
 
+    made = ActorEvent(action="call", actor="grader", topic=call.service, type=call.type, value=call.request)
+    text, misfit = _type_text(call.type, "srv", arena.place), ""
     try:
-        type_ = ServiceType(
-            call.type, _type_text(call.type, "srv", arena.place) or "", _messages(arena.place)
-        )
+        type_ = ServiceType(call.type, text or "", _messages(arena.place))
+        misfit = MISFIT
         data = base64.b64encode(type_.encode_request(call.request)).decode()
     except ValueError as error:
-        arena.note(_answer(call, None, f"the grader could not call it: {error}"))
+        package, _, name = call.type.partition("/")
+        own = (arena.place.workspace.repaired / package).is_dir()
+        if own and (misfit or text is None):
+            arena.note(made)
+            why = str(error) if text is not None else f"srv/{name}.srv is not there"
+            arena.note(_answer(call, None, f"{MISFIT}{why}"))
+        else:
+            arena.note(_answer(call, None, f"the grader could not call it: {error}"))
         return
-    record = {
-        "action": "call",
-        "actor": "grader",
-        "topic": call.service,
-        "type": call.type,
-        "value": call.request,
-    }
+    record = made.model_dump(exclude_defaults=True)
     answer = await arena.call(ANSWER_S, service=call.service, type=call.type, data=data, record=record)
     if "data" not in answer:
         arena.note(_answer(call, None, answer["error"]))

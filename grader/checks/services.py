@@ -15,6 +15,7 @@ from grader.checks.support.processes import life_of
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite, no_node
 from grader.checks.support.values import differences, fields_text
+from grader.evidence.events import MISFIT
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -290,6 +291,12 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
         end = explain_traceback(found, package)
         return end.verdict(failed, f"{asked} fails: {end.cause}")
     kind = one.type.partition("/")[2]
+    if one.detail.startswith(MISFIT):
+        message = f"{service} cannot be called with {fields_text(one.request)}: {shown(one.detail)}"
+        hint = (
+            f"give srv/{kind}.srv the names and types of the handout, the request above ---, and build again"
+        )
+        return failed(message, hint=hint)
     if "returned None" in one.detail:
         hint = f"end the callback with return {kind}Response(…)"
         return failed(f"{asked} fails: its callback returns nothing", hint=hint)
