@@ -43,7 +43,7 @@ ALLOWED = {
     "repaired_copy": {"files", "judging", "model", "package", "rubric"},
     "pipeline": {
         "repaired_copy",
-        *BASE, "arena", "evidence", "faults", "files", "intake", "judging", "package", "submitted_recordings",
+        *BASE, "arena", "evidence", "faults", "files", "installable", "intake", "judging", "package", "submitted_recordings",
         "report", "results", "rubric"
     },
     "api": {

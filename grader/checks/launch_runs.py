@@ -44,7 +44,7 @@ class LaunchConnectsParams(Record):
     nodes: tuple[str, ...] = ()
 
 
-@check("launch-connects", params=LaunchConnectsParams)
+@check("launch-connects", params=LaunchConnectsParams, heeds_losses=True)
 def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParams) -> Verdict:
     """The launch file brings up nodes that are connected.
 
@@ -171,7 +171,7 @@ class Wanted(NamedTuple):
     own: bool
 
 
-@check("launch-runs", params=LaunchRunsParams)
+@check("launch-runs", params=LaunchRunsParams, heeds_losses=True)
 def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Verdict:
     """The launch file brings up its nodes under the names that it gives them.
 

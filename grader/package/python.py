@@ -49,6 +49,8 @@ _LINES = (
     (r"&&|\|\|", "Python writes `and`, `or` and `not`"),
     (r"^\s*(\$|sudo |rosrun |roslaunch |cd |chmod )", "this is a command for the terminal, not Python"),
     (r"^\s*(if|elif|while)\b[^=(:]*[^=!<>(:]=[^=]", "`=` gives a value to a name; to compare, write `==`"),
+    (r"^\s*(if|elif|else|while|for|def|class|try|except|finally|with)\b.*;\s*$",
+     "the line that begins a block ends with `:`, not with `;`"),
     (r"\basync\b(?!\s+(def|for|with)\b)", "`async` is a reserved word since Python 3.7: use another name"),
 )  # fmt: skip
 

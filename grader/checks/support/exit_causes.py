@@ -9,16 +9,20 @@ from typing import NamedTuple
 
 from grader.checks.support.processes import Life, early_end, lives
 from grader.checks.support.scripts import path_in_package
-from grader.checks.support.text import shown
+from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
-from grader.installable import install_hint, known_packages
+from grader.installable import install_hint, known_messages, known_packages
 from grader.model.package import PackageFacts
 from grader.model.verdict import FileCitation, Verdict, inconclusive
-from grader.wording import seconds
+from grader.wording import join_words, seconds
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
 RACE = "publish() to a closed topic"
+ROS_2 = {"rclpy", "rclcpp", "ament_index_python", "launch_ros", "ros2cli", "rosidl_runtime_py"}
+ARGUMENT_HINT = (
+    "give the value in the code, or take a default where `len(sys.argv)` is 1: a lab starts it by its name"
+)
 LIMITS = ("limit", "note")  # evidence of earlier versions has it as a note
 CAUSES = {
     "EOFError": ("it asks for input (`input()`), and a node is given none", "remove `input()`: a node runs by itself"),
@@ -30,6 +34,7 @@ CAUSES = {
      "loop with `while not rospy.is_shutdown():` and sleep with `rospy.Rate`"),
     "ModuleNotFoundError": ("", "check the spelling of the import; a message package is imported as `std_msgs.msg`"),
     "ImportError": ("", "check the spelling of the import: the message types are at http://wiki.ros.org/std_msgs"),
+    "ResourceNotFound": ("there is no such ROS package", "remove `roslib.load_manifest(…)`: catkin needs no such line"),
     "NameError": ("", "check the spelling, and that it is imported or assigned before it is used"),
     "ROSSerializationException": ("", "publish a value that fits the message's type"),
     "SerializationError": ("", "publish a value that fits the message's type"),
@@ -56,6 +61,7 @@ _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
 _NO_MODULE = re.compile(r"No module named '(\w+)'$")
+_NO_TYPE = re.compile(r"cannot import name '(\w+)' from '(\w+)\.msg'")
 HEADING = "Traceback (most recent call last):"
 _FRAME = re.compile(r'^\s+File "([^"]+)", line (\d+)')
 _LAST = re.compile(r"^([A-Za-z_][\w.]*)(?:: ?(.*))?$")
@@ -63,8 +69,11 @@ _LIBRARY = ("/dist-packages/", "/site-packages/", "/usr/lib/python", "<frozen", 
 
 
 class Frame(NamedTuple):
+    """A line of a file, and its source where Python printed it."""
+
     file: str
     line: int
+    source: str = ""
 
     @property
     def in_library(self) -> bool:
@@ -104,6 +113,8 @@ def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
         elif frame and (first is not None or bare[index]):
             first = index if first is None else first
             frames.append(Frame(frame[1], int(frame[2])))
+        elif frames and not frames[-1].source and line.startswith("    "):
+            frames[-1] = frames[-1]._replace(source=line.strip())
         elif first is not None and line and not line[0].isspace():
             last = _LAST.match(line)
             if last:
@@ -140,7 +151,8 @@ class Ending(NamedTuple):
         """Return a verdict of this kind (`failed`, `unjudged`) with the ending's hint and citations, or
         `inconclusive` where the machine is at fault."""
         kind = inconclusive if self.of_machine else kind
-        return kind(message, measured=measured, hint=self.hint, citations=self.citations)
+        verdict = kind(message, measured=measured, hint=self.hint, citations=self.citations)
+        return verdict.model_copy(update={"cause": self.cause})
 
 
 def explain_early_end(package: PackageFacts, run: Run) -> Ending | None:
@@ -202,7 +214,7 @@ def _refused_name(life: Life, run: Run) -> Ending | None:
 def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     """One traceback, with the line of the student's own file where it names one."""
     place = _place(found, package)
-    slip = next((known for said, known in SLIPS.items() if said in found.message), None)
+    slip = _slip(found)
     cause, hint = slip or CAUSES.get(found.kind, ("", "fix the line that is named"))
     if lacking := _lacking(found, package):
         where = f" ({place.file}, line {place.line})" if place else ""
@@ -217,12 +229,40 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     return Ending(text, hint, (place,) if place else ())
 
 
+def _slip(found: Traceback) -> tuple[str, str] | None:
+    """Return the cause and the hint of a known slip, by what was said, by the module and by the line itself."""
+    if known := next((known for said, known in SLIPS.items() if said in found.message), None):
+        return known
+    if wrong := _NO_TYPE.match(found.message):
+        return _other_types(wrong[1], wrong[2])
+    module = _NO_MODULE.search(found.message)
+    if module and module[1] in ROS_2:
+        return f"{module[1]} is of ROS 2", "this lab is for ROS 1: write the node with rospy"
+    source = found.own_frames[-1].source if found.own_frames else ""
+    if found.kind == "IndexError" and "argv" in source:
+        return "it reads an argument of the command line, and is started without any", ARGUMENT_HINT
+    return None
+
+
+def _other_types(name: str, package: str) -> tuple[str, str] | None:
+    """Return which packages of ROS have the message, or what the one that was asked has that is spelt alike."""
+    pairs = [one.split("/") for one in known_messages()]
+    having = [other for other, message in pairs if message == name]
+    near = near_names(name, [message for other, message in pairs if other == package])
+    if having:
+        lines = join_words([f"from {other}.msg import {name}" for other in having], "or")
+        return f"{package} has no {name}, {join_words(having)} has", lines
+    return (f"{package} has {near[0]}", f"from {package}.msg import {near[0]}") if near else None
+
+
 def _lacking(found: Traceback, package: PackageFacts) -> str:
     """Return the module that exists and that this machine lacks; "" for a name that is the student's own affair."""
     match = _NO_MODULE.search(found.message) if found.kind == "ModuleNotFoundError" else None
-    name = match[1] if match else ""
+    # roslib.load_manifest, which rosbuild needed, asks for the ROS package itself
+    name = found.message if found.kind == "ResourceNotFound" else match[1] if match else ""
     own = {package.name, *(f.path.rpartition("/")[2].removesuffix(".py") for f in package.files)}
-    return name if name in known_packages() and name not in own else ""
+    declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
+    return name if name not in own and (name in known_packages() or name in declared) else ""
 
 
 def process_tracebacks(

@@ -9,7 +9,14 @@ from typing import NamedTuple
 
 from grader.checks.support.exit_causes import CAUSES, explain_traceback, process_tracebacks
 from grader.checks.support.processes import lives, observed_until_ns
-from grader.checks.support.scripts import chmod_hint, cmake_calls, find_script, paths_by_name
+from grader.checks.support.scripts import (
+    add_hint,
+    can_be_moved,
+    chmod_hint,
+    cmake_calls,
+    find_script,
+    paths_by_name,
+)
 from grader.checks.support.text import bare, near_names, shown
 from grader.evidence.run import Run
 from grader.model.package import LaunchFile, LaunchNode, PackageFacts
@@ -96,7 +103,8 @@ def _unreadable(package: PackageFacts, file: LaunchFile | None, launch: str) -> 
         near = [names[n] for n in near_names(launch, names)]
         seen = f"; there is {join_words(dict.fromkeys([*near, *others]))}" if near or others else ""
         message = f"{launch} is not in the package{seen}"
-        hint = f"put it at launch/{launch}, then git add, commit and push it"
+        movable = [p for p in near if can_be_moved(p, launch)]
+        hint = f"git mv {movable[0]} launch/{launch}" if movable else add_hint(f"launch/{launch}")
         cited = tuple(FileCitation(file=p) for p in (near or others)[:3])
         return failed(message, hint=hint, citations=cited or (FileCitation(file="package.xml"),))
     if file.fault is None:

@@ -161,7 +161,7 @@ def rename_files(files: Files, renames: dict[str, str]) -> None:
         naming = [file for file in others if _put_word(files, file, PurePosixPath(old).name, name)]
         words = f"{fix}, and write {name} in {join_words(naming)}" if naming else fix
         files.add(Repair(kind="file-name", file=old, before=old, after=new, message=message, fix=words))
-        files.put(new, files.text(old))
+        files.rename(old, new)
 
 
 def _put_word(files: Files, file: str, old: str, new: str) -> bool:
