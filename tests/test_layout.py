@@ -43,8 +43,8 @@ ALLOWED = {
     "repaired_copy": {"files", "judging", "model", "package", "rubric"},
     "pipeline": {
         "repaired_copy",
-        *BASE, "arena", "evidence", "faults", "files", "installable", "intake", "judging", "package", "submitted_recordings",
-        "report", "results", "rubric"
+        *BASE, "arena", "evidence", "faults", "files", "installable", "intake", "judging", "package",
+        "report", "results", "rubric", "submitted_recordings"
     },
     "api": {
         *BASE, "arena.asynchronous", "evidence", "faults", "files", "judging", "pipeline", "results", "rubric"
