@@ -14,7 +14,7 @@ from pathlib import Path
 
 from benchmarks.figures import NotMeasured
 from benchmarks.machine import Cost, timed
-from grader.arena.ros_env import SYSTEM_PATH, RosInstallation, find_ros
+from grader.ros_env import SYSTEM_PATH, RosInstallation, find_ros
 
 MASTER_S, LOOK_S = 10.0, 0.02
 HZTEST = """<launch>

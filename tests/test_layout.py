@@ -23,6 +23,8 @@ ALLOWED = {
     "wording": set[str](),
     "installable": set[str](),
     "portable": {"errors"},
+    "ros_env": {"errors", "model"},
+    "ros_packages": {"errors", "evidence", "installable", "ros_env", "wording"},
     "host_programs": set[str](),
     "limited_child": {"host_programs"},
     "workers": {"errors", "host_programs"},
@@ -33,16 +35,16 @@ ALLOWED = {
     "package": BASE | {"files", "host_programs", "limited_child", "rubric.model"},
     "intake": BASE | {"files", "host_programs", "limited_child"},
     "checks": BASE | {"evidence", "installable"},
-    "rubric": BASE | {"checks", "evidence", "files"},
+    "rubric": BASE | {"checks", "evidence", "files", "ros_packages"},
     "judging": BASE | {"checks", "evidence", "rubric"},
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},
-    "arena": BASE | {"evidence", "files", "host_programs", "package", "rubric.model"},
+    "arena": BASE | {"evidence", "files", "host_programs", "package", "ros_env", "ros_packages", "rubric.model"},
     "submitted_recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "repaired_copy": {"files", "judging", "model", "package", "rubric"},
     "pipeline": {
-        "installable", "repaired_copy",
-        *BASE, "arena", "evidence", "faults", "files", "intake", "judging", "package", "submitted_recordings",
-        "report", "results", "rubric"
+        "repaired_copy",
+        *BASE, "arena", "evidence", "faults", "files", "installable", "intake", "judging", "package",
+        "report", "results", "rubric", "submitted_recordings"
     },
     "api": {
         *BASE, "arena.asynchronous", "evidence", "faults", "files", "judging", "pipeline", "results", "rubric"
@@ -51,7 +53,7 @@ ALLOWED = {
         *BASE, "checks", "classes.batch", "evidence", "files", "intake", "package", "pipeline", "rubric"
     },
     "classes": {
-        *BASE, "arena.ros_env", "checks", "evidence", "faults", "files", "host_programs", "intake", "judging",
+        *BASE, "ros_env", "checks", "evidence", "faults", "files", "host_programs", "intake", "judging",
         "pipeline", "report", "results", "rubric", "workers"
     },
     "student": {
@@ -61,7 +63,8 @@ ALLOWED = {
     "integrations": BASE | {"faults", "files", "intake", "pipeline", "report", "results", "rubric"},
     "cli": {
         *BASE, "arena", "authoring", "checks", "classes", "evidence", "faults", "files", "integrations", "intake",
-        "host_programs", "judging", "package", "pipeline", "report", "results", "rubric", "student"
+        "host_programs", "installable", "judging", "package", "pipeline", "report", "results", "ros_env",
+        "ros_packages", "rubric", "student"
     },
     "__main__": {"cli"},
 }  # fmt: skip

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.ros_env import RosInstallation
 from grader.cli.doctor import _modules
 from grader.host_programs import (
     find_user_program,
@@ -18,6 +17,7 @@ from grader.host_programs import (
 )
 from grader.intake.git import Git
 from grader.judging import overall_status
+from grader.ros_env import RosInstallation
 from grader.workers import Worker
 from tests.intake.samples import write
 

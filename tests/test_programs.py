@@ -37,7 +37,7 @@ STARTS = {
         "stage.folder if gate is not None else NOWHERE",
         "nothing: tests/arena/test_environment.py",
     ),
-    "arena/ros_env.py:_from_setup": Start("base", "'/'", "nothing: ROS's own setup.bash"),
+    "ros_env.py:_from_setup": Start("base", "'/'", "nothing: ROS's own setup.bash"),
     "arena/arena_process.py:__init__": Start("dict(env)", "'/'", "nothing: ROS's own variables"),
     "cli/doctor.py:_hostname": Start("HOST_ENV", "'/'", "nothing"),
     "cli/doctor.py:_modules": Start("ros.env", "'/'", "nothing"),

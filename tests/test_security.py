@@ -11,12 +11,12 @@ import pytest
 from grader import files
 from grader.arena import build, process_environment, scenario_inputs, static_recorder, steps, workspace
 from grader.arena.limits import SUBMISSION_MESSAGE_BYTES, RunLimits
-from grader.arena.ros_env import DUMP_BYTES, NAMES_MAX, VALUE_BYTES
 from grader.checks.support import text
 from grader.evidence import container, decode, definitions, memory_budget
 from grader.intake import archive, git, gitdir
 from grader.intake.limits import IntakeLimits
 from grader.package import cmake, cmake_parse, launch, launch_loader, python, reading
+from grader.ros_env import DUMP_BYTES, NAMES_MAX, VALUE_BYTES
 
 KB, MB, RUN = 1 << 10, 1 << 20, RunLimits()
 ROOT = Path(__file__).resolve().parent.parent

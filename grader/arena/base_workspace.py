@@ -23,7 +23,6 @@ from grader import __version__
 from grader.arena.asynchronous import run_until_signal
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import BASE, ProcessEnvironment
-from grader.arena.ros_env import find_ros
 from grader.arena.sandbox import temporary_base
 from grader.arena.sandbox_files import ANSWERS, INSIDE_WORKSPACE, QUESTIONS, prepare
 from grader.arena.sandbox_probe import choose
@@ -33,6 +32,7 @@ from grader.errors import ArenaError, GraderError
 from grader.evidence.writer import EvidenceWriter
 from grader.files import atomic_write, open_untrusted, temporary_folder
 from grader.model.sandbox_mode import SandboxMode
+from grader.ros_env import find_ros
 
 NAME = "base workspace"
 MAKE_S = 60.0

@@ -14,7 +14,6 @@ from typing import Any
 from grader.arena.base_workspace import NAME as BASE_NAME
 from grader.arena.base_workspace import base_spec, catkin_make, has_base, keep_base
 from grader.arena.process_environment import ARCHIVE, ProcessEnvironment
-from grader.arena.ros_env import DUMP_BYTES, excess_of, keep_ros_variables, parse_env
 from grader.arena.session import ArenaSession
 from grader.arena.static_recorder import RunCost
 from grader.arena.workspace import read_member, run_in_place
@@ -23,6 +22,7 @@ from grader.evidence.writer import EvidenceWriter
 from grader.files import READ_MAX, read_untrusted
 from grader.package.cmake import written_calls
 from grader.package.python import REPORT_BYTES_MAX
+from grader.ros_env import DUMP_BYTES, excess_of, keep_ros_variables, parse_env
 
 BUILD_S = 120.0
 BUILD_EXPECTED_S = 2.0

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from grader.arena.limits import RunLimits
-from grader.arena.ros_env import SYSTEM_PATH, RosInstallation
 from grader.arena.sandbox import Sandbox, Word, copy_of, scratch, system_call_filter
 from grader.arena.sandbox_files import (
     BASE_WORKSPACE,
@@ -29,6 +28,7 @@ from grader.arena.sandbox_files import (
 from grader.arena.workspace import Built, Workspace, read_archive, read_folder
 from grader.files import read_untrusted
 from grader.host_programs import find_host_program
+from grader.ros_env import SYSTEM_PATH, RosInstallation
 
 TEXT_BYTES_MAX = 64 << 10
 LOOPBACK = "127.0.0.1"

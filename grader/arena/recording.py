@@ -21,7 +21,6 @@ from grader.arena.asynchronous import Stop, run_together, run_until_signal
 from grader.arena.build import BUILD_EXPECTED_S, build
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.ros_env import INSTALL_HINT, find_ros
 from grader.arena.sandbox import temporary_base
 from grader.arena.sandbox_files import prepare
 from grader.arena.sandbox_probe import choose
@@ -48,6 +47,7 @@ from grader.model.sandbox_mode import SandboxMode
 from grader.model.submission import Submission
 from grader.package import SyntaxReport, python_paths, read_syntax_report, with_build_facts
 from grader.package.python import REPORT_BYTES_MAX
+from grader.ros_env import INSTALL_HINT, find_ros
 from grader.rubric.model import Rubric
 
 WAITING = "for its turn"

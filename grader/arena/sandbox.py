@@ -18,11 +18,11 @@ from typing import Any, TypeAlias
 
 from grader.arena.control_groups import Cgroups
 from grader.arena.limits import RunLimits
-from grader.arena.ros_env import RosInstallation
 from grader.arena.sandbox_files import HOME, SHIMS, STANDINS
 from grader.errors import HostError
 from grader.host_programs import find_host_program
 from grader.model.record import Record
+from grader.ros_env import RosInstallation
 
 Word: TypeAlias = "str | dict[str, Any]"
 """An argument, or what the arena puts into its place (`ros/launching.py`)."""
@@ -159,6 +159,14 @@ def _system(ros: RosInstallation) -> list[Word]:
     if any(OWN_FOLDER.is_relative_to(folder) for folder in shown):
         argv += ["--size", "4096", "--tmpfs", str(OWN_FOLDER)]
     return argv
+
+
+def is_shown(path: Path, ros: RosInstallation) -> bool:
+    """Return whether a sandbox shows this path of the machine: its own `/tmp` and `/dev/shm` lie over the machine's."""
+    shown = [Path("/usr"), *(Path(prefix).resolve() for prefix in ros.prefixes)]
+    hidden = [Path("/tmp"), Path("/dev/shm"), Path(HOME)]  # noqa: S108 - the sandbox's own
+    real = path.resolve()
+    return any(real.is_relative_to(p) for p in shown) and not any(real.is_relative_to(p) for p in hidden)
 
 
 @lru_cache(maxsize=1)

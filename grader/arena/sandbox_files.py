@@ -11,7 +11,7 @@ from pathlib import Path
 from catkin_pkg.package import PACKAGE_MANIFEST_FILENAME
 from catkin_pkg.packages import find_package_paths
 
-from grader.arena.ros_env import RosInstallation
+from grader.ros_env import RosInstallation
 
 HOME = "/home/student"
 INSIDE_WORKSPACE = f"{HOME}/catkin_ws"

@@ -14,7 +14,6 @@ from typing_extensions import Self
 
 from grader import __version__
 from grader.arena.limits import RunLimits
-from grader.arena.ros_env import RosInstallation, find_ros
 from grader.evidence.events import ActorEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.files import read_untrusted
@@ -23,6 +22,7 @@ from grader.model.progress import Progress
 from grader.model.record import Record
 from grader.model.submission import Submission
 from grader.portable import system
+from grader.ros_env import RosInstallation, find_ros
 from grader.rubric.model import Rubric
 
 if TYPE_CHECKING:

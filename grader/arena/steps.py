@@ -21,7 +21,7 @@ from typing_extensions import Self
 from grader.arena.scenario_inputs import make_shots
 from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError, EvidenceError
-from grader.evidence.events import ActorEvent
+from grader.evidence.events import MISFIT, ActorEvent
 from grader.rubric.model import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
 from grader.wording import plural
 
@@ -382,14 +382,15 @@ class StepRunner:
         from grader.evidence.decode import ServiceType  # noqa: PLC0415 - numpy, which not every run needs
         from grader.evidence.message_values import MessageType, Moment  # noqa: PLC0415 - as above
 
+        text, fits = None, True
         try:
-            text = self._arena.place.type_text(call.type, "srv") or ""
-            type_ = ServiceType(call.type, text, self._message_text)
+            text = self._arena.place.type_text(call.type, "srv")
+            type_ = ServiceType(call.type, text or "", self._message_text)
             request = MessageType(f"{call.type}Request", full=type_.request)
-            moment = Moment(0, 1, self._arena.ros_now_ns())
+            moment, fits = Moment(0, 1, self._arena.ros_now_ns()), False
             data, shown = request.encode(call.request, moment), request.shown(call.request, moment)
         except ValueError as error:
-            self._answer(call, None, f"the grader could not call it: {error}")
+            self._refuse(call, text, str(error), fits=fits)
             return
         about = {"topic": call.service, "type": call.type, "value": shown}
         record = {"action": "call", "actor": "grader", **about}
@@ -402,6 +403,17 @@ class StepRunner:
             return
         value = type_.decode_response(base64.b64decode(answer["data"]))
         self._answer(call, value, "" if value is not None else f"the answer is no {call.type}")
+
+    def _refuse(self, call: Call, text: str | None, error: str, *, fits: bool) -> None:
+        """Note a call that cannot be made: by the fault of the student's own definition, or of this machine."""
+        package, _, name = call.type.partition("/")
+        own = (self._arena.place.workspace.repaired / package).is_dir()
+        if not own or (fits and text is not None):
+            self._answer(call, None, f"the grader could not call it: {error}")
+            return
+        about = {"topic": call.service, "type": call.type, "value": call.request}
+        self._arena.note(ActorEvent(action="call", actor="grader", **about))
+        self._answer(call, None, MISFIT + (error if text is not None else f"srv/{name}.srv is not there"))
 
     # --- Actions (wiki.ros.org/actionlib/DetailedDescription) ---------------------------------------------------------
 

@@ -8,7 +8,7 @@ from here (docs/how-to/own-checks.md), and stays.
 from importlib import import_module
 
 from grader.checks.all_runs import Evidence
-from grader.checks.registry import CHECKS, HEADINGS, Check, check
+from grader.checks.registry import CHECKS, HEADINGS, Check, ProcessName, Refers, check
 from grader.evidence.run import Channel, Message, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -60,7 +60,9 @@ __all__ = [
     "FileCitation",
     "Message",
     "PackageFacts",
+    "ProcessName",
     "Record",
+    "Refers",
     "Run",
     "Verdict",
     "check",

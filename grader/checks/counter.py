@@ -20,6 +20,7 @@ from grader.checks.support.counters import (
     wrong_steps,
 )
 from grader.checks.support.exit_causes import explain_early_end
+from grader.checks.support.nodes import PublishedTopic
 from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -32,14 +33,14 @@ LARGEST = 2.0**64
 
 
 class StartParams(Record):
-    topic: str
+    topic: PublishedTopic
     start: int = 0
 
 
 class StepParams(Record):
     """`maximum` is the last value before the wrap; `rate_hz` the nominal rate, to know a flood."""
 
-    topic: str
+    topic: PublishedTopic
     maximum: int = 127
     rate_hz: Annotated[float, Field(gt=0)] = 10.0
     min_steps: Annotated[int, Field(ge=1)] = 10

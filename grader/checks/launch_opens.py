@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from grader.checks.executable import RIGHT_SHEBANG, ExecutableParams, executable
 from grader.checks.launch_xml import missing_node
-from grader.checks.registry import check
+from grader.checks.registry import LaunchName, check
 from grader.checks.support.launch import (
     died,
     node_slip,
@@ -37,7 +37,7 @@ SHELL = "#!/bin/bash"
 class OpensParams(Record):
     """`program` is asked to open one of `urls`; the node of `script` runs beside it."""
 
-    launch: str
+    launch: LaunchName
     program: str = "firefox"
     urls: tuple[str, ...]
     script: str

@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.launch_xml import missing_node
-from grader.checks.registry import check
+from grader.checks.registry import LaunchName, check
 from grader.checks.support.console_output import printed_lines
 from grader.checks.support.launch import (
     Absence,
@@ -49,7 +49,7 @@ Wanted = Mapping[str, int | float | str]
 class LaunchLoadsParams(Record):
     """`launch` is the launch file's name; `names` are on the server once `file` is loaded, and `script` reads them."""
 
-    launch: str
+    launch: LaunchName
     file: str
     script: str
     names: tuple[str, ...]

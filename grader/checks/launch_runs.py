@@ -10,7 +10,7 @@ from pydantic import Field
 
 from grader.checks.launch_params import params_misplaced
 from grader.checks.launch_xml import missing_node
-from grader.checks.registry import check
+from grader.checks.registry import LaunchName, ProgramName, check
 from grader.checks.support.launch import (
     Slip,
     is_exact,
@@ -41,8 +41,8 @@ from grader.wording import join_words, plural
 class LaunchConnectsParams(Record):
     """`launch` is the file's name, in whatever folder. `nodes` are names that have to come up."""
 
-    launch: str
-    topic: str
+    launch: LaunchName
+    topic: GlobalName
     nodes: tuple[str, ...] = ()
 
 
@@ -178,11 +178,11 @@ class LaunchRunsParams(Record):
     `package/program` under any name; `params` have to be where the node of the first program reads them.
     """
 
-    launch: str
+    launch: LaunchName
     topic: GlobalName | None = None
     scripts: tuple[str, ...] = ()
     nodes: Annotated[dict[str, str], Field(default_factory=dict)]
-    programs: tuple[str, ...] = ()
+    programs: tuple[ProgramName, ...] = ()
     params: Annotated[dict[str, int | float | str], Field(default_factory=dict)]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import PurePosixPath
 
-from grader.checks.registry import check
+from grader.checks.registry import LaunchName, ProgramName, check
 from grader.checks.support.launch import (
     Slip,
     has_program,
@@ -26,9 +26,9 @@ from grader.wording import join_words, plural
 class LaunchXmlParams(Record):
     """`launch` is the file's name, in whatever folder; `programs` are nodes of other packages, `package/program`."""
 
-    launch: str
+    launch: LaunchName
     scripts: tuple[str, ...] = ()
-    programs: tuple[str, ...] = ()
+    programs: tuple[ProgramName, ...] = ()
 
 
 @check("launch-xml", params=LaunchXmlParams)

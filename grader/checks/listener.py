@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Annotated
 
-from grader.checks.registry import check
+from grader.checks.registry import Refers, check
 from grader.checks.support.console_output import (
     Line,
     Probe,
@@ -16,6 +17,7 @@ from grader.checks.support.console_output import (
     text_places,
 )
 from grader.checks.support.exit_causes import explain_early_end, explain_error
+from grader.checks.support.nodes import GlobalName
 from grader.checks.support.processes import lives, not_started
 from grader.checks.support.text import OTHER_WORDS_SHARE, VALUE, in_words, near_names, shown
 from grader.checks.support.topics import cite, topics_with
@@ -39,7 +41,7 @@ class HearsParams(Record):
     Whether the template's own words are in capitals does not matter.
     """
 
-    topic: str
+    topic: Annotated[GlobalName, Refers("sent")]
     template: str = VALUE
 
 

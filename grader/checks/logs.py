@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from grader.checks.registry import check
+from grader.checks.registry import ProcessName, check
 from grader.checks.support.console_output import CALLS, Level, Logged, console_log, logged_by
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.nodes import nodes_of
@@ -30,7 +30,7 @@ class LogsParams(Record):
 
     text: Annotated[str, Field(min_length=1)]
     level: Level = "info"
-    process: str = ""
+    process: ProcessName = ""
 
 
 @check("logs", params=LogsParams, messages_only=True)

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from grader.checks.registry import check
 from grader.checks.support.clocks import GET_TIME, WATCHED_S, clocks_at, wrong_growth
 from grader.checks.support.exit_causes import explain_early_end
-from grader.checks.support.nodes import GlobalName, plain_type
+from grader.checks.support.nodes import PublishedTopic, plain_type
 from grader.checks.support.processes import early_end, is_flood, observed_until_ns
 from grader.checks.support.text import (
     NUMBER,
@@ -39,7 +39,7 @@ ROUNDING = 1e-6
 class MessageParams(Record):
     """`template` is the whole text, `{seconds}` in it a time that grows: `hello world {seconds}`."""
 
-    topic: str
+    topic: PublishedTopic
     template: Annotated[str, Field(min_length=1)]
 
 
@@ -187,7 +187,7 @@ class FieldBoundsParams(Record):
     Give `min`, `max` or both. `share` of the messages has to lie within them.
     """
 
-    topic: GlobalName
+    topic: PublishedTopic
     field: FieldPath
     min: float | None = None
     max: float | None = None

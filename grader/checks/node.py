@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from grader.checks.registry import check
+from grader.checks.registry import ProcessName, Refers, check
 from grader.checks.support.exit_causes import (
     ended_after,
     explain_end,
@@ -40,8 +40,8 @@ class NodeLivesParams(Record):
     With `names`, one of them has to be the node's name, as `node-name` judges it.
     """
 
-    process: str
-    min_s: float = 5.0
+    process: ProcessName
+    min_s: Annotated[float, Refers("watched_s")] = 5.0
     names: tuple[str, ...] = ()
     anonymous: Anonymous = "allowed"
 
@@ -54,7 +54,7 @@ class NodeNameParams(Record):
 
     names: Annotated[tuple[str, ...], Field(min_length=1)]
     anonymous: Anonymous = "allowed"
-    process: str = ""
+    process: ProcessName = ""
 
 
 @check("node-lives", params=NodeLivesParams)

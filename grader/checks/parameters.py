@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
-from typing import Any
+from typing import Annotated, Any
 
-from grader.checks.registry import check
+from grader.checks.registry import ProcessName, Refers, check
 from grader.checks.support.console_output import printed_lines
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.parameters import (
@@ -51,7 +51,7 @@ MISSING = object()
 class ParamsLoadedParams(Record):
     """`process` runs `rosparam load` on `file`; `names` have to be on the server afterwards, maps taken apart."""
 
-    process: str
+    process: ProcessName
     file: str
     names: tuple[str, ...]
 
@@ -214,7 +214,7 @@ def _is_empty(found: dict[str, object], name: str) -> bool:
 class ParamsReadParams(Record):
     """`names` are parameters that the scenario made up; `file` is where the student keeps their usual values."""
 
-    names: tuple[GlobalName, ...]
+    names: tuple[Annotated[GlobalName, Refers("set")], ...]
     file: str = ""
 
 

@@ -9,9 +9,10 @@ from typing import Annotated
 
 from pydantic import Field
 
-from grader.checks.registry import check
+from grader.checks.registry import Refers, check
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.lateness import Lateness, excused, lateness
+from grader.checks.support.nodes import PublishedTopic
 from grader.checks.support.processes import observed_until_ns
 from grader.checks.support.topics import cite, no_message, whole_until_ns
 from grader.evidence.run import Channel, Run
@@ -41,14 +42,14 @@ class RateParams(Record):
     `share_in_bounds` of the gaps have to lie within `gap_tolerance` of the nominal period.
     """
 
-    topic: str
+    topic: PublishedTopic
     rate_hz: Positive
     tolerance: Share = 0.05
     tolerance_low: Share | None = None
     tolerance_high: Positive | None = None
     gap_tolerance: Share = 0.5
     share_in_bounds: Share = 0.95
-    min_window_s: Positive = 5.0
+    min_window_s: Annotated[Positive, Refers("watched_s")] = 5.0
 
     @property
     def low_hz(self) -> float:

@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from types import UnionType
+from typing import Annotated, Literal, NamedTuple, Union, get_args, get_origin
 
 from grader.model.message_rate import RateBounds
 from grader.model.record import Record
@@ -24,6 +26,32 @@ NAME = re.compile(r"[a-z][a-z0-9-]*")
 
 class NoParams(Record):
     """For a check that has nothing to set."""
+
+
+@dataclass(frozen=True)
+class Refers:
+    """What a parameter stands for, in the rubric or on the machine: the rubric is refused where it is not there.
+
+    `process`: a start of the student's in the scenario. `launch`: a launch file that the scenario starts. `program`:
+    `package/program` of another package. `message`, `service`: a type. `sent`: a topic on which the scenario's probes
+    send. `published`: a topic on which the student publishes. `set`: a parameter that the scenario sets. `watched_s`:
+    so long the scenario has to last.
+    """
+
+    to: Literal["process", "launch", "program", "message", "service", "sent", "published", "set", "watched_s"]
+
+
+class Reference(NamedTuple):
+    """A parameter's value, where it stands below `with`, and what it refers to."""
+
+    path: tuple[str | int, ...]
+    to: str
+    value: object
+
+
+ProcessName = Annotated[str, Refers("process")]
+LaunchName = Annotated[str, Refers("launch")]
+ProgramName = Annotated[str, Refers("program")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +86,27 @@ class Check:
             return None
         bounds: RateBounds = self.params.model_validate(parameters).rate_bounds
         return bounds
+
+    def references(self, parameters: Mapping[str, object]) -> Iterator[Reference]:
+        """Yield what these parameters refer to, defaults among them."""
+        for name, info in self.params.model_fields.items():
+            value = parameters.get(name, None if info.is_required() else info.default)
+            kinds = [known for known in info.metadata if isinstance(known, Refers)] or _refers(
+                info.annotation
+            )
+            yield from (Reference((name,), known.to, value) for known in kinds)
+            if get_origin(info.annotation) is tuple and isinstance(value, list | tuple):
+                kinds = _refers(get_args(info.annotation)[0])
+                yield from (Reference((name, n), k.to, item) for n, item in enumerate(value) for k in kinds)
+
+
+def _refers(annotation: object) -> list[Refers]:
+    """Return what a type refers to, also where it may be absent (`ProcessName | None`)."""
+    if get_origin(annotation) is Annotated:
+        return [known for known in get_args(annotation)[1:] if isinstance(known, Refers)]
+    if get_origin(annotation) in {Union, UnionType}:
+        return [known for member in get_args(annotation) for known in _refers(member)]
+    return []
 
 
 CHECKS: dict[str, Check] = {}

@@ -8,13 +8,14 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
-from grader.checks.registry import check
+from grader.checks.registry import Refers, check
 from grader.checks.support.exit_causes import HEADING, Traceback, explain_end, explain_traceback, tracebacks
 from grader.checks.support.nodes import GlobalName, TypeName, plain_type
 from grader.checks.support.processes import life_of
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite, no_node
 from grader.checks.support.values import differences, fields_text
+from grader.evidence.events import MISFIT
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -28,7 +29,7 @@ class ServiceParams(Record):
     """`service` with its slash, `type` as `rosservice type` gives it (`std_srvs/Trigger`)."""
 
     service: GlobalName
-    type: TypeName
+    type: Annotated[TypeName, Refers("service")]
 
 
 class ServiceAnswersParams(Record):
@@ -290,6 +291,12 @@ def no_answer(package: PackageFacts, run: Run, service: str, one: Exchange) -> V
         end = explain_traceback(found, package)
         return end.verdict(failed, f"{asked} fails: {end.cause}")
     kind = one.type.partition("/")[2]
+    if one.detail.startswith(MISFIT):
+        message = f"{service} cannot be called with {fields_text(one.request)}: {shown(one.detail)}"
+        hint = (
+            f"give srv/{kind}.srv the names and types of the handout, the request above ---, and build again"
+        )
+        return failed(message, hint=hint)
     if "returned None" in one.detail:
         hint = f"end the callback with return {kind}Response(…)"
         return failed(f"{asked} fails: its callback returns nothing", hint=hint)

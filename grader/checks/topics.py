@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from grader.checks.registry import check
-from grader.checks.support.nodes import GlobalName, plain_type
+from typing import Annotated
+
+from grader.checks.registry import Refers, check
+from grader.checks.support.nodes import GlobalName, PublishedTopic, TypeName, plain_type
 from grader.checks.support.text import near_names
 from grader.checks.support.topics import cite, no_message, no_node, nodes_on, published_topics
 from grader.evidence.run import Channel, Run
@@ -16,8 +18,8 @@ from grader.wording import join_words, plural
 class TopicTypeParams(Record):
     """`topic` with its slash, `type` as `rostopic info` gives it (`std_msgs/Int8`)."""
 
-    topic: str
-    type: str
+    topic: PublishedTopic
+    type: Annotated[TypeName, Refers("message")]
 
 
 @check("topic-type", params=TopicTypeParams, messages_only=True, heeds_losses=True)
@@ -142,7 +144,7 @@ def _publisher(run: Run, topic: str) -> str:
 class LatchedParams(Record):
     """`topic` with its slash."""
 
-    topic: GlobalName
+    topic: PublishedTopic
 
 
 @check("latched", params=LatchedParams, messages_only=True, heeds_losses=True)

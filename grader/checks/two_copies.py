@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
-from grader.checks.registry import check
+from grader.checks.registry import ProcessName, check
 from grader.checks.support.console_output import (
     LOOKED_AT,
     both_from_ns,
@@ -16,7 +16,7 @@ from grader.checks.support.console_output import (
     sent_by,
 )
 from grader.checks.support.exit_causes import ended_after, explain_end
-from grader.checks.support.nodes import are_noted, nodes_of
+from grader.checks.support.nodes import GlobalName, are_noted, nodes_of
 from grader.checks.support.processes import NO_SCRIPT_HINT, Life, life, lives
 from grader.checks.support.text import VALUE, in_words
 from grader.checks.support.topics import cite
@@ -37,10 +37,10 @@ class CopiesParams(Record):
     name over and the first is shut down.
     """
 
-    first: str
-    second: str
-    listener: str
-    topic: str
+    first: ProcessName
+    second: ProcessName
+    listener: ProcessName
+    topic: GlobalName
     template: str = VALUE
     taken_over_score: Annotated[float, Field(ge=0, le=1)] = 0.3333
 

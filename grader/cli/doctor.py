@@ -17,14 +17,19 @@ from typing import IO
 from rich.table import Table
 from rich.text import Text
 
-from grader.arena.ros_env import INSTALL_HINT, RosInstallation, find_ros
+from grader.arena.sandbox import is_shown
 from grader.arena.sandbox_files import missing_packages
 from grader.cli.host_support import Row, platform_rows, sandbox_rows
 from grader.errors import RosMissing
 from grader.host_programs import HOST_ENV, LISTS, find_host_program
+from grader.installable import known_packages
 from grader.portable import cores, system, user_id
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible
+from grader.ros_env import INSTALL_HINT, RosInstallation, find_ros
+from grader.ros_packages import STANDINS, RosPackages, ros_packages
+from grader.rubric.load import LoadedRubric
+from grader.wording import join_words
 
 STYLES = {"ok": "green", "limited": "yellow", "missing": "red"}
 PROGRAMS = {"git": "git", "cmake": "cmake", "make": "make", "c++": "g++"}
@@ -61,6 +66,59 @@ def diagnose() -> tuple[Row, ...]:
         _hostname(),
         _encoding(),
     )
+
+
+def diagnose_rubric(loaded: LoadedRubric) -> tuple[Row, ...]:
+    """Return a row for each ROS package that the rubric's programs and types come from."""
+    packages = ros_packages()
+    needed = _needed(loaded)
+    return tuple(_package(name, needed[name], packages) for name in sorted(needed))
+
+
+def _needed(loaded: LoadedRubric) -> dict[str, list[str]]:
+    """Return by package what the rubric asks of it, the student's own left out."""
+    rubric = loaded.rubric
+    names = [start.program for s in rubric.scenarios.values() for start in s.start if start.program]
+    names += [probe.type for s in rubric.scenarios.values() for probe in s.probes]
+    names += [call.type for s in rubric.scenarios.values() for call in s.calls]
+    names += [
+        str(one.value)
+        for criterion in rubric.criteria
+        if (check := loaded.checks.get(criterion.check))
+        for one in check.references(criterion.parameters)
+        if one.to in {"program", "message", "service"} and one.value
+    ]
+    found: dict[str, list[str]] = {}
+    for package, _, name in (one.partition("/") for one in dict.fromkeys(names)):
+        if package != rubric.package:
+            found.setdefault(package, []).append(name)
+    return found
+
+
+def _package(name: str, asked: Sequence[str], packages: RosPackages) -> Row:
+    folder, wanted = packages.folders.get(name), f"for {join_words(asked)}"
+    if folder is None:
+        return Row(
+            name=name, state="missing", detail=f"not installed, {wanted}", fix=_install(name, packages.ros)
+        )
+    if folder.is_relative_to(STANDINS):
+        return Row(name=name, state="ok", detail=f"the grader's stand-in, {wanted}")
+    if packages.ros is not None and not is_shown(folder, packages.ros):
+        fix = "install its workspace below /opt (catkin_make install), and name that setup.bash in $GRADER_ROS_SETUP"
+        return Row(
+            name=name, state="missing", detail=f"{folder} is hidden from the sandbox, {wanted}", fix=fix
+        )
+    return Row(name=name, state="ok", detail=f"{folder}, {wanted}")
+
+
+def _install(name: str, ros: RosInstallation | None) -> str:
+    known = known_packages().get(name, "")
+    dashed = name.replace("_", "-")
+    if ros is not None and ros.kind == "setup":
+        known = known or f"ros-{ros.distro}-{dashed}"
+    elif ros is not None and ros.kind == "debian" and name.endswith("_msgs"):
+        known = known or f"python3-{dashed}"
+    return f"apt-get install {known}" if known else f"install the ROS package {name}"
 
 
 def _python() -> Row:

@@ -101,7 +101,7 @@ def _ros() -> str:
     from grader.errors import GraderError  # noqa: PLC0415 - as above
 
     try:
-        from grader.arena.ros_env import find_ros  # noqa: PLC0415 - as above
+        from grader.ros_env import find_ros  # noqa: PLC0415 - as above
 
         ros = find_ros()
     except (GraderError, ImportError, OSError) as error:

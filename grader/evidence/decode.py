@@ -178,6 +178,13 @@ def md5sum(type: str) -> str:  # noqa: A002 - ROS's own word
     return _described(type)[1]
 
 
+def noetic_types(package: str) -> tuple[str, ...]:
+    """Return the names of the message types that a package has in ROS Noetic, none for any other package."""
+    return tuple(
+        name.rpartition("/")[2] for name in _noetic().fielddefs if name.startswith(f"{package}/msg/")
+    )
+
+
 @lru_cache(maxsize=1)
 def known_packages() -> dict[str, tuple[str, ...]]:
     """Return the names of ROS Noetic's own message types by package."""

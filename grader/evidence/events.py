@@ -13,6 +13,8 @@ EVIDENCE_VERSION = str(EVIDENCE.version)
 METADATA_NAME = "grader.evidence"
 RECORDING_MISSING = "recording.missing"
 RECORDING_PROBLEM = "recording.problem"
+MISFIT = "the package's definition does not fit: "
+"""Begins the detail of the answer to a call that could not be made, because the student's own `.srv` is another one."""
 
 
 class ProcessEvent(Record):

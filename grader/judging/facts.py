@@ -14,6 +14,7 @@ from grader.checks.build import run_hint
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import SYNTAX, syntax_hint
 from grader.checks.support.launch import own_script, read_launch
+from grader.checks.support.processes import failed_program
 from grader.checks.support.scripts import find_script
 from grader.evidence.events import RECORDING_MISSING, RECORDING_PROBLEM
 from grader.evidence.run import Run
@@ -93,7 +94,18 @@ class Facts:
             return inconclusive(
                 message, hint="`grader doctor` shows what this machine lacks; then grade again"
             )
-        return run
+        return self._without_program(run, scenario) or run
+
+    def _without_program(self, run: Run, scenario: str) -> Verdict | None:
+        """Return the verdict where a program that the rubric starts beside the student's failed."""
+        known = self.rubric.scenarios.get(scenario)
+        programs = {start.name: start.program for start in known.start if start.program} if known else {}
+        failure = failed_program(run, programs)
+        if not failure:
+            return None
+        message = f"a program of the grader's failed in the run {scenario!r}: {failure}"
+        hint = "`grader doctor --rubric RUBRIC` shows what this machine lacks for it; then grade again"
+        return inconclusive(message, hint=hint)
 
     def unreadable_launch(self, scenario: str) -> Verdict | None:
         """Return why roslaunch cannot read what the scenario launches: that shows without a run."""

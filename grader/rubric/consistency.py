@@ -11,6 +11,7 @@ from typing import Any
 
 from grader.checks.registry import Check
 from grader.rubric.faults import model_faults
+from grader.rubric.references import reference_faults
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
 from grader.rubric.steps import given_steps, slash, step_faults
 from grader.wording import did_you_mean
@@ -46,6 +47,7 @@ def cross_faults(data: object, checks: Mapping[str, Check], *, complete: bool = 
     faults += _circles(criteria)
     faults += _points(rubric, criteria)
     faults += _late(rubric)
+    faults += reference_faults(rubric, checks)
     return faults
 
 

@@ -17,6 +17,8 @@ from grader.rubric.pytest_check import Outcome, SessionOutcome, TestOutcome
 from grader.wording import shorten
 
 MESSAGE_CHARS = 200
+SAYING = (AssertionError, NotRecorded, pytest.fail.Exception, pytest.skip.Exception)
+"""What a test says of the student's work; any other exception is a fault of the test."""
 _ADDRESS = re.compile(r"\b0x[0-9a-fA-F]{6,}\b")
 _EVIDENCE = pytest.StashKey[Evidence]()
 
@@ -82,6 +84,8 @@ class _Notes:
             text = error.msg if isinstance(error, pytest.FixtureLookupError) else str(error)
             fixture = getattr(error, "argname", "")
             self._faults.append(f"{item.name}: {text or f'there is no fixture {fixture!r}'}")
+        elif call.excinfo is not None and report.failed and not isinstance(error, SAYING):
+            self._faults.append(self._exception(item, call.excinfo))
         if report.when == "call" or not report.passed:
             self._note(item, self._outcome(report, error), error, report)
         return report
@@ -120,14 +124,17 @@ class _Notes:
         return float(given)
 
     def _message(self, error: BaseException | None, report: pytest.TestReport) -> str:
-        """The first line of what was asserted or raised; for anything but an assertion, with its place."""
+        """The first line of what was asserted."""
         if error is None:
             return self._short(report.longreprtext.strip().partition("\n")[0])
-        text = str(error).strip().partition("\n")[0]
-        said = isinstance(error, AssertionError | NotRecorded | pytest.fail.Exception | pytest.skip.Exception)
-        if said:
-            return self._short(text or "an assertion does not hold")
-        return self._short(f"{type(error).__name__}{': ' if text else ''}{text}")
+        return self._short(str(error).strip().partition("\n")[0] or "an assertion does not hold")
+
+    def _exception(self, item: pytest.Item, info: pytest.ExceptionInfo[BaseException]) -> str:
+        """What a test raised in place of an assertion, with the last line of its file that took part."""
+        lines = [entry.lineno + 1 for entry in info.traceback if Path(entry.path) == item.path]
+        text = str(info.value).strip().partition("\n")[0]
+        place = f"{item.path.name}:{lines[-1]}" if lines else item.path.name
+        return self._short(f"{item.name}: {place}: {info.typename}{': ' if text else ''}{text}")
 
     def _short(self, text: str) -> str:
         """Without what differs from run to run, addresses and folders, and as what can be written down."""

@@ -12,7 +12,6 @@ import pytest
 
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.ros_env import RosInstallation, find_ros
 from grader.arena.sandbox_files import prepare
 from grader.arena.sandbox_probe import choose, why_not
 from grader.arena.scenario import run_scenario
@@ -21,6 +20,7 @@ from grader.evidence.reader import load_run
 from grader.evidence.run import Run
 from grader.model.submission import SourcePackage, Submission
 from grader.package import read_package
+from grader.ros_env import RosInstallation, find_ros
 from grader.rubric.model import Scenario, Start, Until
 
 MANIFEST = """<?xml version="1.0"?>

@@ -15,7 +15,11 @@ import pytest
 
 from grader.arena.build import build
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.ros_env import (
+from grader.evidence.reader import load_run
+from grader.evidence.run import Run
+from grader.evidence.writer import EvidenceWriter
+from grader.host_programs import HOST_PATH
+from grader.ros_env import (
     DUMP_BYTES,
     NAMES_MAX,
     ROS_VARIABLES,
@@ -24,10 +28,6 @@ from grader.arena.ros_env import (
     keep_ros_variables,
     parse_env,
 )
-from grader.evidence.reader import load_run
-from grader.evidence.run import Run
-from grader.evidence.writer import EvidenceWriter
-from grader.host_programs import HOST_PATH
 from tests.arena.support import CMAKE, SCRIPT, make_place, needs_sandbox, printed, run_script
 
 CANARY = "CANARY"

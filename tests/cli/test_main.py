@@ -6,10 +6,12 @@ import signal
 import subprocess
 import sys
 from contextlib import suppress
+from pathlib import Path
 
 import pytest
 
 from grader import __version__
+from grader.arena.sandbox import is_shown
 from grader.checks import CHECKS
 from grader.cli import doctor
 from grader.cli.doctor import Row
@@ -17,9 +19,11 @@ from grader.cli.main import run
 from grader.errors import EvidenceError
 from grader.judging.summary import criteria_bytes
 from grader.report.result_json import result_bytes
+from grader.ros_env import RosInstallation
+from grader.ros_packages import RosPackages
 from grader.rubric.find import rubric_ids
 from tests.report.hostile import result
-from tests.rubric.samples import spoiled
+from tests.rubric.samples import SOUND, spoiled
 
 HELPED = ["grade", "check", "judge", "record", "inspect", "labs", "explain", "doctor", "rubric"]
 HEAVY = ("pydantic", "rich", "lxml", "yaml", "mcap", "rosbags", "numpy", "grader.checks", "grader.pipeline")
@@ -225,6 +229,63 @@ def test_diagnosis_without_ros_names_the_command_that_mends_it(monkeypatch):
     assert rows["ROS 1"].state == "missing"
     assert "apt-get install" in rows["ROS 1"].fix
     assert {"Python", "git", "sandbox", "memory", "disk", "host name", "encoding"} <= set(rows)
+
+
+def ros_of(*prefixes, env=None):
+    """A ROS that a setup.bash brings."""
+    about = {"kind": "setup", "where": "x", "distro": "noetic", "python": "python3"}
+    return RosInstallation(**about, prefixes=prefixes, env=env or {})
+
+
+def test_doctor_says_what_a_rubric_needs_and_this_machine_lacks(tmp_path, capsys, monkeypatch):
+    for folder in ("share/course_sim", "tmp/course_map"):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "package.xml").write_text(f"<name>{Path(folder).name}</name>")
+        (tmp_path / folder / "msg").mkdir()
+        (tmp_path / folder / "msg" / "Lap.msg").write_text("int32 number\n")
+    path = f"{tmp_path}/share:{tmp_path}/tmp"
+    ros = RosInstallation(
+        kind="setup",
+        where="x",
+        distro="noetic",
+        python="python3",
+        prefixes=(str(tmp_path),),
+        env={"ROS_PACKAGE_PATH": path},
+    )
+    here = RosPackages(ros)
+    monkeypatch.setattr("grader.rubric.references.ros_packages", lambda: here)
+    monkeypatch.setattr(doctor, "ros_packages", lambda: here)
+    monkeypatch.setattr(doctor, "diagnose", lambda: ())
+    monkeypatch.setattr(doctor, "is_shown", lambda folder, _: folder.parent.name == "share")
+    rows = ("course_sim/Lap", "course_map/Lap", "gazebo_msgs/LinkState", "lab1/Own")
+    one = "  - {{id: c{}, title: x, points: 25, check: topic-type, scenario: real, with: {{topic: /c, type: {}}}}}\n"
+    turtle = "script: src/talker.py}\n      - {name: s, program: turtlesim/turtlesim_node}"
+    head = (
+        SOUND.partition("criteria:\n")[0].replace("script: src/talker.py}", turtle).replace("/chatter", "/c")
+    )
+    rubric = tmp_path / "lab.yaml"
+    rubric.write_text(f"{head}criteria:\n{''.join(one.format(n, row) for n, row in enumerate(rows))}")
+    assert run(["doctor", "--rubric", str(rubric), "--json"]) == 3
+    found = {row["name"]: row for row in json.loads(capsys.readouterr().out)}
+    assert {name: row["state"] for name, row in found.items()} == {
+        "course_map": "missing", "course_sim": "ok", "gazebo_msgs": "missing", "turtlesim": "ok"
+    }  # fmt: skip
+    assert found["course_map"]["detail"] == f"{tmp_path}/tmp/course_map is hidden from the sandbox, for Lap"
+    assert found["gazebo_msgs"]["mend"] == "apt-get install ros-noetic-gazebo-msgs"
+    assert found["turtlesim"]["detail"] == "the grader's stand-in, for turtlesim_node"
+
+
+def test_a_workspace_below_tmp_is_hidden_from_the_sandbox():
+    def is_seen(path, *prefixes):
+        ros = RosInstallation(
+            kind="setup", where="x", distro="x", python="python3", prefixes=prefixes, env={}
+        )
+        return is_shown(Path(path), ros)
+
+    assert is_seen("/usr/share/std_msgs")
+    assert is_seen("/opt/course/share/course_sim", "/opt/course")
+    assert not is_seen("/opt/course/share/course_sim", "/opt/ros/noetic")
+    assert not is_seen("/tmp/course_ws/src/course_sim", "/tmp/course_ws")
 
 
 @pytest.mark.full

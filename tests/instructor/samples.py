@@ -24,11 +24,12 @@ scenarios:
     title: The talker
     start: [{name: talker, script: src/talker.py}]
     until: {window_s: 5, topics: [/chatter]}
+"""
+OTHER = """\
   other:
     title: Not recorded
     start: [{name: talker, script: src/talker.py}]
     until: {window_s: 5, topics: [/chatter]}
-criteria:
 """
 GREETING = '''\
 from __future__ import annotations
@@ -79,7 +80,8 @@ def write_rubric(
     if tests is not None:
         (folder / "test_lab.py").write_text(tests, encoding="utf-8")
     path = folder / "lab.yaml"
-    path.write_text(head + SCENARIOS + criteria, encoding="utf-8")
+    other = OTHER if tests is not None or "evidence" in (checks or "") else ""
+    path.write_text(f"{head}{SCENARIOS}{other}criteria:\n{criteria}", encoding="utf-8")
     return path
 
 

@@ -80,16 +80,16 @@ def test_the_digest_is_of_both_files(tmp_path):
 def test_parameters_are_validated(tmp_path):
     criteria = OWN.replace("{word: hello}", "{words: hello, times: x}")
     assert faults(write_rubric(tmp_path, criteria, checks=GREETING)) == [
-        "lab.yaml:17: criteria[0].with.word: is missing",
-        'lab.yaml:17: criteria[0].with.times: must be a whole number, not "x"',
-        'lab.yaml:17: criteria[0].with.words: is not known here (did you mean "word"?)',
+        "lab.yaml:13: criteria[0].with.word: is missing",
+        'lab.yaml:13: criteria[0].with.times: must be a whole number, not "x"',
+        'lab.yaml:13: criteria[0].with.words: is not known here (did you mean "word"?)',
     ]
 
 
 def test_a_misspelt_check_of_ones_own_is_known(tmp_path):
     path = write_rubric(tmp_path, OWN.replace("check: greeting", "check: greetin"), checks=GREETING)
     assert faults(path) == [
-        'lab.yaml:17: criteria[0].check: there is no check "greetin" (did you mean "greeting"?)'
+        'lab.yaml:13: criteria[0].check: there is no check "greetin" (did you mean "greeting"?)'
     ]
 
 
@@ -134,8 +134,8 @@ def test_all_faults_of_the_file_come_with_those_of_the_rubric(tmp_path):
     )
     found = faults(write_rubric(tmp_path, criteria, checks=BROKEN))
     assert found == [
-        "lab.yaml:16: criteria: the points add up to 90, not to 100",
-        'lab.yaml:18: criteria[1].check: there is no check "ratee" (did you mean "rate"?)',
+        "lab.yaml:12: criteria: the points add up to 90, not to 100",
+        'lab.yaml:14: criteria[1].check: there is no check "ratee" (did you mean "rate"?)',
         'my_checks.py:3: check "rate": the grader itself has a check of that name',
         (
             'my_checks.py:7: check "one": there is no fact speed, colour; '

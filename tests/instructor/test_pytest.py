@@ -13,6 +13,14 @@ from grader.rubric.load import load_rubric
 from tests.evidence.bags import CHATTER, write_bag
 from tests.instructor.samples import TESTS, judged, runs, write_rubric
 
+FIXTURE_OF_NOTHING = """\
+import pytest
+@pytest.fixture
+def first(run):
+    yield run.channels[5]
+def test_a(first):
+    pass
+"""
 MIXED = '''\
 import pytest
 
@@ -65,14 +73,14 @@ def test_each_test_is_a_share_of_the_points(tmp_path):
 @pytest.mark.full
 def test_all_pass_and_none(tmp_path):
     assert result(tmp_path, "def test_a(run):\n    assert run.scenario == 'talker'\n").status is Status.PASS
-    found = result(tmp_path, "def test_a():\n    raise OSError('gone\\nfor ever')\n")
-    assert (found.status, found.hint) == (Status.FAIL, "test_a: OSError: gone")
+    found = result(tmp_path, "def test_a():\n    assert 0, 'gone\\nfor ever'\n")
+    assert (found.status, found.hint) == (Status.FAIL, "test_a: gone")
 
 
 @pytest.mark.full
-def test_an_error_in_a_fixture_counts_once(tmp_path):
+def test_an_assertion_in_a_fixture_counts_once(tmp_path):
     text = (
-        "import pytest\n@pytest.fixture\ndef first(run):\n    yield run.channels[5]\n"
+        "import pytest\n@pytest.fixture\ndef first(run):\n    assert len(run.channels) > 5\n    yield 1\n"
         "def test_a(first):\n    pass\ndef test_b():\n    pass\n"
     )
     found = result(tmp_path, text)
@@ -91,7 +99,7 @@ def test_twice_the_same(tmp_path):
     text = (
         "def test_a(tmp_path):\n    assert object() == tmp_path\n"
         "def test_b():\n    assert {'a', 'b', 'c', 'd'} == {'x', 'y', 'z'}\n"
-        "def test_c():\n    raise ValueError(object())\n"
+        "def test_c():\n    assert 0, object()\n"
     )
     first, second = result(tmp_path, text), result(tmp_path, text)
     assert first == second
@@ -119,6 +127,15 @@ def test_some_are_selected(tmp_path):
         ("import pytest\n@pytest.mark.points('x')\ndef test_a():\n    pass\n", "points(…) takes one number"),
         ("import pytest\n@pytest.mark.points(0)\ndef test_a():\n    pass\n", "have 0 points together"),
         ("raise SystemExit('no')\n", "pytest ended with code 3"),
+        ("def test_a():\n    raise OSError('gone\\nfor ever')\n", "test_a: test_lab.py:2: OSError: gone"),
+        (
+            "def f(x):\n    return x[0]\ndef test_a():\n    f([])\n",
+            "test_a: test_lab.py:2: IndexError: list index",
+        ),
+        (
+            FIXTURE_OF_NOTHING,
+            "test_a: test_lab.py:4: IndexError",
+        ),
     ],
 )
 def test_broken_tests_are_an_error_and_never_a_pass(tmp_path, tests, hint):

@@ -10,7 +10,7 @@ from grader.checks import CHECKS
 from grader.judging import judge
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status, Verdict, partial
-from tests.judging.rubrics import ALL, CHATTER, EXECUTABLE, GOOD_RUN, NODE, PACKAGE, RATE, rubric
+from tests.judging.rubrics import ALL, CHATTER, EXECUTABLE, GOOD_RUN, NODE, PACKAGE, RATE, SCENARIO, rubric
 from tests.support.timeline import build_runs
 
 DIED = {"processes": [{"name": "talker", "exit_s": 0.3, "exit_code": 1}], "outcome": "ended"}
@@ -172,6 +172,41 @@ def _with_function(name: str, function: Any) -> Any:
     from dataclasses import replace  # noqa: PLC0415 - beside its only use
 
     return replace(CHECKS[name], function=function)
+
+
+SIMULATOR = {"name": "turtlesim", "role": "grader", "exit_s": 0.4}
+SAID = [{"process": "turtlesim", "at_s": 0.3, "line": "ERROR: cannot open the display"}]
+
+
+@pytest.mark.parametrize(
+    ("end", "lines", "status", "how"),
+    [
+        ({"exit_code": 3}, SAID, "inconclusive", "exit code 3: ERROR: cannot open the display"),
+        ({"signal": 11}, [], "inconclusive", "turtlesim ended with signal 11"),
+        ({"exit_code": 0}, SAID, "pass", ""),
+        ({"exit_code": 1, "exit_s": 6.9, "stopped_by": "INT"}, SAID, "pass", ""),
+        (
+            {"exit_code": 1},
+            [{**SAID[0], "line": "shutdown request: new node registered with same name"}],
+            "pass",
+            "",
+        ),
+    ],
+    ids=["exit-code", "signal", "done", "stopped", "shut-down-by-another-node"],
+)
+def test_a_program_of_the_graders_that_dies_is_the_machines_fault(
+    end: dict[str, Any], lines: list[dict[str, Any]], status: str, how: str
+) -> None:
+    start = [{"name": "turtlesim", "program": "turtlesim/turtlesim_node"}, *SCENARIO["start"]]
+    run = {**GOOD_RUN, "processes": [*GOOD_RUN["processes"], SIMULATOR | end], "console": lines}
+    found = results(
+        {"runs": {"talker": run}, "package": PACKAGE}, scenarios={"talker": {**SCENARIO, "start": start}}
+    )
+    assert statuses(found) == dict.fromkeys(["rate", "chatter", "node"], status) | {"executable": "pass"}
+    assert how in found["rate"].message
+    assert (status == "pass") or "a program of the grader's failed in the run 'talker'" in found[
+        "rate"
+    ].message
 
 
 def test_what_else_is_wrong_with_a_node_is_no_reason_for_its_end() -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from grader.arena.ros_env import RosInstallation
 from grader.arena.sandbox_files import (
     STANDIN_SOURCES,
     copy_standins,
@@ -17,6 +16,7 @@ from grader.arena.sandbox_files import (
     with_standins,
 )
 from grader.cli.doctor import _standins
+from grader.ros_env import RosInstallation
 from grader.rubric.model import Scenario, Start, Until
 from tests.arena.support import make_place, printed, require_ros, run
 

@@ -26,7 +26,7 @@ LOADED = (
         "evidence",
         "report",
         "arena/static_recorder",
-        "arena/ros_env",
+        "ros_env",
     ),
     *(
         "cli/checking",

@@ -12,6 +12,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field
 
 from grader.checks.support.exit_causes import explain_early_end, explain_traceback, process_tracebacks
+from grader.checks.support.nodes import PublishedTopic
 from grader.checks.support.processes import lives, observed_until_ns
 from grader.checks.support.topics import losses, whole_until_ns
 from grader.evidence.run import Channel, Run
@@ -201,7 +202,7 @@ def first_values(values: Sequence[float]) -> str:
 class WrapParams(Record):
     """After `maximum`, or the value before it, comes `minimum`, `wraps` times; `rate_hz` is nominal."""
 
-    topic: str
+    topic: PublishedTopic
     minimum: int = 0
     maximum: int = 127
     wraps: Annotated[int, Field(ge=1)] = 2

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
+from grader.checks.registry import Refers
 from grader.evidence.run import Run
 from grader.wording import join_words
 
@@ -90,3 +91,5 @@ def is_called(node: str, name: str) -> bool:
 
 GlobalName = Annotated[str, AfterValidator(_global)]
 """A topic's, a service's or a parameter's full name."""
+PublishedTopic = Annotated[GlobalName, Refers("published")]
+"""A topic on which the student publishes."""

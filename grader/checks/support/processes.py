@@ -6,12 +6,13 @@ signal handler then waits for a lock that the interrupted call holds.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import NamedTuple
 
 from grader.evidence.events import ProcessEvent
 from grader.evidence.run import Run
 from grader.model.verdict import Verdict, unjudged
+from grader.wording import shorten
 
 NO_SCRIPT_HINT = "add the script to the package, and push it"
 STEPS = ("stop", "kill")
@@ -19,6 +20,8 @@ FLOOD_HZ = 100
 SILENT_AFTER_NS = 500_000_000
 TALKING_NS = 1_000_000_000
 TALKING_LINES = 5
+SHUT_DOWN = "shutdown request"
+LINE_CHARS = 200
 
 
 class Life(NamedTuple):
@@ -53,6 +56,25 @@ def lives(run: Run) -> tuple[Life, ...]:
     """Return the student's processes in order of their start."""
     starts = [(t, e) for t, e in run.processes if e.role == "student" and e.event == "start"]
     return tuple(_life(run, start_ns, start) for start_ns, start in starts)
+
+
+def failed_program(run: Run, names: Collection[str]) -> str:
+    """Return how one of the grader's own programs failed in the run, "" where none did.
+
+    One that another node shut down, by taking its name or by `rosnode kill`, did not fail by itself.
+    """
+    for start_ns, start in run.processes:
+        if start.role != "grader" or start.event != "start" or start.name not in names:
+            continue
+        one = _life(run, start_ns, start)
+        lines = [line.line.strip() for _, line in run.lines(one.name) if line.line.strip()]
+        if one.end is None or not one.ended_early or one.end.exit_code == 0:
+            continue
+        if not any(SHUT_DOWN in line for line in lines):
+            code, signal = one.end.exit_code, one.end.signal
+            how = f"signal {signal}" if code is None else f"exit code {code}"
+            return f"{one.name} ended with {how}" + (f": {shorten(lines[-1], LINE_CHARS)}" if lines else "")
+    return ""
 
 
 def _life(run: Run, start_ns: int, start: ProcessEvent) -> Life:

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from grader.arena.ros_env import INSTALL_HINT
 from grader.classes.cluster import worker
 from grader.errors import HostError, UsageError
+from grader.ros_env import INSTALL_HINT
 
 CONNECT_S = 15.0
 LOGGERS = (

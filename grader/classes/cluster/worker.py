@@ -20,12 +20,12 @@ from pathlib import Path
 import pydantic
 
 import grader
-from grader.arena.ros_env import find_ros
 from grader.classes.batch.job import Outcome, grade_job, outcome_of_ended
 from grader.classes.cluster.exchange import Exchange, GradeRequest, Parcel, Report, is_machines, pack
 from grader.errors import GraderError, HostError
 from grader.files import temporary_folder
 from grader.intake import safe_name
+from grader.ros_env import find_ros
 from grader.workers import Worker, WorkerEnded, WorkerLimits
 
 WATCH_S = 1.0

@@ -103,15 +103,18 @@ def explain(
 
 
 @command("doctor", group=STUDENTS, looks_at_host=True)
-def doctor(*, as_json: JsonFlag = False) -> ExitCode:
+def doctor(*, rubric: Annotated[str | None, RUBRIC] = None, as_json: JsonFlag = False) -> ExitCode:
     """Show what works on this machine, and how to fix what does not.
 
-    The exit code is NOT_GRADED if something is missing.
+    With a rubric, also which ROS packages it needs, and whether they are here. The exit code is NOT_GRADED if
+    something is missing.
     """
     with loading():
         from grader.cli import doctor as machine
         from grader.cli.output import say_json
-    rows = machine.diagnose()
+        from grader.rubric.load import load_rubric
+    loaded = load_rubric(rubric) if rubric is not None else None
+    rows = (*machine.diagnose(), *(machine.diagnose_rubric(loaded) if loaded is not None else ()))
     if as_json:
         say_json([row.model_dump(by_alias=True) for row in rows])
     else:

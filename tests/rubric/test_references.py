@@ -1,0 +1,303 @@
+"""What a rubric names is there: each slip of an instructor's is refused with file, line and suggestion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from grader.checks import CHECKS
+from grader.ros_env import RosInstallation
+from grader.ros_packages import RosPackages
+from grader.rubric import references
+from grader.rubric.load import load_rubric
+from tests.rubric.samples import faults, spoiled
+
+LAB = """\
+schema: grader.rubric/1
+id: sample
+title: A sample
+version: "1"
+package: lab1
+scenarios:
+  real:
+    title: The talker
+    start:
+      - {name: talker, script: src/talker.py}
+    until: {window_s: 5, topics: [/chatter]}
+  listener:
+    title: The listener
+    params:
+      - {name: /side, made_up: number}
+    start:
+      - {name: listener, script: src/listener.py}
+    probes:
+      - {topic: /chatter, type: std_msgs/String, text: 8}
+    calls:
+      - {service: /reset, type: std_srvs/Trigger}
+    until: {heard: true}
+  launch:
+    title: Launched
+    start:
+      - {name: turtlesim, program: turtlesim/turtlesim_node}
+      - {name: roslaunch, launch: lab1.launch}
+    until: {connected: [/chatter], alive_s: 3}
+criteria:
+"""
+ONE = "  - {{id: c{0}, title: One, points: {1}, check: {2}, with: {3}, scenario: {4}}}\n"
+SOUND = (
+    ("node-lives", "{process: talker}", "real"),
+    ("rate", "{topic: /chatter, rate_hz: 10}", "real"),
+    ("topic-type", "{topic: /chatter, type: std_msgs/String}", "real"),
+    ("hears", "{topic: /chatter}", "listener"),
+    ("params-read", "{names: [/side]}", "listener"),
+    ("service", "{service: /reset, type: std_srvs/Trigger}", "listener"),
+    ("launch-runs", "{launch: lab1.launch, programs: [turtlesim/turtlesim_node]}", "launch"),
+    ("path", "{topic: /turtle1/pose, points: [[1, 0]], tolerance_m: 0.1}", "launch"),
+    ("connected", "{topic: /chatter}", "launch"),
+    ("logs", "{text: a}", "launch"),
+)
+
+FOLLOWED = {"window_s: 5", "launch: lab1.launch}\n"}
+"""Slips that two criteria notice, or the scenario and a criterion."""
+
+
+@pytest.fixture(autouse=True)
+def _stand_ins_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine with ROS, and with no packages but the stand-ins."""
+    ros = RosInstallation(
+        kind="debian", where="x", distro="x", python="python3", prefixes=(), env={"PATH": ""}
+    )
+    monkeypatch.setattr(references, "ros_packages", lambda: RosPackages(ros))
+
+
+def _written(folder: Path, old: str = "", new: str = "") -> Path:
+    rows = [ONE.format(n, 100 / len(SOUND), *row) for n, row in enumerate(SOUND)]
+    text = LAB + "".join(rows)
+    assert old in text
+    path = folder / "lab.yaml"
+    path.write_text(text.replace(old, new, 1) if old else text, encoding="utf-8")
+    return path
+
+
+def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
+    assert len(load_rubric(str(_written(tmp_path))).rubric.criteria) == len(SOUND)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        pytest.param(
+            "{process: talker}",
+            "{process: taker}",
+            '30: criteria[0].with.process: real starts no process "taker" of the student\'s (did you mean "talker"?)',
+            id="process",
+        ),
+        pytest.param(
+            "{text: a}",
+            "{text: a, process: turtlesim}",
+            '39: criteria[9].with.process: launch starts no process "turtlesim" of the student\'s: there is roslaunch',
+            id="process-of-the-grader",
+        ),
+        pytest.param(
+            "program: turtlesim/turtlesim_node",
+            "program: turtlesim/turtlesim",
+            '26: scenarios.launch.start[0].program: turtlesim has no program "turtlesim" '
+            '(did you mean "turtlesim_node"?)',
+            id="program",
+        ),
+        pytest.param(
+            "program: turtlesim/turtlesim_node",
+            "program: turtle_sim/turtlesim_node",
+            '26: scenarios.launch.start[0].program: this machine has no ROS package "turtle_sim" '
+            '(did you mean "turtlesim"?)',
+            id="package-of-program",
+        ),
+        pytest.param(
+            "launch: lab1.launch}\n",
+            "launch: lab1}\n",
+            "27: scenarios.launch.start[1].launch: roslaunch takes the file's whole name: \"lab1.launch\"",
+            id="launch-without-ending",
+        ),
+        pytest.param(
+            "{process: talker}",
+            "{process: talker, min_s: 8}",
+            "30: criteria[0].with.min_s: 8 s is more than the scenario lasts: window_s, 5 s",
+            id="min_s",
+        ),
+        pytest.param(
+            "window_s: 5",
+            "window_s: 4.9",
+            "31: criteria[1].with.min_window_s: 5 s is more than the scenario lasts: window_s, 4.9 s",
+            id="min_window_s-by-default",
+        ),
+        pytest.param(
+            "{heard: true}",
+            "{heard: true, limit_s: 0.5}",
+            "",
+            id="nothing-judges-its-length",
+        ),
+        pytest.param(
+            "check: hears, with: {topic: /chatter}",
+            "check: hears, with: {topic: /chater}",
+            '33: criteria[3].with.topic: no probe of listener sends on /chater (did you mean "/chatter"?)',
+            id="hears",
+        ),
+        pytest.param(
+            "topics: [/chatter]",
+            "topics: [/chatter, /cheater]",
+            '11: scenarios.real.until.topics[1]: no criterion and no probe names /cheater (did you mean "/chatter"?)',
+            id="until-topics",
+        ),
+        pytest.param(
+            "window_s: 5, topics: [/chatter]",
+            "messages: {/odometry: 3}",
+            "11: scenarios.real.until.messages./odometry: no criterion and no probe names /odometry",
+            id="until-messages",
+        ),
+        pytest.param(
+            "connected: [/chatter]",
+            "connected: [/chater]",
+            "28: scenarios.launch.until.connected[0]: no criterion and no probe names /chater "
+            '(did you mean "/chatter"?)',
+            id="until-connected",
+        ),
+        pytest.param("connected: [/chatter]", "connected: [/odometry]", "", id="a-launch-file-may-know-it"),
+        pytest.param("connected: [/chatter]", "connected: [/turtle2/pose]", "", id="another-number"),
+        pytest.param(
+            "check: launch-runs, with: {launch: lab1.launch",
+            "check: launch-runs, with: {launch: lab.launch",
+            '36: criteria[6].with.launch: launch does not start "lab.launch" (did you mean "lab1.launch"?)',
+            id="launch",
+        ),
+        pytest.param(
+            "scenario: launch}",
+            "scenario: real}",
+            '36: criteria[6].with.launch: real does not start "lab1.launch": there is none',
+            id="launch-in-another-scenario",
+        ),
+        pytest.param(
+            "type: std_msgs/String}, scenario",
+            "type: std_msgs/Strng}, scenario",
+            '32: criteria[2].with.type: std_msgs has no message type "Strng" (did you mean "String"?)',
+            id="message-type",
+        ),
+        pytest.param(
+            "type: std_msgs/String}, scenario",
+            "type: lab/Count}, scenario",
+            '32: criteria[2].with.type: this machine has no ROS package "lab" (did you mean "lab1"?)',
+            id="package-of-type",
+        ),
+        pytest.param("type: std_msgs/String}, scenario", "type: lab1/Count}, scenario", "", id="own-type"),
+        pytest.param("type: std_msgs/String}, scenario", "type: gazebo_msgs/LinkState}, scenario", "", id="not-here"),
+        pytest.param(
+            "type: std_srvs/Trigger}\n",
+            "type: std_srvs/Triger}\n",
+            '21: scenarios.listener.calls[0].type: std_srvs has no service type "Triger" (did you mean "Trigger"?)',
+            id="type-of-a-call",
+        ),
+        pytest.param(
+            "check: logs, with: {text: a}, scenario: launch",
+            "check: logs, with: {text: a}, scenario: real",
+            "",
+            id="still-used",
+        ),
+        pytest.param(
+            "programs: [turtlesim/turtlesim_node]",
+            "programs: [talker]",
+            '36: criteria[6].with.programs[0]: name its package too, like turtlesim/turtlesim_node, not "talker"',
+            id="program-without-a-package",
+        ),
+        pytest.param(
+            "check: path, with: {topic: /turtle1/pose, points: [[1, 0]], tolerance_m: 0.1}",
+            "check: field-bounds, with: {topic: /turtle1/pose, field: x, min: 0}",
+            "37: criteria[7].with.topic: turtlesim/turtlesim_node publishes on /turtle1/pose, "
+            "and field-bounds judges the student's messages",
+            id="topic-of-a-program",
+        ),
+        pytest.param(
+            "{topic: /chatter, rate_hz: 10}",
+            "{topic: chatter, rate_hz: 10}",
+            '31: criteria[1].with.topic: a name of the graph begins with a slash: "/chatter"',
+            id="topic-without-a-slash",
+        ),
+        pytest.param(
+            "    start:\n      - {name: talker",
+            "    clock: warped\n    start:\n      - {name: talker",
+            "32: criteria[1].with.min_window_s: rates are judged in real time: "
+            "give the criterion a scenario with clock: real",
+            id="rate-with-a-fast-clock",
+        ),
+        pytest.param(
+            "{names: [/side]}",
+            "{names: [/sides]}",
+            '34: criteria[4].with.names[0]: listener sets no parameter /sides (did you mean "/side"?): '
+            "add it to its params",
+            id="parameter-that-nothing-sets",
+        ),
+    ],
+)  # fmt: skip
+def test_a_slip_is_refused(old: str, new: str, fault: str, tmp_path: Path) -> None:
+    path = _written(tmp_path, old, new)
+    if fault:
+        assert f"lab.yaml:{fault}" in faults(path)
+        assert len(faults(path)) == (2 if old in FOLLOWED else 1)
+    else:
+        assert load_rubric(str(path)).rubric.id == "sample"
+
+
+def test_a_scenario_that_no_criterion_judges_is_refused(tmp_path: Path) -> None:
+    idle = "  idle:\n    title: I\n    start: [{name: a, script: a.py}]\n    until: {nodes: 1}\n"
+    path = spoiled(tmp_path, ("criteria:\n", f"{idle}criteria:\n"))
+    assert faults(path) == [
+        "lab.yaml:12: scenarios.idle: no criterion judges this scenario: remove it, or name it in one"
+    ]
+
+
+def test_where_there_is_no_ros_only_a_slip_is_known() -> None:
+    here = RosPackages(None)
+    assert here.program_fault("stage_ros/stageros") == ""
+    assert here.program_fault("turtlsim/turtlesim_node") == (
+        'there is no ROS package "turtlsim" (did you mean "turtlesim"?)'
+    )
+    assert here.type_fault("course_msgs/Lap", "msg") == ""
+    assert here.type_fault("course_msgs/Lap", "srv") == ""
+
+
+def test_packages_of_a_workspace_are_known_with_their_programs_and_types(tmp_path: Path) -> None:
+    package = tmp_path / "ws" / "src" / "sim" / "course_sim"
+    (package / "msg").mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>course_sim</name></package>")
+    (package / "msg" / "Lap.msg").write_text("int32 number\n")
+    for place in (package / "scripts", tmp_path / "ws" / "devel" / "lib" / "course_sim"):
+        place.mkdir(parents=True)
+        (place / f"{place.name}_node").write_text("#!/bin/sh\n")
+        (place / f"{place.name}_node").chmod(0o755)
+    env = {"ROS_PACKAGE_PATH": f"{tmp_path}/ws/src", "CMAKE_PREFIX_PATH": f"{tmp_path}/ws/devel"}
+    here = RosPackages(
+        RosInstallation(kind="setup", where="x", distro="x", python="python3", prefixes=(), env=env)
+    )
+    assert set(here.programs("course_sim")) == {"scripts_node", "course_sim_node"}
+    assert here.program_fault("course_sim/scripts_node") == ""
+    assert here.type_fault("course_sim/Lap", "msg") == ""
+    assert here.type_fault("course_sim/Lab", "msg") == (
+        'course_sim has no message type "Lab" (did you mean "Lap"?)'
+    )
+    assert not here.lacks("course_sim")
+    assert here.lacks("gazebo_ros")
+
+
+def test_every_process_topic_and_program_of_a_check_is_known_as_one() -> None:
+    """A check that takes a process or a program by name declares it, so that the rubric's loader can look."""
+    declared = {
+        (check.name, one.path[0])
+        for check in CHECKS.values()
+        for one in check.references({name: ["a"] for name in check.params.model_fields})
+    }
+    named = {
+        (check.name, name)
+        for check in CHECKS.values()
+        for name in check.params.model_fields
+        if name in {"process", "programs", "launch", "min_s", "min_window_s"}
+    }
+    assert named <= declared
