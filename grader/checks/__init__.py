@@ -32,6 +32,7 @@ FAMILIES = (
     "node",
     "topics",
     "messages",
+    "fields",
     "rate",
     "counter",
     "listener",
