@@ -33,6 +33,7 @@ FAMILIES = (
     "topics",
     "messages",
     "fields",
+    "reacts",
     "rate",
     "counter",
     "listener",

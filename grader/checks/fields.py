@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from grader.checks.registry import check
-from grader.checks.support.fields import FieldPath, Reading, no_field, readings
+from grader.checks.support.fields import FieldPath, Reading, bounds_text, is_within, no_field, readings
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.text import shown
 from grader.checks.support.topics import cite, losses, no_message
@@ -45,19 +45,10 @@ class FieldBoundsParams(Record):
 
     @property
     def words(self) -> str:
-        if self.min is None:
-            return f"at most {significant(self.max or 0)}"
-        return (
-            f"at least {significant(self.min)}"
-            if self.max is None
-            else f"{significant(self.min)} to {significant(self.max)}"
-        )
+        return bounds_text(self.min, self.max)
 
     def holds(self, value: float) -> bool:
-        """A bound counts as within, also where a 32-bit field cannot hold it exactly. NaN is outside."""
-        above = self.min is None or value >= self.min - ROUNDING * max(1.0, abs(self.min))
-        below = self.max is None or value <= self.max + ROUNDING * max(1.0, abs(self.max))
-        return above and below and value == value  # noqa: PLR0124 - NaN is not itself
+        return is_within(value, self.min, self.max)
 
 
 @check("field-bounds", params=FieldBoundsParams, messages_only=True, heeds_losses=True)

@@ -26,7 +26,6 @@ OTHER_WORDS_SHARE = 0.5
 _LAST_NUMBER = re.compile(rf".*?({NUMBER})\D*", re.DOTALL)
 SECONDS_CHARS_MAX = 60
 UNFILLED = ("%s", "%d", "%f", "{}", "{0}")
-ROUNDING = 1e-6
 
 
 class MessageParams(Record):

@@ -11,7 +11,9 @@ from pydantic import AfterValidator
 from grader.checks.support.nodes import plain_type
 from grader.evidence.run import Channel
 from grader.model.verdict import Verdict, inconclusive, unjudged
+from grader.wording import significant
 
+ROUNDING = 1e-6
 _STEP = r"[A-Za-z]\w*(?:\[(?:\d+|\*)\])*"
 _PARTS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
 
@@ -94,3 +96,17 @@ def no_field(missing: Reading, channels: Iterable[Channel]) -> Verdict:
         return inconclusive(f"{what} cannot be read", hint="grade again")
     hint = f"rostopic echo {channel.topic} shows the fields"
     return unjudged(f"{what} do not fit: {missing.fault}", measured=missing.fault, hint=hint)
+
+
+def bounds_text(low: float | None, high: float | None) -> str:
+    """Return bounds in words; at least one of them is given."""
+    if low is None:
+        return f"at most {significant(high or 0)}"
+    return f"at least {significant(low)}" if high is None else f"{significant(low)} to {significant(high)}"
+
+
+def is_within(value: float, low: float | None, high: float | None) -> bool:
+    """A bound counts as within, also where a 32-bit field cannot hold it exactly. NaN is outside."""
+    above = low is None or value >= low - ROUNDING * max(1.0, abs(low))
+    below = high is None or value <= high + ROUNDING * max(1.0, abs(high))
+    return above and below and value == value  # noqa: PLR0124 - NaN is not itself
