@@ -38,6 +38,7 @@ FAMILIES = (
     "counter",
     "listener",
     "logs",
+    "console",
     "launch_xml",
     "launch_runs",
     "launch_params",

@@ -133,7 +133,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
         expected=f"{params.effect.words}, {significant(params.within_s)} s at most after {params.cause.words}",
         measured=verdict.measured
         or f"{len(times)} of {plural(len(answers), 'answer')}"
-        + (f", {max(times):.2f} s late at most" if times else ""),
+        + (f", up to {max(times):.2f} s after" if times else ""),
         citations=(*verdict.citations, cite(run, params.cause.topic, *span), cite(run, params.effect.topic)),
     )
 
@@ -153,8 +153,9 @@ def _answers(
     answers = []
     for number, at_ns in enumerate(starts):
         next_ns = starts[number + 1] if number + 1 < len(starts) else run.end_ns + 1
-        later = (to_s(t) - to_s(at_ns) for t in came if t < next_ns and to_s(t) - to_s(at_ns) >= -ORDER_S)
-        after_s = next((max(0.0, s) for s in later), None)
+        later = ((t, to_s(t) - to_s(at_ns)) for t in came)
+        theirs = (s for t, s in later if s >= -ORDER_S and (t < next_ns or s <= params.within_s))
+        after_s = next((max(0.0, s) for s in theirs), None)
         if after_s is not None or to_s(until_ns) - to_s(at_ns) >= params.within_s:
             answers.append(Answer(at_ns, after_s))
     return answers
@@ -192,7 +193,9 @@ def _early(
     message = f"{params.effect.words} comes {lead_s:.2f} s before {params.cause.words}"
     hint = "publish it only when the message that you hear asks for it"
     verdict = failed(message, hint=hint, measured=f"{plural(len(between), 'message')} too early")
-    return verdict.once() if len(between) == 1 else verdict
+    if to_s(between[-1].time_ns) < from_s + params.within_s:
+        verdict = verdict.once()
+    return excused(verdict, run, causes[0].time_ns, first, _why_late)
 
 
 def _unanswered(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Verdict | None:

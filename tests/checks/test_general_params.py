@@ -46,6 +46,12 @@ SLASH = 'a name of the graph begins with a slash: "/x"'
             ("share",),
             "at most 1, not 1.5",
         ),
+        (
+            "prints",
+            {"process": "x", "text": "at {number}", "numbers": [1, 2]},
+            (),
+            "2, and {number} 1 time in the text",
+        ),
         ("field-equals", {"topic": "/x", "field": "data"}, ("value",), "is missing"),
         (
             "reacts",

@@ -3,7 +3,7 @@
 
 import rospy
 from geometry_msgs.msg import Twist
-from sensor_msgs.msg import LaserScan, Range
+from sensor_msgs.msg import LaserScan
 
 NEAR = 0.5  # m
 SPEED = 0.2  # m/s
@@ -12,7 +12,6 @@ SPEED = 0.2  # m/s
 class Stop:
     def __init__(self):
         self.velocity = rospy.Publisher('/cmd_vel', Twist, queue_size=10)
-        self.nearest = rospy.Publisher('/nearest', Range, queue_size=10)
         self.stopped = False
         rospy.Subscriber('/scan', LaserScan, self.scanned)
 
@@ -25,10 +24,6 @@ class Stop:
         command = Twist()
         command.linear.x = 0.0 if near else SPEED
         self.velocity.publish(command)
-        reading = Range(range=distance)
-        reading.header.stamp = rospy.Time.now()
-        reading.header.frame_id = 'laser'
-        self.nearest.publish(reading)
 
 
 if __name__ == '__main__':
