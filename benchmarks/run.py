@@ -17,7 +17,18 @@ from benchmarks.figures import Found, NotMeasured, Options
 from benchmarks.machine import load, machine
 from grader.errors import GraderError
 
-NAMES = ("one", "against", "hundred", "judging", "recorder", "accuracy", "load", "fair", "thousands")
+NAMES = (
+    "one",
+    "faulty",
+    "against",
+    "hundred",
+    "judging",
+    "recorder",
+    "accuracy",
+    "load",
+    "fair",
+    "thousands",
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

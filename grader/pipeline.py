@@ -31,6 +31,7 @@ from grader.errors import EvidenceError, GraderError, SubmissionError, UsageErro
 from grader.evidence.run import Run, console_log
 from grader.faults import NOTHING_RUN, GradingContext, classify_errors
 from grader.files import make_folder, temporary_folder
+from grader.installable import ON_THE_MACHINE
 from grader.intake import open_recorded, open_recording, open_submission
 from grader.intake.choose import Wanted
 from grader.intake.source import Source
@@ -275,8 +276,10 @@ def record_other_runs(
     doubtful = sorted(judged.doubtful - set(scenarios))
     if doubtful:
         recorder.repeat(doubtful, evidence / copies.REPEATED)
-    if scenarios:
+    if repairs:
         with copies.repaired_copy(submission, repairs) as copy:
+            if copy is None:
+                return bool(doubtful)
             again = make_recorder(
                 copy,
                 read_facts(copy, Silence()),
@@ -291,7 +294,7 @@ def record_other_runs(
                 again.record_all(lambda: None)
                 judge_recorded(again, evidence, rubric)
             recorder.recording.add(again.recording)
-    return bool(doubtful or scenarios)
+    return bool(doubtful or repairs)
 
 
 def judge_recorded(recorder: Recorder | StaticRecorder, evidence: Path, rubric: LoadedRubric) -> Judged:
@@ -356,6 +359,7 @@ def make_recorder(
         facts,
         scenarios,
         evidence,
+        beside=rubric.path.parent,
         rates=rates_of(rubric.rubric),
         mode=options.sandbox,
         progress=progress,
@@ -375,17 +379,17 @@ def keep_recordings(
 
 
 def import_later(rubric: LoadedRubric) -> None:
-    """Import modules before they are needed. Only probes need ROS's own message types, hundreds of them."""
-    probes = any(scenario.probes for scenario in rubric.rubric.scenarios.values())
-    for name in (*LATER, *([ROS_TYPES] if probes else [])):
+    """Import modules before they are needed. Only probes and steps need ROS's own message types, hundreds of them."""
+    sends = any(scenario.probes or scenario.steps for scenario in rubric.rubric.scenarios.values())
+    for name in (*LATER, *([ROS_TYPES] if sends else [])):
         import_module(name)
 
 
 def inconclusive_scenarios(criteria: tuple[CriterionResult, ...], recording: Recording) -> list[str]:
     """Return the scenarios that were run and left a criterion inconclusive."""
     recorded = {path.stem for path in recording.files}
-    doubtful = {c.scenario for c in criteria if c.status is Status.INCONCLUSIVE and c.scenario is not None}
-    return sorted(doubtful & recorded)
+    late = (c for c in criteria if c.status is Status.INCONCLUSIVE and not c.hint.startswith(ON_THE_MACHINE))
+    return sorted({c.scenario for c in late if c.scenario is not None} & recorded)
 
 
 # --- Judge ------------------------------------------------------------------------------------------------------------

@@ -13,19 +13,19 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from grader.files import temporary_folder
-from grader.judging.other_runs import is_used_by
+from grader.judging.other_runs import BUILD, DONE_BEFORE_RUNS, concerns, is_used_by, needs_build
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress, Silence, StepState
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
 from grader.model.submission import Submission
-from grader.package.repairs import apply_repair, find_repairs, wanted_of
+from grader.package.manifest import parse_manifest
+from grader.package.repairs import NotRepairable, apply_repair, find_repairs, wanted_of
+from grader.package.repairs.editing import MANIFEST, read_data
 from grader.rubric.model import Rubric
 
 REPAIRED, REPEATED = "repaired-1", "repeated-1"
 REPAIRS_MAX = 4
-DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding"}
-"""The arena repairs these in whatever it runs, so they alone are no reason for a copy."""
 
 
 def choose_repairs(
@@ -38,27 +38,34 @@ def choose_repairs(
 ) -> tuple[tuple[Repair, ...], tuple[str, ...]]:
     """Return the repairs to try together, and the scenarios to run with them: those that lost a mark.
 
-    Both are empty where nothing was lost in a run, or no mechanical repair could be the reason. `built` is whether the
-    package was built as it is.
+    The copy is built even where there is nothing to run, if that could unblock a criterion of the files. There are no
+    repairs where nothing was lost in a run or blocked, or none could be the reason. `built` is whether the package was
+    built as it is.
     """
     lost = {c.scenario for c in criteria if c.status.is_lost and c.scenario is not None}
-    if not lost:
+    by_id = {c.id: c for c in criteria}
+    of_files = [c for c in rubric.criteria if c.scenario is None and by_id[c.id].status.is_lost]
+    blocked = [c for c in of_files if by_id[c.id].blocked_by or c.check == BUILD]
+    if not lost and not blocked:
         return (), ()
     found = find_repairs(submission.package.folder, facts, wanted_of(rubric))
     counting = [one for one in found if rubric.share_of(one.kind) > 0]
     chosen = [one for one in counting if one.kind not in DONE_BEFORE_RUNS][:REPAIRS_MAX]
+    built = built or not needs_build(facts)
     scenarios = {
         name
         for name in lost
         if any(is_used_by(rubric.scenarios[name], one, rubric, built=built) for one in chosen)
     }
+    unblocks = any(concerns(one, c, rubric, by_id, built=built) for c in blocked for one in chosen)
     before = [one for one in counting if one.kind in DONE_BEFORE_RUNS]
-    return ((*before, *chosen), tuple(sorted(scenarios))) if scenarios else ((), ())
+    return ((*before, *chosen), tuple(sorted(scenarios))) if scenarios or unblocks else ((), ())
 
 
 @contextmanager
-def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator[Submission]:
-    """Return the submission with a repaired copy of its package, there for as long as the block runs."""
+def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator[Submission | None]:
+    """Return the submission with a repaired copy of its package, there for as long as the block runs; None where a file
+    turns out to be none that can be repaired."""
     package = submission.package
     with temporary_folder("repaired") as folder:
         copy = folder / package.folder.name
@@ -67,12 +74,18 @@ def repaired_copy(submission: Submission, repairs: Sequence[Repair]) -> Iterator
         )
         executable = dict(package.executable)
         for repair in repairs:
-            apply_repair(copy, repair)
+            try:
+                apply_repair(copy, repair)
+            except (NotRepairable, OSError):
+                yield None
+                return
             if repair.kind == "executable-bit":
                 executable[repair.file] = True
             elif repair.kind == "file-name" and repair.before in executable:
                 executable[repair.after] = executable.pop(repair.before)
-        repaired = package.model_copy(update={"folder": copy, "executable": executable})
+        manifest, _ = parse_manifest(read_data(copy, MANIFEST) or b"")
+        name = manifest.name if manifest is not None else package.name
+        repaired = package.model_copy(update={"name": name, "folder": copy, "executable": executable})
         yield submission.model_copy(update={"package": repaired})
 
 

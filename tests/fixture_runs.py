@@ -14,7 +14,7 @@ from functools import cache
 from itertools import zip_longest
 from pathlib import Path
 
-from fixtures.make import declaration, declared, faulty_package
+from fixtures.make import declaration, declared, faulty_package, lost_points
 from fixtures.make import rubric_of as loaded
 from grader.model.mutants import Mutant
 from grader.model.progress import Silence
@@ -41,10 +41,10 @@ TOGETHER = {
         "ok-cmake-by-variables+ok-listener-print+rate-11hz+counter-starts-at-1",
     ),
     "mcr2-basic-comms": (
-        "talker-missing+listener-name+manifest-no-buildtool+cmake-no-catkin-package",
+        "talker-missing+listener-name",
         "chatter-other-topic+launch-no-name+build-unknown-component",
-        "rate-sleep-without-brackets+listener-not-executable",
-        "message-constant-time+launch-namespace-apart",
+        "rate-sleep-without-brackets+listener-not-executable+manifest-no-buildtool",
+        "message-constant-time+launch-namespace-apart+cmake-no-catkin-package",
         "ok-launch-terminals+talker-anonymous",
     ),
     "sheffield-com2009-week1": (
@@ -153,9 +153,7 @@ def workers(count: int = SIDE_BY_SIDE) -> Iterator[ProcessPoolExecutor]:
 
 
 def expected_points(fixture: Mutant, rubric: Rubric) -> float:
-    if fixture.points is not None:
-        return fixture.points
-    return sum(c.points for c in rubric.criteria if c.id not in fixture.expect)
+    return rubric.max_points - lost_points(fixture, rubric)
 
 
 def surprises(result: GradingResult, fixture: Mutant, rubric: Rubric) -> list[str]:

@@ -40,7 +40,7 @@ ALLOWED = {
     "submitted_recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "repaired_copy": {"files", "judging", "model", "package", "rubric"},
     "pipeline": {
-        "repaired_copy",
+        "installable", "repaired_copy",
         *BASE, "arena", "evidence", "faults", "files", "intake", "judging", "package", "submitted_recordings",
         "report", "results", "rubric"
     },

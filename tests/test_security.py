@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from grader import files
-from grader.arena import build, scenario_inputs, static_recorder, workspace
+from grader.arena import build, process_environment, scenario_inputs, static_recorder, steps, workspace
 from grader.arena.limits import SUBMISSION_MESSAGE_BYTES, RunLimits
 from grader.arena.ros_env import DUMP_BYTES, NAMES_MAX, VALUE_BYTES
 from grader.checks.support import text
@@ -101,7 +101,7 @@ BOUNDS = {
         ("ros/connection:MESSAGE_BYTES_MAX", MB), RUN.channel_bytes // MB, RUN.channel_messages, RUN.channels,
         RUN.run_bytes // MB,
     ),
-    "a service's answer": (("ros/tcpros:ANSWER_BYTES_MAX", MB), "ros/tcpros:WORDS_CHARS_MAX", scenario_inputs.ANSWER_S),
+    "a service's answer": (("ros/tcpros:ANSWER_BYTES_MAX", MB), "ros/tcpros:WORDS_CHARS_MAX", steps.ANSWER_S),
     "names of nodes": ("ros/guard:NAME_CHARS_MAX", "ros/guard:NAMES_MAX", ("ros/guard:NAME_BYTES_MAX", KB)),
     "parameters": (
         ("ros/registry_log:PROCESS_BYTES_MAX", MB), ("ros/registry_log:RUN_BYTES_MAX", MB),
@@ -131,7 +131,7 @@ BOUNDS = {
         scenario_inputs.FILE_BYTES_MAX // KB, scenario_inputs.EVENTS_MAX, scenario_inputs.VALUES_MAX,
         scenario_inputs.DEPTH_MAX, scenario_inputs.ALIASES_MAX,
     ),
-    "texts of services": (scenario_inputs.TEXT_BYTES_MAX // KB, decode._PARTS_MAX),
+    "texts of services": (process_environment.TEXT_BYTES_MAX // KB, decode._PARTS_MAX),
     "what git says": (git._ANSWER_BYTES // MB, git._FILE_BYTES // MB, git._MEMORY_BYTES >> 30, gitdir._MAX_FILES),
 }  # fmt: skip
 """By how a reading begins: the numbers in its bound, each a constant of the code, of ROS's side as `file:NAME`."""

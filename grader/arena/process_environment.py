@@ -27,8 +27,10 @@ from grader.arena.sandbox_files import (
     with_standins,
 )
 from grader.arena.workspace import Built, Workspace, read_archive, read_folder
+from grader.files import read_untrusted
 from grader.host_programs import find_host_program
 
+TEXT_BYTES_MAX = 64 << 10
 LOOPBACK = "127.0.0.1"
 """As an address: not every machine knows the name localhost."""
 LIBSTDBUF = Path("/usr/libexec/coreutils/libstdbuf.so")
@@ -160,6 +162,21 @@ class ProcessEnvironment:
         known += [Path(p) for p in self.ros.env.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p]
         return (*known, self.folder / "standins" / "share", STANDIN_SOURCES)
 
+    def type_text(self, type_: str, kind: str) -> str | None:
+        """Return the text of `<package>/<kind>/<Name>.<kind>`: the student's own, ROS's, or a stand-in's.
+
+        Raises ValueError where it is too large.
+        """
+        package, _, name = type_.partition("/")
+        own = self.workspace.repaired / package
+        for folder in (own, *(share / package for share in self.share_folders)):
+            data = read_untrusted(folder / kind / f"{name}.{kind}", TEXT_BYTES_MAX + 1)
+            if data is not None and len(data) > TEXT_BYTES_MAX:
+                raise ValueError(f"{name}.{kind} is larger than {TEXT_BYTES_MAX >> 10} kB")
+            if data is not None:
+                return data.decode(errors="replace")
+        return None
+
     def package_file(self, file: str) -> Path | None:
         """Where a file of the package is on disk, found as `script_path` finds it."""
         found = self.script_path(file)
@@ -225,6 +242,7 @@ class ProcessEnvironment:
             else None,
             "script": None,
             "repairs": [],
+            "stdin": False,
             **more,
         }
 

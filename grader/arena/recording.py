@@ -61,7 +61,7 @@ class Recorder:
 
     `rates` are judged, by scenario: a run that is to show them ends when they are clear. `recorded` is evidence, by
     scenario, that stands for a run of it: it is copied. `stop` ends the runs from another thread. `about` is metadata
-    for all its evidence.
+    for all its evidence, `beside` the rubric's folder.
     """
 
     def __init__(
@@ -73,6 +73,7 @@ class Recorder:
         *,
         mode: SandboxMode,
         progress: Progress,
+        beside: Path | None = None,
         rates: Mapping[str, tuple[RateBounds, ...]] | None = None,
         recorded: Mapping[str, Path] | None = None,
         stop: Stop | None = None,
@@ -84,6 +85,7 @@ class Recorder:
         self._stop = stop
         self._rates = rates or {}
         self._rubric = rubric
+        self._beside = beside
         self._progress = progress
         self._limits = RunLimits().shared_by(len(rubric.scenarios))
         ros = find_ros()
@@ -243,6 +245,7 @@ class Recorder:
                     rates=self._rates.get(name, ()),
                     admission=self._admission,
                     last_run=self._runs[name] == RETRIES,
+                    beside=self._beside,
                 )
             )
         self._runs[name] += 1

@@ -6,6 +6,7 @@ import math
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 
 from grader.model.message_rate import RateBounds
@@ -35,7 +36,8 @@ class TopicSeen:
 @dataclass
 class RunState:
     """The state that conditions look at. `running` and `ended` are the student's processes, `helpers` the grader's own
-    programs that run beside them, `registered` the processes of which a node has registered. `lost_s` is what others
+    programs that run beside them, `registered` the processes of which a node has registered, `here` the nodes that are
+    registered now, `owners` the processes of all nodes so far. `lost_s` is what others
     took of the run's time while they filled the machine: so much longer a node is waited for."""
 
     started_s: float = 0.0
@@ -45,6 +47,8 @@ class RunState:
     helpers: set[str] = field(default_factory=set)
     nodes: set[str] = field(default_factory=set)
     helper_nodes: set[str] = field(default_factory=set)
+    here: frozenset[str] = frozenset()
+    owners: dict[str, str] = field(default_factory=dict)
     registered: set[str] = field(default_factory=set)
     registered_s: float = 0.0
     last_start_s: float = 0.0
@@ -53,7 +57,7 @@ class RunState:
     opened: set[str] = field(default_factory=set)
     activity_s: float = 0.0
     news_s: float = 0.0
-    subscribed: set[str] = field(default_factory=set)
+    subscribers: dict[str, set[str]] = field(default_factory=dict)
     connected_s: dict[str, float] = field(default_factory=dict)
     unheard: dict[str, re.Pattern[str]] = field(default_factory=dict)
     last_sent_s: float = 0.0
@@ -107,13 +111,14 @@ class RunState:
 
         `picture` is all that counts as a change, the nodes alone where it is None.
         """
-        nodes = frozenset(nodes)
+        self.here = nodes = frozenset(nodes)
         picture = nodes if picture is None else picture
         if picture != self.graph_picture:
             self.graph_changed_s, self.graph_picture = now_s, picture
         if set(processes.values()) & self.running - self.registered:
             self.registered_s = now_s
         self.registered |= set(processes.values())
+        self.owners.update(processes)
         self.helper_nodes |= {n for n in nodes if processes.get(n) in self.helpers}
         own = {n for n in nodes if n not in self.helper_nodes}
         if own - self.nodes:
@@ -121,9 +126,36 @@ class RunState:
             self.active(now_s)
         self.nodes |= own
 
+    @property
+    def subscribed(self) -> AbstractSet[str]:
+        """The topics of the grader's to which a node has subscribed."""
+        return self.subscribers.keys()
+
     def connections(self, topics: Iterable[str], now_s: float) -> None:
         """The topics over which nodes are connected now; since when is kept."""
         self.connected_s = {topic: self.connected_s.get(topic, now_s) for topic in topics}
+
+    def started(self, process: str, now_s: float, *, helper: bool) -> None:
+        """A process was started, for the first time or again."""
+        (self.helpers if helper else self.running).add(process)
+        self.ended.discard(process)
+        self.registered.discard(process)
+        self.last_start_s = now_s
+
+    def exited(self, process: str, now_s: float) -> None:
+        """A process is gone, and with it its subscribers."""
+        self.helpers.discard(process)
+        for nodes in self.subscribers.values():
+            nodes.difference_update([node for node in nodes if self.owners.get(node) == process])
+        self.subscribers = {topic: nodes for topic, nodes in self.subscribers.items() if nodes}
+        if process in self.running:
+            self.running.remove(process)
+            self.ended.add(process)
+            self.active(now_s)
+
+    def steps_over(self, now_s: float) -> None:
+        """From now on, what is waited for has its time to come."""
+        self.started_s = self.news_s = now_s
 
     def sent(self, value: str, now_s: float) -> None:
         """A probe went out: its value is to be printed, as a word of its own."""
@@ -157,7 +189,7 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     )
     if live.ended and not live.running:
         return "complete" if until.ended and all(enough) else "ended", ""
-    if _waits(until):
+    if waits(until):
         if all(enough):
             return "complete", ""
     elif now_s - live.started_s > until.limit_s:
@@ -175,11 +207,11 @@ def _patient(live: RunState, until: Until) -> Until:
     more_s = round(live.lost_s)
     if not more_s:
         return until
-    limit_s = until.limit_s + more_s if _waits(until) else until.limit_s
+    limit_s = until.limit_s + more_s if waits(until) else until.limit_s
     return until.model_copy(update={"first_message_s": until.first_message_s + more_s, "limit_s": limit_s})
 
 
-def _waits(until: Until) -> bool:
+def waits(until: Until) -> bool:
     """Return whether anything ends the run before its limit."""
     lasting = (until.window_s, until.alive_s, until.quiet_s)
     seen = (until.messages, until.connected, until.heard, until.nodes, until.opened, until.ended)
@@ -309,11 +341,12 @@ def _silent(live: RunState, until: Until, now_s: float) -> str:
             else ""
         )
     for topic, count in until.messages.items():
-        last_s = live.topics[topic].last_s or min(s.first_s for s in seen)
+        last_s = max(live.topics[topic].last_s or min(s.first_s for s in seen), live.started_s)
         if live.topics[topic].count < count and now_s > last_s + until.silent_s:
             return f"no message on {topic} for {until.silent_s:g} s"
     patience_s = max(until.silent_s, until.first_message_s)
-    if until.connected and live.graph_changed_s and now_s > live.graph_changed_s + patience_s:
+    changed_s = live.graph_changed_s and max(live.graph_changed_s, live.started_s)
+    if until.connected and changed_s and now_s > changed_s + patience_s:
         return f"the graph has not changed for {patience_s:g} s"
     return _standstill(live, until, now_s)
 

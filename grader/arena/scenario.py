@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
-from typing import Any, TypeAlias
 
 from grader.arena.admission import Admission, Leave
 from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.run_state import describe_wait, find_outcome, next_look_s
-from grader.arena.scenario_inputs import OVER, advertisement, call_services, make_shots, publication, settings
+from grader.arena.run_state import describe_wait, find_outcome, next_look_s, waits
+from grader.arena.scenario_inputs import OVER, make_shots, settings
 from grader.arena.session import ArenaSession
 from grader.arena.static_recorder import RunCost
+from grader.arena.steps import CTRL_C_S, LAUNCH_CTRL_C_S, TERM_S, Spec, StepRunner, Tell
 from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
@@ -26,24 +26,16 @@ from grader.rubric.model import Param, Scenario, Start
 CLOCK_STEP_S = 0.05
 UNFOLLOWED_S = 2.0
 UNFOLLOWED_HZ = 15.0
-SUBSCRIBE_S = 6.0
 REGISTERED_S = 1.0
 HEARD_SETTLE_S = 0.3
 GRAPH_EVERY_S, GRAPH_S = 0.25, 5.0
 STARTING_S = 1.5
 EXPECTED_HZ = 10.0
 
-Tell = Callable[[str], None]
-CTRL_C_S = 5.0
-LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
-TERM_S = 2.0
 HELD_S = 0.1
 UP_S, SETTLE_S = 5.0, 0.2
 """A process is up when its nodes have registered and nothing changes for a moment; some never are."""
 BUILT_PROGRAMS_MAX = 20
-
-Spec: TypeAlias = dict[str, Any]
-"""What the arena needs to start a process (`ProcessEnvironment.spec`)."""
 
 
 def expected_s(scenario: Scenario) -> float:
@@ -55,6 +47,7 @@ def expected_s(scenario: Scenario) -> float:
         / (scenario.warp if scenario.clock == "warped" else 1)
     )
     probing = sum(shot.pause_s for shot in make_shots(scenario.probes))
+    probing += sum(step.lasts_s for step in scenario.steps)
     watched = max(until.window_s or 0, until.alive_s or 0, until.quiet_s or 0)
     return STARTING_S + watched + messages + probing
 
@@ -70,16 +63,19 @@ async def run_scenario(
     rates: tuple[RateBounds, ...] = (),
     admission: Admission | None = None,
     last_run: bool = False,
+    beside: Path | None = None,
 ) -> RunCost:
     """Record the scenario at `path`. An arena that fails still leaves evidence, with the outcome `host`.
 
     Processes are started when `admission` lets them: others wait until they are up. A window in which nothing but
-    `rates` is to be seen ends when they are clear.
+    `rates` is to be seen ends when they are clear. `beside` is the rubric's folder.
     """
     admission = admission or Admission(None)
     warp = scenario.warp if scenario.clock == "warped" else 1.0
     numbers = count()
     starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place, numbers)]
+    typed_to = {step.type.process for step in scenario.steps if step.type is not None}
+    starts = [(start, spec | {"stdin": start.name in typed_to}) for start, spec in starts]
     with EvidenceWriter(path, scenario=name, clock=scenario.clock, warp=warp, metadata=metadata) as writer:
         session = ArenaSession(place, writer, last_run=last_run, on_lateness=admission.note_lateness)
         if not any(spec["role"] == "student" for _, spec in starts):
@@ -89,8 +85,9 @@ async def run_scenario(
             session.live.rate(rates)
             async with admission.start() as leave, session as arena:
                 arena.course(ScenarioEvent(event="begin"))
-                async with release_when_up(leave, {spec["name"] for _, spec in starts}, arena):
-                    outcome, detail = await _run(scenario, starts, arena, tell)
+                at_once = {spec["name"] for start, spec in starts if start.name not in scenario.started_later}
+                async with release_when_up(leave, at_once, arena):
+                    outcome, detail = await _run(scenario, starts, arena, tell, beside)
                 await stop(scenario.start, arena, warped=scenario.clock == "warped")
                 await arena.finish()
                 arena.course(ScenarioEvent(event="end", outcome=outcome, detail=detail))
@@ -100,25 +97,28 @@ async def run_scenario(
 
 
 async def _run(
-    scenario: Scenario, starts: list[tuple[Start, Spec]], arena: ArenaSession, tell: Tell
+    scenario: Scenario, starts: list[tuple[Start, Spec]], arena: ArenaSession, tell: Tell, beside: Path | None
 ) -> tuple[str, str]:
     tell("starting the managed roscore")
     await arena.wait(lambda: arena.rosout_up, 3.0)
     if scenario.clock == "warped":
         arena.send(do="warp", warp=scenario.warp, step_s=CLOCK_STEP_S)
     set_params(scenario.params, arena)
-    for topic, probe in {probe.topic: probe for probe in scenario.probes}.items():
-        arena.send(do="advertise", fields=advertisement(probe) | {"topic": topic})
-    arena.live.started_s = time.monotonic()
-    for start, spec in starts:
-        if start.after is not None:
-            await _await_node(start.after, scenario, arena, tell)
-        arena.start(spec)
-    if scenario.probes:
-        await _send_probes(scenario, arena, tell)
-    if scenario.calls:
-        await call_services(scenario, arena, tell)
-    return await _observe(scenario, arena, tell)
+    async with StepRunner(scenario, starts, arena, tell, beside=beside) as runner:
+        runner.advertise()
+        arena.live.started_s = time.monotonic()
+        for start, spec in starts:
+            if start.name in scenario.started_later:
+                continue
+            if start.after is not None:
+                await _await_node(start.after, scenario, arena, tell)
+            arena.start(spec)
+        await runner.run()
+        if scenario.steps:
+            arena.live.steps_over(time.monotonic())
+            if runner.stopped_all or (arena.live.running and not waits(scenario.until)):
+                return "complete", ""
+        return await _observe(scenario, arena, tell)
 
 
 async def _await_node(process: str, scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:
@@ -136,26 +136,6 @@ async def _await_node(process: str, scenario: Scenario, arena: ArenaSession, tel
         if left_s <= 0:
             return
         await arena.wait(lambda: process in live.ended, left_s)
-
-
-async def _send_probes(scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:
-    """Once the student's node has subscribed to every topic, or has had its time to."""
-    topics = {probe.topic for probe in scenario.probes}
-    live = arena.live
-    tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
-    await arena.wait(lambda: bool(live.subscribed) or not live.running, scenario.until.first_message_s)
-    await arena.wait(
-        lambda: topics <= live.subscribed or not live.running, SUBSCRIBE_S if live.subscribed else 0.0
-    )
-    tell("sending it messages")
-    for shot in make_shots(scenario.probes):
-        if not live.running:
-            return
-        if shot.topic in live.subscribed:
-            if shot.word is not None:
-                live.sent(shot.word, time.monotonic())
-            arena.send(do="publish", **publication(shot))
-            await asyncio.sleep(shot.pause_s)
 
 
 async def _observe(scenario: Scenario, arena: ArenaSession, tell: Tell) -> tuple[str, str]:

@@ -1,8 +1,7 @@
-"""What the grader gives to a run: messages, parameters and calls of services, with values that cannot be guessed."""
+"""What the grader gives to a run: messages and parameters with values that cannot be guessed."""
 
 from __future__ import annotations
 
-import base64
 import math
 import random
 import string
@@ -13,11 +12,8 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from grader.arena.process_environment import ProcessEnvironment
-from grader.arena.session import ArenaSession
-from grader.evidence.events import ActorEvent
 from grader.files import read_untrusted
-from grader.rubric.model import Call, Param, Probe, Scenario
+from grader.rubric.model import Param, Probe
 
 PROBE_SHAPES = (
     "aaaaaa aaaaaa", "aaaaa aaaaa 5555555.55", "aaaa, aaaaaaa, aaaa and aaa", "aaaaaaa: aaaaa, aaaaaaa: 5555",
@@ -47,10 +43,6 @@ NOT_IN_FILE = "not in the file"
 OVER = TOO_LARGE, TOO_MUCH = "too large", "too much in it"
 """How the remark on a file ends that is more than is read."""
 _EXAMPLES: dict[str, Any] = {"text": "", "integer": 10_000, "number": 1.0}
-ANSWER_S = 10.0
-TEXT_BYTES_MAX = 64 << 10
-
-Tell = Callable[[str], None]
 
 
 class Shot(NamedTuple):
@@ -60,15 +52,6 @@ class Shot(NamedTuple):
     type: str
     value: Any
     pause_s: float
-
-    @property
-    def word(self) -> str | None:
-        """What a listener prints of it; None where that is no single word."""
-        return (
-            str(self.value)
-            if isinstance(self.value, str | int) and not isinstance(self.value, bool)
-            else None
-        )
 
 
 def make_shots(probes: tuple[Probe, ...]) -> list[Shot]:
@@ -87,39 +70,6 @@ def make_shots(probes: tuple[Probe, ...]) -> list[Shot]:
 def _before(shot: Shot, following: Shot) -> Shot:
     same = (shot.topic, shot.value) == (following.topic, following.value) and isinstance(shot.value, str)
     return shot._replace(pause_s=shot.pause_s * PAUSE_BEFORE_SAME) if same else shot
-
-
-def advertisement(probe: Probe) -> dict[str, Any]:
-    """Return the fields of the arena's command `advertise`."""
-    from grader.evidence.decode import definition, md5sum  # noqa: PLC0415 - numpy, which not every run needs
-
-    return {
-        "topic": probe.topic,
-        "type": probe.type,
-        "md5sum": md5sum(probe.type),
-        "definition": definition(probe.type),
-        "latching": False,
-    }
-
-
-def publication(shot: Shot) -> dict[str, Any]:
-    """Return the fields of the arena's command `publish`."""
-    from grader.evidence.decode import encode  # noqa: PLC0415 - as above
-
-    record = {
-        "action": "publish",
-        "actor": "grader",
-        "topic": shot.topic,
-        "type": shot.type,
-        "value": shot.value,
-    }
-    data = base64.b64encode(encode(shot.type, fields_of(shot.value))).decode()
-    return {"topic": shot.topic, "data": data, "record": record}
-
-
-def fields_of(value: object) -> Mapping[str, Any]:
-    """Return a message by its fields; a bare value is the field `data`."""
-    return value if isinstance(value, Mapping) else {"data": value}
 
 
 def _values(probe: Probe) -> Iterator[Any]:
@@ -296,68 +246,3 @@ def _leaves(content: Mapping[Any, Any], prefix: str, depth: int) -> Iterator[tup
 
 def _absolute(name: str) -> str:
     return "/" + name.strip("/")
-
-
-async def call_services(scenario: Scenario, arena: ArenaSession, tell: Tell) -> None:
-    """Call each service once it is offered; requests and answers are events of `/grader/actor`."""
-    for call in scenario.calls:
-        tell(f"waiting for the service {call.service}")
-        if await _offered(call.service, arena, scenario.until.first_message_s):
-            await arena.wait(lambda: not arena.live.running, call.delay_s)
-            tell(f"calling {call.service}")
-            await _call(call, arena)
-
-
-async def _offered(service: str, arena: ArenaSession, patience_s: float) -> bool:
-    live = arena.live
-    await arena.wait(lambda: service in live.services or not live.running, patience_s)
-    return service in live.services
-
-
-async def _call(call: Call, arena: ArenaSession) -> None:
-    from grader.evidence.decode import ServiceType  # noqa: PLC0415 - numpy, which not every run needs
-
-    try:
-        type_ = ServiceType(
-            call.type, _type_text(call.type, "srv", arena.place) or "", _messages(arena.place)
-        )
-        data = base64.b64encode(type_.encode_request(call.request)).decode()
-    except ValueError as error:
-        arena.note(_answer(call, None, f"the grader could not call it: {error}"))
-        return
-    record = {
-        "action": "call",
-        "actor": "grader",
-        "topic": call.service,
-        "type": call.type,
-        "value": call.request,
-    }
-    answer = await arena.call(ANSWER_S, service=call.service, type=call.type, data=data, record=record)
-    if "data" not in answer:
-        arena.note(_answer(call, None, answer["error"]))
-        return
-    value = type_.decode_response(base64.b64decode(answer["data"]))
-    arena.note(_answer(call, value, "" if value is not None else f"the answer is no {call.type}"))
-
-
-def _answer(call: Call, value: object, detail: str) -> ActorEvent:
-    return ActorEvent(
-        action="answer", actor="grader", topic=call.service, type=call.type, value=value, detail=detail
-    )
-
-
-def _messages(place: ProcessEnvironment) -> Callable[[str], str | None]:
-    return lambda type_: _type_text(type_, "msg", place)
-
-
-def _type_text(type_: str, kind: str, place: ProcessEnvironment) -> str | None:
-    """Return the text of `<package>/<kind>/<Name>.<kind>`: the student's own, ROS's, or a stand-in's."""
-    package, _, name = type_.partition("/")
-    own = place.workspace.repaired / package
-    for folder in (own, *(Path(p) / package for p in place.share_folders)):
-        data = read_untrusted(folder / kind / f"{name}.{kind}", TEXT_BYTES_MAX + 1)
-        if data is not None and len(data) > TEXT_BYTES_MAX:
-            raise ValueError(f"{name}.{kind} is larger than {TEXT_BYTES_MAX >> 10} kB")
-        if data is not None:
-            return data.decode(errors="replace")
-    return None

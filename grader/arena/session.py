@@ -6,7 +6,9 @@ import asyncio
 import re
 import secrets
 import signal
+import struct
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +28,10 @@ from grader.evidence.run import is_grader_node
 from grader.evidence.writer import EvidenceChannel, EvidenceWriter
 
 ARENA = Path(__file__).parent / "ros"
+CLOCK = "/clock"
+TIME = struct.Struct("<II")
+WATCHED_MAX = 20
+NS = 1_000_000_000
 ROSOUT = ("/usr/lib/rosout/rosout", "lib/rosout/rosout")
 LOG_FOLDER = ("/bin/sh", "-c", 'mkdir -p "$ROS_HOME/log" && exec "$0"')
 READY_S = 15.0
@@ -84,6 +90,8 @@ class ArenaSession:
         self._frames = FrameReader()
         self._calls = 0
         self._answers: dict[int, dict[str, Any]] = {}
+        self._clock_ns = 0
+        self._watched: dict[str, deque[bytes]] = {}
 
     async def __aenter__(self) -> Self:
         argv = [self.place.ros.python, "-s", "-B", str(ARENA)]
@@ -118,15 +126,23 @@ class ArenaSession:
         self._process.send(command)
 
     def start(self, spec: dict[str, Any]) -> None:
-        (self.live.helpers if spec["role"] == "grader" else self.live.running).add(spec["name"])
-        self.live.last_start_s = time.monotonic()
+        self.live.started(spec["name"], time.monotonic(), helper=spec["role"] == "grader")
+        self.exit_codes.pop(spec["name"], None)
+        self._killed.starting(spec["name"])
         self.send(do="start", spec=spec)
 
-    async def interrupt(self, name: str, *, int_s: float, term_s: float) -> None:
-        """Ctrl-C; TERM after `int_s`, KILL after another `term_s`. Returns when the process has ended."""
+    async def interrupt(self, name: str, *, int_s: float, term_s: float, action: str = "interrupt") -> None:
+        """Ctrl-C; TERM after `int_s`, KILL after another `term_s`. Returns when the process has ended.
+
+        `action` is how the evidence calls it: with `kill`, it is KILL at once.
+        """
         self._killed.stopping(name)
-        self.send(do="interrupt", name=name, int_s=int_s, term_s=term_s)
+        self.send(do="interrupt", name=name, int_s=int_s, term_s=term_s, action=action)
         await self.wait(lambda: name in self.exit_codes, int_s + term_s + END_S)
+
+    def watch(self, topic: str) -> deque[bytes]:
+        """Return where the latest messages on a topic will be, as they come."""
+        return self._watched.setdefault(topic, deque(maxlen=WATCHED_MAX))
 
     def course(self, event: ScenarioEvent) -> None:
         self._writer.event("/grader/scenario", self._now_ns(), event)
@@ -232,8 +248,13 @@ class ArenaSession:
         channel = self._channels[frame.channel]
         for data in frame.datas:
             channel.evidence.message(frame.time_ns, data)
+        if frame.datas and channel.topic == CLOCK and is_grader_node(channel.callerid):
+            secs, nsecs = TIME.unpack(frame.datas[-1])
+            self._clock_ns = secs * NS + nsecs
         if frame.datas and not is_grader_node(channel.callerid):
             own = channel.callerid not in self.live.helper_nodes
+            if channel.topic in self._watched:
+                self._watched[channel.topic].extend(frame.datas)
             self.live.message(channel.topic, len(frame.datas), time.monotonic(), active=own)
             self.live.arrived(channel.topic, len(frame.datas), frame.time_ns)
 
@@ -273,18 +294,14 @@ class ArenaSession:
         self.exit_codes[name] = record["exit_code"]
         if self._master or record["role"] != "student":  # what a build only tries out may end as it likes
             self._killed.ended(record)
-        self.live.helpers.discard(name)
-        if name in self.live.running:
-            self.live.running.remove(name)
-            self.live.ended.add(name)
-            self.live.active(time.monotonic())
+        self.live.exited(name, time.monotonic())
 
     def _status(self, fields: dict[str, Any]) -> None:
         status = fields["status"]
         if status == "ready":
             self._ready = True
         elif status == "subscribed" and not is_grader_node(fields["subscriber"]):
-            self.live.subscribed.add(fields["topic"])
+            self.live.subscribers.setdefault(fields["topic"], set()).add(fields["subscriber"])
         elif status == "answer":
             self._answers[fields["id"]] = fields
         elif status == "graph":
@@ -309,6 +326,10 @@ class ArenaSession:
             max_rss_bytes=fields["max_rss_bytes"],
         )
         self._writer.event("/grader/process", self._now_ns(), event)
+
+    def ros_now_ns(self) -> int:
+        """Return the time of the run's nodes: `/clock` where there is one."""
+        return self._clock_ns or self._now_ns()
 
     def _now_ns(self) -> int:
         return self._offset_ns + time.monotonic_ns()
@@ -336,6 +357,10 @@ class Killed:
     def stopping(self, name: str) -> None:
         """From now on it is the grader who ends it."""
         self._stopping.add(name)
+
+    def starting(self, name: str) -> None:
+        """From now on it ends by itself again."""
+        self._stopping.discard(name)
 
     def limited(self, name: str) -> None:
         self._limited.add(name)

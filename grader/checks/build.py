@@ -7,7 +7,12 @@ from pathlib import PurePosixPath
 from typing import NamedTuple
 
 from grader.checks.registry import NoParams, check
-from grader.checks.support.build_errors import FIRST_ERROR_HINT, explain_error_of_build, first_error
+from grader.checks.support.build_errors import (
+    FIRST_ERROR_HINT,
+    UNKNOWN_COMMAND,
+    explain_error_of_build,
+    first_error,
+)
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.processes import Life, lives
 from grader.checks.support.scripts import cmake_calls, paths_by_name
@@ -123,14 +128,18 @@ def _broken_build(package: PackageFacts, build: Run, exit_code: int | None) -> V
     place = error.place if error else None
     line = f"{place.file}:{place.line}: " if error and place and error.kind == "cmake" else ""
     explained = package.manifest is None or (error is not None and error.kind == "cmake")
-    verdict = inconclusive if told and told.of_machine else unjudged if explained else failed
-    return verdict(
+    kind = inconclusive if told and told.of_machine else unjudged if explained else failed
+    verdict = kind(
         f"catkin_make failed: {line}{told.why}" if told else "catkin_make failed without naming an error",
         expected=EXPECTED,
         measured=f"exit code {exit_code}",
         hint=told.hint if told else FIRST_ERROR_HINT,
         citations=(place or cite(build, "/grader/console"),),
     )
+    # what the package lacks of catkin's own lines shows as a command that CMake does not know
+    if not line or told is None or error is None or UNKNOWN_COMMAND in error.text:
+        return verdict
+    return verdict.model_copy(update={"cause": f"{line}{told.why}"})
 
 
 def _lost_scripts(package: PackageFacts, scripts: Sequence[str]) -> Verdict | None:

@@ -245,7 +245,7 @@ def _unnamed(all_named: Sequence[Installed], hits: Sequence[Installed], path: st
     if near:
         one = names[near[0]]
         why = f"line {one.call.line}: {shown(one.path)} is named, but does not exist; the script is {path}"
-        return Lack(why, f"write {path}", _line(one))
+        return Lack(why, f"write {path} in place of {shown(one.path)}", _line(one))
     return Lack("catkin_install_python(…) does not name {}", "write {} into it, after PROGRAMS", None, path)
 
 

@@ -28,7 +28,7 @@ class ConnectedParams(Record):
         return self.publisher if end == "publishers" else self.subscriber
 
 
-@check("connected", params=ConnectedParams)
+@check("connected", params=ConnectedParams, heeds_losses=True)
 def connected(package: PackageFacts, run: Run, params: ConnectedParams) -> Verdict:
     """Two nodes are connected over a topic.
 

@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 from grader.checks.build import CATKIN_MAKE
 from grader.checks.registry import check
-from grader.checks.support.exit_causes import CAUSES, SYNTAX
+from grader.checks.support.exit_causes import SYNTAX, syntax_hint
 from grader.checks.support.scripts import (
     PYTHON,
     add_hint,
+    can_be_moved,
     chmod_hint,
     find_script,
     installed,
@@ -31,7 +32,6 @@ RIGHT_SHEBANG = "#!/usr/bin/env python3"
 TELLING = ("Couldn't find", "import: command not found", "No such file or directory")
 UNPARSED = (*SYNTAX, "ValueError")
 """What Python says of a file that it cannot parse; other faults are of the reading."""
-C_SOURCES = {".c", ".cc", ".cpp", ".cxx", ".h", ".hpp"}
 
 
 class ExecutableParams(Record):
@@ -67,7 +67,7 @@ def executable(package: PackageFacts, build: Run, params: ExecutableParams) -> V
         file without running it, and says which line it does not understand.
 
     How to fix
-        `chmod +x <file>`, then `git update-index --chmod=+x <file>` and push; write `#!/usr/bin/env
+        `chmod +x <file>`, then `git add --chmod=+x <file>`, commit and push; write `#!/usr/bin/env
         python3` as the very first line; `dos2unix <file>` for a file from Windows. `ls -lF` shows
         executable files with a `*`. `python3 -m py_compile <file>` shows a syntax error: fix that line, or
         the one above it.
@@ -113,7 +113,7 @@ def _unparsed(file: SourceFile, fault: Fault, obstacles: list[Obstacle]) -> Verd
     where = f"line {fault.line}" if fault.line else "cannot be parsed"
     others = f"; besides, it {' and '.join(o.why for o in obstacles)}" if obstacles else ""
     fixes = [
-        CAUSES.get(fault.kind, ("", "save the file as plain UTF-8 text"))[1],
+        syntax_hint(fault),
         *(o.fix for o in obstacles),
     ]
     source = f", {where}: {shown(fault.source.strip())}" if fault.source.strip() else ""
@@ -146,7 +146,7 @@ def _missing(package: PackageFacts, path: str) -> Verdict:
     wanted = PurePosixPath(path)
     near = [names[n] for n in near_names(wanted.name, names)]
     near += [p for n, p in names.items() if n == wanted.stem and p not in near]
-    movable = [p for p in near if PurePosixPath(p).suffix not in C_SOURCES]
+    movable = [p for p in near if can_be_moved(p, path)]
     scripts = [p for n, p in names.items() if n.endswith(".py")]
     seen = f"; there is {join_words(near)}" if near else ""
     return unjudged(
@@ -185,7 +185,8 @@ def _shebang_obstacles(file: SourceFile) -> Iterator[Obstacle]:
 def _rosrun_answer(build: Run, path: str) -> str:
     """The line that tells of what `rosrun` said to the file as handed in, where the build's recording has it."""
     names = {f"rosrun {path}", f"rosrun {PurePosixPath(path).name}"}
-    lines = [c.line for _, c in build.console if c.process in names and c.line.strip()]
+    said = (c.line for _, c in build.console if c.process in names and c.line.strip())
+    lines = [line for line in said if "parsing manifest" not in line]
     telling = (line for words in TELLING for line in lines if words in line)
     answer = next(telling, lines[-1] if lines else "")
     return f"; rosrun answers: {shown(answer)}" if answer else ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import PurePosixPath
 from typing import Annotated, NamedTuple
 
@@ -18,7 +18,9 @@ from grader.checks.support.launch import (
     nodes_of_program,
     nodes_of_script,
     nodes_up,
+    not_executable,
     not_run,
+    own_script,
     quoted,
     read_launch,
     refusals,
@@ -44,7 +46,7 @@ class LaunchConnectsParams(Record):
     nodes: tuple[str, ...] = ()
 
 
-@check("launch-connects", params=LaunchConnectsParams)
+@check("launch-connects", params=LaunchConnectsParams, heeds_losses=True)
 def launch_connects(package: PackageFacts, run: Run, params: LaunchConnectsParams) -> Verdict:
     """The launch file brings up nodes that are connected.
 
@@ -116,12 +118,32 @@ def _unconnected(package: PackageFacts, file: LaunchFile, run: Run, params: Laun
         if wrong := node_slip(package, node.model_copy(update={"file": file.path}), said):
             return wrong.verdict(quoted(run))
     nodes = run.student_nodes()
+    ends = [nodes_on(run, params.topic, end) for end in ("publishers", "subscribers")]
+    absent = [node for node in file.brings if not nodes_up(run, node)]
+    if absent and not all(ends):
+        return _absent(package, run, nodes, absent)
     if len(nodes) < 2:
-        up = f"only {nodes[0]} comes up" if nodes else "no node comes up"
-        message = f"{up}; the file declares {plural(len(file.nodes), 'node')}{quoted(run)}"
-        hint = "give the talker and the listener a <node> each, and try each script alone with rosrun"
-        return failed(message, hint=hint)
+        message = f"{_comes_up(nodes)}; the file declares {plural(len(file.nodes), 'node')}{quoted(run)}"
+        return failed(message, hint="give the talker and the listener a <node> each")
     return over_another_topic(run, params.topic, quoted(run))
+
+
+def _comes_up(nodes: Sequence[str]) -> str:
+    return (
+        f"only {join_words(nodes)} {'comes' if len(nodes) == 1 else 'come'} up"
+        if nodes
+        else "no node comes up"
+    )
+
+
+def _absent(package: PackageFacts, run: Run, nodes: Sequence[str], absent: Sequence[LaunchNode]) -> Verdict:
+    """Return why nodes of the launch file did not come up: all that lack the executable bit, or the first."""
+    scripts = [script for node in absent if (script := own_script(package, node))]
+    plain = [script.path for script in scripts if script.executable is False]
+    why = not_executable(*dict.fromkeys(plain)) if plain else why_not_up(package, run, absent[0])
+    said = "" if why.citations or "roslaunch says" in why.why else quoted(run)
+    name = "" if plain else f"{absent[0].full_name}: "
+    return why.verdict(f"{_comes_up(nodes)}; {name}{why.why}{said}")
 
 
 def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
@@ -171,7 +193,7 @@ class Wanted(NamedTuple):
     own: bool
 
 
-@check("launch-runs", params=LaunchRunsParams)
+@check("launch-runs", params=LaunchRunsParams, heeds_losses=True)
 def launch_runs(package: PackageFacts, run: Run, params: LaunchRunsParams) -> Verdict:
     """The launch file brings up its nodes under the names that it gives them.
 

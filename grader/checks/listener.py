@@ -17,7 +17,7 @@ from grader.checks.support.console_output import (
 )
 from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.processes import lives, not_started
-from grader.checks.support.text import VALUE, in_words, near_names, shown
+from grader.checks.support.text import OTHER_WORDS_SHARE, VALUE, in_words, near_names, shown
 from grader.checks.support.topics import cite, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -27,9 +27,9 @@ from grader.wording import join_words, plural, significant
 
 HAND_IN = "add the script to the package, and push it"
 CALLBACK_HINT = (
-    "print data.data in the callback, without a condition and nothing slow beside it; end with rospy.spin()"
+    "print the message's .data in the callback, without a condition and nothing slow beside it; "
+    "end with rospy.spin()"
 )
-OTHER_WORDS_SHARE = 0.5
 """Of the points, for a message that is printed, but not in the handout's words."""
 
 
@@ -111,7 +111,7 @@ def _other_words(
     glued = params.template.replace(f" {VALUE}", VALUE)
     hint = f"print '{wanted}', with the handout's own words"
     if any(f'data: "{missing[0].value}"' in line for line in said):
-        hint = "print data.data, which is the text: data is the whole message around it"
+        hint = "print the message's .data, which is the text, not the whole message around it"
     elif blank and said and all(text_places(missing, lines, glued)):
         hint = f"put a space between the words and the message: '{wanted}'"
     return partial(1 - (1 - OTHER_WORDS_SHARE) * len(missing) / len(probes), message, hint=hint)
@@ -192,7 +192,7 @@ def _some_numbers(probes: Sequence[Probe], missing: Sequence[Probe], lines: Sequ
     as_unsigned = all(v + 256 in printed for v in values)
     shape = f"as {values[0] + 256} and the like" if as_unsigned else "not at all"
     message = f"negative numbers are printed {shape}, {values[0]} for instance"
-    return failed(message, hint="print data.data as it is: an Int8 goes from -128 to 127")
+    return failed(message, hint="print the message's .data as it is: an Int8 goes from -128 to 127")
 
 
 def _only_again(probes: Sequence[Probe], missing: Sequence[Probe]) -> Verdict | None:

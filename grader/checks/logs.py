@@ -13,13 +13,13 @@ from grader.checks.support.console_output import CALLS, Level, Logged, console_l
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.nodes import nodes_of
 from grader.checks.support.processes import early_end, life, lives, not_started
-from grader.checks.support.text import shown
+from grader.checks.support.text import OTHER_WORDS_SHARE, shown
 from grader.checks.support.topics import cite
 from grader.evidence.events import ConsoleLine
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, partial, passed, unjudged
 from grader.wording import join_words, plural
 
 ALIKE = 0.7
@@ -47,7 +47,7 @@ def logs(package: PackageFacts, run: Run, params: LogsParams) -> Verdict:
     How it is measured
         By the messages on /rosout, where every `rospy.loginfo(…)`, `logwarn(…)` and `logerr(…)` goes. The
         text has to stand in one of them letter by letter, capitals and punctuation included; more may stand
-        around it.
+        around it. Other words of the same kind (`Hello ROS!` for `Hello World!`) earn half of the points.
 
     How to fix
         `rospy.loginfo("…")` after `rospy.init_node(…)` for the level INFO. `print(…)` does not log.
@@ -128,7 +128,12 @@ def _near(run: Run, lines: Iterable[Logged], params: LogsParams) -> Verdict | No
         alike = max(texts, key=lambda text: _likeness(text, params.text), default="")
         if _likeness(alike, params.text) >= ALIKE:
             text = (console_log(alike) or ("", alike))[1]
-            return failed(f"{shown(text)!r} {how}, not {params.text!r}", hint=_call(params))
+            message, hint = f"{shown(text)!r} {how}, not {params.text!r}", _call(params)
+            return (
+                partial(OTHER_WORDS_SHARE, message, hint=hint)
+                if texts is logged
+                else failed(message, hint=hint)
+            )
     return None
 
 

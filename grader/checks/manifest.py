@@ -69,6 +69,11 @@ def _judged(package: PackageFacts, params: ManifestParams) -> Verdict:
         measured = f"build tool {found.build_type or 'none'}, no dependency on catkin"
         hint = "add <buildtool_depend>catkin</buildtool_depend>"
         message = f"{found.file} does not name catkin as its build tool"
+        if (found.build_type or "").startswith("ament"):
+            message = f"{found.file} is of a package for ROS 2 (its build type is {found.build_type})"
+            hint = (
+                f"make a package for ROS 1: catkin_create_pkg {' '.join((params.name, *params.dependencies))}"
+            )
         return failed(message, measured=measured, hint=hint, citations=place)
     if lacking := _lacking(found, params.dependencies):
         return lacking
@@ -153,8 +158,10 @@ def _rename(package: PackageFacts, found: Manifest, name: str) -> str:
         for c in calls
         if c.name == "project" and c.args[:1] == (found.name,)
     ]
-    nodes = [node for file in package.launch_files for node in file.nodes if node.pkg == found.name]
-    places += dict.fromkeys(f'pkg="{name}" in {node.file}, line {node.line}' for node in nodes)
+    nodes = [(file, node) for file in package.launch_files for node in file.nodes if node.pkg == found.name]
+    places += dict.fromkeys(
+        f'pkg="{name}" in {node.file or file.path}, line {node.line}' for file, node in nodes
+    )
     return f"write {join_words(places[:PLACES_SHOWN])}" + (" and so on" if places[PLACES_SHOWN:] else "")
 
 
@@ -191,7 +198,7 @@ def _unreadable(fault: Fault | None) -> Verdict:
     return failed(
         f"{fault.file}{line} cannot be read: {fault.cause or fault.message}",
         measured=fault.message,
-        hint="open the file at that line and close or correct the element",
+        hint=fault.fix or "open the file at that line and close or correct the element",
         citations=(fault.place,),
     )
 

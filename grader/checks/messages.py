@@ -12,7 +12,14 @@ from grader.checks.registry import check
 from grader.checks.support.clocks import GET_TIME, WATCHED_S, clocks_at, wrong_growth
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.processes import early_end, is_flood, observed_until_ns
-from grader.checks.support.text import NUMBER, SECONDS, in_one_line, in_words, message_pattern
+from grader.checks.support.text import (
+    NUMBER,
+    OTHER_WORDS_SHARE,
+    SECONDS,
+    in_one_line,
+    in_words,
+    message_pattern,
+)
 from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
@@ -21,8 +28,6 @@ from grader.model.verdict import Verdict, failed, inconclusive, partial, passed,
 from grader.wording import plural
 
 ENOUGH = 3
-OTHER_WORDS_SHARE = 0.5
-"""Of the points, for a time that grows as it should in other words than the handout's."""
 _LAST_NUMBER = re.compile(rf".*?({NUMBER})\D*", re.DOTALL)
 SECONDS_CHARS_MAX = 60
 UNFILLED = ("%s", "%d", "%f", "{}", "{0}")

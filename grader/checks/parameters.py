@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -24,7 +24,7 @@ from grader.checks.support.parameters import (
     yaml_keys,
 )
 from grader.checks.support.processes import Life, first_interrupt_ns, life, lives, not_started
-from grader.checks.support.scripts import add_hint, find_script, paths_by_name
+from grader.checks.support.scripts import add_hint, can_be_moved, find_script, paths_by_name
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite, no_node
 from grader.checks.support.values import differences, value_text
@@ -89,7 +89,7 @@ def params_loaded(package: PackageFacts, build: Run, run: Run, params: ParamsLoa
         moved = f"the handout puts it at {params.file}; move it there" if source.path != params.file else ""
         verdict = (
             _error(run, one, source.path)
-            or (_missing(found, missing, source.path, _keys_of(build, source.path)) if missing else None)
+            or (_missing(found, missing, source.path, package, build) if missing else None)
             or passed(f"{source.path} loads and sets {join_words(wanted)}", hint=moved)
         )
     measured = f"on the server: {join_words(found)}" if found else "nothing on the server"
@@ -105,7 +105,8 @@ def _no_file(package: PackageFacts, path: str) -> Verdict:
     near = [names[n] for n in near_names(name, names)]
     there = near or yaml
     seen = f"; there is {join_words(there)}" if there else ""
-    hint = f"git mv {near[0]} {path}" if near else add_hint(path)
+    movable = [p for p in near if can_be_moved(p, path)]
+    hint = f"git mv {movable[0]} {path}" if movable else add_hint(path)
     return failed(f"{path} is not in the package{seen}", hint=hint)
 
 
@@ -128,7 +129,10 @@ def _keys_of(build: Run, path: str) -> tuple[Key, ...]:
     return yaml_keys(_text_of(build, path))
 
 
-def _missing(found: dict[str, object], missing: list[str], path: str, keys: tuple[Key, ...]) -> Verdict:
+def _missing(
+    found: dict[str, object], missing: list[str], path: str, package: PackageFacts, build: Run
+) -> Verdict:
+    keys = _keys_of(build, path)
     if not found:
         return failed(f"{path} sets nothing at all", hint="write `details:` and its values below it")
     name = missing[0]
@@ -142,8 +146,22 @@ def _missing(found: dict[str, object], missing: list[str], path: str, keys: tupl
     above, _, last = name.rpartition("/")
     shallow = f"{above.rpartition('/')[0]}/{last}"
     moved = _column(name, shallow, keys)
-    hint = moved if shallow in found else f"write it so that rosparam list shows {name}, letter by letter"
+    hint = f"write it so that rosparam list shows {name}, letter by letter"
+    if shallow in found:
+        readers = join_words(_readers(package, build, shallow, above))
+        hint = f"{moved}; then read it there in {readers} too" if readers else moved
     return failed(f"{path} loads, but {describe_missing(found, name)}{more}", hint=hint)
+
+
+def _readers(package: PackageFacts, build: Run, name: str, not_below: str) -> Iterator[str]:
+    """Yield the lines of scripts that read a parameter where the file has it now: by its path, or by its key alone."""
+    last, beside = name.rpartition("/")[2], not_below.rpartition("/")[2]
+    key = re.compile(
+        rf"""(?<!['"]{re.escape(beside)}['"]\])\[\s*['"]{re.escape(last)}['"]\s*\]|{re.escape(name.lstrip("/"))}\b"""
+    )
+    for file in package.files:
+        lines = _text_of(build, file.path).splitlines() if file.python else []
+        yield from (f"{file.path}, line {n}" for n, line in enumerate(lines, start=1) if key.search(line))
 
 
 def _given_twice(name: str, path: str, keys: tuple[Key, ...]) -> Verdict | None:

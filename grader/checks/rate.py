@@ -205,17 +205,15 @@ def _wrong_mean(found: Rhythm, params: RateParams) -> Verdict:
     direction, nominal = "slow" if found.mean_hz < params.rate_hz else "fast", significant(params.rate_hz)
     message = f"{params.topic} is too {direction}: {hertz(found.mean_hz)} instead of {nominal} Hz"
     ratio = found.mean_hz / params.rate_hz
-    verdict = failed(message, hint=_rate_hint(ratio, nominal))
+    verdict = failed(message, hint=_rate_hint(ratio, nominal, even=found.is_even))
     return verdict.once() if abs(ratio - 1) < NEAR_SHARE else verdict
 
 
-def _rate_hint(ratio: float, nominal: str) -> str:
+def _rate_hint(ratio: float, nominal: str, *, even: bool) -> str:
     """Return what may be wrong where a loop comes round `ratio` times as often as it should."""
     if abs(ratio - 0.5) < 0.05:
-        return (
-            f"half the rate: does the loop sleep twice? One rate.sleep() in each turn, rospy.Rate({nominal})"
-        )
-    if abs(ratio - 2) < 0.2:
+        return f"use rospy.Rate({nominal}), and one rate.sleep() in each turn: two of them halve the rate"
+    if abs(ratio - 2) < 0.2 and not even:
         return f"twice the rate: does the loop, or a second publisher, publish twice? rospy.Rate({nominal})"
     if ratio < 1:
         return f"use rospy.Rate({nominal}) and one rate.sleep() in each turn, with nothing slow beside it"

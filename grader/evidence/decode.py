@@ -179,6 +179,22 @@ def md5sum(type: str) -> str:  # noqa: A002 - ROS's own word
 
 
 @lru_cache(maxsize=1)
+def known_packages() -> dict[str, tuple[str, ...]]:
+    """Return the names of ROS Noetic's own message types by package."""
+    found: dict[str, list[str]] = {}
+    for full in _noetic().fielddefs:
+        package, _, name = full.partition("/msg/")
+        found.setdefault(package, []).append(name)
+    return {package: tuple(sorted(names)) for package, names in found.items()}
+
+
+def is_ros_type(type: str) -> bool:  # noqa: A002 - ROS's own word
+    """Return whether ROS Noetic itself has a message type of that name."""
+    package, _, name = type.partition("/")
+    return name in known_packages().get(package, ())
+
+
+@lru_cache(maxsize=1)
 def _noetic() -> Typestore:
     return get_typestore(Stores.ROS1_NOETIC)
 
@@ -248,7 +264,7 @@ def _checked(base: str, value: Value) -> Value:
 FindText = Callable[[str], str | None]
 """From a message type to the text of its `.msg` file, None where there is none."""
 
-_DIVIDER = re.compile(r"^---\s*$", re.MULTILINE)
+DIVIDER = re.compile(r"^---\s*$", re.MULTILINE)
 _TYPE = re.compile(r"^\s*([A-Za-z][\w/]*)\s*(?:\[\d*\])?\s+[A-Za-z]\w*\s*$", re.ASCII)
 _BUILT_IN = {*PRIMITIVES, "byte", "char", "time", "duration"}
 _RULE = "=" * 80
@@ -256,7 +272,8 @@ _PARTS_MAX = 100
 
 
 class ServiceType:
-    """Encodes requests and decodes responses of one service type, from the text of its `.srv` file (wiki.ros.org/srv).
+    """Decodes responses of one service type, from the text of its `.srv` file (wiki.ros.org/srv). `request` is the full
+    definition of its requests.
 
     `find_text` returns the text of messages that ROS Noetic's own packages do not have.
 
@@ -264,24 +281,20 @@ class ServiceType:
     """
 
     def __init__(self, type: str, text: str, find_text: FindText = lambda _: None) -> None:  # noqa: A002 - ROS's own word
-        parts = _DIVIDER.split(text)
+        parts = DIVIDER.split(text)
         if len(parts) != 2:
             raise ValueError(f"{type}: a service has a request and a response with one line --- between them")
-        request, response = (_with_parts(type, part, find_text) for part in parts)
-        self._request = Encoder(f"{type}Request", request)
+        request, response = (full_definition(type, part, find_text) for part in parts)
+        self.request = request
         self._response = Decoder(f"{type}Response", response)
-
-    def encode_request(self, value: Mapping[str, Any]) -> bytes:
-        """The request's bytes; fields that `value` leaves out are zero. Raises ValueError where it does not fit."""
-        return self._request.encode(value)
 
     def decode_response(self, data: bytes) -> Value:
         """The response's fields, None where the bytes do not fit."""
         return self._response.decode(data)
 
 
-def _with_parts(type_: str, text: str, find_text: FindText) -> str:
-    """Return the text with a `MSG:` part for each type that it needs."""
+def full_definition(type_: str, text: str, find_text: FindText) -> str:
+    """Return a type's text with a `MSG:` part for each type that it needs. Raises ValueError where one is nowhere."""
     package = type_.partition("/")[0]
     parts: dict[str, str] = {}
     waiting = _needed(text, package)

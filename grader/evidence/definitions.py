@@ -112,10 +112,18 @@ def canonical(types: Types) -> str:
 
 
 def _sections(type_: str, definition: str) -> Iterator[tuple[str, tuple[str, ...]]]:
+    for name, lines in sections_of(type_, definition):
+        bare = (line.partition("#")[0].strip() for line in lines)
+        # a line with = is a constant, and constants are not sent
+        yield name, tuple(line for line in bare if line and "=" not in line)
+
+
+def sections_of(type_: str, definition: str) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield each type of a full definition with its lines, constants and comments too. Raises DefinitionError."""
     name: str | None = type_
     lines: list[str] = []
     for raw in definition.split("\n"):
-        line = raw.split("#", 1)[0].strip()
+        line = raw.partition("#")[0].strip()
         if line and set(line) == {"="}:
             yield _named(name), tuple(lines)
             name, lines = None, []
@@ -123,8 +131,8 @@ def _sections(type_: str, definition: str) -> Iterator[tuple[str, tuple[str, ...
             if not line.startswith("MSG: "):
                 raise DefinitionError("a part of the definition has no `MSG:` line")
             name = line.removeprefix("MSG: ").strip()
-        elif line and "=" not in line:  # with one it is a constant, and constants are not sent
-            lines.append(line)
+        elif line:
+            lines.append(raw.strip())
     yield _named(name), tuple(lines)
 
 

@@ -127,10 +127,34 @@ class ActorEvent(Record):
     `answer`: the response's fields, or None and the reason in `detail`. `open`: the stand-in for the program `actor`
     was started with the arguments `value`. `refused`: `actor`, a process where it is known, else a node, was not
     allowed what `detail` says; `limit`: it reached a limit. At most 50 of each in a run, equal ones once.
+    Of steps: `set_param` is `param` in the middle of the run. `wait` waited for the topic or node `topic`, or for a
+    time, and `detail` says whether it came. `start`, `stop` (Ctrl-C) and `kill` have the process in `detail`
+    (`interrupt` is the run's end), and so has `type`, with the line that went to its standard input in `value`. `goal`,
+    `cancel` and `result` are an action's: `topic` is its name, `detail` the word for the result's status (`SUCCEEDED`),
+    or why there is none. `play`: the recording `topic` was played; its messages are on their topics.
     """
 
     action: Literal[
-        "publish", "clock", "interrupt", "param", "call", "answer", "open", "note", "refused", "limit"
+        "publish",
+        "clock",
+        "interrupt",
+        "param",
+        "call",
+        "answer",
+        "open",
+        "note",
+        "refused",
+        "limit",
+        "wait",
+        "start",
+        "stop",
+        "kill",
+        "type",
+        "set_param",
+        "goal",
+        "cancel",
+        "result",
+        "play",
     ]
     """What was done."""
     actor: str

@@ -11,13 +11,12 @@ from typing import NamedTuple
 
 from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Writer
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from rosbags.typesys.base import TypesysError
 
 from grader.errors import EvidenceError, OutputError
 from grader.evidence import decode
-from grader.evidence.definitions import DefinitionError, parse
+from grader.evidence.definitions import DefinitionError
 from grader.evidence.events import FIELDS
+from grader.evidence.message_values import md5_of
 from grader.evidence.run import Channel, Message, Run, merge_channels
 
 TEXT = "std_msgs/String"
@@ -90,17 +89,10 @@ def _connection(writer: Writer, channel: Channel) -> Connection:
 
 
 def _md5sum(channel: Channel) -> str:
-    """Return the MD5 sum of the definition, if the recording lacks it; of its text, if it cannot be parsed.
-
-    rosbags registers types by generating code; its hash needs only their fields.
-    """
-    package, _, name = channel.type.partition("/")
-    store = get_typestore(Stores.EMPTY)
+    """Return the MD5 sum of the definition, if the recording lacks it; of its text, if it cannot be parsed."""
     try:
-        parse(channel.type, channel.definition)
-        store.fielddefs.update(get_types_from_msg(channel.definition, f"{package}/msg/{name}"))
-        return store.generate_msgdef(f"{package}/msg/{name}")[1]
-    except (DefinitionError, TypesysError, SyntaxError, RecursionError):
+        return md5_of(channel.type, channel.definition)
+    except DefinitionError:
         return hashlib.md5(channel.definition.encode(), usedforsecurity=False).hexdigest()
 
 

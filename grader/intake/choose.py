@@ -167,8 +167,11 @@ def not_found(
     root: Path, candidates: list[Candidate], wanted: Wanted, git_links: tuple[str, ...]
 ) -> PackageNotFound:
     """Return the error for a submission without the package; it says what is there instead, and what to do."""
-    packages = [c for c in candidates if c.has_manifest]
-    names = sorted({c.name for c in packages})
+    packages = sorted(
+        (c for c in candidates if c.has_manifest),
+        key=lambda c: (-_count_files(c.folder, wanted.files), c.name),
+    )
+    names = list(dict.fromkeys(c.name for c in packages))
     here = f"packages here: {listing(names)}" if names else f"no {MANIFEST} was found"
     name = printable(wanted.asked or wanted.name)
     return PackageNotFound(
@@ -181,12 +184,17 @@ def _rename(root: Path, packages: list[Candidate], wanted: Wanted) -> str:
     seen = {c.name: c for c in reversed(packages) if c.ignored_by is None and encodable(c.path)}
     if wanted.asked and packages:
         return "Give one of these names with --package, or leave it out."
+    name = printable(wanted.asked or wanted.name)
     if not seen:
-        name = printable(wanted.asked or wanted.name)
-        return f"It is the folder whose {MANIFEST} says <name>{name}</name>: was it handed in (and pushed)?"
-    name, only = next(iter(seen.items()))
-    named = named_at(only.folder, root=root)
-    if len(seen) > 1 or named is None:
+        told = f"It is the folder whose {MANIFEST} says <name>{name}</name>"
+        loose = _loose_files(root, wanted.files)
+        made = f"catkin_create_pkg {name} std_msgs rospy makes it, for {loose} to go into"
+        return f"{told}: {made}." if loose else f"{told}: was it handed in (and pushed)?"
+    counts = {c: _count_files(c.folder, wanted.files) for c in seen.values()}
+    only = max(counts, key=lambda c: counts[c])
+    is_only = len(counts) == 1 or sum(count * 2 >= max(1, counts[only]) for count in counts.values()) == 1
+    name, named = only.name, named_at(only.folder, root=root)
+    if not is_only or named is None:
         return (
             f"Was it handed in (and pushed)? If it is one of these, rename that to {wanted.name} "
             f"(<name> in its {MANIFEST}), or grade it with --package NAME."
@@ -197,6 +205,18 @@ def _rename(root: Path, packages: list[Candidate], wanted: Wanted) -> str:
         f'then in project(…) and each pkg="…"), '
         f"or grade it with --package {shlex.quote(brief(name))}."
     )
+
+
+def _loose_files(root: Path, names: frozenset[str]) -> str:
+    """Return where most of the lab's files lie, though in no package: `publisher.py in week1/`; "" for nowhere."""
+    found = {
+        folder.path: sorted(names & {entry.name for entry in folder.others})
+        for folder in islice(walk(root, tolerant=True), FOLDERS_OF_A_COPY)
+    }
+    path = max(found, key=lambda path: len(found[path]), default="")
+    if not path or not found[path]:
+        return ""
+    return listing(found[path]) + ("" if path == "." else f" in {printable(path)}/")
 
 
 def _where_it_went(root: Path, wanted: str, git_links: tuple[str, ...]) -> str:

@@ -12,13 +12,14 @@ from pydantic import ValidationError
 from grader.checks.all_runs import Evidence
 from grader.checks.build import run_hint
 from grader.checks.registry import Check
-from grader.checks.support.launch import read_launch
+from grader.checks.support.exit_causes import SYNTAX, syntax_hint
+from grader.checks.support.launch import own_script, read_launch
 from grader.checks.support.scripts import find_script
 from grader.evidence.events import RECORDING_MISSING, RECORDING_PROBLEM
 from grader.evidence.run import Run
-from grader.model.package import PackageFacts
+from grader.model.package import LaunchFile, PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, inconclusive, unjudged
+from grader.model.verdict import Verdict, failed, inconclusive, unjudged
 from grader.rubric.model import Criterion, Rubric, Scenario
 
 NOT_RUN = "not_run"
@@ -99,10 +100,24 @@ class Facts:
         known = self.rubric.scenarios.get(scenario)
         if known is None or self.package is None or known.recording is not None:
             return None
-        faulty = {PurePosixPath(f.path).name for f in self.package.launch_files if f.fault is not None}
-        read = (read_launch(self.package, s.launch) for s in known.start if s.launch in faulty)
+        there = {PurePosixPath(f.path).name for f in self.package.launch_files}
+        read = [read_launch(self.package, s.launch) for s in known.start if s.launch in there]
         found = next((one for one in read if isinstance(one, Verdict)), None)
+        if found is None and known.until.connected:
+            found = next(
+                filter(None, (self._too_few_parse(one) for one in read if isinstance(one, LaunchFile))), None
+            )
         return found.model_copy(update={"unjudged": True}) if found else None
+
+    def _too_few_parse(self, launch: LaunchFile) -> Verdict | None:
+        """Return why no two of the file's nodes can be connected: scripts that Python cannot parse."""
+        scripts = [self.package and own_script(self.package, node) for node in launch.brings]
+        faults = [s.python_fault for s in scripts if s and s.python_fault and s.python_fault.kind in SYNTAX]
+        if not faults or len(scripts) - len(faults) > 1:
+            return None
+        why = f"{faults[0].kind}: {faults[0].cause or faults[0].message}"
+        message = f"{launch.path} starts {faults[0].file}, line {faults[0].line}: {why}"
+        return failed(message, hint=syntax_hint(faults[0]), citations=(faults[0].place,))
 
     def _lacks_files(self, scenario: str) -> bool:
         """Return whether the package has none of the files that the scenario starts: then there was nothing to run."""

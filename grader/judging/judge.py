@@ -13,11 +13,19 @@ from grader.checks.all_runs import NotRecorded
 from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
+from grader.judging.advice import add_advice
 from grader.judging.facts import Facts, try_facts
-from grader.judging.other_runs import judged_on_copy, repairs_of, seen_twice, split_runs, was_built
+from grader.judging.other_runs import (
+    judged_on_copy,
+    needs_build,
+    repairs_of,
+    seen_twice,
+    split_runs,
+    was_built,
+)
 from grader.judging.summary import round_half_up
 from grader.model.result import CriterionResult, Repaired
-from grader.model.verdict import Status, Verdict, inconclusive
+from grader.model.verdict import Citation, FileCitation, Status, Verdict, inconclusive
 from grader.rubric.model import Criterion, Rubric
 
 MANUAL = "manual"
@@ -46,25 +54,26 @@ def judge_all_runs(
 ) -> Judgement:
     """Judge the first runs, then what repeated runs and a repaired copy say besides."""
     first, repeated, repaired = split_runs(runs)
-    verdicts = judge_runs(rubric, first, checks)
+    facts = try_facts(rubric, first)
+    verdicts = judge_facts(rubric, facts, checks)
     doubtful = frozenset(c.scenario for c in rubric.criteria if verdicts[c.id].timing and c.scenario)
     if repeated:
-        again = judge_runs(rubric, {**first, **repeated}, checks)
+        again = judge_facts(rubric, try_facts(rubric, {**first, **repeated}), checks)
         verdicts = seen_twice(rubric, verdicts, again, repeated.keys())
     uses: dict[str, Repaired] = {}
     if repaired:
-        on_copy = judge_runs(rubric, {**first, **repaired}, checks)
-        repairs, build_repaired = repairs_of(rubric, repaired), not was_built(first) and was_built(repaired)
-        verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs, built=not build_repaired)
-    results = (result_of(c, verdicts[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
-    return Judgement(tuple(results), doubtful)
+        of_copy = try_facts(rubric, {**first, **repaired})
+        on_copy, repairs = judge_facts(rubric, of_copy, checks), repairs_of(rubric, repaired)
+        needed = needs_build(of_copy.package)
+        built = not needed or was_built(first) or not was_built(repaired)
+        verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs, built=built)
+    results = tuple(result_of(c, verdicts[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
+    advised = results if facts.package is None else add_advice(results, facts.package, rubric)
+    return Judgement(advised, doubtful)
 
 
-def judge_runs(
-    rubric: Rubric, runs: Mapping[str, Run], checks: Mapping[str, Check] = CHECKS
-) -> dict[str, Verdict]:
+def judge_facts(rubric: Rubric, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> dict[str, Verdict]:
     """Return the verdict of each criterion by its id."""
-    facts = try_facts(rubric, runs)
     criteria = {c.id: c for c in rubric.criteria}
     requirements = Requirements(rubric, checks)
     for name in TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order():
@@ -134,14 +143,15 @@ class Requirements:
         """
         if not verdict.unjudged:
             return verdict
-        lost = [r for r in criterion.requires if self._explains(r, criterion)]
+        lost = [r for r in criterion.requires if self._explains(r, criterion, verdict)]
+        same = [r for r in lost if _cause(self.verdicts[r]) == _cause(verdict)]
         if lost:
             # what is not there at all explains most
-            blocking = min(lost, key=lambda r: not self.verdicts[r].unjudged)
+            blocking = min(same or lost, key=lambda r: not self.verdicts[r].unjudged)
             root = self._roots[criterion.id] = self._roots.get(blocking, blocking)
             message = f"blocked by {root}: {self.verdicts[root].message}"
             if verdict.message not in message:
-                message = f"{message}; here: {verdict.message}"
+                message = f"{message}; here: {_without_cause(verdict)}"
             update = {
                 "status": Status.BLOCKED,
                 "message": message,
@@ -155,18 +165,43 @@ class Requirements:
         message = f"{verdict.message}; and {undecided} could not be judged"
         return inconclusive(message, expected=verdict.expected, measured=verdict.measured, hint=verdict.hint)
 
-    def _explains(self, required: str, criterion: Criterion) -> bool:
-        """Return whether the loss of a required criterion can be why there was nothing to judge for this one."""
+    def _explains(self, required: str, criterion: Criterion, found: Verdict) -> bool:
+        """Return whether the loss of a required criterion can be why there was nothing to judge for this one.
+
+        What else was wrong with a node, or with a file, is no reason for its process, or for the build, to end.
+        """
         verdict, check = self.verdicts[required], self._checks.get(self._criteria[required].check)
         repaired = check is not None and check.run_anyway and criterion.scenario is not None
+        beside = (
+            found.cause not in {"", verdict.cause} and self._criteria[required].scenario == criterion.scenario
+        )
+        if beside and not _lines(verdict) & _lines(found):
+            return False
         return verdict.status.is_lost and (verdict.unjudged or not repaired)
+
+
+def _lines(verdict: Verdict) -> set[Citation]:
+    """Return the lines of files that the verdict cites."""
+    return {one for one in verdict.citations if isinstance(one, FileCitation) and one.line is not None}
+
+
+def _cause(verdict: Verdict) -> str:
+    return verdict.cause or verdict.message
+
+
+def _without_cause(verdict: Verdict) -> str:
+    """Return what was found, without the cause that the blocking criterion's message has named already."""
+    if not verdict.cause:
+        return verdict.message
+    return verdict.message.replace(f" ({verdict.cause})", "").replace(f": {verdict.cause}", "")
 
 
 def result_of(
     criterion: Criterion, verdict: Verdict, digits: int, repaired: Repaired | None = None
 ) -> CriterionResult:
     """Return the report's line of a criterion, with the points of its verdict."""
-    lost = verdict.status.is_lost or verdict.status is Status.INCONCLUSIVE
+    earned = repaired is not None and not repaired.charged and verdict.score >= repaired.share
+    lost = (verdict.status.is_lost or verdict.status is Status.INCONCLUSIVE) and not earned
     return CriterionResult(
         id=criterion.id,
         title=criterion.title,

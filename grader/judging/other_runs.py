@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from graphlib import TopologicalSorter
 from pathlib import PurePosixPath
 
@@ -12,17 +12,23 @@ from pydantic import ValidationError
 
 from grader.checks.build import CATKIN_MAKE
 from grader.evidence.run import Run
-from grader.model.repair import Repair, place_of
-from grader.model.result import Repaired
+from grader.model.package import PackageFacts
+from grader.model.repair import Repair, advice_of, place_of
+from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import Status, Verdict, failed
 from grader.rubric.model import Criterion, Rubric, Scenario
 from grader.wording import join_words
 
-PACKAGE_RUN, REPAIRS = "package", "repairs"
+PACKAGE_RUN, REPAIRS, BUILD = "package", "repairs", "build"
 NAMES = {"topic-name", "node-name", "parameter-name", "file-name", "package-name", "launch-type"}
-EVERYWHERE = {"build-line", "manifest-line", "package-name"}
 OF_BUILDS = {"build-line", "manifest-line"}
-"""These explain nothing but the build and the files, where the package as handed in was built."""
+"""These explain nothing but the build and the files, unless something is run that the build makes."""
+SEEN_IN_RUNS = {"missing-import", "missing-call", "topic-name", "node-name", "parameter-name"}
+"""These are lost in runs, so no criterion of the files asks for them."""
+DONE_BEFORE_RUNS = {"executable-bit", "line-ends", "shebang", "byte-order-mark", "encoding"}
+"""The arena repairs these in the scripts that the rubric starts, so no run of those is lost by them."""
+MADE_BY_BUILDS = {".msg", ".srv", ".action", ".c", ".cc", ".cpp", ".cxx"}
+OF_PACKAGES = {"package.xml", "CMakeLists.txt"}
 SHARES = {1.0: "all", 0.5: "half"}
 
 Runs = dict[str, Run]
@@ -64,6 +70,12 @@ def was_built(runs: Mapping[str, Run]) -> bool:
     return any(e.event == "exit" and e.name == CATKIN_MAKE and e.exit_code == 0 for _, e in events)
 
 
+def needs_build(package: PackageFacts | None) -> bool:
+    """Return whether its nodes need what the build makes: messages, programs, modules. Scripts run without."""
+    paths = [PurePosixPath(file.path) for file in package.files] if package is not None else []
+    return any(path.suffix in MADE_BY_BUILDS or path.name == "setup.py" for path in paths)
+
+
 def repairs_of(rubric: Rubric, repaired: Mapping[str, Run]) -> tuple[Repair, ...]:
     """Return the repairs of the copy that was run, as far as the rubric lets them count."""
     written = repaired[PACKAGE_RUN].metadata.get(REPAIRS, "[]") if PACKAGE_RUN in repaired else "[]"
@@ -92,53 +104,78 @@ def judged_on_copy(
         c.id for c in rubric.criteria if first[c.id].status.is_lost and not _is_worse(first, on_copy, c)
     }
     needs = {
-        c.id: tuple(one for one in repairs if concerns(one, c, rubric, first[c.id], built=built))
+        c.id: tuple(one for one in repairs if concerns(one, c, rubric, first, built=built))
         for c in rubric.criteria
     }
     charges = _charges(rubric, first, better, needs)
     for criterion in rubric.criteria:
-        needed = needs[criterion.id]
+        charged = tuple(one for one in repairs if criterion.id in charges.get(one, ()))
+        needed = needs[criterion.id] or charged
         if criterion.id not in better or not needed:
             continue
         verdict, copy = first[criterion.id], on_copy[criterion.id]
-        charged = tuple(one for one in needed if criterion.id in charges.get(one, ()))
-        share = min(rubric.share_of(one.kind) for one in needed)
+        share = min(rubric.share_of(one.kind) for one in needed) if criterion.points else 1.0
         if charged:
-            verdicts[criterion.id] = _charge(verdict, copy, charged[0])
+            verdicts[criterion.id] = _charge(verdict, copy, charged)
         else:
             verdicts[criterion.id] = _share(copy, needed, share)
         uses[criterion.id] = Repaired(repairs=charged or needed, share=share, charged=bool(charged))
     return verdicts, uses
 
 
-def concerns(repair: Repair, criterion: Criterion, rubric: Rubric, verdict: Verdict, *, built: bool) -> bool:
-    """Return whether the criterion may depend on what was repaired: it cites the file, or its run uses it. What the
-    files of the build lack stays lost, though: the criteria of these files ask for just that.
+def concerns(
+    repair: Repair,
+    criterion: Criterion,
+    rubric: Rubric,
+    found: Mapping[str, Verdict] | Mapping[str, CriterionResult],
+    *,
+    built: bool,
+) -> bool:
+    """Return whether the criterion may depend on what was repaired: its run or build uses it, or it, or what blocks it,
+    cites the file. What the files of the build lack stays lost, though: the criteria of these files ask for just that.
 
-    `built` is whether the package was built without the repair, or not even with it.
+    `found` is what each criterion came to without the repair, `built` whether what is run was built without it, or
+    needs no build.
     """
     if criterion.scenario is not None:
         return is_used_by(rubric.scenarios[criterion.scenario], repair, rubric, built=built)
-    return repair.kind == "package-name" or (repair.kind not in OF_BUILDS and _cites(verdict, repair))
+    if repair.kind == "package-name" and repair.file in OF_PACKAGES:
+        wrong = _words(repair.before) - _words(repair.after)
+        return bool(wrong & _words(found[criterion.id].message)) or _cites(found[criterion.id], repair)
+    if criterion.check == BUILD and repair.kind in OF_BUILDS:
+        return True
+    if found[criterion.id].blocked_by:
+        return any(_asks_for(found[name], repair) for name in criterion.requires)
+    return repair.kind not in OF_BUILDS | SEEN_IN_RUNS and _cites(found[criterion.id], repair)
 
 
 def is_used_by(scenario: Scenario, repair: Repair, rubric: Rubric, *, built: bool) -> bool:
     """Return whether the scenario runs the repaired file, as far as the rubric says. A launch file may run any."""
+    name, launches = PurePosixPath(repair.file).name, any(start.launch for start in scenario.start)
+    known = any(name in _started(one) for one in rubric.scenarios.values())
+    if repair.kind in DONE_BEFORE_RUNS:
+        return launches and not known
     if repair.kind in OF_BUILDS:
         return not built or any(start.built for start in scenario.start)
-    if any(start.launch for start in scenario.start) or repair.kind in EVERYWHERE:
+    if repair.kind == "package-name" and repair.file in OF_PACKAGES:
         return True
-    name = PurePosixPath(repair.file).name
-    started = {PurePosixPath(s.script).name for s in scenario.start if s.script}
-    every = {PurePosixPath(s.script).name for one in rubric.scenarios.values() for s in one.start if s.script}
-    return name in started or name not in every
+    if name in _started(scenario):
+        return True
+    if name.endswith((".launch", ".launch.xml")):
+        return launches and not known
+    return repair.kind != "launch-type" and (launches or not known)
+
+
+def _started(scenario: Scenario) -> set[str]:
+    """The names of the files that the scenario starts."""
+    return {PurePosixPath(path).name for s in scenario.start for path in (s.script, s.launch) if path}
 
 
 def _is_worse(first: Mapping[str, Verdict], on_copy: Mapping[str, Verdict], criterion: Criterion) -> bool:
     """Return whether the copy shows no more of a lost criterion than the package as it is."""
     one, copy = first[criterion.id], on_copy[criterion.id]
     if copy.status.is_lost and copy.score <= one.score:
-        return not one.unjudged or copy.unjudged
+        return not one.unjudged or (copy.unjudged and copy.cause == one.cause)
     return copy.status is Status.ERROR
 
 
@@ -149,12 +186,14 @@ def _charges(
     needs: Mapping[str, tuple[Repair, ...]],
 ) -> dict[Repair, set[str]]:
     """Return for each repair the criterion that asks for what was wrong: one of the files, else by its name where a
-    name was wrong, else the first that failed by itself. What others require comes first."""
+    name was wrong, else the first that failed by itself, and not for its name. What others require comes first."""
     charges: dict[Repair, set[str]] = {}
+    misnamed: set[str] = set()
     by_id = {c.id: c for c in rubric.criteria}
     order = TopologicalSorter({c.id: c.requires for c in rubric.criteria}).static_order()
     criteria = [by_id[name] for name in order if name in better]
-    for repair in dict.fromkeys(one for repairs in needs.values() for one in repairs):
+    needed = dict.fromkeys(one for repairs in needs.values() for one in repairs)
+    for repair in sorted(needed, key=lambda one: one.kind not in NAMES):
         asking = [c.id for c in rubric.criteria if c.scenario is None and _asks_for(first[c.id], repair)]
         if asking:
             charges[repair] = {asking[0]}
@@ -162,24 +201,34 @@ def _charges(
         possible = [c for c in criteria if repair in needs[c.id]]
         named = [c for c in possible if repair.kind in NAMES and _names(c, repair)]
         failing = [c for c in possible if first[c.id].status is not Status.BLOCKED]
-        counting = [c for c in (*named, *failing, *possible) if c.points > 0]
-        charges[repair] = {counting[0].id} if counting else set()
+        counting = [c.id for c in (*named, *failing, *possible) if c.points > 0]
+        other = [name for name in counting if name not in misnamed]
+        charges[repair] = set((counting if named else other or counting)[:1])
+        misnamed |= charges[repair] if named else set()
     return charges
 
 
-def _cites(verdict: Verdict, repair: Repair) -> bool:
-    return any(getattr(citation, "file", None) == repair.file for citation in verdict.citations)
+def _cites(found: Verdict | CriterionResult, repair: Repair) -> bool:
+    if repair.kind == "executable-bit" and repair.fix not in found.hint:
+        return False  # the build installs what runs the script, bit or not
+    return any(getattr(citation, "file", None) == repair.file for citation in found.citations)
 
 
-def _asks_for(verdict: Verdict, repair: Repair) -> bool:
+def _asks_for(found: Verdict | CriterionResult, repair: Repair) -> bool:
     """Return whether a criterion of the files is lost by what was repaired."""
-    return verdict.status.is_lost and verdict.status is not Status.BLOCKED and _cites(verdict, repair)
+    lost = found.status.is_lost and found.status is not Status.BLOCKED
+    return lost and repair.kind not in SEEN_IN_RUNS and _cites(found, repair)
 
 
 def _names(criterion: Criterion, repair: Repair) -> bool:
     """Return whether the criterion asks for the name that the repair puts in place."""
-    new = set(re.findall(r"[\w.-]+", repair.after)) - set(re.findall(r"[\w.-]+", repair.before))
+    before, after = (set(re.findall(r"[\w.~/-]*\w", text)) for text in (repair.before, repair.after))
+    new = {word.rpartition("/")[2] for word in after - before}
     return any(text.strip("/").rpartition("/")[2] in new for text in _texts(criterion.parameters))
+
+
+def _words(text: str) -> set[str]:
+    return set(re.findall(r"[\w.-]+", text))
 
 
 def _texts(value: object) -> Iterator[str]:
@@ -193,19 +242,23 @@ def _texts(value: object) -> Iterator[str]:
             yield from _texts(item)
 
 
-def _charge(verdict: Verdict, copy: Verdict, repair: Repair) -> Verdict:
-    """Return the loss, with the repair that was seen to help as its hint."""
+def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdict:
+    """Return the loss, with the repairs that were seen to help as its hint."""
     if verdict.status is Status.BLOCKED:
+        message = "; ".join(one.message for one in repairs)
         verdict = failed(
-            repair.message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
+            message, expected=copy.expected, measured=verdict.measured, citations=verdict.citations
         )
-    return verdict.model_copy(update={"hint": f"{place_of(repair)}: {repair.fix}"})
+    if copy.status.is_lost and verdict.hint:
+        return verdict  # the repair brings up another fault, so it is not the advice
+    return verdict.model_copy(update={"hint": "; ".join(advice_of(one) for one in repairs)})
 
 
 def _share(copy: Verdict, repairs: tuple[Repair, ...], share: float) -> Verdict:
-    where = join_words([place_of(repair) for repair in repairs])
+    where = join_words(dict.fromkeys(place_of(repair) for repair in repairs))
     earned = SHARES.get(share, f"{share:.0%}")
     score = copy.score * share
     status = Status.PARTIAL if share < 1 and copy.status is Status.PASS else copy.status
-    message = f"judged on a copy with {where} repaired: {earned} of the points; {copy.message}"
+    points = f"{earned} of the points; " if copy.score else ""
+    message = f"judged on a copy with {where} repaired: {points}{copy.message}"
     return copy.model_copy(update={"status": status, "score": score, "message": message})

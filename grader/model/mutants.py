@@ -106,9 +106,10 @@ class PackageEdit(Record):
 class Mutant(Record):
     """A package: the reference solution with `edits`, and the criteria that it must not reach, with their statuses.
 
-    All other criteria must pass. With an empty `expect` it is another correct package. The grader's own tests also use
-    `message` (a pattern, case ignored, for what the report says of a criterion), `points` (where a score is partial)
-    and `git_links` (the package is handed in as a repository with submodules at these paths and no .gitmodules).
+    All other criteria must pass. With an empty `expect` it is another correct package. `points` is what it gets, where
+    a score is partial: the share that a repair leaves, for instance. The grader's own tests also use `message` (a
+    pattern, case ignored, for what the report says of a criterion) and `git_links` (the package is handed in as a
+    repository with submodules at these paths and no .gitmodules).
 
     `says` holds texts that message, measurement and hint of a criterion must contain, `never_says` texts that they must
     not: of one criterion, or, as a list, of any. Case does not matter, nor does how words are spaced.

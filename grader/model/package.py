@@ -32,6 +32,13 @@ class Fault(Record):
         """The line, with its column where it is known."""
         return FileCitation(file=self.file, line=self.line, column=self.column, source=self.source)
 
+    @property
+    def fix(self) -> str:
+        """What to do in which line, where `cause` says that behind a colon; "" where it does not."""
+        told = self.cause.partition(": ")[2]
+        where = f"line {self.line}: " if self.line else ""
+        return f"{where}{told}" if told and not told.endswith("?") else ""
+
 
 class Dependency(Record):
     """One dependency element of `package.xml`; `kind` is the tag: `depend`, `exec_depend`, `run_depend`, …"""

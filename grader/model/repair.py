@@ -75,3 +75,18 @@ class Repair(Record):
 def place_of(repair: Repair) -> str:
     """Return `src/talker.py line 12`, or the file alone."""
     return repair.file if repair.line is None else f"{repair.file} line {repair.line}"
+
+
+def added_lines(before: str, after: str) -> str:
+    """Return the lines that are new, in one line."""
+    old = before.split("\n")
+    return "; ".join(line.strip() for line in after.split("\n") if line not in old and line.strip())
+
+
+def advice_of(repair: Repair) -> str:
+    """Return where and how the repair is done by hand: `package.xml: below line 9 add <depend>rospy</depend>`."""
+    new = repair.after.split("\n")
+    if repair.before not in (new[0], new[-1]) or repair.fix != added_lines(repair.before, repair.after):
+        return f"{place_of(repair)}: {repair.fix}"
+    where = "below" if repair.before == new[0] else "above"
+    return f"{repair.file}: {where} line {repair.line} add {repair.fix}"

@@ -30,6 +30,7 @@ _TYPOGRAPHIC = (
     ("\u2010\u2011\u2012\u2013\u2014\u2015\u2212", "dash", "-"),
 )
 TEXT_CHARS_MAX = SOURCE_CHARS_MAX = 300
+_NEVER_CLOSED = "a bracket that is opened in line {} is never closed"
 _COPIED = "copied from a PDF or a web page"
 
 # On any message: the faulty line itself tells.
@@ -49,6 +50,8 @@ _LINES = (
     (r"&&|\|\|", "Python writes `and`, `or` and `not`"),
     (r"^\s*(\$|sudo |rosrun |roslaunch |cd |chmod )", "this is a command for the terminal, not Python"),
     (r"^\s*(if|elif|while)\b[^=(:]*[^=!<>(:]=[^=]", "`=` gives a value to a name; to compare, write `==`"),
+    (r"^\s*(if|elif|else|while|for|def|class|try|except|finally|with)\b.*;\s*$",
+     "the line that begins a block ends with `:`, not with `;`"),
     (r"\basync\b(?!\s+(def|for|with)\b)", "`async` is a reserved word since Python 3.7: use another name"),
 )  # fmt: skip
 
@@ -148,9 +151,12 @@ def _fault(file: str, raw: _RawFault) -> Fault:
     column = raw.column if raw.line and raw.column and 0 < raw.column <= len(raw.text) + 1 else None
     if kind in {"TabError", "IndentationError"} and raw.text.strip():
         column = len(raw.text) - len(raw.text.lstrip()) + 1  # Python points at the end of the line
+    line = raw.line
+    if raw.opened and cause == _NEVER_CLOSED.format(raw.opened):
+        line, column = raw.opened, column if raw.opened == raw.line else None
     return Fault(
         file=file,
-        line=raw.line,
+        line=line,
         column=column,
         kind=kind,
         message=printable(raw.message[:MESSAGE_CHARS_MAX]) or kind,
@@ -230,7 +236,7 @@ def cause_of(
     if (vague or _MARKER.match(text)) and (told := _first(_LINES, _without_texts(text))):
         return told
     if opened is not None and vague:
-        return f"a bracket that is opened in line {opened} is never closed"
+        return _NEVER_CLOSED.format(opened)
     if message.startswith("invalid syntax") and _lacks_colon(text, column):
         message = "expected ':'"
     return _first(_MESSAGES, message)

@@ -239,6 +239,8 @@ def _with_token(line: str, error: Error | None) -> Iterator[str]:
         if quote in ("'", '"'):
             yield line[:cut] + quote + line[cut:]
             yield line + quote
+    if BLOCKS.match(line) and code.endswith(";"):
+        yield f"{code[:-1].rstrip()}:{rest}"
     if BLOCKS.match(line) and not code.endswith(":"):
         yield f"{code}:{rest}"
     for bracket in ")]}":

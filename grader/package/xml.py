@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from difflib import get_close_matches
 from itertools import islice
 
 from lxml import etree
@@ -119,15 +120,30 @@ def _fault(error: etree.XMLSyntaxError, parser: etree.XMLParser, data: bytes, fi
     text = _line(data, line)
     known = 0 < column <= len(text) + 1
     log = [str(entry.message)[:_MESSAGE_CHARS_MAX] for entry in islice(parser.error_log, _MESSAGES)]
+    cause = cause_of(message, log, text, root=root)[:_MESSAGE_CHARS_MAX]
+    if (opened := _opened(cause, log)) and opened != line:
+        line, text = opened, _line(data, opened)
+        column = text.find("<") + 1
+        known = column > 0
     return Fault(
         file=file,
         line=line or None,
         column=column if known else None,
         kind="XMLSyntaxError",
         message=message[:_MESSAGE_CHARS_MAX],
-        cause=cause_of(message, log, text, root=root)[:_MESSAGE_CHARS_MAX],
+        cause=cause,
         source=text.rstrip("\r") if known else "",
     )
+
+
+def _opened(cause: str, log: list[str]) -> int | None:
+    """Return the line of the tag that is not ended, where the cause is that one: libxml2 says where it noticed."""
+    if told := re.search(r"of line (\d+) (?:is still open|is never closed)", cause):
+        return int(told[1])
+    if "is not finished properly" in cause or cause.startswith("a closing quote is missing"):
+        found = (re.search(r"end of Start Tag \S+ line (\d+)", message) for message in log)
+        return next((int(one[1]) for one in found if one), None)
+    return None
 
 
 def _line(data: bytes, number: int) -> str:
@@ -162,6 +178,8 @@ def cause_of(message: str, log: list[str], line: str, *, root: str) -> str:
 def _mismatch(opened: str, line: str, closed: str, root: str) -> str:
     if opened.lower() == closed.lower():
         return f"`<{opened}>` of line {line} is closed by `</{closed}>`: capital and small letters must agree"
+    if get_close_matches(closed, [opened], cutoff=0.7):
+        return f"`<{opened}>` of line {line} is closed by `</{closed}>`: write `</{opened}>`"
     if opened == root:
         return f"`</{closed}>` closes nothing: `<{opened}>` of line {line} is the only tag that is open here"
     return (

@@ -12,6 +12,7 @@ from typing import Any
 from grader.checks.registry import Check
 from grader.rubric.faults import model_faults
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
+from grader.rubric.steps import given_steps, slash, step_faults
 from grader.wording import did_you_mean
 
 TOTAL_POINTS = 100
@@ -88,7 +89,9 @@ def _uncalled(path: KeyPath, criterion: dict[str, Any], scenarios: dict[str, Any
     expect, service = given.get("expect"), given.get("service")
     if criterion.get("check") != ANSWERS or not isinstance(expect, list) or scenario not in scenarios:
         return
-    calls = [c for _, c in as_maps(as_map(scenarios[scenario]).get("calls")) if c.get("service") == service]
+    run = as_map(scenarios[scenario])
+    made_calls = [*(call for _, call in as_maps(run.get("calls"))), *given_steps(run, "call")]
+    calls = [call for call in made_calls if call.get("service") == service]
     if len(calls) < len(expect):
         made = f"{len(calls)} of them" if calls else "none"
         yield (*path, "with", "expect"), f"asks for {len(expect)} calls of {service}; {scenario} makes {made}"
@@ -166,7 +169,8 @@ def scenario_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     yield from _params(path, scenario)
     yield from _probes(path, scenario)
     for index, call in as_maps(scenario.get("calls")):
-        yield from _slash((*path, "calls", index, "service"), call.get("service"), "a service")
+        yield from slash((*path, "calls", index, "service"), call.get("service"), "a service")
+    yield from step_faults(path, scenario)
     yield from _until((*path, "until"), as_map(scenario.get("until")), scenario)
 
 
@@ -175,10 +179,10 @@ def _means(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     if scenario.get("recording") is None:
         if scenario.get("start") in (None, []):
             yield (*path, "start"), "is missing: give start, or recording"
-        elif "until" not in scenario:
+        elif "until" not in scenario and not scenario.get("steps"):
             yield (*path, "until"), "is missing"
         return
-    for key in ("start", "params", "probes", "calls", "until", "clock", "warp"):
+    for key in ("start", "params", "probes", "calls", "steps", "until", "clock", "warp"):
         if key in scenario:
             yield (*path, key), "is not for a scenario with a recording: nothing is run"
 
@@ -222,7 +226,7 @@ def _probes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
             yield at, "sends nothing: give text, integers, among or values"
         if probe.get("times", 1) != 1 and not probe.get("values"):
             yield (*at, "times"), "is for values"
-        yield from _slash((*at, "topic"), probe.get("topic"), "a topic")
+        yield from slash((*at, "topic"), probe.get("topic"), "a topic")
         kind = probe.get("type")
         if isinstance(kind, str) and "/" in kind:
             yield from _contents(at, probe, kind)
@@ -270,13 +274,13 @@ def _items(value: object) -> list[Any]:
 def _until(path: KeyPath, until: dict[str, Any], scenario: dict[str, Any]) -> Iterator[Fault]:
     for key in ("topics", "connected"):
         for index, topic in as_texts(until.get(key)):
-            yield from _slash((*path, key, index), topic, "a topic")
+            yield from slash((*path, key, index), topic, "a topic")
     for topic, count in as_map(until.get("messages")).items():
-        yield from _slash((*path, "messages", topic), topic, "a topic")
+        yield from slash((*path, "messages", topic), topic, "a topic")
         if isinstance(count, int) and count < 1:
             yield (*path, "messages", topic), f"must be at least 1, not {count}"
-    if until.get("heard") is True and not scenario.get("probes"):
-        yield (*path, "heard"), "needs probes: there is nothing to hear"
+    if until.get("heard") is True and not (scenario.get("probes") or given_steps(scenario, "publish")):
+        yield (*path, "heard"), "needs probes or steps that publish: there is nothing to hear"
     names = [str(start.get("name")) for _, start in as_maps(scenario.get("start"))]
     for index, name in as_texts(until.get("ended")):
         if name not in names:
@@ -286,8 +290,3 @@ def _until(path: KeyPath, until: dict[str, Any], scenario: dict[str, Any]) -> It
         value_s = until.get(key)
         if isinstance(value_s, int | float) and isinstance(limit_s, int | float) and value_s >= limit_s > 0:
             yield (*path, key), f"{value_s:g} s can never pass within limit_s, {limit_s:g} s"
-
-
-def _slash(path: KeyPath, name: object, what: str) -> Iterator[Fault]:
-    if isinstance(name, str) and not name.startswith("/"):
-        yield path, f'{what} begins with a slash: "/{name}"'

@@ -23,8 +23,9 @@ from typing import TextIO
 from grader.checks import CHECKS, Check
 from grader.checks.registry import collecting
 from grader.model.verdict import Verdict
-from grader.rubric.pytest_check import FileFault, pytest_check, read_beside
+from grader.rubric.pytest_check import BAG, PYTHON, FileFault, pytest_check, read_beside
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps
+from grader.rubric.steps import bag_faults, played_bags
 from grader.untrusted_text import visible
 
 PYTEST = "pytest"
@@ -45,7 +46,7 @@ class Beside:
 
 
 def read_instructor(data: object, folder: Path) -> Beside:
-    """Reads what `checks:` and `check: pytest` name, and runs the file of checks."""
+    """Reads what `checks:`, `check: pytest` and steps that play name, and runs the file of checks."""
     rubric = as_map(data)
     named: list[tuple[KeyPath, object]] = [(("checks",), rubric["checks"])] if "checks" in rubric else []
     named += [
@@ -53,6 +54,8 @@ def read_instructor(data: object, folder: Path) -> Beside:
         for index, criterion in as_maps(rubric.get("criteria"))
         if criterion.get("check") == PYTEST
     ]
+    played = played_bags(rubric)
+    named += [(path, play.get("bag")) for path, play in played.items()]
     files: dict[str, bytes] = {}
     faults: list[Fault] = []
     own = OwnChecks(complete=rubric.get("checks") is None)
@@ -60,10 +63,12 @@ def read_instructor(data: object, folder: Path) -> Beside:
         if not isinstance(name, str):
             continue
         try:
-            file, files[name] = read_beside(folder, name)
+            file, files[name] = read_beside(folder, name, BAG if path in played else PYTHON)
         except FileFault as fault:
             faults.append((path, str(fault)))
             continue
+        if path in played:
+            faults += bag_faults(path, file, played[path])
         if path == ("checks",):
             own = run_checks_file(file, files[name])
     return Beside(files=files, own=own, known=known_checks(folder, own.checks), faults=tuple(faults))

@@ -16,7 +16,12 @@ Share = Annotated[float, Field(ge=0, le=1)]
 NAME_PATTERN = r"^[a-z][a-z0-9-]*$"
 PROGRAM_PATTERN = r"^[A-Za-z][\w-]*/[\w.-]+$"
 TYPE_PATTERN = r"^[A-Za-z]\w*/[A-Za-z]\w*$"
+MESSAGES_MAX = 10_000
+LINE_CHARS_MAX = 1_000
+TF_TYPE = "tf2_msgs/TFMessage"
+STEP_S_MAX = 600
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
+StepSeconds = Annotated[float, Field(gt=0, le=STEP_S_MAX)]
 YEARS = range(2000, 3000)
 LATE_DAYS_MAX = 3660
 
@@ -97,6 +102,176 @@ class Call(Record):
     delay_s: Seconds = 0.0
 
 
+class Publish(Record):
+    """Messages on one topic. Give `value`, the same each time, or `values`, which take turns.
+
+    `type` is a message type of ROS's, of the student's package or of one that is installed. A value is the field
+    `data`, or a map of the message's fields; what it leaves out is zero. In it, `now`, `now-2` and `now+0.5` (seconds)
+    are stamps, `.inf` and `.nan` are floats, `{from: 0, to: 1}` is a number that goes evenly from the first message to
+    the last, `{each: […]}` takes its items in turn, one for each message, and
+    `{repeat: .inf, count: 360, except: {"150-210": 0.3}}` is an array. `count` messages are sent at `rate_hz`, or
+    those of `duration_s`; without either, each value once. With `background`, the next steps begin at once; without
+    count and duration it then lasts until the run ends. Sending begins once a node has subscribed, and with
+    `latched` at once.
+    """
+
+    topic: str
+    type: Annotated[str, Field(pattern=TYPE_PATTERN)]
+    value: Any = None
+    values: tuple[Any, ...] = ()
+    rate_hz: Annotated[float, Field(gt=0, le=100)] = 10.0
+    count: Annotated[int, Field(ge=1, le=MESSAGES_MAX)] | None = None
+    duration_s: StepSeconds | None = None
+    latched: bool = False
+    background: bool = False
+
+    @property
+    def in_turn(self) -> tuple[Any, ...]:
+        """The values, one after the other."""
+        return self.values or (self.value,)
+
+    @property
+    def total(self) -> int | None:
+        """How many messages it is; None for one that lasts until the run ends."""
+        if self.count is not None:
+            return self.count
+        if self.duration_s is not None:
+            return max(1, round(self.duration_s * self.rate_hz))
+        return None if self.background else len(self.in_turn)
+
+
+class Wait(Record):
+    """Give one of `seconds`, `topic` and `node`.
+
+    `seconds` are those of the run's clock. `topic`: until it has had so many `messages` in the run, or with `new`
+    since this step began. `node`: until a node of that name is registered. After `limit_s` (without it, the
+    `first_message_s` of `until`) the run goes on without it.
+    """
+
+    seconds: StepSeconds | None = None
+    topic: str | None = None
+    messages: Annotated[int, Field(ge=1, le=MESSAGES_MAX)] = 1
+    new: bool = False
+    node: str | None = None
+    limit_s: StepSeconds | None = None
+
+
+class Action(Record):
+    """A goal for an action server (actionlib), once it listens, until its result comes.
+
+    `type` is that of the `.action` file: `lab6/Count`. `cancel_after_s` cancels the goal so long after it was sent,
+    where no result has come by then. Without a result within `limit_s`, the run goes on.
+    """
+
+    name: str
+    type: Annotated[str, Field(pattern=TYPE_PATTERN)]
+    goal: Annotated[dict[str, Any], Field(default_factory=dict)]
+    cancel_after_s: StepSeconds | None = None
+    limit_s: StepSeconds = 30.0
+
+
+class Play(Record):
+    """A recording (`.bag` or `.mcap`, 20 MB at most) beside the rubric, with its messages as they are, stamps too.
+
+    `topics` are those that are played, all but `/clock` and `/rosout` where none is given; `speed` 2 is twice as fast.
+    With `background`, the next steps begin at once. Playing begins once a node has subscribed to one of the topics.
+    """
+
+    bag: Annotated[str, Field(min_length=1)]
+    topics: tuple[str, ...] = ()
+    speed: Annotated[float, Field(gt=0, le=100)] = 1.0
+    background: bool = False
+
+
+class SetParam(Record):
+    """A parameter that is set in the middle of a run, on the parameter server."""
+
+    name: Annotated[str, Field(min_length=1)]
+    value: Any
+
+
+class Transform(Record):
+    """Where the frame `child` is in the frame `parent`, on `/tf`; with `static`, latched on `/tf_static`.
+
+    `translation` is x, y, z in metres, `rotation_deg` roll, pitch and yaw in degrees, as tf's are. Each may be a number
+    that changes, `{from: 0, to: 90}`. It is sent as `publish` sends: `rate_hz`, `count` or `duration_s`, `background`.
+    """
+
+    parent: Annotated[str, Field(min_length=1)]
+    child: Annotated[str, Field(min_length=1)]
+    translation: Annotated[tuple[Any, ...], Field(min_length=3, max_length=3)] = (0, 0, 0)
+    rotation_deg: Annotated[tuple[Any, ...], Field(min_length=3, max_length=3)] = (0, 0, 0)
+    static: bool = False
+    rate_hz: Annotated[float, Field(gt=0, le=100)] = 20.0
+    count: Annotated[int, Field(ge=1, le=MESSAGES_MAX)] | None = None
+    duration_s: StepSeconds | None = None
+    background: bool = False
+
+    @property
+    def published(self) -> Publish:
+        """The same as messages: in the place of the quaternion, `rpy_deg`."""
+        about = {
+            "header": {"stamp": "now", "frame_id": self.parent},
+            "child_frame_id": self.child,
+            "transform": {
+                "translation": dict(zip("xyz", self.translation, strict=True)),
+                "rotation": {"rpy_deg": list(self.rotation_deg)},
+            },
+        }
+        sending = self.model_dump(include={"rate_hz", "count", "duration_s", "background"})
+        return Publish(
+            topic="/tf_static" if self.static else "/tf",
+            type=TF_TYPE,
+            value={"transforms": [about]},
+            latched=self.static,
+            **sending,
+        )
+
+
+class Typed(Record):
+    """A line on the standard input of a process. Only processes that a step types to have one."""
+
+    process: Name
+    line: Annotated[str, Field(max_length=LINE_CHARS_MAX)]
+
+
+class Step(Record):
+    """One thing that the grader does in a run, after the probes, the calls and the steps before it. Give one key.
+
+    `start`, `stop` (Ctrl-C), `kill` (SIGKILL) and `restart` (stop and start) name one of the scenario's `start`. What
+    a step starts before anything else names it is not started with the others.
+
+    What it did is in the evidence (`/grader/actor`). When no student's process runs any more, and no later step starts
+    one, the steps that are left are left out.
+    """
+
+    publish: Publish | None = None
+    wait: Wait | None = None
+    call: Call | None = None
+    action: Action | None = None
+    start: Name | None = None
+    stop: Name | None = None
+    kill: Name | None = None
+    restart: Name | None = None
+    type: Typed | None = None
+    set_param: SetParam | None = None
+    transform: Transform | None = None
+    play: Play | None = None
+
+    @property
+    def published(self) -> Publish | None:
+        """What it publishes, if it does."""
+        return self.transform.published if self.transform is not None else self.publish
+
+    @property
+    def lasts_s(self) -> float:
+        """About how long it takes where all is as it should be."""
+        sent = self.published
+        if sent is not None and not sent.background:
+            return (sent.total or 0) / sent.rate_hz
+        return (self.wait.seconds or 0.0) if self.wait is not None else 0.0
+
+
 class Until(Record):
     """When a run has seen enough. All conditions that are given must hold.
 
@@ -133,6 +308,7 @@ class Until(Record):
 class Scenario(Record):
     """One run in an arena. `clock` `warped` sets `/use_sim_time` and runs `/clock` `warp` times faster.
 
+    `steps` are done one after the other; `until` is looked at once they are over, and its times count from then on.
     With `recording` in place of `start` nothing is run: it is a pattern (`*.bag`, `bags/lab3*.mcap`) for the one
     file of the submission that is judged as this run.
     """
@@ -145,12 +321,26 @@ class Scenario(Record):
     start: tuple[Start, ...] = ()
     probes: tuple[Probe, ...] = ()
     calls: tuple[Call, ...] = ()
+    steps: tuple[Step, ...] = ()
     until: Annotated[Until, Field(default_factory=lambda: Until(messages={}))]
+
+    @property
+    def started_later(self) -> frozenset[str]:
+        """The names of those that a step starts first."""
+        first: dict[str, str] = {}
+        for step in self.steps:
+            named = {"start": step.start, "": step.stop or step.kill or step.restart}
+            for kind, name in named.items():
+                first.setdefault(name or "", kind)
+        return frozenset(name for name, kind in first.items() if name and kind)
 
     @property
     def digest(self) -> str:
         """The sha256 of what is run and until when: evidence of a scenario with another one says something else."""
-        return sha256(self.model_dump_json(exclude={"title"}).encode()).hexdigest()
+        left_out = (
+            {"title"} if self.steps else {"title", "steps"}
+        )  # before there were steps, none were counted
+        return sha256(self.model_dump_json(exclude=left_out).encode()).hexdigest()
 
 
 class Criterion(Record):

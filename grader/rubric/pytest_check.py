@@ -9,7 +9,7 @@ import subprocess
 import sys
 from functools import partial
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field, ValidationError
 
@@ -227,17 +227,30 @@ class FileFault(ValueError):
     """The file is not there, or is none that may be used."""
 
 
-def read_beside(folder: Path, name: str) -> tuple[Path, bytes]:
+class Kind(NamedTuple):
+    """A kind of files that lie beside a rubric."""
+
+    what: str
+    suffixes: frozenset[str]
+    example: str
+    bytes_max: int
+
+
+PYTHON = Kind("Python file", frozenset({".py"}), "my_checks.py", MAX_BYTES)
+BAG = Kind("recording", frozenset({".bag", ".mcap"}), "bags/corridor.bag", 20 * MAX_BYTES)
+
+
+def read_beside(folder: Path, name: str, kind: Kind = PYTHON) -> tuple[Path, bytes]:
     """Return the file of that name in the rubric's folder, or below it. Raises FileFault."""
     plain = PurePosixPath(name)
-    if plain.suffix != ".py" or plain.is_absolute() or ".." in plain.parts or "\0" in name:
-        raise FileFault("must name a Python file beside the rubric, like my_checks.py")
+    if plain.suffix not in kind.suffixes or plain.is_absolute() or ".." in plain.parts or "\0" in name:
+        raise FileFault(f"must name a {kind.what} beside the rubric, like {kind.example}")
     path = folder.resolve() / plain
     try:
         with path.open("rb") as file:
-            raw = file.read(MAX_BYTES + 1)
+            raw = file.read(kind.bytes_max + 1)
     except OSError as error:
         raise FileFault(f"{name} cannot be read beside the rubric: {error.strerror}") from error
-    if len(raw) > MAX_BYTES:
-        raise FileFault(f"{name} is larger than 1 MB")
+    if len(raw) > kind.bytes_max:
+        raise FileFault(f"{name} is larger than {kind.bytes_max // 1_000_000} MB")
     return path, raw

@@ -30,7 +30,8 @@ Fault = tuple[KeyPath, str]
 class Form:
     """What a file may hold, and how messages call it.
 
-    Times are text of ISO 8601 under the keys of `times`, and faults elsewhere. With `written_keys`, a key is what is
+    Times are text of ISO 8601 under the keys of `times`, and faults elsewhere. `.inf`, `-.inf` and `.nan` are text
+    below the keys of `not_finite`, and faults elsewhere. With `written_keys`, a key is what is
     written there, also where YAML reads a number or `no`. A file that `may_be_empty` is an empty map then.
     """
 
@@ -39,11 +40,12 @@ class Form:
     bytes_max: int = 1_000_000
     nodes_max: int = 100_000
     times: frozenset[str] = frozenset()
+    not_finite: frozenset[str] = frozenset()
     written_keys: bool = False
     may_be_empty: bool = False
 
 
-RUBRIC = Form(times=frozenset({"deadline"}))
+RUBRIC = Form(times=frozenset({"deadline"}), not_finite=frozenset({"steps"}))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -280,10 +282,15 @@ class _Reader:
         if value is None or isinstance(value, bool | int | str):
             return value
         if isinstance(value, float):
-            return value if math.isfinite(value) else self._refuse(path, f"must be finite, not {node.value}")
+            return value if math.isfinite(value) else self._not_finite(path, value, node.value)
         if isinstance(value, date) and path and path[-1] in self.form.times:
             return value.isoformat()
         return self._refuse(path, f"must be text or a number: put {node.value[:40]} in quotes", node.value)
+
+    def _not_finite(self, path: KeyPath, value: float, written: str) -> Value:
+        if self.form.not_finite.isdisjoint(path):
+            return self._refuse(path, f"must be finite, not {written}")
+        return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
 
     def _refuse(self, path: KeyPath, message: str, stand_in: Value = 0.0) -> Value:
         self.faults.append((path, message))

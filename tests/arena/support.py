@@ -100,9 +100,9 @@ def repaired(place: ProcessEnvironment) -> ProcessEnvironment:
     return place
 
 
-def run(place: ProcessEnvironment, scenario: Scenario, path: Path) -> Run:
-    """Record a scenario and read it back."""
-    asyncio.run(_bounded(repaired(place), scenario, path))
+def run(place: ProcessEnvironment, scenario: Scenario, path: Path, *, beside: Path | None = None) -> Run:
+    """Record a scenario and read it back. `beside` is the rubric's folder."""
+    asyncio.run(_bounded(repaired(place), scenario, path, beside))
     return load_run(path)
 
 
@@ -120,10 +120,9 @@ def run_script(
         return run(place, scenario, tmp_path / "run.mcap")
 
 
-async def _bounded(place: ProcessEnvironment, scenario: Scenario, path: Path) -> None:
-    await asyncio.wait_for(
-        run_scenario("run", scenario, place, path=path, metadata={}, tell=lambda _: None), RUN_S
-    )
+async def _bounded(place: ProcessEnvironment, scenario: Scenario, path: Path, beside: Path | None) -> None:
+    about = {"path": path, "metadata": {}, "tell": lambda _: None, "beside": beside}
+    await asyncio.wait_for(run_scenario("run", scenario, place, **about), RUN_S)  # type: ignore[arg-type]
 
 
 def exit_of(run: Run, name: str = "node") -> object:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
+from grader.arena.process_environment import TEXT_BYTES_MAX, ProcessEnvironment
 from grader.arena.scenario import set_params
-from grader.arena.scenario_inputs import FILE_BYTES_MAX, TEXT_BYTES_MAX, _messages
+from grader.arena.scenario_inputs import FILE_BYTES_MAX
 from grader.arena.static_recorder import (
     ATTACHED_BYTES_MAX,
     ATTACHED_FILES_MAX,
@@ -62,11 +64,11 @@ def test_a_service_text_that_is_too_large_is_named(tmp_path: Path) -> None:
     folder.mkdir(parents=True)
     place = SimpleNamespace(workspace=SimpleNamespace(repaired=tmp_path), share_folders=())
     (folder / "Odd.msg").write_text("int8 x\n" * (TEXT_BYTES_MAX // 7))
-    find = _messages(place)  # type: ignore[arg-type] # as much of a place as it looks at
-    assert find("lab/Odd") is not None
+    find = partial(ProcessEnvironment.type_text, place)  # type: ignore[arg-type] # as much of a place as it looks at
+    assert find("lab/Odd", "msg") is not None
     (folder / "Odd.msg").write_text("int8 x\n" * (TEXT_BYTES_MAX // 7 + 1))
     with pytest.raises(ValueError, match=r"Odd\.msg is larger than 64 kB"):
-        find("lab/Odd")
+        find("lab/Odd", "msg")
 
 
 def test_what_is_read_is_a_regular_file_and_no_longer_than_the_limit(tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ from grader.errors import EvidenceError, GraderError, OutputError, RubricError, 
 from grader.evidence.decode import Decoder, ServiceType
 from grader.evidence.export import export_bag
 from grader.evidence.inspect import inspect_run
+from grader.evidence.message_values import MessageType
 from grader.evidence.reader import load_run, package_facts
 from grader.evidence.run import Run
 from grader.evidence.writer import EvidenceStream
@@ -261,7 +262,7 @@ def service(data: bytes) -> None:
     text, _, answer = data.partition(b"\0")
     name, _, lines = text.decode("utf-8", "replace").partition("\n")
     found = ServiceType(name, lines, lambda _: None)
-    found.encode_request({})
+    MessageType(f"{name}Request", full=found.request).encode({})
     found.decode_response(answer)
 
 

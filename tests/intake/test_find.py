@@ -122,6 +122,30 @@ def test_what_is_there_instead_is_named(files, message, hint, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("files", "message", "hint"),
+    [
+        (
+            {**tree("a:first", "b:second"), "b/src/talker.py": "x"},
+            "packages here: second, first",
+            "--package second.",
+        ),
+        (
+            {**tree("a:first", "b:second"), "a/talker.py": "x", "b/talker.py": "x"},
+            "packages here: first, second",
+            "--package NAME.",
+        ),
+        ({"week1/talker.py": "x"}, "no package.xml", "for talker.py in week1/ to go into"),
+    ],
+)
+def test_what_has_the_labs_files_is_named(files, message, hint, tmp_path):
+    wanted = Wanted(name="lab1", files=frozenset({"talker.py", "listener.py"}))
+    with pytest.raises(PackageNotFound) as caught:
+        opened(write(tmp_path / "repo", files), tmp_path, package=wanted)
+    assert message in caught.value.message
+    assert hint in caught.value.hint
+
+
+@pytest.mark.parametrize(
     "text",
     [
         manifest("lab1"),

@@ -131,6 +131,19 @@ def test_what_does_not_parse_is_told_before_anything_runs(tmp_path) -> None:
     assert talker.citations[0].column == 1
 
 
+def test_a_launch_file_whose_nodes_do_not_parse_connects_none(tmp_path) -> None:
+    node = '<node pkg="lab1" type="{0}.py" name="{0}"/>'
+    faulty = {
+        "src/talker.py": "#!/usr/bin/env python3\nwhile True\n    pass\n",
+        "src/listener.py": "#!/usr/bin/env python3\n",
+        "launch/lab1.launch": f"<launch>{node.format('talker')}{node.format('listener')}</launch>",
+    }
+    launch = early_of("leeds-comp3631-lab1", facts_of(tmp_path, **faulty))["launch"]
+    assert (launch.criterion.status, launch.final) == (Status.FAIL, False)
+    assert "starts src/talker.py, line 2: SyntaxError" in launch.criterion.message
+    assert launch.criterion.hint == "line 2: write `while True:`"
+
+
 def test_what_rests_on_something_unsettled_is_unsettled(tmp_path) -> None:
     facts = facts_of(tmp_path, **{"package.xml": "<package>", "CMakeLists.txt": "project(other)"})
     found = judge_files(rubric(CMAKE_CHECK, {**DEPENDENCIES, "requires": ["cmake"]}), facts)

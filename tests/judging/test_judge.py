@@ -172,3 +172,28 @@ def _with_function(name: str, function: Any) -> Any:
     from dataclasses import replace  # noqa: PLC0415 - beside its only use
 
     return replace(CHECKS[name], function=function)
+
+
+def test_what_else_is_wrong_with_a_node_is_no_reason_for_its_end() -> None:
+    named = {
+        "id": "node",
+        "check": "node-name",
+        "with": {"process": "talker", "names": ["talker"], "anonymous": "forbidden"},
+        "scenario": "talker",
+    }
+    lines = [
+        "Traceback (most recent call last):",
+        '  File "/ws/src/lab1/src/numeric_talker.py", line 3, in <module>',
+        "EOFError: EOF when reading a line",
+    ]
+    run = {
+        "processes": [{"name": "talker", "nodes": ["/other"], "exit_s": 0.5, "exit_code": 1}],
+        "console": [{"process": "talker", "stream": "stderr", "at_s": 0.4, "every_s": 0.001, "lines": lines}],
+        "outcome": "ended",
+    }
+    runs = build_runs({"runs": {"talker": run}, "package": PACKAGE})
+    found = {c.id: c for c in judge(rubric(named, CHATTER, RATE), runs)}
+    assert (found["node"].status.value, found["chatter"].status.value) == ("fail", "fail")
+    assert "EOFError" in found["chatter"].message
+    assert found["rate"].blocked_by == "chatter"
+    assert found["rate"].message.count("EOFError") == 1

@@ -6,11 +6,15 @@ import json
 from dataclasses import replace
 from typing import Any
 
+import pytest
+
+from grader.evidence.run import Run
 from grader.judging import judge
 from grader.judging.judge import judge_all_runs
+from grader.judging.other_runs import is_used_by
 from grader.model.repair import Repair
 from grader.model.result import CriterionResult
-from tests.judging.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, rubric
+from tests.judging.rubrics import ALL, GOOD_RUN, NODE, PACKAGE, SCENARIO, rubric
 from tests.support.timeline import build_runs
 
 DIED = {"processes": [{"name": "talker", "exit_s": 0.3, "exit_code": 1}], "outcome": "ended"}
@@ -113,3 +117,104 @@ def test_what_was_seen_once_costs_nothing() -> None:
     assert "seen once and not again" in node.message
     (node,) = judge(rubric(alone), {**runs, "repeated-1/talker": runs["talker"]})
     assert (node.status.value, node.points) == ("fail", 0)
+
+
+def test_a_missing_call_is_charged_where_no_name_is_wrong() -> None:
+    flooded = {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 500, "rate_hz": 500}]}
+    call = TABS.model_copy(update={"kind": "missing-call", "message": "rate.sleep is named but not called"})
+    found = judged(flooded, GOOD_RUN, call, TOPIC)
+    assert found["chatter"].hint == f"src/numeric_talker.py line 9: {TOPIC.fix}"
+    assert (found["rate"].status.value, found["rate"].message) == ("fail", call.message)
+
+
+def test_two_faults_of_one_criterion_are_both_its_hint() -> None:
+    quote = TABS.model_copy(update={"line": 12, "fix": "print('x')"})
+    found = judged(DIED, GOOD_RUN, TABS, quote)
+    assert found["node"].hint == (
+        "src/numeric_talker.py line 7: indent every line with four spaces; "
+        "src/numeric_talker.py line 12: print('x')"
+    )
+
+
+def test_a_private_name_is_charged_where_the_rubric_asks_for_it() -> None:
+    private = TOPIC.model_copy(update={"before": "pub = rospy.Publisher('~chatter', String)"})
+    found = judged(DIED, GOOD_RUN, TABS, private)
+    assert (found["node"].points, found["chatter"].points) == (0, 0)
+
+
+def test_what_the_arena_repairs_before_it_runs_is_charged_to_no_run() -> None:
+    mark = Repair(
+        kind="byte-order-mark", file="src/numeric_talker.py", message="a mark", fix="save it without"
+    )
+    misspelt = {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 61}]}
+    found = judged(misspelt, GOOD_RUN, mark, TOPIC)
+    assert (found["chatter"].points, found["rate"].points) == (0, 10)
+    assert found["chatter"].repaired is not None
+    assert found["chatter"].repaired.repairs == (TOPIC,)
+
+
+def test_a_line_of_the_build_costs_the_build_alone_where_scripts_are_run() -> None:
+    line = Repair(kind="build-line", file="CMakeLists.txt", line=3, message="open", fix="close it")
+    misspelt = {**GOOD_RUN, "topics": [{"topic": "/chater", "count": 61}]}
+    found = judged(misspelt, GOOD_RUN, line, TOPIC)
+    assert (found["chatter"].points, found["rate"].points) == (0, 10)
+
+
+def test_a_line_that_is_missing_is_added_below_its_neighbour() -> None:
+    spin = TABS.model_copy(
+        update={"before": "import rospy", "after": "import rospy\nimport sys", "fix": "import sys"}
+    )
+    assert judged(DIED, GOOD_RUN, spin)["node"].hint == "src/numeric_talker.py: below line 7 add import sys"
+
+
+def test_a_criterion_that_passes_on_the_copy_needs_no_hint() -> None:
+    found = judged(DIED, GOOD_RUN, TABS)
+    assert (found["rate"].status.value, found["rate"].hint) == ("partial", "")
+
+
+def test_a_build_that_the_manifest_blocks_is_judged_on_the_copy() -> None:
+    tag = Repair(
+        kind="manifest-line",
+        file="package.xml",
+        line=5,
+        before="<description>x",
+        after="<description>x</description>",
+        message="<description> is never closed",
+        fix="<description>x</description>",
+    )
+    asked = rubric(
+        {"id": "manifest", "check": "manifest", "with": {"name": "lab1"}},
+        {"id": "build", "check": "build", "requires": ["manifest"]},
+    )
+    fault = {"line": 9, "kind": "XMLSyntaxError", "message": "tag", "cause": "`<description>` is still open"}
+    runs = built({"manifest": None, "manifest_fault": fault}, exit_code=1)
+    assert [c.status.value for c in judge(asked, runs)] == ["fail", "blocked"]
+    copy = built({"manifest": {}}, exit_code=0)["package"]
+    about = {**copy.metadata, "repairs": json.dumps([tag.model_dump()])}
+    manifest, build = judge(asked, {**runs, "repaired-1/package": replace(copy, metadata=about)})
+    assert (manifest.points, manifest.hint) == (0, f"package.xml line 5: {tag.fix}")
+    assert (build.status.value, build.points, build.hint) == ("partial", 5, "")
+
+
+def built(package: dict[str, Any], *, exit_code: int) -> dict[str, Run]:
+    made = {"name": "catkin_make", "role": "build", "exit_s": 3, "exit_code": exit_code}
+    return build_runs({"runs": {"package": {"package": package, "processes": [made]}}})
+
+
+@pytest.mark.parametrize(
+    ("file", "runs"),
+    [
+        ("src/numeric_talker.py", {"talker", "lab", "other"}),
+        ("src/helper.py", {"talker", "lab", "other"}),
+        ("launch/lab.launch", {"lab"}),
+        ("launch/included.launch", {"lab", "other"}),
+    ],
+)
+def test_a_repair_concerns_the_runs_that_use_its_file(file: str, runs: set[str]) -> None:
+    launched = {
+        name: {**SCENARIO, "start": [{"name": "all", "launch": f"{name}.launch"}]}
+        for name in ("lab", "other")
+    }
+    asked = rubric(*ALL, scenarios={"talker": SCENARIO, **launched})
+    name = Repair(kind="node-name", file=file, line=1, before="a", after="b", message="m", fix="b")
+    assert {s for s, one in asked.scenarios.items() if is_used_by(one, name, asked, built=True)} == runs

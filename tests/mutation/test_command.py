@@ -35,8 +35,10 @@ class Judge:
         for job in jobs:
             begun(job.name)
             lost = self.instead.get(job.name, self.declared.get(job.name, {}))
-            says = declared(LAB)[job.name].says if job.name in declared(LAB) else {}
-            yield Graded(name=job.name, result=result(criteria=self.criteria(lost, says), points=100))
+            mutant = declared(LAB).get(job.name)
+            criteria = self.criteria(lost, mutant.says if mutant else {})
+            points = (mutant.points if mutant else None) or 100
+            yield Graded(name=job.name, result=result(criteria=criteria, points=points))
 
     def criteria(self, lost: dict[str, str], says: dict[str, tuple[str, ...]]):
         return tuple(

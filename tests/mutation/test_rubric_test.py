@@ -252,12 +252,14 @@ def test_a_person_gives_no_points_away():
         ({"says": {"a": ("flooded",)}}, ("a does not say 'flooded': too fast use rospy.rate(1)",)),
         ({"never_says": ("rospy.Rate",)}, ("a says 'rospy.Rate': too fast use rospy.rate(1)",)),
         ({"never_says": {"b": ("rospy.Rate",)}}, ()),
+        ({"points": 92.5}, ()),
+        ({"points": 95}, ("it gets 92.5 points, not 95",)),
     ],
 )
 def test_words_of_the_report_are_compared(words, differing):
     mutant = Mutant.model_validate({"edits": ({"crlf": {"file": "x"}},), "expect": {"a": "fail"}, **words})
     (found,) = criteria(a="fail")
     found = found.model_copy(update={"message": "Too fast", "measured": "", "hint": "use rospy.Rate(1)"})
-    compared = Comparison(state="killed").with_words(mutant, [found])
+    compared = Comparison(state="killed").with_words(mutant, result(criteria=(found,), points=92.5))
     assert compared.differing == differing
     assert compared.state == ("differs" if differing else "killed")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from grader.checks.support.exit_causes import syntax_hint
 from grader.package.python import cause_of, check_syntax, read_syntax_report
 
 # Each text, the line of its fault, and words of its cause; all hold under Python 3.8 as under the newest.
@@ -170,3 +171,23 @@ def test_foreign_lines_are_passed_over():
 
 def test_a_message_that_says_enough_has_no_cause():
     assert cause_of("invalid syntax", "x = a ? b") == ""
+
+
+@pytest.mark.parametrize(
+    ("source", "hint"),
+    [
+        ("x = \u2018numbers\u2019", "line 1: write `x = 'numbers'`"),
+        ("x = \u2018it's\u2019", "line 1: type a plain '"),
+        ("x =\u00a01", "line 1: write `x = 1`"),
+        ("print x, y", "line 1: write `print(x, y)`"),
+        ("print x  # twice", "line 1: `print` needs brackets, `print(...)`"),
+        ("while True", "line 1: write `while True:`"),
+        ("if x = 1:\n    pass", "line 1: write `if x == 1:`"),
+        ("try:\n    pass\nexcept IOError, e:\n    pass", "line 3: write `except IOError as e:`"),
+        ("x = (1,\ny = 2\n", "line 1: write `)` at the end of what is opened there"),
+        ("<<<<<<< HEAD", "line 1: keep one version"),
+    ],
+)
+def test_the_hint_names_the_repair_where_the_cause_is_known(tmp_path, source, hint):
+    (tmp_path / "a.py").write_text(source)
+    assert syntax_hint(check_syntax(tmp_path, ["a.py"]).faults["a.py"]) == hint

@@ -14,14 +14,12 @@ import pytest
 from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.package_tree import Tree, read_tree, write_tree
 from grader.authoring.mutation.solution import Solution
-from grader.model.package import PackageFacts
 from grader.model.repair import BY_HAND, DEFAULT_SHARES, KINDS
-from grader.model.submission import SourcePackage
-from grader.package import read_package
 from grader.package.repairs import NotRepairable, Repair, Wanted, apply_repair, find_repairs, wanted_of
 from grader.package.repairs.wanted import is_near, is_one_edit
 from grader.rubric.find import rubric_ids
 from grader.rubric.load import load_rubric
+from tests.package.trees import facts_of, plain
 
 SOLUTIONS = Path(__file__).parents[2] / "reference_solutions"
 TURTLE = str(Path(__file__).parents[2] / "rubrics" / "examples" / "turtle-square.yaml")
@@ -74,14 +72,6 @@ FILES = {
     "CMakeLists.txt": CMAKE,
     "launch/lab.launch": LAUNCH,
 }
-
-
-def facts_of(folder: Path, name: str = "lab") -> PackageFacts:
-    files = [path for path in folder.rglob("*") if path.is_file() and not path.is_symlink()]
-    modes = {p.relative_to(folder).as_posix(): bool(p.stat().st_mode & 0o100) for p in files}
-    return read_package(
-        SourcePackage(name=name, folder=folder, path=folder.name, mode_source="disk", executable=modes)
-    )
 
 
 def package(folder: Path, changes: dict[str, str | bytes | None] | None = None) -> Path:
@@ -377,13 +367,6 @@ FOREIGN = ("launch-type-without-py", "launch-pkg-misspelt")
 """Operators that also change the node of another package, of which this package knows nothing."""
 
 
-def plain(path: str, data: bytes) -> str:
-    if path.endswith(".py"):
-        return ast.dump(ast.parse(data))
-    lines = data.decode().split("\n")
-    return "".join("".join(line for line in lines if not line.startswith("#!")).split())
-
-
 def assert_repaired(operator: str, lab: str, folder: Path) -> int:
     tree, wanted, name = solution_of(lab)
     solution = Solution(tree=tree, folder="", name=name)
@@ -536,3 +519,17 @@ def test_a_hostile_source_costs_its_own_repairs(source: str, tmp_path: Path) -> 
     found = [repair for repair in repair_all(folder) if repair.file == TALKER]
     assert [repair.kind for repair in found] == ["topic-name"]
     assert (folder / "src" / "talker.py").read_text() == SCRIPT
+
+
+def test_a_renamed_launch_file_is_repaired_further(tmp_path: Path) -> None:
+    """By its old path, and a package's wrong name is one repair however often it stands in the file."""
+    nodes = LAUNCH.replace("</launch>", LAUNCH.splitlines()[1].replace("talker", "listener") + "\n</launch>")
+    wrong: dict[str, str | bytes | None] = {
+        "launch/lab.launch": None,
+        "launch/la_b.launch": nodes.replace('pkg="lab"', 'pkg="laab"'),
+    }
+    folder = package(tmp_path, wrong)
+    found = repair_all(folder, WANTED.model_copy(update={"launch_files": ("lab.launch",)}))
+    assert [one.kind for one in found] == ["file-name", "package-name"]
+    assert found[1].fix == 'write pkg="lab" for pkg="laab"'
+    assert (folder / "launch" / "lab.launch").read_text() == nodes

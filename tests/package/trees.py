@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 from typing import Any
 
+from grader.model.package import PackageFacts
 from grader.model.submission import ModeSource, SourcePackage
+from grader.package import read_package
 
 MANIFEST = """<?xml version="1.0"?>
 <package format="2">
@@ -38,3 +41,20 @@ def make_package(folder: Path, files: dict[str, bytes | str], **fields: Any) -> 
     return SourcePackage(
         name="lab1", folder=folder, path=fields.pop("path", "lab1"), mode_source=source, executable=modes
     )
+
+
+def facts_of(folder: Path, name: str = "lab") -> PackageFacts:
+    """What the files of a package on this disk say."""
+    files = [path for path in folder.rglob("*") if path.is_file() and not path.is_symlink()]
+    modes = {p.relative_to(folder).as_posix(): bool(p.stat().st_mode & 0o100) for p in files}
+    return read_package(
+        SourcePackage(name=name, folder=folder, path=folder.name, mode_source="disk", executable=modes)
+    )
+
+
+def plain(path: str, data: bytes) -> str:
+    """The file without what a repair may change: space, quotes and the shebang."""
+    if path.endswith(".py"):
+        return ast.dump(ast.parse(data))
+    lines = data.decode().split("\n")
+    return "".join("".join(line for line in lines if not line.startswith("#!")).split())

@@ -129,7 +129,7 @@ def test_three_faults_are_all_named_with_file_and_line(tmp_path):
         (
             "window_s: 5",
             "heard: true",
-            "11: scenarios.real.until.heard: needs probes: there is nothing to hear",
+            "11: scenarios.real.until.heard: needs probes or steps that publish: there is nothing to hear",
         ),
         (
             "window_s: 5",

@@ -152,19 +152,28 @@ class Arena:
         return sum(process.cpu_used_s() for process in list(self._students))
 
     def _interrupt(self, command):
-        if command["name"] not in self._processes:
+        process, action = self._processes.get(command["name"]), command["action"]
+        if process is None:
             return
-        self._wire.event(
-            "/grader/actor", {"action": "interrupt", "actor": "grader", "detail": command["name"]}
-        )
-        self._processes[command["name"]].stop(command["int_s"], command["term_s"])
+        self._wire.event("/grader/actor", {"action": action, "actor": "grader", "detail": process.name})
+        if action == "kill":
+            process.kill()
+        else:
+            process.stop(command["int_s"], command["term_s"])
+
+    def _type(self, command):
+        process = self._processes.get(command["name"])
+        if process is not None:
+            self._wire.event("/grader/actor", command["record"])
+            process.type(base64.b64decode(command["data"]))
 
     def _advertise(self, command):
         self._actor.advertise(self._master, command["fields"])
 
     def _publish(self, command):
         self._actor.publish(command["topic"], base64.b64decode(command["data"]))
-        self._wire.event("/grader/actor", command["record"])
+        if command["record"]:
+            self._wire.event("/grader/actor", command["record"])
 
     def _set_param(self, command):
         self._master.setParam(self._actor.caller_id, command["name"], command["value"])

@@ -50,7 +50,7 @@ def launch(spec, stage, groups):
         walled = [spec["bwrap"], "--args", str(fds["args"]), "--"] if gate is not None else []
         popen = subprocess.Popen(
             [*spec["outer"], *walled, *shell],
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE if spec["stdin"] else subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             env=HOST_ENV,

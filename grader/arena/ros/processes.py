@@ -19,7 +19,7 @@ PIPE_READS = 16
 
 class Process:
     """One process tree. `spec` is made by `ProcessEnvironment.spec` (arena/process_environment.py): name,
-    role, argv, env, outer, bwrap, wall, filter, shell, collect, script, repairs.
+    role, argv, env, outer, bwrap, wall, filter, shell, collect, script, repairs, stdin (whether it has one).
 
     `collect` names a file for what the process writes to `{collect}`, and how many bytes of it are taken.
     """
@@ -68,6 +68,16 @@ class Process:
                 with contextlib.suppress(ProcessLookupError, PermissionError):  # already over
                     os.killpg(self.pid, signal.SIGKILL)
 
+    def type(self, data):
+        """Write to its standard input. What a full pipe does not take is lost, and noted."""
+        try:
+            written = os.write(self._popen.stdin.fileno(), data) if self._popen.stdin else 0
+        except OSError:  # it reads no more, or the pipe is full
+            written = 0
+        if written < len(data):
+            detail = "did not take what was typed: it reads no standard input"
+            self._wire.event("/grader/actor", {"action": "note", "actor": self.name, "detail": detail})
+
     def reap(self):
         """Take the exit status if there is one; tell it once the last output is read.
 
@@ -106,6 +116,8 @@ class Process:
         self.pid = self._popen.pid
         if launched.info is not None:
             self._read_info(launched.info)
+        if self._popen.stdin:
+            os.set_blocking(self._popen.stdin.fileno(), False)
         self._give_leave(launched.lifeline)
         for name, pipe in (("stdout", self._popen.stdout), ("stderr", self._popen.stderr)):
             self._open_streams += 1
@@ -265,6 +277,9 @@ class Process:
         if not self.alive:
             return
         self.alive = False
+        if self._popen.stdin:
+            with contextlib.suppress(OSError):  # nothing is buffered
+                self._popen.stdin.close()
         if self._collected is not None:
             self._collected.close()
         if self._groups is not None:

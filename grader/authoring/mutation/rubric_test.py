@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import time
 from collections.abc import Callable, Collection, Generator, Iterable, Mapping, Sequence
@@ -21,6 +22,7 @@ from grader.model.result import CriterionResult, GradingResult, RubricInfo
 from grader.model.sandbox_mode import SandboxMode
 from grader.model.verdict import Status
 from grader.rubric.load import LoadedRubric
+from grader.wording import number
 
 REFERENCE = "reference"
 SOURCE = "source"
@@ -154,8 +156,8 @@ def _judge_mutant(
 ) -> MutantResult:
     criteria = graded.result.criteria if graded.result else ()
     compared = compare(mutant.costs, criteria, ignored) if graded.result else Comparison(state="error")
-    if compared.state in {"killed", "differs"}:
-        compared = compared.with_words(mutant.mutant, criteria)
+    if graded.result is not None and compared.state in {"killed", "differs"}:
+        compared = compared.with_words(mutant.mutant, graded.result)
     return MutantResult(
         name=mutant.name,
         label=mutant.label,
@@ -225,9 +227,11 @@ class Comparison:
     surplus: tuple[str, ...] = ()
     differing: tuple[str, ...] = ()
 
-    def with_words(self, mutant: Mutant, criteria: Sequence[CriterionResult]) -> Comparison:
-        """Return the same with the words that the report should have used, or should not."""
-        words = [line for criterion in criteria for line in mutant.wrong_words(criterion)]
+    def with_words(self, mutant: Mutant, result: GradingResult) -> Comparison:
+        """Return the same with the words that the report should have used, or should not, and with other points."""
+        words = [line for criterion in result.criteria for line in mutant.wrong_words(criterion)]
+        if mutant.points is not None and not math.isclose(mutant.points, result.points):
+            words.append(f"it gets {number(result.points)} points, not {number(mutant.points)}")
         return replace(self, state="differs", differing=(*self.differing, *words)) if words else self
 
 

@@ -16,6 +16,7 @@ from grader.model.verdict import FileCitation
 
 ALWAYS_THERE = ("catkin", "rospy", "roscpp", "std_msgs")
 ONE_EDIT = 0.88
+UNKNOWN_COMMAND = "Unknown CMake command"
 FIRST_ERROR_HINT = "run catkin_make in a fresh clone and fix the first error that it prints"
 _CMAKE_ERROR = re.compile(
     r"^CMake Error(?: at (?P<file>[^:()]+):(?P<line>\d+) \((?P<call>\w+)\))?:?\s*(?P<text>.*)"
@@ -143,6 +144,38 @@ def _missing_folder(found: re.Match[str], _package: PackageFacts, _lines: Sequen
     return Explained(why, f"put your .{folder} files into {folder}/ and push them, or take {call}(…) out")
 
 
+def _missing_include(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    folder = found[1].rstrip("/")
+    why = f"catkin_package(…) names the folder {folder}/, which is not in the package"
+    hint = f"take INCLUDE_DIRS {folder} out: it is for header files of C++; or put them into {folder}/ and push them"
+    return Explained(why, hint)
+
+
+def _missing_launch(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    return _missing_file(_below(found[1], package), package, f"roslaunch_add_file_check(…) names {found[1]}")
+
+
+def _missing_source(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    return _missing_file(found[1], package, f"a target is made of {found[1]}")
+
+
+def _message_of_another(found: re.Match[str], _package: PackageFacts, lines: Sequence[str]) -> Explained:
+    words = " ".join(word for line in lines for word in line.split())
+    named = re.search(r"Cannot locate message \[(\w+)\]: unknown package \[(\w+)\]", words)
+    message = posixpath.basename(found[1])
+    if named is None:
+        why = f"{message} needs messages that generate_messages(DEPENDENCIES …) does not name"
+        return Explained(why, FIRST_ERROR_HINT)
+    why = f"{message} has a field of the type {named[2]}/{named[1]}, and generate_messages(…) does not name {named[2]}"
+    return Explained(why, f"write {named[2]} after DEPENDENCIES, and in find_package(…) and package.xml")
+
+
+def _before_catkin_package(found: re.Match[str], _package: PackageFacts, _lines: Sequence[str]) -> Explained:
+    return Explained(
+        f"{found[1]}() is called after catkin_package()", f"move {found[1]}(…) above catkin_package(…)"
+    )
+
+
 def _missing_message(found: re.Match[str], package: PackageFacts, _lines: Sequence[str]) -> Explained:
     path = _below(found[1], package)
     return _missing_file(path, package, f"add_{found[2]}_files(…) names {path}")
@@ -221,6 +254,11 @@ _EXPLAINED: tuple[tuple[str, Callable[[re.Match[str], PackageFacts, Sequence[str
         _missing_message,
     ),
     (r"catkin_install_python\(\) called with non-existing file '([^']+)'", _missing_script),
+    (r"catkin_package\(\)(?: absolute)? include dir '([^']+)' does not exist", _missing_include),
+    (r"roslaunch_add_file_check\(\) path '([^']+)' was not found", _missing_launch),
+    (r"Cannot find source file: (\S+)", _missing_source),
+    (r"Could not find messages which '([^']+)' depends on", _message_of_another),
+    (r"(generate_messages)\(\) must be called before catkin_package\(\)", _before_catkin_package),
     (r"does not contain a CMakeLists\.txt", _no_cmake_lists),
     (r'dependency target "([^"]+)" of target "([^"]+)" does not exist', _missing_dependency),
     (r'dependencies to non-existent target "([^"]+)"', _missing_target),

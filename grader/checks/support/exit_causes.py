@@ -9,16 +9,20 @@ from typing import NamedTuple
 
 from grader.checks.support.processes import Life, early_end, lives
 from grader.checks.support.scripts import path_in_package
-from grader.checks.support.text import shown
+from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
-from grader.installable import install_hint, known_packages
-from grader.model.package import PackageFacts
+from grader.installable import install_hint, known_messages, known_packages
+from grader.model.package import Fault, PackageFacts
 from grader.model.verdict import FileCitation, Verdict, inconclusive
-from grader.wording import seconds
+from grader.wording import join_words, seconds
 
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
 RACE = "publish() to a closed topic"
+ROS_2 = {"rclpy", "rclcpp", "ament_index_python", "launch_ros", "ros2cli", "rosidl_runtime_py"}
+ARGUMENT_HINT = (
+    "give the value in the code, or take a default where `len(sys.argv)` is 1: a lab starts it by its name"
+)
 LIMITS = ("limit", "note")  # evidence of earlier versions has it as a note
 CAUSES = {
     "EOFError": ("it asks for input (`input()`), and a node is given none", "remove `input()`: a node runs by itself"),
@@ -30,11 +34,12 @@ CAUSES = {
      "loop with `while not rospy.is_shutdown():` and sleep with `rospy.Rate`"),
     "ModuleNotFoundError": ("", "check the spelling of the import; a message package is imported as `std_msgs.msg`"),
     "ImportError": ("", "check the spelling of the import: the message types are at http://wiki.ros.org/std_msgs"),
+    "ResourceNotFound": ("there is no such ROS package", "remove `roslib.load_manifest(…)`: catkin needs no such line"),
     "NameError": ("", "check the spelling, and that it is imported or assigned before it is used"),
     "ROSSerializationException": ("", "publish a value that fits the message's type"),
     "SerializationError": ("", "publish a value that fits the message's type"),
     "SyntaxError": ("", "fix that line, or the one above it"),
-    "IndentationError": ("", "indent every line with four spaces"),
+    "IndentationError": ("", "indent every block by four spaces, and all lines of a block alike"),
     "TabError": ("tabs and spaces are mixed in its indentation", "indent every line with four spaces"),
 }  # fmt: skip
 # what rospy says of a slip that its exception's class does not tell of
@@ -52,10 +57,21 @@ SLIPS = {
      "the message gets a different number of values than it has fields",
      'one value for each field; put a number into text with `%`: `publish("… %s" % value)`, not by a comma'),
 }  # fmt: skip
+# of a line that Python cannot parse: what its cause speaks of, and how the line is written instead
+_REWRITES = (
+    ("typographic quote|no-break space|special space",
+     ((r"[\u2018-\u201b]", "'"), (r"[\u201c-\u201f]", '"'), (r"[\u00a0\u2000-\u200a\u202f\u3000]", " "))),
+    ("`print` needs brackets", ((r"^(\s*)print\s+([^>(\s].*[^,\s])\s*$", r"\1print(\2)"),)),
+    ("`except Error as name:`", ((r"^(\s*except\s+[\w.]+)\s*,\s*(\w+\s*:)", r"\1 as \2"),)),
+    ("a colon `:` is missing", ((r"\s*$", ":"),)),
+    ("to compare, write `==`", ((r"(?<![=!<>])=(?!=)", "=="),)),
+    ("`elif`, not `else if`", ((r"\belse\s+if\b", "elif"),)),
+)  # fmt: skip
 _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
 _NO_MODULE = re.compile(r"No module named '(\w+)'$")
+_NO_TYPE = re.compile(r"cannot import name '(\w+)' from '(\w+)\.msg'")
 HEADING = "Traceback (most recent call last):"
 _FRAME = re.compile(r'^\s+File "([^"]+)", line (\d+)')
 _LAST = re.compile(r"^([A-Za-z_][\w.]*)(?:: ?(.*))?$")
@@ -63,8 +79,11 @@ _LIBRARY = ("/dist-packages/", "/site-packages/", "/usr/lib/python", "<frozen", 
 
 
 class Frame(NamedTuple):
+    """A line of a file, and its source where Python printed it."""
+
     file: str
     line: int
+    source: str = ""
 
     @property
     def in_library(self) -> bool:
@@ -91,6 +110,29 @@ class Traceback(NamedTuple):
         return tuple(f for f in self.frames if not f.in_library)
 
 
+def syntax_hint(fault: Fault) -> str:
+    """Return how to repair a file that Python cannot parse: the line as it has to be where that is known."""
+    where = f"line {fault.line}: " if fault.line else ""
+    if bracket := re.match(r"the bracket `(.)`|(a bracket)", fault.cause):
+        closing = {"(": "`)`", "[": "`]`", "{": "`}`"}.get(bracket[1], "the bracket that closes it")
+        return f"{where}write {closing} at the end of what is opened there"
+    if right := _rewritten(fault):
+        return f"{where}write `{shown(right)}`"
+    return fault.fix or CAUSES.get(fault.kind, ("", "save the file as plain UTF-8 text"))[1]
+
+
+def _rewritten(fault: Fault) -> str:
+    """Return the faulty line put right; "" where that is not sure, as beside a comment or a text with other quotes."""
+    source = fault.source.strip()
+    rules = next((rules for told, rules in _REWRITES if re.search(told, fault.cause)), ())
+    if "#" in source or ";" in source or (re.search("['\"]", source) and "quote" in fault.cause):
+        return ""
+    right = source
+    for pattern, new in rules:
+        right = re.sub(pattern, new, right, count=0 if len(rules) > 1 else 1)
+    return right if right != source else ""
+
+
 def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
     """Return every traceback, also the bare `File …` form of a syntax error. One that was cut short is left out."""
     found: list[Traceback] = []
@@ -104,6 +146,8 @@ def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
         elif frame and (first is not None or bare[index]):
             first = index if first is None else first
             frames.append(Frame(frame[1], int(frame[2])))
+        elif frames and not frames[-1].source and line.startswith("    "):
+            frames[-1] = frames[-1]._replace(source=line.strip())
         elif first is not None and line and not line[0].isspace():
             last = _LAST.match(line)
             if last:
@@ -140,7 +184,8 @@ class Ending(NamedTuple):
         """Return a verdict of this kind (`failed`, `unjudged`) with the ending's hint and citations, or
         `inconclusive` where the machine is at fault."""
         kind = inconclusive if self.of_machine else kind
-        return kind(message, measured=measured, hint=self.hint, citations=self.citations)
+        verdict = kind(message, measured=measured, hint=self.hint, citations=self.citations)
+        return verdict.model_copy(update={"cause": self.cause})
 
 
 def explain_early_end(package: PackageFacts, run: Run) -> Ending | None:
@@ -175,7 +220,11 @@ def _explained(life: Life, run: Run, package: PackageFacts) -> Ending:
 
 def explain_error(package: PackageFacts, run: Run) -> Ending | None:
     """Return the last traceback of the student's processes before Ctrl-C; None where there is none."""
-    found = [t for one in lives(run) for t in process_tracebacks(run, one.name, before_ns=one.interrupt_ns)]
+    found = [
+        t
+        for one in lives(run)
+        for t in process_tracebacks(run, one.name, after_ns=one.start_ns, before_ns=one.interrupt_ns)
+    ]
     return explain_traceback(found[-1], package) if found else None
 
 
@@ -202,7 +251,7 @@ def _refused_name(life: Life, run: Run) -> Ending | None:
 def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     """One traceback, with the line of the student's own file where it names one."""
     place = _place(found, package)
-    slip = next((known for said, known in SLIPS.items() if said in found.message), None)
+    slip = _slip(found)
     cause, hint = slip or CAUSES.get(found.kind, ("", "fix the line that is named"))
     if lacking := _lacking(found, package):
         where = f" ({place.file}, line {place.line})" if place else ""
@@ -211,18 +260,47 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     source = package.file(place.file) if place and found.kind in SYNTAX else None
     if place is not None and source is not None and source.python_fault is not None:
         cause = source.python_fault.cause or cause
-        place = source.python_fault.place if source.python_fault.line == place.line else place
+        hint = syntax_hint(source.python_fault)
+        place = source.python_fault.place
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(found.text)}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else ())
 
 
+def _slip(found: Traceback) -> tuple[str, str] | None:
+    """Return the cause and the hint of a known slip, by what was said, by the module and by the line itself."""
+    if known := next((known for said, known in SLIPS.items() if said in found.message), None):
+        return known
+    if wrong := _NO_TYPE.match(found.message):
+        return _other_types(wrong[1], wrong[2])
+    module = _NO_MODULE.search(found.message)
+    if module and module[1] in ROS_2:
+        return f"{module[1]} is of ROS 2", "this lab is for ROS 1: write the node with rospy"
+    source = found.own_frames[-1].source if found.own_frames else ""
+    if found.kind == "IndexError" and "argv" in source:
+        return "it reads an argument of the command line, and is started without any", ARGUMENT_HINT
+    return None
+
+
+def _other_types(name: str, package: str) -> tuple[str, str] | None:
+    """Return which packages of ROS have the message, or what the one that was asked has that is spelt alike."""
+    pairs = [one.split("/") for one in known_messages()]
+    having = [other for other, message in pairs if message == name]
+    near = near_names(name, [message for other, message in pairs if other == package])
+    if having:
+        lines = join_words([f"from {other}.msg import {name}" for other in having], "or")
+        return f"{package} has no {name}, {join_words(having)} has", lines
+    return (f"{package} has {near[0]}", f"from {package}.msg import {near[0]}") if near else None
+
+
 def _lacking(found: Traceback, package: PackageFacts) -> str:
     """Return the module that exists and that this machine lacks; "" for a name that is the student's own affair."""
     match = _NO_MODULE.search(found.message) if found.kind == "ModuleNotFoundError" else None
-    name = match[1] if match else ""
+    # roslib.load_manifest, which rosbuild needed, asks for the ROS package itself
+    name = found.message if found.kind == "ResourceNotFound" else match[1] if match else ""
     own = {package.name, *(f.path.rpartition("/")[2].removesuffix(".py") for f in package.files)}
-    return name if name in known_packages() and name not in own else ""
+    declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
+    return name if name not in own and (name in known_packages() or name in declared) else ""
 
 
 def process_tracebacks(

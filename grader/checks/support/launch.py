@@ -7,12 +7,19 @@ from collections.abc import Iterable, Iterator
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from grader.checks.support.exit_causes import CAUSES, explain_traceback, process_tracebacks
+from grader.checks.support.exit_causes import explain_traceback, process_tracebacks, syntax_hint
 from grader.checks.support.processes import lives, observed_until_ns
-from grader.checks.support.scripts import chmod_hint, cmake_calls, find_script, paths_by_name
+from grader.checks.support.scripts import (
+    add_hint,
+    can_be_moved,
+    chmod_hint,
+    cmake_calls,
+    find_script,
+    paths_by_name,
+)
 from grader.checks.support.text import bare, near_names, shown
 from grader.evidence.run import Run
-from grader.model.package import LaunchFile, LaunchNode, PackageFacts
+from grader.model.package import LaunchFile, LaunchNode, PackageFacts, SourceFile
 from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, unjudged
 from grader.wording import join_words
 
@@ -96,14 +103,15 @@ def _unreadable(package: PackageFacts, file: LaunchFile | None, launch: str) -> 
         near = [names[n] for n in near_names(launch, names)]
         seen = f"; there is {join_words(dict.fromkeys([*near, *others]))}" if near or others else ""
         message = f"{launch} is not in the package{seen}"
-        hint = f"put it at launch/{launch}, then git add, commit and push it"
+        movable = [p for p in near if can_be_moved(p, launch)]
+        hint = f"git mv {movable[0]} launch/{launch}" if movable else add_hint(f"launch/{launch}")
         cited = tuple(FileCitation(file=p) for p in (near or others)[:3])
         return failed(message, hint=hint, citations=cited or (FileCitation(file="package.xml"),))
     if file.fault is None:
         return None
     line = f", line {file.fault.line}" if file.fault.line else ""
     message = f"{file.path}{line} is not well-formed: {file.fault.cause or file.fault.message}"
-    hint = "close every element, and begin with <launch> and end with </launch>"
+    hint = file.fault.fix or "close every element, and begin with <launch> and end with </launch>"
     return failed(message, hint=hint, citations=(file.fault.place,))
 
 
@@ -140,8 +148,8 @@ def node_slip(package: PackageFacts, node: LaunchNode, said: str = "") -> Slip |
         return None if has_program(package, name) else _no_program(package, node)
     if near_names(package.name, [pkg]) or f"[{pkg}/{name}]" in said or _folder(package) == pkg:
         slip = _slip(node, f"there is no {name} in a package {pkg}", f'write pkg="{package.name}"')
-        # Where the launch file has the folder's name and the manifest another one, the manifest is at fault.
-        return slip._replace(of_manifest=_folder(package) == pkg)
+        # Where the launch file has the name of the folder or of project(…), the manifest is at fault.
+        return slip._replace(of_manifest=pkg in {_folder(package), *_projects(package)})
     return None
 
 
@@ -217,6 +225,10 @@ def _folder(package: PackageFacts) -> str:
     """The folder's name where it is not the package's."""
     name = PurePosixPath(package.path).name
     return name if name != package.name else ""
+
+
+def _projects(package: PackageFacts) -> set[str]:
+    return {call.args[0] for call in cmake_calls(package, "project") if call.args}
 
 
 def _slip(node: LaunchNode, why: str, fix: str) -> Slip:
@@ -305,16 +317,28 @@ def why_not_up(package: PackageFacts, run: Run, node: LaunchNode) -> Absence:
     )
 
 
+def own_script(package: PackageFacts, node: LaunchNode) -> SourceFile | None:
+    """Return the file of the package that the node runs."""
+    return find_script(package, str(node.type)) if node.pkg == package.name else None
+
+
+def not_executable(*paths: str) -> Absence:
+    """Return the absence of nodes whose scripts lack the executable bit."""
+    has, them = ("has", "it") if len(paths) == 1 else ("have", "them")
+    why = f"{join_words(paths)} {has} no executable bit, so that roslaunch does not find {them}"
+    return Absence(why, chmod_hint(*paths), True, tuple(FileCitation(file=path) for path in paths))
+
+
 def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | None:
     """Its traceback where it was printed, or what roslaunch says of its end."""
     code = died(run, node)
     if code is None:
         return None
-    script = find_script(package, str(node.type)) if node.pkg == package.name else None
+    script = own_script(package, node)
     found = [
         t
         for one in lives(run)
-        for t in process_tracebacks(run, one.name, before_ns=one.interrupt_ns)
+        for t in process_tracebacks(run, one.name, after_ns=one.start_ns, before_ns=one.interrupt_ns)
         if script is None
         or any(PurePosixPath(f.file).name == PurePosixPath(script.path).name for f in t.frames)
     ]
@@ -323,10 +347,8 @@ def why_died(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | Non
         return Absence(f"it died: {end.cause}", end.hint, True, end.citations, end.of_machine)
     if script is not None and script.python_fault is not None:
         fault = script.python_fault
-        hint = CAUSES.get(fault.kind, ("", "fix that line"))[1]
-        return Absence(
-            f"it died: {fault.kind}: {fault.message}", hint, of_script=True, citations=(fault.place,)
-        )
+        why = f"it died: {fault.kind}: {fault.cause or fault.message}"
+        return Absence(why, syntax_hint(fault), of_script=True, citations=(fault.place,))
     hint = 'write output="screen" into the <node>, and read what it prints last'
     return Absence(f"it died with exit code {code}", hint, of_script=True)
 
@@ -350,11 +372,8 @@ def _not_found(package: PackageFacts, run: Run, node: LaunchNode) -> Absence | N
     line = next((text for text in _lines(run) if mark in text), None)
     if line is None:
         return None
-    script = find_script(package, str(node.type)) if node.pkg == package.name else None
-    if script is not None and script.executable is False:
-        why = f"{script.path} has no executable bit, so that roslaunch does not find it"
-        cited = (FileCitation(file=script.path),)
-        return Absence(why, chmod_hint(script.path), of_script=True, citations=cited)
+    if (script := own_script(package, node)) and script.executable is False:
+        return not_executable(script.path)
     if "Cannot locate" not in line:
         return Absence(
             f"there is no package {node.pkg}", "check the spelling of pkg, and that it is installed"

@@ -6,6 +6,7 @@ signal handler then waits for a lock that the interrupted call holds.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from grader.evidence.events import ProcessEvent
@@ -13,6 +14,7 @@ from grader.evidence.run import Run
 from grader.model.verdict import Verdict, unjudged
 
 NO_SCRIPT_HINT = "add the script to the package, and push it"
+STEPS = ("stop", "kill")
 FLOOD_HZ = 100
 SILENT_AFTER_NS = 500_000_000
 TALKING_NS = 1_000_000_000
@@ -20,7 +22,8 @@ TALKING_LINES = 5
 
 
 class Life(NamedTuple):
-    """One process from start to end. `end` is None while it ran on to the end of the recording."""
+    """One process from start to end. `end` is None while it ran on to the end of the recording. `by_step`: it was not
+    the run's end that stopped it, but a step of the scenario."""
 
     name: str
     start_ns: int
@@ -28,6 +31,7 @@ class Life(NamedTuple):
     end_ns: int | None
     end: ProcessEvent | None
     interrupt_ns: int | None
+    by_step: bool = False
 
     @property
     def ended_early(self) -> bool:
@@ -54,24 +58,27 @@ def lives(run: Run) -> tuple[Life, ...]:
 def _life(run: Run, start_ns: int, start: ProcessEvent) -> Life:
     ends = ((t, e) for t, e in run.processes if e.event == "exit" and e.name == start.name and t >= start_ns)
     end_ns, end = next(ends, (None, None))
-    interrupt_ns = _interrupt_ns(run, start.name)
+    interrupt_ns, action = min(_interrupts(run, start.name, start_ns), default=(None, ""))
     if interrupt_ns is not None and end_ns is not None and end_ns < interrupt_ns:
-        interrupt_ns = None
-    return Life(start.name, start_ns, start, end_ns, end, interrupt_ns)
+        interrupt_ns, action = None, ""
+    return Life(start.name, start_ns, start, end_ns, end, interrupt_ns, action in STEPS)
 
 
-def _interrupt_ns(run: Run, process: str) -> int | None:
-    """Return when the grader pressed Ctrl-C on this process. An interrupt that names no known process is for all."""
+def _interrupts(run: Run, process: str, after_ns: int) -> Iterator[tuple[int, str]]:
+    """Yield when the grader stopped this process, and how. An interrupt that names no known process is for all."""
     known = {e.name for _, e in run.processes}
-    pressed = ((t, {e.actor, e.detail} & known) for t, e in run.actors if e.action == "interrupt")
-    return min((t for t, named in pressed if not named or process in named), default=None)
+    for time_ns, event in run.actors:
+        if event.action in {"interrupt", *STEPS} and time_ns >= after_ns:
+            named = {event.actor, event.detail} & known
+            if not named or process in named:
+                yield time_ns, event.action
 
 
 def life(run: Run, process: str) -> Life | None:
-    """Return the process of that name; the only one of the run where `process` is empty."""
+    """Return the first life of that process; of the only one of the run where `process` is empty."""
     found = lives(run)
     if not process:
-        return found[0] if len(found) == 1 else None
+        return found[0] if len({one.name for one in found}) == 1 else None
     return next((one for one in found if one.name == process), None)
 
 
@@ -87,13 +94,15 @@ def early_end(run: Run) -> Life | None:
 
 
 def first_interrupt_ns(run: Run) -> int | None:
-    """Return when the grader first pressed Ctrl-C; None where it never did."""
-    return min((one.interrupt_ns for one in lives(run) if one.interrupt_ns is not None), default=None)
+    """Return when the grader first pressed Ctrl-C to end the run; None where it never did."""
+    stops = (one.interrupt_ns for one in lives(run) if one.interrupt_ns is not None and not one.by_step)
+    return min(stops, default=None)
 
 
 def observed_until_ns(run: Run) -> int | None:
     """Return up to when silence is a living node's own: the first Ctrl-C. None where none was recorded."""
-    ends = [one.until_ns(run) for one in lives(run) if not one.ended_early and one.end_ns is not None]
+    own = [one for one in lives(run) if not one.ended_early and not one.by_step]
+    ends = [one.until_ns(run) for one in own if one.end_ns is not None]
     pressed = first_interrupt_ns(run)
     return min(ends if pressed is None else [*ends, pressed], default=None)
 

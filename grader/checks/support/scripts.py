@@ -25,6 +25,7 @@ _HERE = tuple(
         "CMAKE_CURRENT_LIST_DIR",
     )
 )
+BACKUPS = ("~", ".bak", ".orig", ".swp")
 _BIN = ("${CATKIN_PACKAGE_BIN_DESTINATION}", "lib/${PROJECT_NAME}")
 
 
@@ -72,16 +73,25 @@ def path_in_package(package: PackageFacts, file: str) -> str | None:
 
 
 def paths_by_name(package: PackageFacts) -> dict[str, str]:
-    """Return the paths of all files that no build made, by their names without folders."""
-    return {PurePosixPath(f.path).name: f.path for f in package.files if not is_product(f.path)}
+    """Return the paths of all files that no build made and that are no editor's backups, by their names without
+    folders."""
+    paths = (f.path for f in package.files if not is_product(f.path) and not f.path.endswith(BACKUPS))
+    return {PurePosixPath(path).name: path for path in paths}
+
+
+def can_be_moved(path: str, wanted: str) -> bool:
+    """Return whether one file can be what another was meant to be: of the same kind, or without a suffix."""
+    one, other = PurePosixPath(path).suffix, PurePosixPath(wanted).suffix
+    return one == other or not one or not other
 
 
 def add_hint(path: str) -> str:
     return f"write {path}, then git add, commit and push it"
 
 
-def chmod_hint(path: str) -> str:
-    return f"chmod +x {path}, then git update-index --chmod=+x {path}, commit and push"
+def chmod_hint(*paths: str) -> str:
+    files = " ".join(paths)
+    return f"chmod +x {files}, then git add --chmod=+x {files}, commit and push"
 
 
 def cmake_calls(package: PackageFacts, *names: str) -> tuple[CMakeCall, ...]:

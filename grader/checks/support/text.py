@@ -11,6 +11,8 @@ from grader.untrusted_text import visible
 from grader.wording import shorten
 
 SIMILARITY = 0.8
+OTHER_WORDS_SHARE = 0.5
+"""Of the points, for what is said at the right place in other words than the handout's."""
 NAMES_MAX, NAME_CHARS_MAX = 1_000, 60
 """Of names that students may give by the thousand: so many are looked at, and so much of each."""
 SHOWN_CHARS = 160

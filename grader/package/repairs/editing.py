@@ -17,7 +17,7 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from grader.files import atomic_write, open_untrusted
-from grader.model.repair import Repair, RepairKind
+from grader.model.repair import Repair, RepairKind, added_lines
 from grader.package.reading import LEFT_OUT
 from grader.portable import BINARY, CLOEXEC, DIRECTORY, NOFOLLOW, READ
 
@@ -73,14 +73,17 @@ def parts_of(file: str) -> tuple[str, ...]:
 
 @dataclass(kw_only=True)
 class Files:
-    """The texts of a package's files with the repairs so far made in them. Nothing is written."""
+    """The texts of a package's files with the repairs so far made in them. Nothing is written. A file that was renamed
+    is known by its old path too."""
 
     folder: Path
     repairs: list[Repair] = field(default_factory=list)
     _texts: dict[str, str | None] = field(default_factory=dict)
+    _renamed: dict[str, str] = field(default_factory=dict)
 
     def text(self, file: str) -> str | None:
         """Return the file's text, line ends as on Linux; None where it is no text that can be repaired."""
+        file = self._renamed.get(file, file)
         if file not in self._texts:
             data = read_data(self.folder, file)
             self._texts[file] = None if data is None else as_text(data)
@@ -88,7 +91,12 @@ class Files:
 
     def put(self, file: str, text: str | None) -> None:
         """Remember what the file will be."""
-        self._texts[file] = text
+        self._texts[self._renamed.get(file, file)] = text
+
+    def rename(self, old: str, new: str) -> None:
+        """Remember that the file will be at another path."""
+        self._texts[new] = self.text(old)
+        self._renamed[old] = new
 
     def add(self, repair: Repair) -> None:
         """Remember a repair that changes no line of a text."""
@@ -96,6 +104,7 @@ class Files:
 
     def change(self, kind: RepairKind, file: str, after: str, message: str, fix: str = "") -> None:
         """Remember that the file's text becomes `after`. Without a `fix`, the changed lines say it."""
+        file = self._renamed.get(file, file)
         before = self.text(file)
         if before is None or before == after or not _is_unicode(before + after):
             return
@@ -132,12 +141,6 @@ def changed_lines(before: str, after: str) -> tuple[int, str, str]:
         start, end = (start - 1, end) if start else (start, end - 1)
     first, last = old[start : len(old) - end], new[start : len(new) - end]
     return start + 1, "\n".join(first), "\n".join(last)
-
-
-def added_lines(before: str, after: str) -> str:
-    """Return the lines that are new, in one line."""
-    old = before.split("\n")
-    return "; ".join(line.strip() for line in after.split("\n") if line not in old and line.strip())
 
 
 # ---- on the disk

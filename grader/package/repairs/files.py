@@ -37,7 +37,7 @@ def repair_files(files: Files, scripts: Iterable[SourceFile]) -> None:
         if script.executable is False:
             on_disk = not MODES_ON_DISK or is_executable(files.folder, script.path)
             in_git = script.mode_source == "git" and on_disk
-            command = f"{'git update-index --chmod=+x' if in_git else 'chmod +x'} {script.path}"
+            command = f"{'git add --chmod=+x' if in_git else 'chmod +x'} {script.path}"
             message = f"{script.path} is not executable"
             files.add(Repair(kind="executable-bit", file=script.path, message=message, fix=command))
         if script.link is None and not script.binary:
@@ -161,7 +161,7 @@ def rename_files(files: Files, renames: dict[str, str]) -> None:
         naming = [file for file in others if _put_word(files, file, PurePosixPath(old).name, name)]
         words = f"{fix}, and write {name} in {join_words(naming)}" if naming else fix
         files.add(Repair(kind="file-name", file=old, before=old, after=new, message=message, fix=words))
-        files.put(new, files.text(old))
+        files.rename(old, new)
 
 
 def _put_word(files: Files, file: str, old: str, new: str) -> bool:

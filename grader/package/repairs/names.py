@@ -214,7 +214,7 @@ def _repair_node(files: Files, launch: LaunchFile, node: LaunchNode, wanted: Wan
 def _set_attribute(
     files: Files, file: str, line: int, change: tuple[str, str, str], *, kind: RepairKind
 ) -> None:
-    """Replace the attribute's value where it next stands, from the tag's line on."""
+    """Replace the attribute's value where it next stands, from the tag's line on; a package's name in all the file."""
     attribute, old, new = change
     text = files.text(file)
     if text is None or line < 1:
@@ -227,8 +227,11 @@ def _set_attribute(
         changed = pattern.sub(lambda m: m["head"] + new, lines[number], count=1)
         if changed != lines[number]:
             lines[number] = changed
+            if kind == "package-name":
+                lines = [pattern.sub(lambda m: m["head"] + new, one) for one in lines]
             message = f'line {number + 1} of {file}: {attribute}="{old}" should be {attribute}="{new}"'
-            files.change(kind, file, "\n".join(lines), message)
+            fix = f'write pkg="{new}" for pkg="{old}"' if kind == "package-name" else ""
+            files.change(kind, file, "\n".join(lines), message, fix)
             return
         if number >= line and "<" in lines[number].replace("<!--", ""):
             return

@@ -56,6 +56,11 @@ def _of_scenarios(rubric: Rubric) -> Iterator[tuple[str, Any]]:
             yield from _each("params", param.also)
         for probe in scenario.probes:
             yield from (("topics", probe.topic), ("types", probe.type))
+        for step in scenario.steps:
+            sent, waited = step.published, step.wait
+            yield from (("topics", sent.topic), ("types", sent.type)) if sent is not None else ()
+            yield ("topics", waited.topic if waited is not None else None)
+            yield ("params", step.set_param.name if step.set_param is not None else None)
         until = scenario.until
         yield from _each("topics", (*until.topics, *until.messages, *until.connected))
 

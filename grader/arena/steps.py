@@ -1,0 +1,472 @@
+"""What the grader does in a run once the processes are started: probes, calls, and the scenario's steps, one by one.
+
+Messages are made here, from the text of their types, and go to the arena as bytes. Each deed is an event of
+`/grader/actor`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import time
+from collections.abc import Callable, Coroutine
+from contextlib import suppress
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from typing_extensions import Self
+
+from grader.arena.scenario_inputs import make_shots
+from grader.arena.session import NS, ArenaSession
+from grader.errors import ArenaError, EvidenceError
+from grader.evidence.events import ActorEvent
+from grader.rubric.model import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
+from grader.wording import plural
+
+if TYPE_CHECKING:
+    from grader.evidence.decode import FindText
+    from grader.evidence.message_values import MessageType
+    from grader.evidence.run import Channel
+
+Tell = Callable[[str], None]
+ANSWER_S = 10.0
+SUBSCRIBE_S = 6.0
+CTRL_C_S = 5.0
+LAUNCH_CTRL_C_S = 20.0  # roslaunch gives its own nodes 15 s and more
+TERM_S = 2.0
+NOT_PLAYED = frozenset({"/clock", "/rosout", "/rosout_agg"})
+"""Where none is named: they are the run's own."""
+GOAL_ID = "actionlib_msgs/GoalID"
+GOAL_STATUS = (
+    "PENDING", "ACTIVE", "PREEMPTED", "SUCCEEDED", "ABORTED", "REJECTED", "PREEMPTING", "RECALLING", "RECALLED", "LOST",
+)  # fmt: skip
+"""By number (actionlib_msgs/GoalStatus)."""
+
+Spec: TypeAlias = dict[str, Any]
+"""What the arena needs to start a process (`ProcessEnvironment.spec`)."""
+
+
+class StepRunner:
+    """Does the probes, calls and steps of one run. Inside the context, what has gone to the background goes on."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        starts: list[tuple[Start, Spec]],
+        arena: ArenaSession,
+        tell: Tell,
+        *,
+        beside: Path | None = None,
+    ) -> None:
+        self._scenario = scenario
+        self._starts = starts
+        self._results: dict[str, MessageType] = {}
+        self._goals = 0
+        self._beside = beside or Path()
+        self._bags: dict[str, tuple[Channel, ...]] = {}
+        self._stopped: set[str] = set()
+        self._may_start = False
+        self._arena = arena
+        self._live = arena.live
+        self._tell = tell
+        self._types: dict[str, MessageType] = {}
+        self._md5sums: dict[str, str] = {}
+        self._announced: set[str] = set()
+        self._fixed: dict[str, Any] = {}
+        self._deaf: set[str] = set()
+        self._background: list[asyncio.Task[None]] = []
+        self._endless: list[asyncio.Task[None]] = []
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        for task in (*self._background, *self._endless):
+            task.cancel()
+            with suppress(asyncio.CancelledError, ArenaError):  # the run itself meets the same error
+                await task
+
+    def advertise(self) -> None:
+        """Say on which topics there will be messages, before anything is started."""
+        for probe in self._scenario.probes:
+            self._advertise(probe.topic, probe.type, latched=False)
+        for step in self._scenario.steps:
+            if (sent := step.published) is not None:
+                self._advertise(sent.topic, sent.type, latched=sent.latched)
+            if step.action is not None:
+                self._advertise_action(step.action)
+            if step.play is not None:
+                self._advertise_bag(step.play)
+
+    async def run(self) -> None:
+        """Return when all is done, but for what lasts as long as the run."""
+        if self._scenario.probes:
+            await self._probe()
+        steps = (*(Step(call=call) for call in self._scenario.calls), *self._scenario.steps)
+        for index, step in enumerate(steps):
+            self._may_start = any(left.start or left.restart for left in steps[index:])
+            if self._is_over():
+                break
+            await self._do(step)
+        await asyncio.gather(*self._background)
+
+    async def _do(self, step: Step) -> None:
+        if step.transform is not None and step.transform.static:
+            self._static(step.transform)
+        elif (sent := step.published) is not None:
+            await self._publish(sent)
+        if step.set_param is not None:
+            about = step.set_param
+            record = {"action": "set_param", "actor": "grader", "topic": about.name, "value": about.value}
+            self._arena.send(do="set_param", name=about.name, value=about.value, record=record)
+        if step.wait is not None:
+            await self._wait(step.wait)
+        if step.call is not None:
+            await self._call(step.call)
+        if step.play is not None:
+            await self._begin(self._play(step.play), background=step.play.background)
+        if step.action is not None:
+            await self._act(step.action)
+        await self._do_to_process(step)
+
+    async def _do_to_process(self, step: Step) -> None:
+        if step.type is not None:
+            self._type(step.type)
+        if name := step.stop or step.kill or step.restart:
+            await self._stop(name, "kill" if step.kill else "stop")
+        if name := step.start or step.restart:
+            self._start(name)
+
+    def _is_over(self) -> bool:
+        """Whether nothing of the student's runs any more, nor will."""
+        return not self._live.running and not self._may_start
+
+    @property
+    def stopped_all(self) -> bool:
+        """Whether steps have stopped all that ran."""
+        return not self._live.running and self._live.ended <= self._stopped
+
+    # --- Messages ----------------------------------------------------------------------------------------------------
+
+    def _advertise(self, topic: str, type_: str, *, latched: bool, find_text: FindText | None = None) -> None:
+        from grader.evidence.message_values import MessageType  # noqa: PLC0415 - numpy, which not every run needs
+
+        if topic in self._types:
+            return
+        try:
+            found = MessageType(type_, find_text or self._message_text)
+        except ValueError as error:
+            self._note("note", topic, f"the grader cannot publish {type_}: {error}")
+            return
+        if self._md5sums.setdefault(topic, found.md5sum) != found.md5sum:
+            self._note(
+                "note", topic, f"the grader cannot publish {type_}: a recording has another type there"
+            )
+            return
+        self._types[topic] = found
+        about = {"type": type_, "md5sum": found.md5sum, "definition": found.definition}
+        self._announce(topic, {**about, "latching": latched})
+
+    def _announce(self, topic: str, fields: dict[str, Any]) -> None:
+        """Advertise it to the master, once."""
+        if topic not in self._announced:
+            self._announced.add(topic)
+            self._arena.send(do="advertise", fields={"topic": topic, **fields})
+
+    def _message_text(self, type_: str) -> str | None:
+        return self._arena.place.type_text(type_, "msg")
+
+    def _send(
+        self, topic: str, value: object, index: int, total: int | None, deed: dict[str, Any] | None = None
+    ) -> None:
+        """Send one message, and note it as `deed`. Raises ValueError where the value does not fit."""
+        from grader.evidence.message_values import Moment  # noqa: PLC0415 - as above
+
+        type_, moment = self._types[topic], Moment(index, total, self._arena.ros_now_ns())
+        data, shown = type_.encode(value, moment), type_.shown(value, moment)
+        if isinstance(shown, str | int) and not isinstance(shown, bool):
+            self._live.sent(str(shown), time.monotonic())
+        about = deed or {"action": "publish", "topic": topic, "type": type_.type, "value": shown}
+        record = {"actor": "grader", **about}
+        self._arena.send(do="publish", topic=topic, data=base64.b64encode(data).decode(), record=record)
+
+    async def _probe(self) -> None:
+        """Once the student's node has subscribed to every topic, or has had its time to."""
+        live, topics = self._live, {probe.topic for probe in self._scenario.probes}
+        self._tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
+        patience_s = self._scenario.until.first_message_s
+        await self._arena.wait(lambda: bool(live.subscribed & topics) or not live.running, patience_s)
+        patience_s = SUBSCRIBE_S if live.subscribed & topics else 0.0
+        await self._arena.wait(lambda: topics <= live.subscribed or not live.running, patience_s)
+        self._tell("sending it messages")
+        for shot in make_shots(self._scenario.probes):
+            if not live.running:
+                return
+            if shot.topic in live.subscribed and shot.topic in self._types:
+                self._send(shot.topic, shot.value, 0, 1)
+                await asyncio.sleep(shot.pause_s)
+
+    async def _publish(self, publish: Publish) -> None:
+        if publish.topic not in self._types:
+            return  # said when it was to be advertised
+        await self._begin(self._stream(publish), background=publish.background, endless=publish.total is None)
+
+    def _static(self, transform: Transform) -> None:
+        """A latched topic keeps its last message only: each holds all that were sent."""
+        sent = transform.published
+        self._fixed[transform.child] = sent.value["transforms"][0]
+        self._try_send(sent, {"transforms": list(self._fixed.values())}, 0, 1)
+
+    def _try_send(self, publish: Publish, value: object, index: int, total: int | None) -> bool:
+        try:
+            self._send(publish.topic, value, index, total)
+        except ValueError as error:
+            self._note("note", publish.topic, f"the grader cannot publish {publish.type}: {error}")
+            return False
+        return True
+
+    async def _stream(self, publish: Publish) -> None:
+        topic, total, values = publish.topic, publish.total, publish.in_turn
+        if not publish.latched and not await self._has_subscriber(topic):
+            return
+        self._tell(f"publishing on {topic}")
+        due_ns = self._arena.ros_now_ns()
+        for index in count() if total is None else range(total):
+            if not self._live.running or not self._try_send(
+                publish, values[index % len(values)], index, total
+            ):
+                return
+            due_ns = max(due_ns + round(NS / publish.rate_hz), self._arena.ros_now_ns())
+            await self._until(due_ns)
+
+    async def _has_subscriber(self, topic: str) -> bool:
+        """Wait for one, once for each topic."""
+        live = self._live
+        if topic not in live.subscribed and topic not in self._deaf:
+            self._tell(f"waiting for a subscriber on {topic}")
+            settled = live.subscribed & self._types.keys() and live.running <= live.registered
+            patience_s = SUBSCRIBE_S if settled else self._scenario.until.first_message_s
+            await self._arena.wait(lambda: topic in live.subscribed or not live.running, patience_s)
+        if topic in live.subscribed:
+            self._deaf.discard(topic)
+            return True
+        self._deaf.add(topic)
+        self._note("note", topic, "nothing was published: no node has subscribed")
+        return False
+
+    async def _begin(
+        self, work: Coroutine[Any, Any, None], *, background: bool, endless: bool = False
+    ) -> None:
+        if not background:
+            await work
+            return
+        (self._endless if endless else self._background).append(asyncio.ensure_future(work))
+
+    # --- Recordings --------------------------------------------------------------------------------------------------
+
+    def _advertise_bag(self, play: Play) -> None:
+        """The recording's topics, each by its first channel; a type that a topic has already stays."""
+        from grader.evidence.message_values import md5_of  # noqa: PLC0415 - numpy, which not every run needs
+        from grader.evidence.reader import load_run  # noqa: PLC0415 - few runs play anything
+
+        if play.bag not in self._bags:
+            try:
+                found = load_run(self._beside / play.bag).channels
+                self._bags[play.bag] = tuple(
+                    replace(c, md5sum=c.md5sum or md5_of(c.type, c.definition)) for c in found
+                )
+            except (EvidenceError, ValueError) as error:
+                raise ArenaError(f"{play.bag} cannot be played: {error}") from error
+        for channel in self._played(play):
+            if self._md5sums.setdefault(channel.topic, channel.md5sum) == channel.md5sum:
+                about = {"type": channel.type, "md5sum": channel.md5sum, "definition": channel.definition}
+                self._announce(channel.topic, {**about, "latching": channel.latching})
+
+    def _played(self, play: Play) -> list[Channel]:
+        wanted = set(play.topics)
+        return [
+            channel
+            for channel in self._bags[play.bag]
+            if (channel.topic in wanted if wanted else channel.topic not in NOT_PLAYED)
+        ]
+
+    async def _play(self, play: Play) -> None:
+        channels = [c for c in self._played(play) if self._md5sums[c.topic] == c.md5sum]
+        messages = sorted((m.log_time_ns, c.topic, m.data) for c in channels for m in c.messages)
+        topics = {channel.topic for channel in channels}
+        self._tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
+        patience_s = self._scenario.until.first_message_s
+        await self._arena.wait(lambda: bool(topics & self._live.subscribed) or self._is_over(), patience_s)
+        if not topics & self._live.subscribed:
+            self._note("note", play.bag, "nothing was played: no node has subscribed")
+            return
+        self._note("play", play.bag, f"{plural(len(messages), 'message')} on {', '.join(sorted(topics))}")
+        self._tell(f"playing {play.bag}")
+        begun_ns = self._arena.ros_now_ns()
+        for time_ns, topic, data in messages:
+            await self._until(begun_ns + round((time_ns - messages[0][0]) / play.speed))
+            if not self._live.running:
+                return
+            self._arena.send(do="publish", topic=topic, data=base64.b64encode(data).decode(), record=None)
+
+    # --- Waiting -----------------------------------------------------------------------------------------------------
+
+    async def _until(self, time_ns: int) -> None:
+        """Until it is so late by the run's clock; by the wall's, where that stands still."""
+        left_s = max(0.0, (time_ns - self._arena.ros_now_ns()) / NS)
+        await self._arena.wait(lambda: self._arena.ros_now_ns() >= time_ns or self._is_over(), left_s)
+
+    async def _wait(self, wait: Wait) -> None:
+        live, limit_s = self._live, wait.limit_s or self._scenario.until.first_message_s
+        if wait.seconds is not None:
+            self._tell(f"waiting for {wait.seconds:g} s")
+            await self._until(self._arena.ros_now_ns() + round(wait.seconds * NS))
+            if not self._is_over():
+                self._note("wait", None, f"{wait.seconds:g} s have passed")
+            return
+        name = wait.topic or wait.node or ""
+        self._tell(f"waiting for {name}")
+        wanted = wait.messages + (live.topics[name].count if wait.new else 0)
+
+        def is_there() -> bool:
+            return live.topics[name].count >= wanted if wait.topic else name in live.here
+
+        await self._arena.wait(lambda: is_there() or self._is_over(), limit_s)
+        what = plural(wait.messages, "message") if wait.topic else "the node"
+        there = is_there()
+        self._note("wait", name, f"{what} came" if there else f"{what} did not come within {limit_s:g} s")
+
+    # --- Processes ---------------------------------------------------------------------------------------------------
+
+    def _start(self, name: str) -> None:
+        for spec in self._specs(name):
+            self._note("start", None, spec["name"])
+            self._stopped.discard(spec["name"])
+            self._arena.start(spec)
+
+    async def _stop(self, name: str, action: str) -> None:
+        self._tell(f"stopping {name}")
+        int_s = LAUNCH_CTRL_C_S if any(s.launch for s, _ in self._starts if s.name == name) else CTRL_C_S
+        for spec in self._specs(name):
+            process = spec["name"]
+            if process in self._live.running | self._live.helpers:
+                self._stopped.add(process)
+                await self._arena.interrupt(process, int_s=int_s, term_s=TERM_S, action=action)
+
+    def _type(self, typed: Typed) -> None:
+        data = base64.b64encode(f"{typed.line}\n".encode()).decode()
+        for spec in self._specs(typed.process):
+            process = spec["name"]
+            record = {"action": "type", "actor": "grader", "detail": process, "value": typed.line}
+            self._arena.send(do="type", name=process, data=data, record=record)
+
+    def _specs(self, name: str) -> list[Spec]:
+        return [spec for start, spec in self._starts if start.name == name]
+
+    # --- Services ----------------------------------------------------------------------------------------------------
+
+    async def _call(self, call: Call) -> None:
+        """Call the service once it is offered; request and answer are events."""
+        arena, live, service = self._arena, self._live, call.service
+        self._tell(f"waiting for the service {service}")
+        patience_s = self._scenario.until.first_message_s
+        await arena.wait(lambda: service in live.services or not live.running, patience_s)
+        if service in live.services:
+            await arena.wait(lambda: not live.running, call.delay_s)
+            self._tell(f"calling {service}")
+            await self._ask(call)
+
+    async def _ask(self, call: Call) -> None:
+        from grader.evidence.decode import ServiceType  # noqa: PLC0415 - numpy, which not every run needs
+        from grader.evidence.message_values import MessageType, Moment  # noqa: PLC0415 - as above
+
+        try:
+            text = self._arena.place.type_text(call.type, "srv") or ""
+            type_ = ServiceType(call.type, text, self._message_text)
+            request = MessageType(f"{call.type}Request", full=type_.request)
+            moment = Moment(0, 1, self._arena.ros_now_ns())
+            data, shown = request.encode(call.request, moment), request.shown(call.request, moment)
+        except ValueError as error:
+            self._answer(call, None, f"the grader could not call it: {error}")
+            return
+        about = {"topic": call.service, "type": call.type, "value": shown}
+        record = {"action": "call", "actor": "grader", **about}
+        encoded = base64.b64encode(data).decode()
+        answer = await self._arena.call(
+            ANSWER_S, service=call.service, type=call.type, data=encoded, record=record
+        )
+        if "data" not in answer:
+            self._answer(call, None, answer["error"])
+            return
+        value = type_.decode_response(base64.b64decode(answer["data"]))
+        self._answer(call, value, "" if value is not None else f"the answer is no {call.type}")
+
+    # --- Actions (wiki.ros.org/actionlib/DetailedDescription) ---------------------------------------------------------
+
+    def _advertise_action(self, action: Action) -> None:
+        from grader.evidence.message_values import MessageType, action_texts  # noqa: PLC0415 - as above
+
+        try:
+            text = self._arena.place.type_text(action.type, "action")
+            texts = action_texts(action.type, text) if text is not None else {}
+
+            def find_text(type_: str) -> str | None:
+                return texts.get(type_) or self._message_text(type_)
+
+            self._results[action.type] = MessageType(f"{action.type}ActionResult", find_text)
+        except ValueError as error:
+            self._note("note", action.name, f"the grader cannot use {action.type}: {error}")
+            return
+        goal, cancel = f"{action.name}/goal", f"{action.name}/cancel"
+        self._advertise(goal, f"{action.type}ActionGoal", latched=False, find_text=find_text)
+        self._advertise(cancel, GOAL_ID, latched=False)
+        self._arena.watch(f"{action.name}/result")
+
+    async def _act(self, action: Action) -> None:
+        goal, cancel = f"{action.name}/goal", f"{action.name}/cancel"
+        if goal not in self._types or not (
+            await self._has_subscriber(goal) and await self._has_subscriber(cancel)
+        ):
+            return
+        self._goals += 1
+        name = f"grader-{self._goals}"
+        value = {"header": {"stamp": "now"}, "goal_id": {"stamp": "now", "id": name}, "goal": action.goal}
+        about = {"topic": action.name, "type": action.type}
+        try:
+            self._send(goal, value, 0, 1, {"action": "goal", **about, "value": action.goal})
+        except ValueError as error:
+            self._note("note", action.name, f"the grader cannot send the goal: {error}")
+            return
+        self._tell(f"waiting for the result of {action.name}")
+        left_s, found = action.limit_s, None
+        if action.cancel_after_s is not None:
+            found = await self._result(action, name, action.cancel_after_s)
+            if found is None:
+                self._send(cancel, {"id": name}, 0, 1, {"action": "cancel", **about})
+        found = found or await self._result(action, name, left_s)
+        value_, detail = found or (None, f"no result within {left_s:g} s")
+        self._arena.note(ActorEvent(action="result", actor="grader", **about, value=value_, detail=detail))
+
+    async def _result(self, action: Action, name: str, limit_s: float) -> tuple[Any, str] | None:
+        """Return the result of that goal and the word for its status."""
+        type_, came = self._results[action.type], self._arena.watch(f"{action.name}/result")
+
+        def own() -> dict[str, Any] | None:
+            values = (type_.decode(data) for data in came)
+            return next((v for v in values if v and v["status"]["goal_id"]["id"] == name), None)
+
+        await self._arena.wait(lambda: own() is not None or self._is_over(), limit_s)
+        found = own()
+        if found is None:
+            return None
+        status = found["status"]["status"]
+        return found["result"], GOAL_STATUS[status] if status < len(GOAL_STATUS) else f"status {status}"
+
+    def _answer(self, call: Call, value: object, detail: str) -> None:
+        about = {"topic": call.service, "type": call.type, "value": value, "detail": detail}
+        self._arena.note(ActorEvent(action="answer", actor="grader", **about))
+
+    def _note(self, action: Any, topic: str | None, detail: str) -> None:  # noqa: ANN401 - one of ActorEvent's words
+        self._arena.note(ActorEvent(action=action, actor="grader", topic=topic, detail=detail))

@@ -1,0 +1,210 @@
+"""Faults of a scenario's steps that their records' types cannot say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from grader.errors import EvidenceError
+from grader.rubric.faults import model_faults
+from grader.rubric.model import STEP_S_MAX, Step, Transform
+from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
+from grader.wording import did_you_mean
+
+KINDS = tuple(Step.model_fields)
+RUN_S_MAX = 2 * STEP_S_MAX
+PROCESS_STEPS = ("start", "stop", "kill", "restart")
+NAMED = {
+    "publish": ("topic", "a topic"),
+    "call": ("service", "a service"),
+    "action": ("name", "an action"),
+    "set_param": ("name", "a parameter"),
+}
+"""The key of a step that is a name of ROS's."""
+NOT_FINITE = (".inf", "-.inf", ".nan")
+WAITS = ("seconds", "topic", "node")
+
+
+def given_steps(scenario: dict[str, Any], kind: str) -> list[dict[str, Any]]:
+    """Return what the scenario's steps of one kind (`publish`) say."""
+    return [as_map(step[kind]) for _, step in as_maps(scenario.get("steps")) if kind in step]
+
+
+def played_bags(rubric: dict[str, Any]) -> dict[KeyPath, dict[str, Any]]:
+    """Return what steps play, by the place in the rubric where the recording is named."""
+    return {
+        ("scenarios", name, "steps", index, "play", "bag"): as_map(step["play"])
+        for name, scenario in as_map(rubric.get("scenarios")).items()
+        for index, step in as_maps(as_map(scenario).get("steps"))
+        if "play" in step
+    }
+
+
+def bag_faults(path: KeyPath, file: Path, play: dict[str, Any]) -> Iterator[Fault]:
+    """Yield what is wrong with a recording that a step plays. `path` is the place of its name."""
+    from grader.evidence.reader import load_run  # noqa: PLC0415 - few rubrics play anything
+
+    try:
+        topics = {channel.topic for channel in load_run(file).channels}
+    except EvidenceError as error:
+        yield path, f"cannot be played: {error.message}"
+        return
+    for number, topic in as_texts(play.get("topics")):
+        if topic not in topics:
+            yield (*path[:-1], "topics", number), f"{file.name} has no {topic}{did_you_mean(topic, topics)}"
+
+
+def step_faults(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield the faults of one scenario's steps."""
+    types: dict[str, str] = {}
+    yield from _processes(path, scenario)
+    for index, step in as_maps(scenario.get("steps")):
+        at = (*path, "steps", index)
+        given = [kind for kind in KINDS if step.get(kind) is not None]
+        if len(given) != 1:
+            yield at, f"give one of {_one_of(KINDS)}: {_found(given)}"
+        for kind in given:
+            yield from _faults_of((*at, kind), kind, as_map(step[kind]), types)
+    lasting_s = sum(_seconds(step) for _, step in as_maps(scenario.get("steps")))
+    if lasting_s > RUN_S_MAX:
+        yield (*path, "steps"), f"last {lasting_s:g} s together, at most {RUN_S_MAX} s"
+
+
+def _faults_of(at: KeyPath, kind: str, given: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
+    if kind in NAMED:
+        key, what = NAMED[kind]
+        yield from slash((*at, key), given.get(key), what)
+    if kind == "publish":
+        yield from _publish(at, given, types)
+    elif kind == "wait":
+        yield from _wait(at, given)
+    elif kind == "set_param" and (given.get("value", "") is None or given.get("value") in NOT_FINITE):
+        yield (*at, "value"), "is no value that the parameter server takes"
+    elif kind == "transform":
+        yield from _transform(at, given)
+    elif kind == "play":
+        for number, topic in as_texts(given.get("topics")):
+            yield from slash((*at, "topics", number), topic, "a topic")
+
+
+def _one_of(names: tuple[str, ...]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _found(given: list[str]) -> str:
+    return f"{' and '.join(given)} are there" if given else "none is there"
+
+
+def _seconds(step: dict[str, Any]) -> float:
+    """Return how long a step lasts at least, where that is given."""
+    publish, wait = as_map(step.get("publish") or step.get("transform")), as_map(step.get("wait"))
+    lasting = publish.get("duration_s"), wait.get("seconds")
+    return sum(s for s in lasting if isinstance(s, int | float))
+
+
+def _publish(at: KeyPath, publish: dict[str, Any], types: dict[str, str]) -> Iterator[Fault]:
+    """`types` are those of the topics that earlier steps publish on."""
+    topic, kind = publish.get("topic"), publish.get("type")
+    if ("value" in publish) == bool(publish.get("values")):
+        yield at, "give one of value and values"
+    if publish.get("count") is not None and publish.get("duration_s") is not None:
+        yield at, "give count or duration_s, not both"
+    if not isinstance(topic, str) or not isinstance(kind, str) or "/" not in kind:
+        return
+    if types.setdefault(topic, kind) != kind:
+        yield (*at, "type"), f"an earlier step publishes {types[topic]} on {topic}"
+    values = publish.get("values")
+    listed = enumerate(values) if isinstance(values, list) else ()
+    places: list[tuple[KeyPath, Any]] = [((*at, "values", index), value) for index, value in listed]
+    places += [((*at, "value"), publish["value"])] if "value" in publish else []
+    yield from misfits((*at, "type"), kind, places, endless=_is_endless(publish))
+
+
+def _is_endless(publish: dict[str, Any]) -> bool:
+    return (
+        publish.get("background") is True
+        and publish.get("count") is None
+        and publish.get("duration_s") is None
+    )
+
+
+def misfits(
+    at: KeyPath, kind: str, values: list[tuple[KeyPath, Any]], *, endless: bool = False
+) -> Iterator[Fault]:
+    """Yield what does not fit the type, where it is one of ROS's own: no other is known before a run.
+
+    `at` is the place of the type.
+    """
+    from grader.evidence.decode import known_packages  # noqa: PLC0415 - slow to load, and few rubrics need it
+    from grader.evidence.message_values import FIRST, OTHER_TEXTS, MessageType  # noqa: PLC0415 - as above
+
+    package, _, name = kind.partition("/")
+    names = known_packages().get(package, ())
+    if not names and kind not in OTHER_TEXTS:
+        return
+    if names and name not in names:
+        yield (
+            at,
+            f"ROS Noetic has no message type {kind}{did_you_mean(kind, [f'{package}/{n}' for n in names])}",
+        )
+        return
+    message_type, moment = MessageType(kind), FIRST._replace(total=None if endless else 1)
+    for place, value in values:
+        if wrong := message_type.misfit(value, moment):
+            yield place, wrong
+
+
+def _transform(at: KeyPath, transform: dict[str, Any]) -> Iterator[Fault]:
+    if transform.get("static") is True:
+        for key in ("rate_hz", "count", "duration_s", "background"):
+            if key in transform:
+                yield (*at, key), "is not for a static transform: it is sent once, and stays"
+    elif transform.get("count") is not None and transform.get("duration_s") is not None:
+        yield at, "give count or duration_s, not both"
+    if model_faults(Transform, transform):
+        return  # said elsewhere
+    sent = Transform.model_validate(transform).published
+    yield from misfits(at, sent.type, [(at, sent.value)], endless=sent.total is None)
+
+
+def _processes(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
+    """Yield the faults of steps that start, stop or type to a process."""
+    starts = {str(start.get("name")): start for _, start in as_maps(scenario.get("start"))}
+    runs: dict[str, bool] = {}
+    for index, step in as_maps(scenario.get("steps")):
+        for kind in (*PROCESS_STEPS, "type"):
+            key = (kind,) if kind in PROCESS_STEPS else (kind, "process")
+            name = as_map(step.get(kind)).get("process") if kind == "type" else step.get(kind)
+            if not isinstance(name, str):
+                continue
+            at = (*path, "steps", index, *key)
+            if name not in starts:
+                yield at, f'there is no start "{name}"{did_you_mean(name, starts)}'
+            elif kind == "type" and not {"script", "program", "launch"} & starts[name].keys():
+                yield at, f'"{name}" is no script, program or launch file'
+            elif kind == "start" and runs.get(name, False):
+                yield at, f'"{name}" runs already: stop it before, or restart it'
+            elif kind in {"stop", "kill"} and not runs.get(name, True):
+                yield at, f'"{name}" does not run: an earlier step has stopped it'
+            if kind != "type":
+                runs[name] = kind in {"start", "restart"}
+
+
+def _wait(at: KeyPath, wait: dict[str, Any]) -> Iterator[Fault]:
+    given = [key for key in WAITS if wait.get(key) is not None]
+    if len(given) != 1:
+        yield at, f"give one of {_one_of(WAITS)}: {_found(given)}"
+    for key in ("messages", "new"):
+        if key in wait and "topic" not in given:
+            yield (*at, key), "is for a topic"
+    if wait.get("limit_s") is not None and "seconds" in given:
+        yield (*at, "limit_s"), "is for a topic or a node"
+    yield from slash((*at, "topic"), wait.get("topic"), "a topic")
+    yield from slash((*at, "node"), wait.get("node"), "a node's name")
+
+
+def slash(path: KeyPath, name: object, what: str) -> Iterator[Fault]:
+    """Yield a fault for a name that does not begin with a slash."""
+    if isinstance(name, str) and not name.startswith("/"):
+        yield path, f'{what} begins with a slash: "/{name}"'
