@@ -146,7 +146,7 @@ def test_a_bit_that_git_lacks_is_told_below_the_report(folder, monkeypatch, caps
     git("add", ".")
     git("commit", "-qm", "Lab")
     assert run(["check", str(folder), "--fix", "--yes", "--static"]) == 1  # marks come from what git has
-    assert "git add --chmod=+x basic_comms/scripts/talker.py" in capsys.readouterr().out
+    assert "git update-index --chmod=+x basic_comms/scripts/talker.py" in capsys.readouterr().out
     assert run(["check", str(folder), "--fix", "--dry-run"]) == 0
 
 

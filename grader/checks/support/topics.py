@@ -1,12 +1,9 @@
-"""Topics of a run: who is on them, why no message came, what the recorder lost, fields of messages by their path."""
+"""Topics of a run: who is on them, why no message came, what the recorder lost."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Annotated, Any, Literal
-
-from pydantic import AfterValidator
+from typing import Literal
 
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end
@@ -24,8 +21,6 @@ End = Literal["publishers", "subscribers"]
 LOGGED = frozenset({"logs", "hears"})
 """Checks that also read what is logged."""
 TAKEN = {Status.FAIL, Status.PARTIAL}
-_STEP = r"[A-Za-z]\w*(?:\[(?:\d+|\*)\])*"
-_PARTS = re.compile(r"[A-Za-z]\w*|\[(?:\d+|\*)\]")
 
 
 def cite(run: Run, topic: str, from_ns: int | None = None, to_ns: int | None = None) -> EvidenceCitation:
@@ -186,41 +181,3 @@ def _texts(value: object) -> Iterator[str]:
     elif isinstance(value, list | tuple | set | frozenset):
         for item in value:
             yield from _texts(item)
-
-
-def _sound(path: str) -> str:
-    if not re.fullmatch(rf"{_STEP}(?:\.{_STEP})*", path):
-        raise ValueError(f'must be a field like linear.x, ranges[0] or ranges[*], not "{path}"')
-    return path
-
-
-FieldPath = Annotated[str, AfterValidator(_sound)]
-
-
-class NoField(LookupError):
-    """What of the path is not there, and what is there instead."""
-
-
-def values_at(message: Any, path: str) -> list[Any]:  # noqa: ANN401 - decoded messages hold anything
-    """Return all values that the path names, several where it holds `[*]`. Raises NoField."""
-    found, done = [message], ""
-    for part in _PARTS.findall(path):
-        found = [item for one in found for item in _step(one, part, done)]
-        done += part if part.startswith("[") else f".{part}" if done else part
-    return found
-
-
-def _step(value: Any, part: str, done: str) -> list[Any]:  # noqa: ANN401 - as above
-    if not part.startswith("["):
-        if isinstance(value, Mapping) and part in value:
-            return [value[part]]
-        there = ", ".join(value) if isinstance(value, Mapping) else ""
-        raise NoField(f"{done or 'the message'} has no field {part}" + (f", but {there}" if there else ""))
-    if not isinstance(value, list | tuple | bytes):
-        raise NoField(f"{done} is no list")
-    if part == "[*]":
-        return list(value)
-    index = int(part[1:-1])
-    if index >= len(value):
-        raise NoField(f"{done} has {len(value)} items only")
-    return [value[index]]

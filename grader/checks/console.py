@@ -1,0 +1,205 @@
+"""What a process writes on its console, how it ends, and whether its callbacks fail."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from itertools import islice
+from typing import Annotated
+
+from pydantic import Field, model_validator
+
+from grader.checks.registry import ProcessName, check
+from grader.checks.support.console_output import Line, stream_lines
+from grader.checks.support.exit_causes import (
+    ended_after,
+    explain_end,
+    explain_traceback,
+    is_rospys_own,
+    process_tracebacks,
+)
+from grader.checks.support.processes import Life, life, lives, not_started
+from grader.checks.support.text import NUMBER, shown, words_pattern
+from grader.checks.support.topics import cite
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import Verdict, failed, passed, unjudged
+from grader.wording import plural, significant
+
+PLACE = "{number}"
+LINES_MAX, LINE_CHARS_MAX = 20_000, 1_000
+"""A text is looked for in so much of each stream."""
+ROUNDING = 1e-9
+
+
+class PrintsParams(Record):
+    """`process` is the scenario's name for it. `text` is part of a line, `{number}` in it stands for any number.
+
+    `numbers` are those that have to stand there, in this order, each within `tolerance` (in the text's own unit).
+    With `exit_code`, the process has to end by itself, with this code.
+    """
+
+    process: ProcessName
+    text: Annotated[str, Field(min_length=1)]
+    numbers: tuple[float, ...] = ()
+    tolerance: Annotated[float, Field(ge=0)] = 0.0
+    exit_code: int | None = None
+
+    @model_validator(mode="after")
+    def _has_places(self) -> PrintsParams:
+        places = self.text.count(PLACE)
+        if self.numbers and len(self.numbers) != places:
+            raise ValueError(
+                f"numbers: {len(self.numbers)}, and {PLACE} {plural(places, 'time')} in the text"
+            )
+        return self
+
+    @property
+    def words(self) -> str:
+        """The text with its numbers in their places."""
+        text = self.text
+        for number in self.numbers:
+            text = text.replace(PLACE, significant(number), 1)
+        return repr(text.replace(PLACE, "<number>"))
+
+    def pattern(self, number: str = NUMBER) -> re.Pattern[str]:
+        """Return the words, without regard to capitals and blanks, and a group for each number."""
+        return re.compile(f"({number})".join(words_pattern(words) for words in self.text.split(PLACE)))
+
+
+@check("prints", params=PrintsParams)
+def prints(package: PackageFacts, run: Run, params: PrintsParams) -> Verdict:
+    """The program prints the line.
+
+    What it checks
+        That the process writes this text, with the right numbers where the lab names them, and that it ends
+        with the right exit code where the lab asks for one.
+
+    Why it matters on a robot
+        Who starts a program reads what it says, and scripts go by its exit code.
+
+    How it is measured
+        Every line on stdout and stderr, and every log message of the process's nodes, is compared. Capitals,
+        and how many blanks stand between words, do not matter; more may stand around the text. Numbers may
+        differ by the tolerance.
+
+    How to fix
+        `print("…")` or `rospy.loginfo("…")` with the handout's words, at the place where it happens.
+        In Python, `sys.exit(code)` sets the exit code.
+    """
+    one = life(run, params.process)
+    code = "" if params.exit_code is None else f", exit code {params.exit_code}"
+    expected = f"{params.words} printed{code}"
+    if one is None:
+        return not_started(params.process).about(expected=expected)
+    lines = [
+        line
+        for stream in stream_lines(run, one.name)
+        for line in islice(stream, LINES_MAX)
+        if line.text.strip()
+    ]
+    right = next((line for line in lines if _fits(line, params)), None)
+    if right is None:
+        verdict = _not_printed(one, lines, package, run, params)
+    else:
+        verdict = _other_end(one, params) or passed(f"it prints {shown(right.text)!r}")
+    span = (right.at_ns, right.at_ns) if right else (one.start_ns, one.end_ns)
+    return verdict.about(
+        expected=expected,
+        measured=verdict.measured or plural(len(lines), "line"),
+        citations=(*verdict.citations, cite(run, "/grader/console", *span)),
+    )
+
+
+def _fits(line: Line, params: PrintsParams) -> bool:
+    """Return whether the text stands anywhere on the line with the right numbers in it."""
+    each = (found.groups() for found in params.pattern().finditer(line.text[:LINE_CHARS_MAX]))
+    return any(
+        all(
+            abs(float(text) - n) <= params.tolerance + ROUNDING
+            for text, n in zip(texts, params.numbers, strict=False)
+        )
+        for texts in each
+    )
+
+
+def _not_printed(
+    one: Life, lines: Sequence[Line], package: PackageFacts, run: Run, params: PrintsParams
+) -> Verdict:
+    other = [line for line in lines if params.pattern().search(line.text[:LINE_CHARS_MAX])]
+    hint = f"print {params.words} where it happens"
+    if other:
+        near = f", within {significant(params.tolerance)}" if params.tolerance else ""
+        return failed(f"it prints {shown(other[0].text)!r}, not {params.words}{near}", hint=hint)
+    if one.ended_early and (one.end is None or one.end.exit_code != 0):
+        end = explain_end(one, run, package)
+        return end.verdict(unjudged, f"it ended before it printed {params.words}: {end.cause}")
+    if not lines:
+        return failed(f"it prints nothing, not {params.words}", hint=f"{hint}, with flush=True").once()
+    return failed(f"it never prints {params.words}; it prints {shown(lines[0].text)!r}", hint=hint).once()
+
+
+def _other_end(one: Life, params: PrintsParams) -> Verdict | None:
+    if params.exit_code is None:
+        return None
+    hint = f"end with sys.exit({params.exit_code})"
+    if not one.ended_early or one.end is None:
+        return failed("it does not end by itself", hint=hint, measured="no exit code").once()
+    code = one.end.exit_code
+    if code == params.exit_code:
+        return None
+    how = f"exit code {code}" if code is not None else f"signal {one.end.signal}"
+    return failed(f"it ends with {how}, not {params.exit_code}", hint=hint, measured=how)
+
+
+class CallbacksCleanParams(Record):
+    """With `process`, the scenario's name for it, only that process counts; else each of the student's."""
+
+    process: ProcessName = ""
+
+
+@check("callbacks-clean", params=CallbacksCleanParams)
+def callbacks_clean(package: PackageFacts, run: Run, params: CallbacksCleanParams) -> Verdict:
+    """No callback ends with an exception.
+
+    What it checks
+        That no traceback is printed while the node runs. rospy catches an exception of a callback, prints it,
+        and lets the node live on.
+
+    Why it matters on a robot
+        A callback that fails does nothing with its message. The node looks healthy, and the robot drives on
+        with the command before.
+
+    How it is measured
+        By the tracebacks on stderr up to Ctrl-C in which a line of the package's own takes part. The one
+        that ends the whole process is no callback's.
+
+    How to fix
+        Read the last line of the traceback, and the line of your file above it. Look at what the message
+        holds before you use it: a list may be empty, a number may be NaN or infinite.
+    """
+    asked = [one for one in lives(run) if params.process in {"", one.name}]
+    expected = "no exception in a callback"
+    if not asked:
+        return not_started(params.process or "the node").about(expected=expected)
+    until = {one.name: one.interrupt_ns or one.end_ns for one in asked}
+    found = [
+        (one, traceback)
+        for one in asked
+        for traceback in process_tracebacks(run, one.name, before_ns=until[one.name])
+        if not is_rospys_own(traceback)
+    ]
+    ended = next((one for one in asked if one.ended_early and one.end and one.end.exit_code != 0), None)
+    if ended is not None and (len(found) <= 1 or found[0][0] != ended):
+        end = explain_end(ended, run, package)
+        message = f"{ended.name} ended by itself after {ended_after(ended)}: {end.cause}"
+        verdict = end.verdict(unjudged, message)
+    elif found:
+        end = explain_traceback(found[0][1], package)
+        verdict = end.verdict(failed, f"a callback of {found[0][0].name} fails: {end.cause}")
+    else:
+        verdict = passed("no callback failed")
+    measured = plural(len(found), "traceback")
+    place = cite(run, "/grader/console", asked[0].start_ns, asked[-1].end_ns)
+    return verdict.about(expected=expected, measured=measured, citations=(*verdict.citations, place))

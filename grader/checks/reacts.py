@@ -1,0 +1,223 @@
+"""Whether a node answers what it hears: a message on one topic, and then, in time, one on another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import Field, model_validator
+
+from grader.checks.registry import check
+from grader.checks.support.clocks import run_seconds
+from grader.checks.support.fields import FieldPath, Reading, bounds_text, is_within, no_field, readings
+from grader.checks.support.lateness import Lateness, excused
+from grader.checks.support.nodes import GlobalName
+from grader.checks.support.processes import observed_until_ns
+from grader.checks.support.topics import cite, no_message
+from grader.checks.support.values import differences, value_text
+from grader.evidence.run import Channel, Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import Verdict, failed, inconclusive, passed
+from grader.wording import plural, significant
+
+LATE_MS = 100.0
+ORDER_S = 0.1
+"""Two topics come over two connections: so much earlier a message may be recorded than what it answers."""
+
+
+class Condition(Record):
+    """A message on `topic`; with `field`, one whose field is `min` to `max`, or `value` within `tolerance`.
+
+    Of a list (`ranges[*]`) `all` items have to be so, or `any` of them.
+    """
+
+    topic: GlobalName
+    field: FieldPath | None = None
+    min: float | None = None
+    max: float | None = None
+    value: float | str | bool | None = None
+    tolerance: Annotated[float, Field(ge=0)] = 0.0
+    items: Literal["all", "any"] = "all"
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Condition:
+        asks = (self.min is not None or self.max is not None, self.value is not None)
+        if (self.field is None and any(asks)) or (self.field is not None and sum(asks) != 1):
+            raise ValueError("give field with min, max or both, or field with value, or none of them")
+        return self
+
+    @property
+    def words(self) -> str:
+        """`linear.x of /cmd_vel at most 0.1`."""
+        if self.field is None:
+            return f"a message on {self.topic}"
+        return f"{'any of ' if self.items == 'any' else ''}{self.field} of {self.topic} {self._bounds()}"
+
+    def _bounds(self) -> str:
+        if self.value is not None:
+            near = f", within {significant(self.tolerance)}" if self.tolerance else ""
+            return f"{value_text(self.value)}{near}"
+        return bounds_text(self.min, self.max)
+
+    def read(self, channels: Sequence[Channel]) -> list[Reading]:
+        """Return what of the messages is asked for, by time."""
+        if self.field is not None:
+            return readings(channels, self.field, numbers=self.value is None)
+        return sorted(Reading(t, (), "") for c in channels for t in c.times_ns)
+
+    def holds(self, reading: Reading) -> bool:
+        if self.field is None:
+            return True
+        each = [self._fits(value) for value in reading.values]
+        return any(each) if self.items == "any" else bool(each) and all(each)
+
+    def _fits(self, value: object) -> bool:
+        if self.value is not None:
+            return next(differences(value, self.value, self.tolerance), None) is None
+        assert isinstance(value, int | float)  # noqa: S101 - what is no number was left out
+        return is_within(value, self.min, self.max)
+
+
+class ReactsParams(Record):
+    """Each time that `cause` begins to hold, a message for which `effect` holds has to come `within_s` (seconds).
+
+    With `not_before`, none may come before the first cause, from `within_s` after a message for which it does not hold.
+    """
+
+    cause: Condition
+    effect: Condition
+    within_s: Annotated[float, Field(gt=0)]
+    not_before: bool = True
+
+
+class Answer(NamedTuple):
+    """A cause, and how long after it (s) the effect came; None where it never did before the next cause."""
+
+    at_ns: int
+    after_s: float | None
+
+
+@check("reacts", params=ReactsParams)
+def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
+    """The node answers what it hears, in time.
+
+    What it checks
+        That each time the cause begins to be true on its topic, a message with the effect follows in time, and
+        that none comes before.
+
+    Why it matters on a robot
+        A robot that stops half a second late has hit the wall, and one that always stops never arrives.
+
+    How it is measured
+        By when the messages reach the recorder. A cause counts where it begins: several messages in a row for
+        which it is true are one. In a run with a fast clock, time is the clock's.
+
+    How to fix
+        Publish the answer in the callback of the subscriber, or let the loop look at what the callback kept.
+        `rostopic echo` on both topics shows which message is answered late, or not at all.
+    """
+    causes = params.cause.read([c for c in run.channels if c.topic == params.cause.topic])
+    own = run.student_channels(params.effect.topic)
+    effects = params.effect.read(own)
+    answers = _answers(run, causes, effects, params)
+    verdict = (
+        _nothing_to_judge(package, run, effects, own, params)
+        or _early(causes, effects, run, params)
+        or _unanswered(answers, run, params)
+        or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.cause.words}")
+    )
+    times = [one.after_s for one in answers if one.after_s is not None]
+    span = (answers[0].at_ns, answers[-1].at_ns) if answers else (None, None)
+    return verdict.about(
+        expected=f"{params.effect.words}, {significant(params.within_s)} s at most after {params.cause.words}",
+        measured=verdict.measured
+        or f"{len(times)} of {plural(len(answers), 'answer')}"
+        + (f", up to {max(times):.2f} s after" if times else ""),
+        citations=(*verdict.citations, cite(run, params.cause.topic, *span), cite(run, params.effect.topic)),
+    )
+
+
+def _answers(
+    run: Run, causes: Sequence[Reading], effects: Sequence[Reading], params: ReactsParams
+) -> list[Answer]:
+    """Return what came after each beginning of the cause of which the answer was waited for."""
+    to_s, until_ns = run_seconds(run), observed_until_ns(run) or run.end_ns
+    if to_s is None:
+        return []
+    before = (False, *(params.cause.holds(one) for one in causes))
+    starts = [
+        one.time_ns for held, one in zip(before, causes, strict=False) if not held and params.cause.holds(one)
+    ]
+    came = [one.time_ns for one in effects if params.effect.holds(one)]
+    answers = []
+    for number, at_ns in enumerate(starts):
+        next_ns = starts[number + 1] if number + 1 < len(starts) else run.end_ns + 1
+        later = ((t, to_s(t) - to_s(at_ns)) for t in came)
+        theirs = (s for t, s in later if s >= -ORDER_S and (t < next_ns or s <= params.within_s))
+        after_s = next((max(0.0, s) for s in theirs), None)
+        if after_s is not None or to_s(until_ns) - to_s(at_ns) >= params.within_s:
+            answers.append(Answer(at_ns, after_s))
+    return answers
+
+
+def _nothing_to_judge(
+    package: PackageFacts, run: Run, effects: Sequence[Reading], own: Sequence[Channel], params: ReactsParams
+) -> Verdict | None:
+    if run_seconds(run) is None:
+        return inconclusive("the run's fast clock was not recorded", hint="grade again")
+    if not effects:
+        return no_message(package, run, params.effect.topic)
+    if params.effect.field is not None and not any(one.values for one in effects):
+        return no_field(effects[0], own)
+    return None
+
+
+def _early(
+    causes: Sequence[Reading], effects: Sequence[Reading], run: Run, params: ReactsParams
+) -> Verdict | None:
+    """The effect without its cause: between a first message that is no cause, and the first that is one."""
+    to_s = run_seconds(run)
+    if not params.not_before or not causes or params.cause.holds(causes[0]) or to_s is None:
+        return None
+    from_s = to_s(causes[0].time_ns) + params.within_s
+    first = next((one.time_ns for one in causes if params.cause.holds(one)), causes[-1].time_ns)
+    between = [
+        one
+        for one in effects
+        if from_s < to_s(one.time_ns) < to_s(first) - ORDER_S and params.effect.holds(one)
+    ]
+    if not between:
+        return None
+    lead_s = to_s(first) - to_s(between[0].time_ns)
+    message = f"{params.effect.words} comes {lead_s:.2f} s before {params.cause.words}"
+    hint = "publish it only when the message that you hear asks for it"
+    verdict = failed(message, hint=hint, measured=f"{plural(len(between), 'message')} too early")
+    if to_s(between[-1].time_ns) >= from_s + params.within_s:
+        return verdict
+    # what ends so soon may be an older answer of a machine that was late itself
+    return excused(verdict.once(), run, causes[0].time_ns, first, _why_late)
+
+
+def _unanswered(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Verdict | None:
+    hint = f"publish on {params.effect.topic} in the callback of {params.cause.topic}"
+    if not answers:
+        message = f"{params.cause.words} did not come, or so late that no answer could be waited for"
+        return inconclusive(message, hint="grade again")
+    slow = [one for one in answers if one.after_s is None or one.after_s > params.within_s]
+    if not slow:
+        return None
+    reaction, times = f"{params.effect.words} {{}} {params.cause.words}", plural(len(answers), "time")
+    late = max((one.after_s for one in slow if one.after_s is not None), default=None)
+    if late is None and len(slow) == len(answers):
+        verdict = failed(f"{reaction.format('never follows')}, which came {times}", hint=hint)
+        return verdict.once() if len(answers) == 1 else verdict
+    how = "does not follow" if late is None else f"comes up to {late:.2f} s after"
+    verdict = failed(f"{len(slow)} of {times} {reaction.format(how)}", hint=hint).once()
+    return excused(verdict, run, slow[0].at_ns, run.end_ns, _why_late)
+
+
+def _why_late(late: Lateness) -> str:
+    if not (late.full or late.max_ms >= LATE_MS):
+        return ""
+    return "busy" if late.full else f"late itself, by up to {late.max_ms:.0f} ms"
