@@ -57,8 +57,9 @@ rospy.spin()
 
 def test_node_that_sleeps_by_the_wall_is_noticed_and_goes_on_in_real_time(tmp_path: Path) -> None:
     code = COUNTER.format(prepare="", sleep="time.sleep(0.1)")
-    run = run_script(tmp_path, code, clock="warped", messages={"/count": 40}, limit_s=30)
-    assert _values(run)[:40] == list(range(40))
+    # on a full machine it takes longer to see: the time that others took is left out
+    run = run_script(tmp_path, code, clock="warped", messages={"/count": 120}, limit_s=60)
+    assert _values(run)[:120] == list(range(120))
     assert run.outcome.outcome == "complete"
     assert any("does not follow" in event.detail for _, event in run.actors)
 
