@@ -168,14 +168,16 @@ class Requirements:
     def _explains(self, required: str, criterion: Criterion, found: Verdict) -> bool:
         """Return whether the loss of a required criterion can be why there was nothing to judge for this one.
 
-        What else was wrong with a node, or with a file, is no reason for its process, or for the build, to end.
+        What else was wrong with a node, or with a file, is no reason for its process, or for the build, to end; unless
+        it was at the same line, or what is absent is named.
         """
         verdict, check = self.verdicts[required], self._checks.get(self._criteria[required].check)
         repaired = check is not None and check.run_anyway and criterion.scenario is not None
         beside = (
             found.cause not in {"", verdict.cause} and self._criteria[required].scenario == criterion.scenario
         )
-        if beside and not _lines(verdict) & _lines(found):
+        named = verdict.unjudged and any(text in found.message for text in _paths(self._criteria[required]))
+        if beside and not named and not _lines(verdict) & _lines(found):
             return False
         return verdict.status.is_lost and (verdict.unjudged or not repaired)
 
@@ -183,6 +185,11 @@ class Requirements:
 def _lines(verdict: Verdict) -> set[Citation]:
     """Return the lines of files that the verdict cites."""
     return {one for one in verdict.citations if isinstance(one, FileCitation) and one.line is not None}
+
+
+def _paths(criterion: Criterion) -> list[str]:
+    """Return the parameters that look like the path of a file."""
+    return [value for value in criterion.parameters.values() if isinstance(value, str) and "/" in value]
 
 
 def _cause(verdict: Verdict) -> str:
