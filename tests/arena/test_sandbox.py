@@ -214,9 +214,11 @@ def test_memory_that_no_process_counts(
         monkeypatch.setattr(sandbox_probe, "find_cgroups", Cgroups)
     run = run_script(tmp_path, code, limit_s=20, limits=limits)
     assert exit_of(run).stopped_by == "KILL"
-    (said,) = limits_met(run)
-    memory = f"more than {limits.memory_bytes >> 20} MB of memory"  # the kernel may be first
-    assert said in {f"stopped by the grader: {found}" for found in (words, *[memory] * groups)}
+    memory = f"more than {limits.memory_bytes >> 20} MB of memory"  # the kernel may be first, or be there too
+    told = {f"stopped by the grader: {found}" for found in (words, *[memory] * groups)}
+    said = set(limits_met(run))
+    assert said
+    assert said <= told
 
 
 @needs_sandbox
