@@ -26,10 +26,12 @@ HEARD_AT_MOST_S = 8.0
 
 @dataclass
 class TopicSeen:
-    """Student's messages on one topic; times are monotonic seconds of arrival at the grader."""
+    """Student's messages on one topic; times are monotonic seconds of arrival at the grader. `lost_before_s` is what others
+    had taken from a full machine until the first."""
 
     count: int = 0
     first_s: float = 0.0
+    lost_before_s: float = 0.0
     last_s: float = 0.0
 
 
@@ -88,7 +90,8 @@ class RunState:
     def message(self, topic: str, count: int, now_s: float, *, active: bool = True) -> None:
         """Messages came, of the student's (`active`) or of a program that runs beside."""
         seen = self.topics[topic]
-        seen.first_s = seen.first_s or now_s
+        if not seen.first_s:
+            seen.first_s, seen.lost_before_s = now_s, self.lost_s
         seen.last_s = now_s
         seen.count += count
         if active:

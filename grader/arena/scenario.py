@@ -166,8 +166,9 @@ def _does_not_follow(scenario: Scenario, arena: ArenaSession, now_s: float) -> b
     """A node that sleeps by the wall's clock stays at its own rate, however fast `/clock` runs."""
     for topic in scenario.until.messages:
         seen = arena.live.topics[topic]
-        seen_s = now_s - seen.first_s - arena.live.lost_s
-        if seen.count and seen_s > UNFOLLOWED_S:
+        seen_s = now_s - seen.first_s
+        lost_s = arena.live.lost_s - seen.lost_before_s
+        if seen.count and seen_s - lost_s > UNFOLLOWED_S:
             return seen.count / seen_s < UNFOLLOWED_HZ
     return False
 
