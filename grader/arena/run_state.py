@@ -26,8 +26,8 @@ HEARD_AT_MOST_S = 8.0
 
 @dataclass
 class TopicSeen:
-    """Student's messages on one topic; times are monotonic seconds of arrival at the grader. `lost_before_s` is what others
-    had taken from a full machine until the first."""
+    """Student's messages on one topic; times are monotonic seconds of arrival at the grader. `lost_before_s` is
+    what others had taken from a full machine until the first."""
 
     count: int = 0
     first_s: float = 0.0
