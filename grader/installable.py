@@ -9,6 +9,17 @@ from pathlib import Path
 
 _TABLE = Path(__file__).with_name("installable.txt")
 PIP = "pip:"
+ROS_2 = {
+    "rclpy",
+    "rclcpp",
+    "ament_cmake",
+    "ament_python",
+    "ament_index_python",
+    "launch_ros",
+    "ros2cli",
+    "rosidl_runtime_py",
+}
+"""No machine for ROS 1 has these."""
 ON_THE_MACHINE = "on the grading machine: "
 """How every hint begins that only who keeps the machine can follow: grading again changes nothing before."""
 _PREFIX = re.compile(r"/opt/ros/([a-z]+)\b")

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from grader.checks.support.scripts import path_in_package
 from grader.checks.support.text import near_names, shown
-from grader.installable import install_hint, known_packages
+from grader.installable import ROS_2, install_hint, known_packages
 from grader.model.package import PackageFacts
 from grader.model.verdict import FileCitation
 
@@ -125,6 +125,8 @@ def _missing_package(found: re.Match[str], package: PackageFacts, lines: Sequenc
     name = found[1]
     near = get_close_matches(name, (*ALWAYS_THERE, *known_packages()), 1, ONE_EDIT)
     declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
+    if name in ROS_2:
+        return Explained(f"it needs {name}, which is of ROS 2", f"take {name} out: this lab is for ROS 1")
     if name in known_packages() or (name in declared and not near):
         return Explained(
             f"it needs the package {name}, which this grading machine lacks",

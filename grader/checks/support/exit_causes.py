@@ -11,7 +11,7 @@ from grader.checks.support.processes import Life, early_end, lives
 from grader.checks.support.scripts import path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
-from grader.installable import install_hint, known_messages, known_packages
+from grader.installable import ROS_2, install_hint, known_messages, known_packages
 from grader.model.package import Fault, PackageFacts
 from grader.model.verdict import FileCitation, Verdict, inconclusive
 from grader.wording import join_words, seconds
@@ -19,7 +19,6 @@ from grader.wording import join_words, seconds
 SYNTAX = ("SyntaxError", "IndentationError", "TabError")
 RUN_IT = "run it by itself with rosrun, and read what it prints last"
 RACE = "publish() to a closed topic"
-ROS_2 = {"rclpy", "rclcpp", "ament_index_python", "launch_ros", "ros2cli", "rosidl_runtime_py"}
 ARGUMENT_HINT = (
     "give the value in the code, or take a default where `len(sys.argv)` is 1: a lab starts it by its name"
 )
@@ -300,7 +299,7 @@ def _lacking(found: Traceback, package: PackageFacts) -> str:
     name = found.message if found.kind == "ResourceNotFound" else match[1] if match else ""
     own = {package.name, *(f.path.rpartition("/")[2].removesuffix(".py") for f in package.files)}
     declared = {one.name for one in package.manifest.dependencies} if package.manifest else set[str]()
-    return name if name not in own and (name in known_packages() or name in declared) else ""
+    return name if name not in own | ROS_2 and (name in known_packages() or name in declared) else ""
 
 
 def process_tracebacks(
