@@ -35,24 +35,30 @@ def known_packages() -> dict[str, tuple[str, ...]]:
 
 
 @cache
-def known_messages() -> tuple[str, ...]:
-    """Return the names of ROS Noetic's own message types (`sensor_msgs/JointState`)."""
-    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - hundreds of types, for a rare mistake
+def noetic_messages() -> dict[str, tuple[str, ...]]:
+    """Return the names of ROS Noetic's own message types by package (`sensor_msgs`: `JointState`, …)."""
+    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415 - slow to load, and few need it
 
-    names = get_typestore(Stores.ROS1_NOETIC).fielddefs
-    return tuple(name.replace("/msg/", "/") for name in names if "/msg/" in name)
+    found: dict[str, list[str]] = {}
+    for full in get_typestore(Stores.ROS1_NOETIC).fielddefs:
+        package, _, name = full.partition("/msg/")
+        found.setdefault(package, []).append(name)
+    return {package: tuple(sorted(names)) for package, names in found.items()}
 
 
 def install_hint(name: str, lines: Iterable[str] = ()) -> str:
     """Return what the grading machine needs, by the distribution of ROS that these lines of output name."""
     ros = next((found[1] for found in map(_PREFIX.search, lines) if found), "")
+    return f"{ON_THE_MACHINE}{install_command(name, ros)}, then grade again"
+
+
+def install_command(name: str, ros: str = "") -> str:
+    """Return how a package is installed; `ros` is the distribution below /opt/ros, "" for Debian's own ROS."""
     packages = known_packages().get(name, ())
     if not ros and name not in known_packages():
-        what = f"install the ROS package {name}"
-    elif packages and packages[0].startswith(PIP):
-        what = f"pip install {packages[0].removeprefix(PIP)}"
-    elif packages and not ros:
-        what = f"apt-get install {' '.join(packages)}"
-    else:
-        what = f"apt-get install ros-{ros or 'noetic'}-{name.replace('_', '-')}, from ROS's own repository"
-    return f"{ON_THE_MACHINE}{what}, then grade again"
+        return f"install the ROS package {name}"
+    if packages and packages[0].startswith(PIP):
+        return f"pip install {packages[0].removeprefix(PIP)}"
+    if packages and not ros:
+        return f"apt-get install {' '.join(packages)}"
+    return f"apt-get install ros-{ros or 'noetic'}-{name.replace('_', '-')}, from ROS's own repository"

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from grader.errors import RosMissing
-from grader.installable import known_packages
+from grader.installable import known_packages, noetic_messages
 from grader.ros_env import RosInstallation, find_ros
 from grader.wording import closest, did_you_mean
 
@@ -56,7 +56,7 @@ class RosPackages:
         """Return the names of a package's types, as installed here, else as ROS Noetic has them."""
         folder = self.folders.get(package)
         there = sorted(p.stem for p in (folder / kind).glob(f"*.{kind}")) if folder else []
-        return tuple(there) or (_of_noetic(package) if kind == "msg" else ())
+        return tuple(there) or (noetic_messages().get(package, ()) if kind == "msg" else ())
 
     def lacks(self, package: str) -> bool:
         """Return whether a package exists that is not installed here."""
@@ -83,7 +83,7 @@ class RosPackages:
     def _unknown(self, package: str, own: Collection[str]) -> str:
         """Return what is to be said of a package that is not here; empty where it may be elsewhere."""
         known = {*own, *self.folders, *known_packages()}
-        if package in known_packages() or _of_noetic(package):
+        if package in known_packages() or package in noetic_messages():
             return ""
         if self.ros is not None:
             return f'this machine has no ROS package "{package}"{did_you_mean(package, known)}'
@@ -143,10 +143,3 @@ def _is_program(path: Path) -> bool:
         with path.open("rb") as file:
             return file.read(2) == b"#!"
     return os.access(path, os.X_OK)
-
-
-@lru_cache(maxsize=64)
-def _of_noetic(package: str) -> tuple[str, ...]:
-    from grader.evidence.decode import noetic_types  # noqa: PLC0415 - slow to load, and few rubrics need it
-
-    return noetic_types(package)

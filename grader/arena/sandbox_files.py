@@ -115,15 +115,15 @@ def _program(shims: Path, source: str, name: str, called: Sequence[str]) -> None
         (shims / other).symlink_to(name)
 
 
-def known_packages() -> tuple[str, ...]:
-    """Every package that can be stood in for."""
+def standin_packages() -> tuple[str, ...]:
+    """Return every package that the grader has a stand-in for."""
     return tuple(sorted(p.parent.name for p in STANDIN_SOURCES.glob(f"*/{PACKAGE_MANIFEST_FILENAME}")))
 
 
 def missing_packages(ros: RosInstallation) -> tuple[str, ...]:
     """Those of them that this ROS does not know."""
     known = set(_installed(ros)) | set(_overlaid(ros))
-    return tuple(name for name in known_packages() if name not in known)
+    return tuple(name for name in standin_packages() if name not in known)
 
 
 def copy_standins(folder: Path, ros: RosInstallation) -> None:
@@ -181,7 +181,9 @@ def _is_program(path: Path) -> bool:
 def _installed(ros: RosInstallation) -> Iterator[str]:
     entries = [Path(entry) for entry in _package_path(ros)]
     for share in (*entries, *(Path(prefix) / SHARE for prefix in ros.prefixes)):
-        yield from (name for name in known_packages() if (share / name / PACKAGE_MANIFEST_FILENAME).is_file())
+        yield from (
+            name for name in standin_packages() if (share / name / PACKAGE_MANIFEST_FILENAME).is_file()
+        )
 
 
 def _overlaid(ros: RosInstallation) -> Iterator[str]:

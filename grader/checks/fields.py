@@ -8,7 +8,15 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from grader.checks.registry import check
-from grader.checks.support.fields import FieldPath, Reading, bounds_text, is_within, no_field, readings
+from grader.checks.support.fields import (
+    ROUNDING,
+    FieldPath,
+    Reading,
+    bounds_text,
+    is_within,
+    no_field,
+    readings,
+)
 from grader.checks.support.nodes import PublishedTopic
 from grader.checks.support.text import shown
 from grader.checks.support.topics import cite, losses, no_message
@@ -19,7 +27,6 @@ from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed
 from grader.wording import join_words, plural, seconds, significant
 
-ROUNDING = 1e-6
 VALUES_SHOWN = 4
 
 

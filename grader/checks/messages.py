@@ -60,7 +60,7 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
         stays the same will not. A right time in other words than the handout's earns half.
 
     How to fix
-        Make the text anew in each turn of the loop: `"hello world %s" % rospy.get_time()`. `rostopic echo
+        Build the text in each turn of the loop: `"hello world %s" % rospy.get_time()`. `rostopic echo
         <topic>` shows what is sent.
     """
     heard = [c for c in run.student_channels(params.topic) if c.messages]

@@ -83,6 +83,7 @@ class ReactsParams(Record):
     """Each time that `cause` begins to hold, a message for which `effect` holds has to come `within_s` (seconds).
 
     With `not_before`, none may come before the first cause, from `within_s` after a message for which it does not hold.
+    Publish about three times `within_s` of such messages first, so that there is something to see.
     """
 
     cause: Condition

@@ -22,7 +22,7 @@ from grader.arena.sandbox_files import missing_packages
 from grader.cli.host_support import Row, platform_rows, sandbox_rows
 from grader.errors import RosMissing
 from grader.host_programs import HOST_ENV, LISTS, find_host_program
-from grader.installable import known_packages
+from grader.installable import install_command
 from grader.portable import cores, system, user_id
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible
@@ -99,7 +99,10 @@ def _package(name: str, asked: Sequence[str], packages: RosPackages) -> Row:
     folder, wanted = packages.folders.get(name), f"for {join_words(asked)}"
     if folder is None:
         return Row(
-            name=name, state="missing", detail=f"not installed, {wanted}", fix=_install(name, packages.ros)
+            name=name,
+            state="missing",
+            detail=f"not installed, {wanted}",
+            fix=install_command(name, _distro(packages.ros)),
         )
     if folder.is_relative_to(STANDINS):
         return Row(name=name, state="ok", detail=f"the grader's stand-in, {wanted}")
@@ -111,14 +114,9 @@ def _package(name: str, asked: Sequence[str], packages: RosPackages) -> Row:
     return Row(name=name, state="ok", detail=f"{folder}, {wanted}")
 
 
-def _install(name: str, ros: RosInstallation | None) -> str:
-    known = known_packages().get(name, "")
-    dashed = name.replace("_", "-")
-    if ros is not None and ros.kind == "setup":
-        known = known or f"ros-{ros.distro}-{dashed}"
-    elif ros is not None and ros.kind == "debian" and name.endswith("_msgs"):
-        known = known or f"python3-{dashed}"
-    return f"apt-get install {known}" if known else f"install the ROS package {name}"
+def _distro(ros: RosInstallation | None) -> str:
+    """Return the distribution of ROS's own repository; "" for Debian's ROS, or none."""
+    return ros.distro if ros is not None and ros.kind == "setup" else ""
 
 
 def _python() -> Row:

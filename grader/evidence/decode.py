@@ -178,29 +178,6 @@ def md5sum(type: str) -> str:  # noqa: A002 - ROS's own word
     return _described(type)[1]
 
 
-def noetic_types(package: str) -> tuple[str, ...]:
-    """Return the names of the message types that a package has in ROS Noetic, none for any other package."""
-    return tuple(
-        name.rpartition("/")[2] for name in _noetic().fielddefs if name.startswith(f"{package}/msg/")
-    )
-
-
-@lru_cache(maxsize=1)
-def known_packages() -> dict[str, tuple[str, ...]]:
-    """Return the names of ROS Noetic's own message types by package."""
-    found: dict[str, list[str]] = {}
-    for full in _noetic().fielddefs:
-        package, _, name = full.partition("/msg/")
-        found.setdefault(package, []).append(name)
-    return {package: tuple(sorted(names)) for package, names in found.items()}
-
-
-def is_ros_type(type: str) -> bool:  # noqa: A002 - ROS's own word
-    """Return whether ROS Noetic itself has a message type of that name."""
-    package, _, name = type.partition("/")
-    return name in known_packages().get(package, ())
-
-
 @lru_cache(maxsize=1)
 def _noetic() -> Typestore:
     return get_typestore(Stores.ROS1_NOETIC)

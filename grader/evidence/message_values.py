@@ -18,9 +18,9 @@ from grader.evidence.decode import (
     FindText,
     definition,
     full_definition,
-    is_ros_type,
 )
 from grader.evidence.definitions import MAX_DEFINITION_BYTES, PRIMITIVES, Field, parse, sections_of
+from grader.installable import noetic_messages
 from grader.wording import did_you_mean
 
 ITEMS_MAX = 1_000_000
@@ -102,7 +102,9 @@ class MessageType:
 
 
 def _definition(type_: str, find_text: FindText) -> str:
-    text = None if is_ros_type(type_) else find_text(type_) or OTHER_TEXTS.get(type_)
+    package, _, name = type_.partition("/")
+    known = name in noetic_messages().get(package, ())
+    text = None if known else find_text(type_) or OTHER_TEXTS.get(type_)
     if text is None:
         return definition(type_)
     if len(text) > MAX_DEFINITION_BYTES:

@@ -137,7 +137,7 @@ class Unpacker:
     def refuse(self, why: str) -> None:
         raise SubmissionError(
             f"{self._name} is not unpacked: {why}",
-            hint="Pack the package's folder anew, as a plain .zip or .tar.gz.",
+            hint="Pack the package's folder again, as a plain .zip or .tar.gz.",
         )
 
     def _leads_out(self, path: str) -> bool:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from grader.checks import CHECKS, Check
 from grader.checks.all_runs import NotRecorded
+from grader.checks.support.text import texts_in
 from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
@@ -188,8 +189,8 @@ def _lines(verdict: Verdict) -> set[Citation]:
 
 
 def _paths(criterion: Criterion) -> list[str]:
-    """Return the parameters that look like the path of a file."""
-    return [value for value in criterion.parameters.values() if isinstance(value, str) and "/" in value]
+    """Return the parameters that look like the path of a file of the package: no topic."""
+    return [text for text in texts_in(criterion.parameters) if "/" in text and not text.startswith("/")]
 
 
 def _cause(verdict: Verdict) -> str:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from graphlib import TopologicalSorter
 from pathlib import PurePosixPath
 
 from pydantic import ValidationError
 
 from grader.checks.build import CATKIN_MAKE
+from grader.checks.support.text import texts_in
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.repair import Repair, advice_of, place_of
@@ -224,22 +225,11 @@ def _names(criterion: Criterion, repair: Repair) -> bool:
     """Return whether the criterion asks for the name that the repair puts in place."""
     before, after = (set(re.findall(r"[\w.~/-]*\w", text)) for text in (repair.before, repair.after))
     new = {word.rpartition("/")[2] for word in after - before}
-    return any(text.strip("/").rpartition("/")[2] in new for text in _texts(criterion.parameters))
+    return any(text.strip("/").rpartition("/")[2] in new for text in texts_in(criterion.parameters))
 
 
 def _words(text: str) -> set[str]:
     return set(re.findall(r"[\w.-]+", text))
-
-
-def _texts(value: object) -> Iterator[str]:
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, Mapping):
-        for item in value.values():
-            yield from _texts(item)
-    elif isinstance(value, (list, tuple)):
-        for item in value:
-            yield from _texts(item)
 
 
 def _charge(verdict: Verdict, copy: Verdict, repairs: Sequence[Repair]) -> Verdict:

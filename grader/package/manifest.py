@@ -115,7 +115,7 @@ def _fault(line: int | None, kind: str, message: str, cause: str) -> Fault:
 
 
 def _meaning(root: etree._Element, said: list[str]) -> Package:
-    """What catkin_pkg makes of it. Written anew from the tree, so that no DTD reaches its XML parser."""
+    """What catkin_pkg makes of it. Written again from the tree, so that no DTD reaches its XML parser."""
     _shorten(root)
     text = etree.tostring(root, encoding="unicode", with_tail=False)
     package = parse_package_string(text, warnings=said)

@@ -287,11 +287,11 @@ def _character_words(char: str) -> str:
     if unicodedata.category(char) == "Zs":
         name = "no-break space" if char == "\u00a0" else "special space"
         return (
-            f"an invisible {name} ({code}) was {_COPIED}: delete the spaces of this line and type them anew"
+            f"an invisible {name} ({code}) was {_COPIED}: delete the spaces of this line and type them again"
         )
     if not char.isprintable():
-        return f"an invisible character ({code}) was {_COPIED}: delete this line and type it anew"
+        return f"an invisible character ({code}) was {_COPIED}: delete this line and type it again"
     plain = unicodedata.normalize("NFKC", char)
     if plain != char and plain.isascii():
-        return f"`{char}` ({code}) is not the plain `{plain}`: type it anew"
+        return f"`{char}` ({code}) is not the plain `{plain}`: type it again"
     return f"`{char}` ({code}) cannot stand in Python code outside a text or a comment"

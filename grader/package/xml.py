@@ -30,7 +30,7 @@ _CAUSES = (
     (r"EntityRef|Entity '.*' not defined", "a plain `&` is written `&amp;`"),
     (r"character encoding|not proper UTF-8|Unsupported encoding|switch encoding",
      "the file is not saved in the encoding that it names: save it as UTF-8"),
-    (r"Invalid character|invalid Char|xmlChar", "an invisible control character: type the line anew"),
+    (r"Invalid character|invalid Char|xmlChar", "an invisible control character: type the line again"),
     (r"[Ee]ntity", "entities are not read: write the text out"),
     (r"Excessive depth", "tags are nested more than 250 deep"),
     (r"Namespace prefix (\S+)", "`{0}:` stands before a name: no colons in the names of tags and attributes"),

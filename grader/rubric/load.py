@@ -23,7 +23,7 @@ from grader.rubric.source import Source, read_source, text_at
 class LoadedRubric(Record):
     """A rubric and where it came from; `digest` is the sha256 of the file's bytes, and of the instructor's files.
 
-    `own` is the text of the instructor's file of checks: another process, to which this record is sent, runs it anew.
+    `own` is the text of the instructor's file of checks: another process, to which this record is sent, runs it again.
     """
 
     rubric: Rubric

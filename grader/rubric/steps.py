@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from grader.errors import EvidenceError
+from grader.installable import noetic_messages
 from grader.rubric.faults import model_faults
 from grader.rubric.model import STEP_S_MAX, Step, Transform
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
@@ -136,11 +137,10 @@ def misfits(
 
     `at` is the place of the type.
     """
-    from grader.evidence.decode import known_packages  # noqa: PLC0415 - slow to load, and few rubrics need it
-    from grader.evidence.message_values import FIRST, OTHER_TEXTS, MessageType  # noqa: PLC0415 - as above
+    from grader.evidence.message_values import FIRST, OTHER_TEXTS, MessageType  # noqa: PLC0415 - slow to load, and few rubrics need it
 
     package, _, name = kind.partition("/")
-    names = known_packages().get(package, ())
+    names = noetic_messages().get(package, ())
     if not names and kind not in OTHER_TEXTS:
         return
     if names and name not in names:

@@ -1,7 +1,7 @@
 """`grader check --watch`: grade a package again whenever one of its files is saved, until Ctrl-C.
 
 A package's folder and the options of `grader check` come in; results go to a screen (`watch_screen`). Each run grades
-everything anew: how one file of a package affects another cannot be foreseen, and a stale result would mislead.
+everything again: how one file of a package affects another cannot be foreseen, and a stale result would mislead.
 
 Saves are found by polling, which works on network folders and virtual machines' shares too. A save only says when to
 look; whether the package has changed is decided by its contents.

@@ -10,7 +10,7 @@ from grader.host_programs import HOST_ENV, find_host_program
 
 
 @pytest.fixture(autouse=True)
-def _asked_anew():
+def _asked_again():
     find_host_program.cache_clear()
     yield
     find_host_program.cache_clear()

@@ -55,7 +55,7 @@ UNKNOWN = (
 
 
 @pytest.fixture(autouse=True)
-def _asked_anew():
+def _asked_again():
     sandbox_probe._walls.cache_clear()
     yield
     sandbox_probe._walls.cache_clear()

@@ -271,8 +271,23 @@ def test_doctor_says_what_a_rubric_needs_and_this_machine_lacks(tmp_path, capsys
         "course_map": "missing", "course_sim": "ok", "gazebo_msgs": "missing", "turtlesim": "ok"
     }  # fmt: skip
     assert found["course_map"]["detail"] == f"{tmp_path}/tmp/course_map is hidden from the sandbox, for Lap"
-    assert found["gazebo_msgs"]["mend"] == "apt-get install ros-noetic-gazebo-msgs"
+    assert found["gazebo_msgs"]["mend"] == "apt-get install ros-noetic-gazebo-msgs, from ROS's own repository"
     assert found["turtlesim"]["detail"] == "the grader's stand-in, for turtlesim_node"
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "fix"),
+    [
+        ("debian", "actionlib", "apt-get install libactionlib-dev python3-actionlib"),
+        ("setup", "actionlib", "apt-get install ros-noetic-actionlib, from ROS's own repository"),
+        ("debian", "course_sim", "install the ROS package course_sim"),
+    ],
+)
+def test_doctor_says_how_a_package_is_installed(kind, name, fix):
+    ros = RosInstallation(
+        kind=kind, where="x", distro="noetic", python="python3", prefixes=(), env={"ROS_PACKAGE_PATH": ""}
+    )
+    assert doctor._package(name, ["Lap"], RosPackages(ros)).fix == fix
 
 
 def test_a_workspace_below_tmp_is_hidden_from_the_sandbox():

@@ -132,7 +132,7 @@ def damage_all(mirror):
     [damage_pack, damage_lock, damage_head, damage_config, damage_refs, damage_state, damage_all],
 )
 @pytest.mark.parametrize("fresh", [True, False])
-def test_a_damaged_mirror_is_made_anew(damage, fresh, server):
+def test_a_damaged_mirror_is_made_again(damage, fresh, server):
     repo = server.new()
     since = time.time()
     server.obtain(since=since)

@@ -189,7 +189,7 @@ def test_names_that_lead_outside(name, tmp_path):
     ],
 )
 def test_entries_that_mean_harm(entries, tmp_path):
-    refused(make_tar(tmp_path / "a.tar", tar_with_manifest(*entries)), tmp_path)
+    assert refused(make_tar(tmp_path / "a.tar", tar_with_manifest(*entries)), tmp_path)
 
 
 def test_a_zip_with_a_device(tmp_path):

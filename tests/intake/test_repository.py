@@ -133,7 +133,7 @@ def test_a_ref_that_is_not_there(ref, hint, repo, history, tmp_path):
 
 def test_a_ref_that_is_no_commit(repo, tmp_path):
     git(repo, "tag", "blob", git(repo, "rev-parse", "HEAD:lab1/package.xml"))
-    refused(f"{repo}@blob", tmp_path)
+    assert "no branch, tag or commit 'blob'" in refused(f"{repo}@blob", tmp_path).message
 
 
 def test_a_folder_of_a_repository_at_a_ref(repo, history, tmp_path):

@@ -1,6 +1,6 @@
 """What each operator makes of the reference solutions and of a package that is written quite differently.
 
-`GRADER_REGENERATE=1 pytest tests/mutation` writes golden/<operator>.diff anew.
+`GRADER_REGENERATE=1 pytest tests/mutation` writes golden/<operator>.diff again.
 """
 
 from __future__ import annotations

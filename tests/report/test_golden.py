@@ -1,4 +1,4 @@
-"""The reports of one hostile result. `GRADER_REGENERATE=1 pytest tests/report/test_golden.py` writes them anew."""
+"""The reports of one hostile result. `GRADER_REGENERATE=1 pytest tests/report/test_golden.py` writes them again."""
 
 from __future__ import annotations
 

@@ -11,8 +11,8 @@ import pytest
 from grader.arena.sandbox_files import (
     STANDIN_SOURCES,
     copy_standins,
-    known_packages,
     missing_packages,
+    standin_packages,
     with_standins,
 )
 from grader.cli.doctor import _standins
@@ -41,7 +41,7 @@ def _package(folder: Path) -> Path:
 
 
 def test_all_are_missing_where_ros_knows_none(tmp_path: Path) -> None:
-    assert known_packages() == ALL
+    assert standin_packages() == ALL
     assert missing_packages(_ros(tmp_path, ROS_PACKAGE_PATH=f"{tmp_path}/share::/nowhere")) == ALL
 
 

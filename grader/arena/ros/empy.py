@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Stands before `empy`, which Python would compile anew on every start: the same program, from its module."""
+"""Stands before `empy`, which Python would compile again on every start: the same program, from its module."""
 
 import sys
 from importlib.machinery import SourceFileLoader

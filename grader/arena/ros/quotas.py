@@ -167,7 +167,7 @@ class Pool:
 class Notifications:
     """What rosmaster queues for nodes (a new publisher, a changed parameter, a name that was taken over), in the
     shape of its own thread pool. One node gets them one after the other, in order; large ones, of which each takes
-    memory anew, are told to one node at a time."""
+    memory again, are told to one node at a time."""
 
     def __init__(self):
         self._pool = Pool(each_max=1)

@@ -201,7 +201,7 @@ class Owners:
         return self._known.get(api)
 
     def look(self, api):
-        """The owner, found out anew: ports are used again."""
+        """The owner, looked up each time: ports are used again."""
         port = port_of(api)
         owner = self._holder(listening(port)) if port else None
         if owner is not None:

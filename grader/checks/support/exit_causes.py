@@ -11,7 +11,7 @@ from grader.checks.support.processes import Life, early_end, lives
 from grader.checks.support.scripts import path_in_package
 from grader.checks.support.text import near_names, shown
 from grader.evidence.run import Run
-from grader.installable import ROS_2, install_hint, known_messages, known_packages
+from grader.installable import ROS_2, install_hint, known_packages, noetic_messages
 from grader.model.package import Fault, PackageFacts
 from grader.model.verdict import FileCitation, Verdict, inconclusive
 from grader.wording import join_words, seconds
@@ -283,9 +283,8 @@ def _slip(found: Traceback) -> tuple[str, str] | None:
 
 def _other_types(name: str, package: str) -> tuple[str, str] | None:
     """Return which packages of ROS have the message, or what the one that was asked has that is spelt alike."""
-    pairs = [one.split("/") for one in known_messages()]
-    having = [other for other, message in pairs if message == name]
-    near = near_names(name, [message for other, message in pairs if other == package])
+    having = [other for other, names in noetic_messages().items() if name in names]
+    near = near_names(name, noetic_messages().get(package, ()))
     if having:
         lines = join_words([f"from {other}.msg import {name}" for other in having], "or")
         return f"{package} has no {name}, {join_words(having)} has", lines

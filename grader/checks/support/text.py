@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 
 from grader.untrusted_text import visible
@@ -21,6 +21,19 @@ _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 SECONDS = "{seconds}"
 VALUE = "{value}"
 NUMBER = r"[-+]?[0-9]+(?:\.[0-9]*)?(?:[eE][-+]?[0-9]+)?"
+
+
+def texts_in(value: object) -> Iterator[str]:
+    """Yield every string of a value of JSON or YAML, the keys of mappings among them."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from texts_in(key)
+            yield from texts_in(item)
+    elif isinstance(value, list | tuple | set | frozenset):
+        for item in value:
+            yield from texts_in(item)
 
 
 def near_names(wanted: str, names: Iterable[str]) -> tuple[str, ...]:

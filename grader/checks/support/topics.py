@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Literal
 
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.nodes import plain_type
 from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives
-from grader.checks.support.text import near_names
+from grader.checks.support.text import near_names, texts_in
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -167,17 +167,5 @@ def heed_losses(check: Check, facts: Mapping[str, object], verdict: Verdict) -> 
 
 def _topics(check: Check, params: object) -> Iterable[str]:
     """Whatever of its parameters may be the name of a topic."""
-    named = dict.fromkeys(_texts(params.model_dump() if isinstance(params, Record) else None))
+    named = dict.fromkeys(texts_in(params.model_dump() if isinstance(params, Record) else None))
     return (*named, "/rosout") if check.name in LOGGED and "/rosout" not in named else named
-
-
-def _texts(value: object) -> Iterator[str]:
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, Mapping):
-        for key, item in value.items():
-            yield from _texts(key)
-            yield from _texts(item)
-    elif isinstance(value, list | tuple | set | frozenset):
-        for item in value:
-            yield from _texts(item)

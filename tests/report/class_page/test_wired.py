@@ -36,7 +36,7 @@ def test_a_batch_writes_the_page_beside_the_gradebook(tmp_path, capsys) -> None:
 
 
 @pytest.mark.full
-def test_a_regrade_writes_it_anew(tmp_path) -> None:
+def test_a_regrade_writes_it_again(tmp_path) -> None:
     out = tmp_path / "out"
     batch(roster_of(tmp_path, [f"ada,{CORRECT}"]), out, "--allow-local", str(ROOT))
     before = data_of(out / "index.html")
