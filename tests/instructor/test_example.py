@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
 from grader import checks
 from grader.checks import CHECKS, registry
+from grader.cli.main import run
 from grader.evidence.reader import load_evidence
 from grader.judging import judge
 from grader.judging.summary import total_points
@@ -51,6 +53,15 @@ def test_one_that_dies_at_128_loses_what_the_page_says():
         f"hint: {counting.hint}",
     ]
     assert "```\n" + "\n".join(shown) + "\n```\n" in PAGE
+
+
+def test_explain_and_the_schema_say_what_a_parameter_means(capsys):
+    rubric = str(EXAMPLE / "own-checks.yaml")
+    assert run(["explain", "in-step", "--rubric", rubric]) == 0
+    assert "within_s (number, seconds; default 0.05): How far apart the two may be" in capsys.readouterr().out
+    assert run(["rubric", "schema", "--rubric", rubric]) == 0
+    keys = json.loads(capsys.readouterr().out)["$defs"]["InStepParams"]["properties"]
+    assert keys["within_s"]["description"] == "How far apart the two may be, one way or the other."
 
 
 def test_the_page_names_the_facts_and_what_can_be_imported():
