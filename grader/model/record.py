@@ -23,14 +23,15 @@ class Record(BaseModel):
         return cls.model_validate_json(data, extra="ignore")
 
 
-def field_docstrings(record: type[Record]) -> dict[str, str]:
-    """Return the docstrings of a record's fields by their keys; none where there is no source to read.
+def field_docstrings(record: type) -> dict[str, str]:
+    """Return the docstrings of a class's fields by their keys; none where there is no source to read.
 
     pydantic's `use_attribute_docstrings` gives the same, but reads all the sources whenever the grader starts.
     """
     texts: dict[str, str] = {}
-    for kind in reversed(record.__mro__[:-1]):
-        if not issubclass(kind, Record) or kind is Record:
+    fields = record.model_fields if issubclass(record, Record) else {}
+    for kind in reversed(record.__mro__):
+        if kind in {Record, BaseModel, tuple, object}:
             continue
         try:
             (definition,) = ast.parse(dedent(inspect.getsource(kind))).body
@@ -40,6 +41,8 @@ def field_docstrings(record: type[Record]) -> dict[str, str]:
         for node, text in pairwise(definition.body):
             match node, text:
                 case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
-                    key = record.model_fields[name].serialization_alias or name.removesuffix("_")
+                    key = (fields[name].serialization_alias if name in fields else "") or name.removesuffix(
+                        "_"
+                    )
                     texts[key] = inspect.cleandoc(words).replace("\n", " ")
     return texts
