@@ -47,35 +47,37 @@ DRIVE = "publish a velocity that is not 0, again and again while it has to drive
 
 
 class Place(Record):
-    """Whose position it is.
-
-    `topic` carries poses (nav_msgs/Odometry, geometry_msgs/Pose, PoseStamped and PoseWithCovarianceStamped,
-    turtlesim/Pose), any other messages with `fields`, or velocities (geometry_msgs/Twist), which are added up from
-    (0, 0) and hold no longer than `hold_s` seconds each. With `relative`, positions are seen from the first one, x
-    being forward there and y to the left.
-    """
+    """Whose position it is."""
 
     topic: GlobalName
+    """The topic of poses (`nav_msgs/Odometry`, `geometry_msgs/PoseStamped`, `turtlesim/Pose`, …), of any messages with
+    `fields`, or of velocities (`geometry_msgs/Twist`), which are added up from (0, 0)."""
     fields: PoseFields | None = None
+    """The fields of a position, in messages that are none of ROS's poses."""
     relative: bool = False
+    """Whether positions are seen from the first one, x being forward there and y to the left."""
     hold_s: Annotated[float, Field(gt=0)] | None = 1.0
+    """A velocity holds until the next one, but no longer than this; null: for ever."""
 
 
 class EndsAtParams(Place):
-    """`goal` is `[x, y]` in metres, and `heading_deg` 0 along x and 90 along y.
-
-    Judged is where the robot is at the end of the run. With `asked_on`, a topic on which the grader sends goals, it is
-    where the robot is when the next message comes there after message `number`. `within_s` (seconds) counts from that
-    message, else from when the robot sets off; it has to be there by then, and stay.
-    """
+    """The goal, and when it is looked at."""
 
     goal: Spot
+    """`[x, y]` in metres."""
     tolerance_m: Annotated[float, Field(gt=0)]
+    """So far from the goal it may end."""
     heading_deg: Annotated[float, Field(ge=-360, le=360)] | None = None
+    """Where it has to look: 0 along x, 90 along y; null: anywhere."""
     heading_tolerance_deg: Annotated[float, Field(gt=0, le=180)] = 15.0
+    """How much the heading may differ."""
     within_s: Annotated[float, Field(gt=0)] | None = None
+    """So soon it has to be there, and stay: after the message that asked, or else after it set off."""
     asked_on: Annotated[GlobalName, Refers("sent")] | None = None
+    """The topic on which the grader sends goals: judged is where the robot is when the next one comes. Null: at the
+    end of the run."""
     number: Annotated[int, Field(ge=1)] = 1
+    """Which of the messages on `asked_on` asks for this goal."""
 
     @property
     def words(self) -> str:
@@ -265,21 +267,24 @@ def _why_late(late: Lateness) -> str:
 
 
 class StaysWithinParams(Place):
-    """Give `box`, two opposite corners, or `polygon`, its corners in turn, or `min_m`, `max_m` or both.
-
-    All in metres. `min_m` and `max_m` are distances from the nearest of `walls`: each is a line through points
-    `[x, y]`, or a single point; without `walls`, they are those that the simulator shows. `share` of the time has to be
-    inside. The first `from_s` seconds after it sets off do not count. The path has to be `least_m` metres long.
-    """
+    """The region: give `box`, `polygon`, or `min_m`, `max_m` or both."""
 
     box: tuple[Spot, Spot] | None = None
+    """Two opposite corners `[x, y]`, in metres."""
     polygon: Annotated[tuple[Spot, ...], Field(min_length=3)] | None = None
+    """Its corners `[x, y]` in turn, in metres."""
     walls: tuple[Annotated[tuple[Spot, ...], Field(min_length=1)], ...] = ()
+    """Lines through points `[x, y]`, or single points, in metres; empty: the walls that the run's simulator shows."""
     min_m: Annotated[float, Field(ge=0)] | None = None
+    """The least distance from the nearest of the walls; null: no bound."""
     max_m: Annotated[float, Field(gt=0)] | None = None
+    """The greatest distance from the nearest of the walls; null: no bound."""
     share: Annotated[float, Field(gt=0, le=1)] = 1.0
+    """So much of the time it has to be inside."""
     from_s: Annotated[float, Field(ge=0)] = 0.0
+    """The time after it sets off that does not count."""
     least_m: Annotated[float, Field(ge=0)] = 0.0
+    """The path has to be so long."""
 
     @model_validator(mode="after")
     def _is_one_region(self) -> StaysWithinParams:

@@ -30,11 +30,14 @@ MOVED_M = 0.01
 
 
 class PoseFields(Record):
-    """The fields that hold a position (m) and, in radians, a heading, in messages that are none of ROS's poses."""
+    """Where a message holds a position."""
 
     x: FieldPath
+    """The field of x, in metres: `vector.x`."""
     y: FieldPath
+    """The field of y, in metres."""
     heading: FieldPath | None = None
+    """The field of the heading, in radians; null: none."""
 
 
 class Pose(NamedTuple):
