@@ -13,6 +13,7 @@ from grader.checks.registry import Refers, check
 from grader.checks.robot_path import metres, spot
 from grader.checks.support.clocks import run_seconds
 from grader.checks.support.geometry import (
+    MOVED_M,
     Point,
     Pose,
     PoseFields,
@@ -321,7 +322,8 @@ def stays_within(package: PackageFacts, run: Run, params: StaysWithinParams) -> 
 
     How it is measured
         By the positions that the simulator publishes, or else the package's own nodes; velocities are added up over
-        time. What counts is the robot's centre. A share is one of time: each position holds until the next one.
+        time. What counts is the robot's centre. A share is one of the time after it sets off, in which each
+        position holds until the next one.
 
     How to fix
         The report draws the path and where it leaves the region. Stop, or turn away, before the robot is there:
@@ -342,11 +344,11 @@ def stays_within(package: PackageFacts, run: Run, params: StaysWithinParams) -> 
 
 
 def placed(found: Track, params: StaysWithinParams) -> list[Pose]:
-    """Return the part of the path that counts."""
+    """Return the part of the path that counts: how long it stood before it set off is no one's doing."""
     path = relative(found.path) if params.relative else list(found.path)
-    return (
-        [pose for pose in path if pose.time_s >= set_off_s(path) + params.from_s] if params.from_s else path
-    )
+    moved = next((i for i, pose in enumerate(path) if math.dist(pose.point, path[0].point) > MOVED_M), 0)
+    from_s = path[max(0, moved - 1)].time_s + params.from_s
+    return [pose for pose in path if pose.time_s >= from_s]
 
 
 def out_along(path: Sequence[Pose], region: Region) -> list[float]:
@@ -407,7 +409,7 @@ def _outside(
     first = next(pose for pose, far in zip(path, out, strict=True) if far)
     peak = path[max(range(len(out)), key=out.__getitem__)]
     where = f"{metres(max(out))} at {spot(peak.point)}"
-    after = f"{max(0.0, first.time_s - set_off_s(path)):.1f} s after it set off"
+    after = f"{first.time_s - path[0].time_s + params.from_s:.1f} s after it set off"
     message = f"it is not {region.words} from {spot(first.point)} on, {after}; farthest out by {where}"
     if params.share < 1:
         message = f"only {inside:.0%} of the time it is {region.words}: farthest out by {where}"
