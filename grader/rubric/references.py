@@ -16,7 +16,10 @@ from grader.rubric.model import PROGRAM_PATTERN, TYPE_PATTERN, Until
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
 from grader.wording import closest, did_you_mean, join_words
 
-PUBLISHED_BY = {"turtlesim/turtlesim_node": re.compile(r"/turtle\d+/(pose|color_sensor)")}
+PUBLISHED_BY = {
+    "turtlesim/turtlesim_node": re.compile(r"/turtle\d+/(pose|color_sensor)"),
+    "robot_world/robot_world": re.compile(r"/(scan|base_scan|odom|base_pose_ground_truth|collision)"),
+}
 """Topics on which a program of the grader's publishes, and no one else would."""
 LAUNCH_ENDINGS = (".launch", ".xml")
 OTHER_CONDITIONS = ("messages", "connected", "heard", "nodes", "opened", "ended", "quiet_s")
