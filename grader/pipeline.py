@@ -39,7 +39,7 @@ from grader.judging import judge
 from grader.judging.early import judge_files
 from grader.judging.judge import judge_all_runs
 from grader.judging.other_runs import REPAIRS, was_built
-from grader.judging.summary import notes_of, overall_status, total_points
+from grader.judging.summary import closed_gate, notes_of, overall_status, total_points
 from grader.model.figure import Figures
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress, Silence
@@ -462,6 +462,7 @@ def assemble_result(
         rubric=RubricInfo(id=rubric.rubric.id, version=rubric.rubric.version, digest=rubric.digest),
         status=overall_status(criteria),
         points=total_points(rubric.rubric, criteria),
+        gate=closed_gate(rubric.rubric, criteria),
         max_points=rubric.rubric.max_points,
         criteria=criteria,
         environment=EnvironmentInfo(
