@@ -86,6 +86,15 @@ def _shares(whole: float, weights: dict[str, float], digits: int) -> dict[str, f
     return {name: share / 10**digits for name, share in shares.items()}
 
 
+def read_beside_rubric(rubric: LoadedRubric) -> dict[str, bytes]:
+    """Return the files that a rubric brings along, by their paths from its folder: checks, tests, recordings, packages.
+
+    Raises RubricError where its file is not there any more.
+    """
+    source = read_source(rubric.path, rubric.path.name)
+    return read_instructor(source.data, rubric.path.parent).files
+
+
 def refuse_newer(source: Source, known: Versioned) -> None:
     """Raise RubricError where the file is for a newer grader: what else may be strange in it follows from that."""
     said = source.data.get("schema") if isinstance(source.data, dict) else None

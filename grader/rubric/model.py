@@ -16,6 +16,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 NAME_PATTERN = r"^[a-z][a-z0-9-]*$"
 PROGRAM_PATTERN = r"^[A-Za-z][\w-]*/[\w.-]+$"
 TYPE_PATTERN = r"^[A-Za-z]\w*/[A-Za-z]\w*$"
+PACKAGE_PATTERN = r"^[A-Za-z]\w*$"
 MESSAGES_MAX = 10_000
 LINE_CHARS_MAX = 1_000
 TF_TYPE = "tf2_msgs/TFMessage"
@@ -41,7 +42,8 @@ class Start(Record):
     `script` is the student's file and the place where the handout wants it (`src/numeric_talker.py`); it is found
     under `scripts/`, `src/` and anywhere else in the package too. `launch` is the launch file's name. `load` is a
     YAML file that `rosparam load` puts on the parameter server. `program` is a node of another package, as `rosrun`
-    takes it (`turtlesim/turtlesim_node`): it is the grader's, and what it does never counts as the student's.
+    takes it (`turtlesim/turtlesim_node`), or a launch file of one (`course_sim/world.launch`): it is the grader's, and
+    what it does never counts as the student's.
     `built` starts every program that the build made (`add_executable`), as processes `<name>/<program>`.
     `after` names an earlier start: this one waits until a node of that one is registered.
     """
@@ -405,6 +407,14 @@ class Late(Record):
     cut_off_days: Annotated[float, Field(ge=0, le=LATE_DAYS_MAX)] | None = None
 
 
+class Needs(Record):
+    """What a lab needs of the machine: ROS packages, Debian packages, and modules of ROS's Python (`pip`)."""
+
+    ros: tuple[str, ...] = ()
+    apt: tuple[str, ...] = ()
+    pip: tuple[str, ...] = ()
+
+
 class Rubric(Record):
     """A lab. `pass_mark` in points; without one, every visible criterion must be reached.
 
@@ -413,7 +423,8 @@ class Rubric(Record):
     without it nothing is lost. `repairs` has shares by kind of repair: what is judged on a copy with such a repair
     earns that share of its points; 0 switches the repair off.
     With `fixes: none`, `grader check --fix` repairs nothing: students are to find it themselves. `groups` and `gates`
-    say how the criteria's points come to a total.
+    say how the criteria's points come to a total. `packages` are folders beside the rubric, each a ROS package of the
+    course: nodes, messages, launch files. `needs` is what the machine has to have besides.
     """
 
     schema_: Annotated[Literal["grader.rubric/1"], Field(alias="schema")] = "grader.rubric/1"
@@ -429,6 +440,8 @@ class Rubric(Record):
     late: Late | None = None
     repairs: Annotated[dict[RepairKind, Share], Field(default_factory=dict)]
     fixes: Literal["offered", "none"] = "offered"
+    packages: tuple[Annotated[str, Field(pattern=PACKAGE_PATTERN)], ...] = ()
+    needs: Annotated[Needs, Field(default_factory=Needs)]
     groups: Annotated[dict[Name, Group], Field(default_factory=dict)]
     gates: tuple[Gate, ...] = ()
     scenarios: dict[Name, Scenario]
