@@ -16,10 +16,12 @@ from grader.wording import join_words, plural
 
 
 class TopicTypeParams(Record):
-    """`topic` with its slash, `type` as `rostopic info` gives it (`std_msgs/Int8`)."""
+    """The topic and its type."""
 
     topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""
     type: Annotated[TypeName, Refers("message")]
+    """As `rostopic info` gives it: `std_msgs/Int8`."""
 
 
 @check("topic-type", params=TopicTypeParams, messages_only=True, heeds_losses=True)
@@ -82,9 +84,10 @@ def _cited(run: Run, channels: tuple[Channel, ...]) -> tuple[Citation, ...]:
 
 
 class OnlyTopicsParams(Record):
-    """`topics` that may be published: full names, or the beginning of names with `*` after it (`/square/*`)."""
+    """The topics of the lab."""
 
     topics: tuple[GlobalName, ...]
+    """Those that may be published: full names, or the beginning of names with `*` after it: `/square/*`."""
 
     def allows(self, topic: str) -> bool:
         return any(
@@ -142,9 +145,10 @@ def _publisher(run: Run, topic: str) -> str:
 
 
 class LatchedParams(Record):
-    """`topic` with its slash."""
+    """The topic."""
 
     topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""
 
 
 @check("latched", params=LatchedParams, messages_only=True, heeds_losses=True)
