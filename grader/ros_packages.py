@@ -147,7 +147,13 @@ def _has_module(python: str, name: str) -> bool:
 def _prints(command: list[str]) -> str:
     try:
         done = subprocess.run(
-            command, capture_output=True, check=False, timeout=LOOK_S, env=HOST_ENV, stdin=subprocess.DEVNULL
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            timeout=LOOK_S,
+            env=HOST_ENV,
+            cwd="/",
         )
     except (OSError, subprocess.TimeoutExpired):
         return ""

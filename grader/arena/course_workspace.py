@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import os
 import tarfile
 from collections.abc import Collection
 from dataclasses import replace
@@ -19,6 +20,7 @@ from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.sandbox import Word, copy_of, scratch
 from grader.arena.sandbox_files import COURSE, SOURCES
 from grader.arena.session import ArenaSession
+from grader.arena.workspace import give_to
 from grader.errors import ArenaError
 from grader.evidence.writer import EvidenceWriter
 from grader.rubric.course_packages import SCRIPT, package_files
@@ -78,7 +80,9 @@ def _digest(place: ProcessEnvironment) -> str:
 
 async def _build(place: ProcessEnvironment) -> bytes:
     """Return the archive of `devel/`; without a sandbox it is built in place, and nothing is returned."""
-    path = place.folder / "course.mcap"
+    path, boxed = place.folder / "course.mcap", place.sandbox.bubblewrap
+    if not boxed:
+        give_to(place.course, place.sandbox.uid)
     with EvidenceWriter(path, scenario="course", clock="real", warp=1.0, metadata={}) as writer:
         async with ArenaSession(place, writer, master=False) as arena:
             arena.start(_spec(place))
@@ -91,8 +95,10 @@ async def _build(place: ProcessEnvironment) -> bytes:
             f"the lab's own packages do not build: {_last_words(path) or 'catkin_make failed'}",
             hint="it is the course's to fix: catkin_make shows the same on the folders of the rubric's `packages`",
         )
+    if not boxed and place.sandbox.uid is not None:
+        give_to(place.course, os.geteuid())
     archive = place.workspace.kept / ARCHIVE
-    return archive.read_bytes() if place.sandbox.bubblewrap and archive.is_file() else b""
+    return archive.read_bytes() if boxed and archive.is_file() else b""
 
 
 def _spec(place: ProcessEnvironment) -> dict[str, Any]:

@@ -99,7 +99,7 @@ def make_workspace(
         _replace_manifest(package_copy / "package.xml", workspace.folder)
     if not sandbox.bubblewrap:
         for path in (workspace.built, place / "home"):
-            _give_to(path, sandbox.uid)
+            give_to(path, sandbox.uid)
     return workspace.model_copy(update={"repairs": repairs, "copied_bytes": copier.copied_bytes})
 
 
@@ -108,7 +108,7 @@ def run_in_place(workspace: Workspace, sandbox: Sandbox) -> None:
     sources = workspace.built / "src"
     shutil.rmtree(sources)
     shutil.copytree(workspace.repaired, sources, symlinks=True)
-    _give_to(sources, sandbox.uid)
+    give_to(sources, sandbox.uid)
 
 
 def needed_packages(submission: Submission, course: Collection[str] = ()) -> list[SourcePackage]:
@@ -221,8 +221,8 @@ def _give_browsers(path: Path, facts: SourceFile) -> None:
         path.write_bytes(named)
 
 
-def _give_to(path: Path, uid: int | None) -> None:
-    """The build writes as the student: hand the tree over before anything of the student's runs."""
+def give_to(path: Path, uid: int | None) -> None:
+    """Give the tree to a user who builds in it, before anything of the student's runs. None is the grader's own."""
     if uid is None:
         return
     os.chown(path, uid, uid)
