@@ -45,7 +45,7 @@ def worst(codes: Iterable[ExitCode]) -> ExitCode:
 def staged_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
     """Return the code of a pre-commit hook: any criterion that fails, fails it, whatever the pass mark is."""
     judged = settled(criteria)
-    counted = [c for c in judged if c.max_points > 0 or c.status is Status.ERROR]
+    counted = [c for c in judged if c.is_required or c.status is Status.ERROR]
     return exit_code(judged, rubric.model_copy(update={"pass_mark": None})) if counted else ExitCode.PASSED
 
 

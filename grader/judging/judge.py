@@ -25,7 +25,7 @@ from grader.judging.other_runs import (
     split_runs,
     was_built,
 )
-from grader.judging.summary import round_half_up
+from grader.judging.summary import leave_out, round_half_up
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import Citation, FileCitation, Status, Verdict, inconclusive
 from grader.rubric.model import Criterion, Rubric
@@ -73,7 +73,7 @@ def judge_all_runs(
     shown = {name: show_lines(verdict, build) for name, verdict in verdicts.items()} if build else verdicts
     results = tuple(result_of(c, shown[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
     advised = results if facts.package is None else add_advice(results, facts.package, rubric)
-    return Judgement(advised, doubtful)
+    return Judgement(leave_out(rubric, advised), doubtful)
 
 
 def judge_facts(rubric: Rubric, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> dict[str, Verdict]:
@@ -219,8 +219,9 @@ def result_of(
         check=criterion.check,
         scenario=criterion.scenario,
         status=verdict.status,
-        points=round_half_up(verdict.score * criterion.points, digits),
+        points=round_half_up(_points(criterion, verdict), digits),
         max_points=criterion.points,
+        extra=criterion.extra,
         message=verdict.message,
         expected=verdict.expected,
         measured=verdict.measured,
@@ -230,3 +231,11 @@ def result_of(
         blocked_by=verdict.blocked_by,
         repaired=repaired,
     )
+
+
+def _points(criterion: Criterion, verdict: Verdict) -> float:
+    """Return the points of a verdict: a penalty is taken off for what was found, not for what could not be judged."""
+    if criterion.penalty is None:
+        return verdict.score * (criterion.bonus or criterion.points)
+    found = verdict.status in {Status.FAIL, Status.PARTIAL}
+    return (verdict.score - 1) * criterion.penalty if found else 0.0

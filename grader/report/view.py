@@ -8,6 +8,7 @@ from unicodedata import east_asian_width
 
 from grader.errors import PackageNotFound, SubmissionError
 from grader.judging.settle import lateness
+from grader.judging.summary import total_fields, total_points
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
 from grader.rubric.model import Rubric
@@ -33,7 +34,7 @@ class Loss:
     @property
     def points(self) -> float:
         """What it cost, the blocked ones included."""
-        return sum(c.max_points - c.points for c in (self.criterion, *self.blocked, *self.alike))
+        return sum(c.missing for c in (self.criterion, *self.blocked, *self.alike))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +54,7 @@ def arrange(result: GradingResult, rubric: Rubric) -> ReportView:
     losses = [
         Loss(criterion=c, blocked=tuple(b for b in unreached if b is not c and roots[b.id] == c.id))
         for c in unreached
-        if c.id in causes or (roots[c.id] == c.id and c.max_points > 0)
+        if c.id in causes or (roots[c.id] == c.id and (c.is_required or (c.counts and c.status.is_open)))
     ]
     losses.sort(key=lambda loss: -loss.points)
     told = {c.id for loss in losses for c in (loss.criterion, *loss.blocked)}
@@ -134,8 +135,21 @@ def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric) -
 
 
 def points_of(criterion: CriterionResult) -> str:
-    """`5/10`."""
-    return f"{number(criterion.points)}/{number(criterion.max_points)}"
+    """`5/10`; `+5/+10` of a bonus, `-5` of a penalty, `not counted` of what its group leaves out."""
+    return of_points(criterion).replace(" of ", "/")
+
+
+def of_points(criterion: CriterionResult) -> str:
+    """`5 of 10`; `+5 of +10` of a bonus, `-5` of a penalty, `not counted` of what its group leaves out."""
+    if criterion.left_out is not None:
+        return "not counted"
+    if criterion.extra > 0:
+        return f"+{number(criterion.points)} of +{number(criterion.extra)}"
+    return (
+        number(criterion.points)
+        if criterion.extra
+        else f"{number(criterion.points)} of {number(criterion.max_points)}"
+    )
 
 
 def places(criterion: CriterionResult) -> list[str]:
@@ -207,24 +221,25 @@ def without_hidden(result: GradingResult, rubric: Rubric) -> GradingResult:
     if len(shown) == len(result.criteria):
         return result
     decided = tuple(o for o in result.overrides if o.criterion not in hidden)
-    points = round(sum(c.points for c in shown), rubric.digits)
     visible = rubric.model_copy(update={"criteria": tuple(c for c in rubric.criteria if c.id not in hidden)})
+    points = total_points(visible, shown)
     late = lateness(points, visible, result.late) if result.late else None
     update = {
+        **total_fields(visible, shown),
         "criteria": shown,
         "overrides": decided,
         "late": late,
         "points": late.points if late else points,
-        "max_points": sum(c.max_points for c in shown),
+        "max_points": round(sum(c.max_points for c in shown), 6),
         "status": _status(result, shown, {o.criterion for o in decided}),
     }
     return result.model_copy(update=update)
 
 
 def _status(result: GradingResult, shown: tuple[CriterionResult, ...], decided: set[str]) -> str:
-    if result.error and any(c.max_points > 0 and c.id not in decided for c in shown):
+    if result.error and any(c.counts and c.id not in decided for c in shown):
         return "error"
-    statuses = {c.status for c in shown if c.max_points > 0}
+    statuses = {c.status for c in shown if c.counts}
     if not statuses or Status.ERROR in statuses:
         return "error"
     return "inconclusive" if statuses & {Status.INCONCLUSIVE, Status.MANUAL} else "graded"

@@ -156,7 +156,7 @@ def compare(before: GradingResult, after: GradingResult) -> dict[str, list[Crite
     earlier = {c.id: c for c in before.criteria}
     found: dict[str, list[CriterionResult]] = {words: [] for words in CHANGES}
     for criterion in after.criteria:
-        if criterion.id in earlier and criterion.max_points > 0:
+        if criterion.id in earlier and criterion.counts:
             words = _change(earlier[criterion.id], criterion)
             if words:
                 found[words].append(criterion)
