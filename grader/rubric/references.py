@@ -24,7 +24,7 @@ PUBLISHED_BY = {
 LAUNCH_ENDINGS = (".launch", ".xml")
 OTHER_CONDITIONS = ("messages", "connected", "heard", "nodes", "opened", "ended", "quiet_s")
 """Conditions of `until` that say nothing of how long a run lasts."""
-TYPES: Mapping[str, TypeKind] = {"message": "msg", "service": "srv"}
+TYPES: Mapping[str, TypeKind] = {"message": "msg", "field": "msg", "service": "srv"}
 LIKELY, SURE = 0.6, 0.85
 """How alike two names have to be: to be suggested, and to be taken for one with a slip."""
 _DIGITS = re.compile(r"\d+")
@@ -69,7 +69,7 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -
         fault = f'name its package too, like turtlesim/turtlesim_node, not "{value}"'
     elif to == "program" and value.partition("/")[0] not in own:
         fault = ros_packages().program_fault(value)
-    elif to in TYPES and re.fullmatch(TYPE_PATTERN, value):
+    elif to in TYPES and re.fullmatch(TYPE_PATTERN, value := value.partition("[")[0]):
         fault = ros_packages().type_fault(value, TYPES[to], own)
     if fault:
         yield path, fault

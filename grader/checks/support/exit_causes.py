@@ -257,6 +257,14 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     place = _place(found, package)
     slip = _slip(found)
     cause, hint = slip or CAUSES.get(found.kind, ("", "fix the line that is named"))
+    if (
+        any(f"'{package.name}{inner}'" in found.message for inner in ("", ".msg", ".srv"))
+        and package.interfaces
+    ):
+        hint = (
+            "the build makes the package's own messages: list them in add_message_files(…) or "
+            "add_service_files(…), call generate_messages(…), and build again"
+        )
     if lacking := _lacking(found, package):
         where = f" ({place.file}, line {place.line})" if place else ""
         cause = f"{shown(found.text)}{where}: this grading machine lacks {lacking}"
