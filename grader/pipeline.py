@@ -60,7 +60,7 @@ from grader.report.files import write_reports
 from grader.report.view import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
 from grader.rubric.load import LoadedRubric, files_of, needs_package, needs_ros, started
-from grader.rubric.rates import rates_of
+from grader.rubric.rates import rates_of, watched_of
 
 if TYPE_CHECKING:
     from grader.arena.asynchronous import Stop
@@ -361,6 +361,7 @@ def make_recorder(
         evidence,
         beside=rubric.path.parent,
         rates=rates_of(rubric.rubric),
+        watched=watched_of(rubric.rubric),
         mode=options.sandbox,
         progress=progress,
         recorded=options.reused,

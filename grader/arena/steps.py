@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from typing_extensions import Self
 
+from grader.arena.run_state import is_settled
 from grader.arena.scenario_inputs import make_shots
 from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError, EvidenceError
@@ -197,7 +198,7 @@ class StepRunner:
         live, topics = self._live, {probe.topic for probe in self._scenario.probes}
         self._tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
         patience_s = self._scenario.until.first_message_s
-        await self._arena.wait(lambda: bool(live.subscribed & topics) or not live.running, patience_s)
+        await self._come(lambda: bool(live.subscribed & topics), patience_s)
         patience_s = SUBSCRIBE_S if live.subscribed & topics else 0.0
         await self._arena.wait(lambda: topics <= live.subscribed or not live.running, patience_s)
         self._tell("sending it messages")
@@ -248,13 +249,22 @@ class StepRunner:
             self._tell(f"waiting for a subscriber on {topic}")
             settled = live.subscribed & self._types.keys() and live.running <= live.registered
             patience_s = SUBSCRIBE_S if settled else self._scenario.until.first_message_s
-            await self._arena.wait(lambda: topic in live.subscribed or not live.running, patience_s)
+            await self._come(lambda: topic in live.subscribed, patience_s)
         if topic in live.subscribed:
             self._deaf.discard(topic)
             return True
         self._deaf.add(topic)
         self._note("note", topic, "nothing was published: no node has subscribed")
         return False
+
+    async def _come(
+        self, has_come: Callable[[], bool], patience_s: float, is_over: Callable[[], bool] | None = None
+    ) -> None:
+        """Wait for what a node registers, for as long as one may still do so."""
+        live, is_over = self._live, is_over or (lambda: not self._live.running)
+        await self._arena.wait(
+            lambda: has_come() or is_over() or is_settled(live, time.monotonic()), patience_s
+        )
 
     async def _begin(
         self, work: Coroutine[Any, Any, None], *, background: bool, endless: bool = False
@@ -298,7 +308,7 @@ class StepRunner:
         topics = {channel.topic for channel in channels}
         self._tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
         patience_s = self._scenario.until.first_message_s
-        await self._arena.wait(lambda: bool(topics & self._live.subscribed) or self._is_over(), patience_s)
+        await self._come(lambda: bool(topics & self._live.subscribed), patience_s, self._is_over)
         if not topics & self._live.subscribed:
             self._note("note", play.bag, "nothing was played: no node has subscribed")
             return
@@ -372,7 +382,7 @@ class StepRunner:
         arena, live, service = self._arena, self._live, call.service
         self._tell(f"waiting for the service {service}")
         patience_s = self._scenario.until.first_message_s
-        await arena.wait(lambda: service in live.services or not live.running, patience_s)
+        await self._come(lambda: service in live.services, patience_s)
         if service in live.services:
             await arena.wait(lambda: not live.running, call.delay_s)
             self._tell(f"calling {service}")

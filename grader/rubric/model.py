@@ -285,9 +285,10 @@ class Until(Record):
     ended. `quiet_s`: for so long, nothing was printed, published, registered or set, and something was before.
     A run gives up when no message came within `first_message_s`, when all that is waited for has been silent for
     `silent_s`, when nothing in the graph has changed for the longer of the two while a connection is waited for, or
-    after `limit_s`. `alive_s`, silence and quiet do not count while a process may still become a node: until it is one,
-    or `silent_s` after its start. Where others fill the machine, this, `first_message_s` and `limit_s` are longer by
-    what they take. With no condition at all it is watched for `limit_s`.
+    after `limit_s`. What no node is there for is given up sooner: once all processes are nodes that only wait or loop,
+    and nothing in the graph has changed for 1.5 to 4 s. `alive_s`, silence and quiet do not count while a process may
+    still become a node: until it is one, or `silent_s` after its start. Where others fill the machine, this,
+    `first_message_s` and `limit_s` are longer by what they take. With no condition at all it is watched for `limit_s`.
     """
 
     window_s: Seconds | None = None
