@@ -53,6 +53,10 @@ TOGETHER = {
         "message-constant-time+launch-namespace-apart+cmake-no-catkin-package",
         "ok-launch-terminals+talker-anonymous",
     ),
+    "own-message": (
+        "field-float32+fahrenheit+no-stamp+node-named-otherwise+too-slow",
+        "build-unknown-component",
+    ),
     "sheffield-com2009-week1": (
         "publisher-not-executable+subscriber-name+manifest-malformed",
         "chatter-float+subscriber-other-topic+launch-as-printed+cmake-no-catkin-package",

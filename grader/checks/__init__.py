@@ -34,6 +34,8 @@ FAMILIES = (
     "messages",
     "fields",
     "reacts",
+    "stamps",
+    "definition",
     "rate",
     "counter",
     "listener",

@@ -13,7 +13,7 @@ from grader.checks.support.fields import FieldPath, Reading, bounds_text, is_wit
 from grader.checks.support.lateness import Lateness, excused
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.processes import observed_until_ns
-from grader.checks.support.topics import cite, no_message
+from grader.checks.support.topics import cite, misfit, no_message
 from grader.checks.support.values import differences, value_text
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
@@ -221,6 +221,8 @@ def _never_caused(causes: Sequence[Reading], run: Run, params: ReactsParams) -> 
 
 def _unanswered(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Verdict | None:
     hint = f"publish on {params.effect.topic} in the callback of {params.cause.topic}"
+    if not answers and (unsent := misfit(run, params.cause.topic)):
+        return unsent
     if not answers:
         message = f"{params.cause.words} did not come, or so late that no answer could be waited for"
         return inconclusive(message, hint="grade again")

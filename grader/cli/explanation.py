@@ -74,13 +74,30 @@ def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]
 
 def _criterion_lines(rubric: Rubric, criterion: Criterion) -> Iterator[Line]:
     yield f"{rubric.id}/{criterion.id}: {criterion.title}", 0
-    points = f"{number(criterion.points)} of {number(rubric.max_points)} points"
-    yield f"{points}, judged by the check {criterion.check}", 2
+    yield f"{worth_of(criterion, rubric)}, judged by the check {criterion.check}", 2
     if criterion.hint:
         yield f"hint: {criterion.hint}", 2
     if criterion.reproduce:
         yield f"see it yourself: {criterion.reproduce}", 2
     yield "", 0
+
+
+def worth_of(criterion: Criterion, rubric: Rubric) -> str:
+    """`10 of 100 points, the best 3 of 4 count`, `a bonus of 5 points`."""
+    if criterion.extra:
+        return f"a {'bonus' if criterion.bonus else 'penalty'} of {number(abs(criterion.extra))} points"
+    said = [f"{number(criterion.points)} of {number(rubric.max_points)} points"]
+    said += [
+        f"the best {group.best} of {len(group.criteria)} in {name} count"
+        for name, group in rubric.groups.items()
+        if group.best and criterion.id in group.criteria
+    ]
+    said += [
+        f"without it at most {number(gate.at_most)} points count"
+        for gate in rubric.gates
+        if gate.criterion == criterion.id
+    ]
+    return ", ".join(said)
 
 
 def _check_lines(check: Check) -> Iterator[Line]:

@@ -30,6 +30,7 @@ from grader.evidence.definitions import (
     parse,
 )
 from grader.evidence.memory_budget import DECODED_BYTES_MAX
+from grader.model.definition import DIVIDER, RULE
 
 Value: TypeAlias = Any
 """What a message holds: numbers, text, bytes, lists and dicts of these."""
@@ -261,10 +262,8 @@ def _checked(base: str, value: Value) -> Value:
 FindText = Callable[[str], str | None]
 """From a message type to the text of its `.msg` file, None where there is none."""
 
-DIVIDER = re.compile(r"^---\s*$", re.MULTILINE)
 _TYPE = re.compile(r"^\s*([A-Za-z][\w/]*)\s*(?:\[\d*\])?\s+[A-Za-z]\w*\s*$", re.ASCII)
 _BUILT_IN = {*PRIMITIVES, "byte", "char", "time", "duration"}
-_RULE = "=" * 80
 _PARTS_MAX = 100
 
 
@@ -304,13 +303,13 @@ def full_definition(type_: str, text: str, find_text: FindText) -> str:
         parts[name] = _text_of(name, find_text)
         waiting += _needed(parts[name], name.partition("/")[0])
     sections = [text, *(f"MSG: {name}\n{part}" for name, part in parts.items())]
-    return f"\n{_RULE}\n".join(sections)
+    return f"\n{RULE}\n".join(sections)
 
 
 def _text_of(name: str, find_text: FindText) -> str:
     """Return the type's own text, without the parts that come behind it in a full definition."""
     found = find_text(name)
-    return found if found is not None else definition(name).partition(_RULE)[0]
+    return found if found is not None else definition(name).partition(RULE)[0]
 
 
 def _needed(text: str, package: str) -> list[str]:

@@ -57,9 +57,42 @@ def load_rubric(name_or_path: str) -> LoadedRubric:
     faults = _faults(source, beside)
     if faults:
         raise RubricError(faults)
-    rubric = Rubric.model_validate_json(json.dumps(source.data), strict=True)
+    rubric = share_points(Rubric.model_validate_json(json.dumps(source.data), strict=True))
     own = beside.files[rubric.checks] if rubric.checks is not None else None
     return LoadedRubric(rubric=rubric, path=path, digest=_digest(source.raw, beside), own=own)
+
+
+def share_points(rubric: Rubric) -> Rubric:
+    """Return the rubric with the points of each group shared out to its criteria by their weights.
+
+    Shares are rounded down to the rubric's digits; what is left goes, a step at a time, to those that lost most by it.
+    """
+    weights = {c.id: c.points for c in rubric.criteria}
+    for group in rubric.groups.values():
+        if group.points is not None:
+            counted = group.best or len(group.criteria)
+            whole = group.points * len(group.criteria) / counted
+            weights |= _shares(whole, {name: weights[name] for name in group.criteria}, rubric.digits)
+    criteria = tuple(c.model_copy(update={"points": weights[c.id]}) for c in rubric.criteria)
+    return rubric.model_copy(update={"criteria": criteria})
+
+
+def _shares(whole: float, weights: dict[str, float], digits: int) -> dict[str, float]:
+    steps = round(whole * 10**digits)
+    exact = {name: steps * weight / sum(weights.values()) for name, weight in weights.items()}
+    shares = {name: int(share + 1e-9) for name, share in exact.items()}
+    for name in sorted(exact, key=lambda name: shares[name] - exact[name])[: steps - sum(shares.values())]:
+        shares[name] += 1
+    return {name: share / 10**digits for name, share in shares.items()}
+
+
+def read_beside_rubric(rubric: LoadedRubric) -> dict[str, bytes]:
+    """Return the files that a rubric brings along, by their paths from its folder: checks, tests, recordings, packages.
+
+    Raises RubricError where its file is not there any more.
+    """
+    source = read_source(rubric.path, rubric.path.name)
+    return read_instructor(source.data, rubric.path.parent).files
 
 
 def refuse_newer(source: Source, known: Versioned) -> None:

@@ -16,6 +16,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 NAME_PATTERN = r"^[a-z][a-z0-9-]*$"
 PROGRAM_PATTERN = r"^[A-Za-z][\w-]*/[\w.-]+$"
 TYPE_PATTERN = r"^[A-Za-z]\w*/[A-Za-z]\w*$"
+PACKAGE_PATTERN = r"^[A-Za-z]\w*$"
 MESSAGES_MAX = 10_000
 LINE_CHARS_MAX = 1_000
 TF_TYPE = "tf2_msgs/TFMessage"
@@ -35,13 +36,20 @@ def _of_these_times(time: datetime) -> datetime:
 Deadline = Annotated[AwareDatetime, AfterValidator(_of_these_times)]
 
 
+def _service_text(text: str | None) -> str | None:
+    if text is not None and sum(line.strip() == "---" for line in text.splitlines()) != 1:
+        raise ValueError("a service has a request and a response with one line --- between them")
+    return text
+
+
 class Start(Record):
     """A process of a run. Give one of `script`, `launch`, `load`, `program` and `built`.
 
     `script` is the student's file and the place where the handout wants it (`src/numeric_talker.py`); it is found
     under `scripts/`, `src/` and anywhere else in the package too. `launch` is the launch file's name. `load` is a
     YAML file that `rosparam load` puts on the parameter server. `program` is a node of another package, as `rosrun`
-    takes it (`turtlesim/turtlesim_node`): it is the grader's, and what it does never counts as the student's.
+    takes it (`turtlesim/turtlesim_node`), or a launch file of one (`course_sim/world.launch`): it is the grader's, and
+    what it does never counts as the student's.
     `built` starts every program that the build made (`add_executable`), as processes `<name>/<program>`.
     `after` names an earlier start: this one waits until a node of that one is registered.
     """
@@ -93,12 +101,14 @@ class Probe(Record):
 class Call(Record):
     """A service that the grader calls `delay_s` after it is offered, after the probes and the calls before it.
 
-    Fields that `request` lacks are zero.
+    Fields that `request` lacks are zero. `definition` is the handout's text of a `.srv` that students write themselves:
+    where theirs has other fields, types or another order, the service is not called, and the reason is said.
     """
 
     service: str
     type: Annotated[str, Field(pattern=TYPE_PATTERN)]
     request: Annotated[dict[str, Any], Field(default_factory=dict)]
+    definition: Annotated[str | None, AfterValidator(_service_text)] = None
     delay_s: Seconds = 0.0
 
 
@@ -285,9 +295,10 @@ class Until(Record):
     ended. `quiet_s`: for so long, nothing was printed, published, registered or set, and something was before.
     A run gives up when no message came within `first_message_s`, when all that is waited for has been silent for
     `silent_s`, when nothing in the graph has changed for the longer of the two while a connection is waited for, or
-    after `limit_s`. `alive_s`, silence and quiet do not count while a process may still become a node: until it is one,
-    or `silent_s` after its start. Where others fill the machine, this, `first_message_s` and `limit_s` are longer by
-    what they take. With no condition at all it is watched for `limit_s`.
+    after `limit_s`. What no node is there for is given up sooner: once all processes are nodes that only wait or loop,
+    and nothing in the graph has changed for 1.5 to 4 s. `alive_s`, silence and quiet do not count while a process may
+    still become a node: until it is one, or `silent_s` after its start. Where others fill the machine, this,
+    `first_message_s` and `limit_s` are longer by what they take. With no condition at all it is watched for `limit_s`.
     """
 
     window_s: Seconds | None = None
@@ -337,21 +348,28 @@ class Scenario(Record):
     @property
     def digest(self) -> str:
         """The sha256 of what is run and until when: evidence of a scenario with another one says something else."""
-        left_out = (
-            {"title"} if self.steps else {"title", "steps"}
-        )  # before there were steps, none were counted
+        left_out: dict[str, Any] = {"title": True}
+        if not self.steps:  # before there were any, none were counted, and so it is with definitions
+            left_out["steps"] = True
+        if not any(call.definition for call in self.calls):
+            left_out["calls"] = {"__all__": {"definition"}}
         return sha256(self.model_dump_json(exclude=left_out).encode()).hexdigest()
 
 
 class Criterion(Record):
     """One line of the report. `with` holds the check's own parameters.
 
-    `requires` names criteria that explain why there may be nothing to judge here: this one is then `blocked`.
+    Give one of `points`, `bonus` and `penalty`. `points` are of the rubric's 100, and 0 is advice. A `bonus` is added
+    to them where the check passes; not to reach it costs nothing. A `penalty` is taken off where the check fails, and
+    the total is never less than 0. `requires` names criteria that explain why there may be nothing to judge here: this
+    one is then `blocked`.
     """
 
     id: Name
     title: str
-    points: Annotated[float, Field(ge=0)]
+    points: Annotated[float, Field(ge=0)] = 0.0
+    bonus: Annotated[float, Field(gt=0)] | None = None
+    penalty: Annotated[float, Field(gt=0)] | None = None
     check: str
     parameters: Annotated[dict[str, Any], Field(alias="with", default_factory=dict)]
     scenario: Name | None = None
@@ -359,6 +377,30 @@ class Criterion(Record):
     visibility: Literal["visible", "hidden"] = "visible"
     hint: str = ""
     reproduce: str = ""
+
+    @property
+    def extra(self) -> float:
+        """What it can change beside the rubric's 100 points: a bonus, or minus a penalty."""
+        return self.bonus or -(self.penalty or 0.0)
+
+
+class Group(Record):
+    """Criteria whose points are given together.
+
+    With `points`, the group is worth so much, and those of its criteria are their weights in it. With `best`, only so
+    many of its criteria count, those with the most points; all have to be worth the same then.
+    """
+
+    criteria: Annotated[tuple[Name, ...], Field(min_length=1)]
+    points: Annotated[float, Field(gt=0)] | None = None
+    best: Annotated[int, Field(ge=1)] | None = None
+
+
+class Gate(Record):
+    """Without this criterion (it fails, or is blocked), the whole is worth `at_most` so many points."""
+
+    criterion: Name
+    at_most: Annotated[float, Field(ge=0)]
 
 
 class Late(Record):
@@ -376,6 +418,14 @@ class Late(Record):
     cut_off_days: Annotated[float, Field(ge=0, le=LATE_DAYS_MAX)] | None = None
 
 
+class Needs(Record):
+    """What a lab needs of the machine: ROS packages, Debian packages, and modules of ROS's Python (`pip`)."""
+
+    ros: tuple[str, ...] = ()
+    apt: tuple[str, ...] = ()
+    pip: tuple[str, ...] = ()
+
+
 class Rubric(Record):
     """A lab. `pass_mark` in points; without one, every visible criterion must be reached.
 
@@ -383,7 +433,9 @@ class Rubric(Record):
     beside the rubric with checks of the instructor's own. `deadline` has a time zone; `late` says what later costs, and
     without it nothing is lost. `repairs` has shares by kind of repair: what is judged on a copy with such a repair
     earns that share of its points; 0 switches the repair off.
-    With `fixes: none`, `grader check --fix` repairs nothing: students are to find it themselves.
+    With `fixes: none`, `grader check --fix` repairs nothing: students are to find it themselves. `groups` and `gates`
+    say how the criteria's points come to a total. `packages` are folders beside the rubric, each a ROS package of the
+    course: nodes, messages, launch files. `needs` is what the machine has to have besides.
     """
 
     schema_: Annotated[Literal["grader.rubric/1"], Field(alias="schema")] = "grader.rubric/1"
@@ -399,6 +451,10 @@ class Rubric(Record):
     late: Late | None = None
     repairs: Annotated[dict[RepairKind, Share], Field(default_factory=dict)]
     fixes: Literal["offered", "none"] = "offered"
+    packages: tuple[Annotated[str, Field(pattern=PACKAGE_PATTERN)], ...] = ()
+    needs: Annotated[Needs, Field(default_factory=Needs)]
+    groups: Annotated[dict[Name, Group], Field(default_factory=dict)]
+    gates: tuple[Gate, ...] = ()
     scenarios: dict[Name, Scenario]
     criteria: Annotated[tuple[Criterion, ...], Field(min_length=1)]
 
@@ -408,4 +464,9 @@ class Rubric(Record):
 
     @property
     def max_points(self) -> float:
-        return sum(c.points for c in self.criteria)
+        """The most points that can be reached, without bonuses."""
+        worth = {c.id: c.points for c in self.criteria}
+        uncounted = sum(
+            worth.get(name, 0.0) for g in self.groups.values() if g.best for name in g.criteria[g.best :]
+        )
+        return round(sum(worth.values()) - uncounted, 6)
