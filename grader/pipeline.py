@@ -61,7 +61,7 @@ from grader.report.view import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
 from grader.ros_packages import look_for
 from grader.rubric.load import LoadedRubric, files_of, needs_package, needs_ros, started
-from grader.rubric.rates import rates_of
+from grader.rubric.rates import rates_of, watched_of
 from grader.wording import join_words
 
 if TYPE_CHECKING:
@@ -364,6 +364,7 @@ def make_recorder(
         evidence,
         beside=rubric.path.parent,
         rates=rates_of(rubric.rubric),
+        watched=watched_of(rubric.rubric),
         mode=options.sandbox,
         progress=progress,
         recorded=options.reused,

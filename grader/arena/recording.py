@@ -60,9 +60,9 @@ _UMASK = threading.Lock()
 class Recorder:
     """Records one submission into a folder. Use as a context: its workspaces live as long as it does.
 
-    `rates` are judged, by scenario: a run that is to show them ends when they are clear. `recorded` is evidence, by
-    scenario, that stands for a run of it: it is copied. `stop` ends the runs from another thread. `about` is metadata
-    for all its evidence, `beside` the rubric's folder.
+    `rates` are judged, by scenario: a run that is to show them ends when they are clear. `watched` is how long nodes
+    have to be seen (s), by scenario. `recorded` is evidence, by scenario, that stands for a run of it: it is copied.
+    `stop` ends the runs from another thread. `about` is metadata for all its evidence, `beside` the rubric's folder.
     """
 
     def __init__(
@@ -76,6 +76,7 @@ class Recorder:
         progress: Progress,
         beside: Path | None = None,
         rates: Mapping[str, tuple[RateBounds, ...]] | None = None,
+        watched: Mapping[str, float] | None = None,
         recorded: Mapping[str, Path] | None = None,
         stop: Stop | None = None,
         about: Mapping[str, str] | None = None,
@@ -85,6 +86,7 @@ class Recorder:
         self._recorded = recorded or {}
         self._stop = stop
         self._rates = rates or {}
+        self._watched = watched or {}
         self._rubric = rubric
         self._beside = beside
         self._progress = progress
@@ -252,6 +254,7 @@ class Recorder:
                     metadata=self._metadata() | {"scenario.digest": scenario.digest},
                     tell=tell,
                     rates=self._rates.get(name, ()),
+                    watched_s=self._watched.get(name, 0.0),
                     admission=self._admission,
                     last_run=self._runs[name] == RETRIES,
                     beside=self._beside,

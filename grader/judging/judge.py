@@ -15,7 +15,8 @@ from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
 from grader.judging.advice import add_advice
-from grader.judging.facts import Facts, try_facts
+from grader.judging.cited_lines import show_lines
+from grader.judging.facts import PACKAGE_RUN, Facts, try_facts
 from grader.judging.other_runs import (
     judged_on_copy,
     needs_build,
@@ -68,7 +69,9 @@ def judge_all_runs(
         needed = needs_build(of_copy.package)
         built = not needed or was_built(first) or not was_built(repaired)
         verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs, built=built)
-    results = tuple(result_of(c, verdicts[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
+    build = first.get(PACKAGE_RUN)
+    shown = {name: show_lines(verdict, build) for name, verdict in verdicts.items()} if build else verdicts
+    results = tuple(result_of(c, shown[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
     advised = results if facts.package is None else add_advice(results, facts.package, rubric)
     return Judgement(leave_out(rubric, advised), doubtful)
 

@@ -59,6 +59,21 @@ def _repair_words(repair: Repair, criteria: list[CriterionResult]) -> str:
     return f"{words[:1].upper()}{words[1:]}"
 
 
+def judged_repaired(result: GradingResult) -> dict[str, list[str]]:
+    """Return by the criterion that a fault is charged to, which others were judged with it repaired."""
+    found: dict[str, list[str]] = {}
+    with_copy = [(c.id, c.repaired) for c in result.criteria if c.repaired is not None]
+    for name, charged in with_copy:
+        if charged.charged:
+            others = [
+                other
+                for other, used in with_copy
+                if not used.charged and {*used.repairs} & {*charged.repairs}
+            ]
+            found[name] = others
+    return found
+
+
 def late_words(result: GradingResult) -> tuple[str, ...]:
     """Lines that say what being late cost, when it was handed in, and which commit counts; none where no one asked."""
     late, known = result.late, result.late or result.handed_in

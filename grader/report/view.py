@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from unicodedata import east_asian_width
 
@@ -22,7 +23,8 @@ SOURCE_CHARS = 60
 class Loss:
     """A criterion that was not reached, and those that it blocks (directly or through another).
 
-    `alike` are others that are open with the same advice: no ROS on a machine leaves a dozen of them.
+    `alike` are others of the same mistake, or that are open with the same advice: no ROS on a machine leaves a dozen
+    of them.
     """
 
     criterion: CriterionResult
@@ -58,7 +60,7 @@ def arrange(result: GradingResult, rubric: Rubric) -> ReportView:
     told = {c.id for loss in losses for c in (loss.criterion, *loss.blocked)}
     told |= {override.criterion for override in result.overrides}
     return ReportView(
-        lost=tuple(loss for loss in losses if not loss.criterion.status.is_open),
+        lost=_told_once([loss for loss in losses if not loss.criterion.status.is_open]),
         open=_folded([loss for loss in losses if loss.criterion.status.is_open]),
         advice=tuple(c for c in result.criteria if c.id not in told and _advises(c)),
     )
@@ -69,11 +71,32 @@ def _advises(criterion: CriterionResult) -> bool:
     return not criterion.status.is_open and bool(criterion.hint or criterion.status is not Status.PASS)
 
 
-def _folded(losses: list[Loss]) -> tuple[Loss, ...]:
-    """One entry for all that are open in the same way."""
-    groups: dict[tuple[Status, str], list[Loss]] = {}
+def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
+    """One entry for all that one mistake costs: those of the same line with the same advice, or of the same repairs.
+    What costs most in all comes first."""
+    asked_first = sorted(
+        losses, key=lambda loss: not (loss.criterion.repaired and loss.criterion.repaired.charged)
+    )
+    return tuple(sorted(_folded(asked_first, _mistake), key=lambda loss: -loss.points))
+
+
+def _mistake(loss: Loss) -> Hashable:
+    criterion = loss.criterion
+    if criterion.repaired is not None:
+        return criterion.repaired.repairs
+    lines = tuple(c for c in criterion.citations if isinstance(c, FileCitation) and c.line is not None)
+    return (criterion.hint, lines) if criterion.hint and lines else criterion.id
+
+
+def _open_alike(loss: Loss) -> Hashable:
+    return loss.criterion.status, loss.criterion.hint
+
+
+def _folded(losses: list[Loss], key: Callable[[Loss], Hashable] = _open_alike) -> tuple[Loss, ...]:
+    """One entry for all that have the same key."""
+    groups: dict[Hashable, list[Loss]] = {}
     for loss in losses:
-        groups.setdefault((loss.criterion.status, loss.criterion.hint), []).append(loss)
+        groups.setdefault(key(loss), []).append(loss)
     return tuple(
         replace(
             first,
@@ -134,30 +157,46 @@ def places(criterion: CriterionResult) -> list[str]:
     return [clip(_place(citation), PLACE_CHARS) for citation in criterion.citations[:CITATIONS_MAX]]
 
 
-def pointed_at(criterion: CriterionResult) -> list[tuple[str, str]]:
-    """Each line of a file in which a column is named, below its number, and the line with the caret below it:
+def file_places(criterion: CriterionResult) -> list[str]:
+    """Those of `places` that are files of the student's: `src/talker.py:17`."""
+    cited = [c for c in criterion.citations[:CITATIONS_MAX] if isinstance(c, FileCitation)]
+    return [clip(_place(citation), PLACE_CHARS) for citation in cited]
+
+
+def pointed_at(criterion: CriterionResult, chars: int = SOURCE_CHARS) -> list[tuple[str, str]]:
+    """Each line of a file whose text is known, behind its number, and carets below what is meant:
     `12 | print "hello"` and `   |       ^`."""
     cited = [c for c in criterion.citations[:CITATIONS_MAX] if isinstance(c, FileCitation)]
     found = []
     for citation in cited:
-        if citation.line is not None and (place := caret(citation)):
+        if citation.line is not None and (place := caret(citation, chars)):
             number = str(citation.line)
             text, below = place
             found.append((f"{number} | {text}", f"{' ' * len(number)} | {below}"))
     return found
 
 
-def caret(citation: FileCitation) -> tuple[str, str] | None:
-    """Return the visible text of the cited line, of `SOURCE_CHARS` around its column, and a caret for the line below;
-    None where there is no column."""
-    if citation.column is None or not citation.source.strip():
+def caret(citation: FileCitation, chars: int = SOURCE_CHARS) -> tuple[str, str] | None:
+    """Return the visible text of the cited line, `chars` of it around its column, and carets for the line below;
+    None where the text is not known. Without a column all of the text is meant."""
+    source = citation.source.rstrip()
+    if not source.strip():
         return None
-    before = citation.source[: max(citation.column, 1) - 1]
-    first = max(0, len(before) - SOURCE_CHARS // 2)
+    begin = (citation.column or len(source) - len(source.lstrip()) + 1) - 1
+    end = citation.end_column - 1 if citation.end_column else begin + 1 if citation.column else len(source)
+    first = max(0, begin - chars // 2) if end > chars else 0
     left = "…" if first else ""
-    text = left + visible(citation.source[first : first + SOURCE_CHARS].rstrip())
-    wide = sum(east_asian_width(c) in "WF" for c in before[first:])
-    return text, " " * (len(left + visible(before[first:])) + wide) + "^"
+    shown, meant = source[first : first + chars], source[begin : min(end, first + chars)]
+    right = "…" if len(source) > first + chars else ""
+    return left + visible(shown) + right, " " * _cells(left + source[first:begin]) + "^" * max(
+        1, _cells(meant)
+    )
+
+
+def _cells(text: str) -> int:
+    """Return how many columns of a terminal the visible text takes."""
+    shown = visible(text)
+    return len(shown) + sum(east_asian_width(letter) in "WF" for letter in shown)
 
 
 def _place(citation: Citation) -> str:

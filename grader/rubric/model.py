@@ -36,6 +36,12 @@ def _of_these_times(time: datetime) -> datetime:
 Deadline = Annotated[AwareDatetime, AfterValidator(_of_these_times)]
 
 
+def _service_text(text: str | None) -> str | None:
+    if text is not None and sum(line.strip() == "---" for line in text.splitlines()) != 1:
+        raise ValueError("a service has a request and a response with one line --- between them")
+    return text
+
+
 class Start(Record):
     """A process of a run. Give one of `script`, `launch`, `load`, `program` and `built`.
 
@@ -95,12 +101,14 @@ class Probe(Record):
 class Call(Record):
     """A service that the grader calls `delay_s` after it is offered, after the probes and the calls before it.
 
-    Fields that `request` lacks are zero.
+    Fields that `request` lacks are zero. `definition` is the handout's text of a `.srv` that students write themselves:
+    where theirs has other fields, types or another order, the service is not called, and the reason is said.
     """
 
     service: str
     type: Annotated[str, Field(pattern=TYPE_PATTERN)]
     request: Annotated[dict[str, Any], Field(default_factory=dict)]
+    definition: Annotated[str | None, AfterValidator(_service_text)] = None
     delay_s: Seconds = 0.0
 
 
@@ -287,9 +295,10 @@ class Until(Record):
     ended. `quiet_s`: for so long, nothing was printed, published, registered or set, and something was before.
     A run gives up when no message came within `first_message_s`, when all that is waited for has been silent for
     `silent_s`, when nothing in the graph has changed for the longer of the two while a connection is waited for, or
-    after `limit_s`. `alive_s`, silence and quiet do not count while a process may still become a node: until it is one,
-    or `silent_s` after its start. Where others fill the machine, this, `first_message_s` and `limit_s` are longer by
-    what they take. With no condition at all it is watched for `limit_s`.
+    after `limit_s`. What no node is there for is given up sooner: once all processes are nodes that only wait or loop,
+    and nothing in the graph has changed for 1.5 to 4 s. `alive_s`, silence and quiet do not count while a process may
+    still become a node: until it is one, or `silent_s` after its start. Where others fill the machine, this,
+    `first_message_s` and `limit_s` are longer by what they take. With no condition at all it is watched for `limit_s`.
     """
 
     window_s: Seconds | None = None
@@ -339,9 +348,11 @@ class Scenario(Record):
     @property
     def digest(self) -> str:
         """The sha256 of what is run and until when: evidence of a scenario with another one says something else."""
-        left_out = (
-            {"title"} if self.steps else {"title", "steps"}
-        )  # before there were steps, none were counted
+        left_out: dict[str, Any] = {"title": True}
+        if not self.steps:  # before there were any, none were counted, and so it is with definitions
+            left_out["steps"] = True
+        if not any(call.definition for call in self.calls):
+            left_out["calls"] = {"__all__": {"definition"}}
         return sha256(self.model_dump_json(exclude=left_out).encode()).hexdigest()
 
 
