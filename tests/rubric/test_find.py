@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grader.cli.main import main
+from grader.cli.main import run
 from grader.cli.select_rubric import choose_all
 from grader.errors import UsageError
 from grader.rubric.find import add_folder, config_file, known_labs, remove_folder, rubric_ids
@@ -109,13 +109,13 @@ def test_the_list_says_where_each_comes_from_and_which_is_faulty(
     lab(tmp_path / "labs")
     broken = lab(tmp_path / "labs", "broken", "other")
     broken.write_text(broken.read_text().replace("points: 40", "points: 30"))
-    assert main(["labs", "--add", str(tmp_path / "labs")]) == 0
+    assert run(["labs", "--add", str(tmp_path / "labs")]) == 0
     capsys.readouterr()
-    assert main(["labs"]) == 0
+    assert run(["labs"]) == 0
     shown = capsys.readouterr().out
     assert "rovers-1" in shown
     assert f"{broken} is faulty: grader rubric validate {broken}" in shown.replace("\n", "")
-    assert main(["labs", "--json"]) == 0
+    assert run(["labs", "--json"]) == 0
     listed = {one["id"]: one["source"] for one in json.loads(capsys.readouterr().out)}
     assert listed["rovers-1"] == str(tmp_path / "labs")
     assert {listed[name] for name in rubric_ids()} == {"the grader"}
