@@ -215,7 +215,7 @@ def _never_caused(causes: Sequence[Reading], run: Run, params: ReactsParams) -> 
         measured=f"0 of {plural(len(causes), 'message')}",
         hint=f"rostopic echo {params.cause.topic} shows what comes while your node runs",
     )
-    return excused(verdict, run, run.start_ns, run.end_ns, _why_late)
+    return excused(verdict, run, run.start_ns, run.end_ns, why_late)
 
 
 def _unanswered(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Verdict | None:
