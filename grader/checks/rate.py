@@ -11,7 +11,7 @@ from pydantic import Field
 
 from grader.checks.registry import Refers, check
 from grader.checks.support.exit_causes import explain_early_end
-from grader.checks.support.lateness import Lateness, excused, lateness
+from grader.checks.support.lateness import NO_EXCUSE, Lateness, excused, lateness
 from grader.checks.support.nodes import PublishedTopic
 from grader.checks.support.processes import observed_until_ns
 from grader.checks.support.topics import cite, no_message, whole_until_ns
@@ -19,7 +19,7 @@ from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, passed, unjudged
+from grader.model.verdict import FileCitation, Status, Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import hertz, plural, seconds, significant
 
 FLOOD_FACTOR = 5
@@ -129,7 +129,10 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
         or passed(f"{params.topic} has {hertz(found.mean_hz)}, evenly")
     )
     citations = (*verdict.citations, cite(run, params.topic, found.times_ns[0], found.times_ns[-1]))
-    return verdict.about(expected=expected, measured=_measured(found, run, params), citations=citations)
+    measured = described(found, *params.bounds_ns)
+    if verdict.status is Status.INCONCLUSIVE or NO_EXCUSE in verdict.message:
+        measured += _lateness(found, run)
+    return verdict.about(expected=expected, measured=measured, citations=citations)
 
 
 def judged_rhythm(run: Run, params: RateParams, channels: Sequence[Channel]) -> Rhythm | None:
@@ -138,11 +141,10 @@ def judged_rhythm(run: Run, params: RateParams, channels: Sequence[Channel]) -> 
     return rhythm(channels, until_ns, params.period_ns)
 
 
-def _measured(found: Rhythm, run: Run, params: RateParams) -> str:
-    """Return what came, and how late the machine was during it."""
-    seen = described(found, *params.bounds_ns)
+def _lateness(found: Rhythm, run: Run) -> str:
+    """Return how late the machine was during it, which is of use only where that decides."""
     late = lateness(run, found.times_ns[0], found.until_ns, own=True) if found.gaps_ns else None
-    return seen if late is None else f"{seen}, {late.described}"
+    return "" if late is None else f", {late.described}"
 
 
 def _flood(found: Rhythm, package: PackageFacts, params: RateParams) -> Verdict | None:

@@ -137,7 +137,10 @@ class Terminal:
         unwalled = without_sandbox(result.environment.sandbox)
         parts = [self._head(result, rubric)]
         parts += [self._words(unwalled, indent=0, style="yellow")] if unwalled else []
-        parts += [self._words(words, indent=0) for words in sentences.late_words(result)]
+        parts += [
+            self._words(words, indent=0)
+            for words in (*sentences.gate_words(result), *sentences.late_words(result))
+        ]
         parts += self._section(
             sentences.DECIDED_TITLE, [self._decision(o, c) for o, c in sentences.decided(result)]
         )
