@@ -216,12 +216,6 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
             id="topic-of-a-program",
         ),
         pytest.param(
-            "{name: talker, script: src/talker.py}",
-            "{name: talker, program: robot_world/robot_wrld}",
-            '10: scenarios.real.start[0].program: robot_world has no program "robot_wrld" (did you mean "robot_world"?)',
-            id="program-of-the-robot-world",
-        ),
-        pytest.param(
             "{topic: /chatter, rate_hz: 10}",
             "{topic: chatter, rate_hz: 10}",
             '31: criteria[1].with.topic: a name of the graph begins with a slash: "/chatter"',
