@@ -16,7 +16,7 @@ from grader.model.record import Record
 from grader.model.repair import BY_HAND, RepairKind
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible
-from grader.rubric.find import rubric_ids
+from grader.rubric.find import known_labs
 from grader.rubric.instructor import known_checks
 from grader.rubric.load import LoadedRubric, all_rubrics, load_rubric
 from grader.rubric.model import Criterion, Rubric
@@ -65,7 +65,9 @@ def print_explanation(name: str, rubric: str | None) -> None:
 
 def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]) -> UsageError:
     criteria = (c.id for r in rubrics for c in r.rubric.criteria if c.visibility == "visible")
-    near = did_you_mean(name.rpartition("/")[2], [*checks, *criteria, *(f"{lab}/" for lab in rubric_ids())])
+    near = did_you_mean(
+        name.rpartition("/")[2], [*checks, *criteria, *(f"{lab.id}/" for lab in known_labs())]
+    )
     return UsageError(
         f'there is no check or criterion "{name}"{near}',
         hint="give a check, a criterion of a lab, or LAB/criterion; grader labs lists the labs",
