@@ -39,8 +39,8 @@ TOGETHER = {
     ),
     "follow-wall": ("build-unknown-component+node-named-otherwise+drives-straight",),
     "go-to-goal": (
-        "build-unknown-component+node-named-otherwise+turns-the-wrong-way",
-        "too-fast",
+        "build-unknown-component+node-named-otherwise+too-fast",
+        "turns-the-wrong-way",
     ),
     "leeds-comp3631-lab1": (
         "counter-every-second-loop+cmake-no-catkin-package+launch-malformed+talker-crlf",
