@@ -109,7 +109,9 @@ def _named(path: Path, found: Found, rubric: LoadedRubric) -> Chosen:
 
 
 def _chosen(path: Path, found: Found, lab: Lab) -> Chosen:
-    words = f"Checking {lab.package.name} in {shown(lab.package.folder)} by {lab.rubric}, {lab.why}"
+    folder = shown(lab.package.folder)
+    where = f" in {folder}" if folder != "." else ""
+    words = f"Checking {lab.package.name}{where} against {lab.rubric}{f', {lab.why}' if lab.why else ''}"
     return Chosen(
         rubric=load_rubric(lab.rubric),
         source=_source(path, found, lab.package),
@@ -126,7 +128,7 @@ def _source(path: Path, found: Found, package: Candidate) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Lab:
-    """A lab and the package that it is for; `why` says how they were matched."""
+    """A lab and the package that it is for; `why` says how they were matched, "" where the names are the same."""
 
     rubric: str
     package: Candidate
@@ -158,7 +160,7 @@ def _by_name(candidate: Candidate) -> Lab | None:
     rubric = find_rubric_for_package(candidate.name)
     if rubric is None:
         return None
-    return Lab(rubric=rubric, package=candidate, why=f"the lab for a package named {candidate.name}")
+    return Lab(rubric=rubric, package=candidate, why="")
 
 
 def _by_folder(candidate: Candidate) -> Lab | None:

@@ -51,7 +51,7 @@ def test_every_folder_of_a_workspace_leads_to_the_package(lab: str, tmp_path: Pa
         assert (chosen.rubric.rubric.id, chosen.package and chosen.package.resolve()) == (lab, package), (
             folder
         )
-        assert f"by {lab}, the lab for a package named {chosen.rubric.rubric.package}" in chosen.words
+        assert chosen.words.endswith(f" against {lab}")
 
 
 @pytest.mark.full
