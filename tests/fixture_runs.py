@@ -39,8 +39,8 @@ TOGETHER = {
     ),
     "follow-wall": ("build-unknown-component+node-named-otherwise+drives-straight",),
     "go-to-goal": (
-        "build-unknown-component+node-named-otherwise+round-by-the-wall+says-nothing+too-fast",
-        "stops-too-early",
+        "build-unknown-component+node-named-otherwise+too-fast",
+        "turns-the-wrong-way",
     ),
     "leeds-comp3631-lab1": (
         "counter-every-second-loop+cmake-no-catkin-package+launch-malformed+talker-crlf",

@@ -210,12 +210,11 @@ def _never_caused(causes: Sequence[Reading], run: Run, params: ReactsParams) -> 
     simulated = any(c.topic == params.cause.topic and c.callerid in run.grader_nodes for c in run.channels)
     if not causes or not simulated or any(map(params.cause.holds, causes)):
         return None
-    verdict = unjudged(
+    return unjudged(
         f"{params.cause.words} never came in this run",
         measured=f"0 of {plural(len(causes), 'message')}",
         hint=f"rostopic echo {params.cause.topic} shows what comes while your node runs",
-    )
-    return excused(verdict, run, run.start_ns, run.end_ns, why_late)
+    ).once()
 
 
 def _unanswered(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Verdict | None:

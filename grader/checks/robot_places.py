@@ -29,7 +29,7 @@ from grader.checks.support.lateness import Lateness, excused
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.processes import observed_until_ns
 from grader.checks.support.regions import Area, Band, Region, shown_walls
-from grader.checks.support.topics import cite, no_message, nodes_on
+from grader.checks.support.topics import SYSTEM_TOPICS, cite, no_message, nodes_on
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -272,7 +272,9 @@ def _excused(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
             else ""
         )
 
-    return excused(verdict.once() if nearly else verdict, run, run.start_ns, run.end_ns, why_late)
+    began = (c.times_ns[0] for c in run.student_channels() if c.messages and c.topic not in SYSTEM_TOPICS)
+    from_ns, to_ns = min(began, default=run.start_ns), observed_until_ns(run) or run.end_ns
+    return excused(verdict.once() if nearly else verdict, run, from_ns, to_ns, why_late)
 
 
 class StaysWithinParams(Place):
