@@ -40,6 +40,7 @@ TOGETHER = {
         "build-unknown-component+node-named-otherwise+round-by-the-wall+says-nothing+too-fast",
         "stops-too-early",
     ),
+    "latched-map": ("build-unknown-component+node-named-otherwise+not-latched+nan-unchecked",),
     "leeds-comp3631-lab1": (
         "counter-every-second-loop+cmake-no-catkin-package+launch-malformed+talker-crlf",
         "talker-asks-input+listener-bom+manifest-malformed",
@@ -56,6 +57,10 @@ TOGETHER = {
     "own-message": (
         "field-float32+fahrenheit+no-stamp+node-named-otherwise+too-slow",
         "build-unknown-component",
+    ),
+    "params-and-namespaces": (
+        "build-unknown-component+node-named-otherwise+launch-without-a-namespace",
+        "no-default+topic-absolute",
     ),
     "sheffield-com2009-week1": (
         "publisher-not-executable+subscriber-name+manifest-malformed",
