@@ -162,7 +162,8 @@ def counter_wrap(package: PackageFacts, run: Run, params: WrapParams) -> Verdict
         `if counter > 127: counter = 0` between adding one and publishing.
     """
     low, high = params.minimum, params.maximum
-    expected = f"after {high} comes {low}, after {high - 1} comes {high} or {low}; {params.wraps} times"
+    times = {1: "once", 2: "twice"}.get(params.wraps, f"{params.wraps} times")
+    expected = f"…{high - 1}, {high}, {low}… (or …{high - 1}, {low}…), seen {times}"
     count = longest(run, params.topic)
     if count is None:
         return _nothing(package, run, params.topic).about(expected=expected)

@@ -37,6 +37,8 @@ from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, 
 from grader.wording import join_words, significant
 
 LATE_MS = 100.0
+STALLED_MS = 1000.0
+"""In the time of the run, which may be faster than the wall's."""
 STILL_S = 0.5
 """A robot's speed at the end is that of so long a time."""
 SLOW_M_S = 0.02
@@ -250,21 +252,27 @@ def _speed_m_s(path: Sequence[Pose]) -> float:
 
 
 def _excused_end(verdict: Verdict, judged: Sequence[Pose], run: Run, params: EndsAtParams) -> Verdict:
-    """What nearly is there counts if it is seen twice; that, and what was on its way, a late machine excuses."""
+    """A robot that never moved has no excuse; nearly there is also who was there, but looks elsewhere, or late."""
     if verdict.status is not Status.FAIL or stands(judged):
         return verdict
-    nearly = params.is_near(judged[-1], NEARLY)
-    if nearly:
-        verdict = verdict.once()
-    elif _speed_m_s(judged) <= SLOW_M_S:
-        return verdict
-    return excused(verdict, run, run.start_ns, run.end_ns, _why_late)
+    return _excused(verdict, run, nearly=params.is_near(judged[-1], NEARLY))
 
 
-def _why_late(late: Lateness) -> str:
-    if not (late.full or late.max_ms >= LATE_MS):
-        return ""
-    return "busy" if late.full else f"late itself, by up to {late.max_ms:.0f} ms"
+def _excused(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
+    """What nearly is right counts if it is seen twice, and not where the machine was late; all else is lost, unless the
+    machine stood still for so long that a robot drives into a wall."""
+
+    def why_late(late: Lateness) -> str:
+        stalled = late.max_ms * run.warp >= STALLED_MS
+        if nearly and late.full and not stalled:
+            return "busy"
+        return (
+            f"late itself, by up to {late.max_ms:.0f} ms"
+            if stalled or (nearly and late.max_ms >= LATE_MS)
+            else ""
+        )
+
+    return excused(verdict.once() if nearly else verdict, run, run.start_ns, run.end_ns, why_late)
 
 
 class StaysWithinParams(Place):
@@ -388,10 +396,8 @@ def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinPa
     else:
         always = f"for {inside:.0%} of the time" if any(out) else "all the time"
         return passed(f"it is {region.words} {always}", measured=figures)
-    verdict = verdict.about(measured=figures)
-    if inside * NEARLY >= params.share and long_m * NEARLY >= params.least_m:
-        verdict = verdict.once()
-    return excused(verdict, run, run.start_ns, run.end_ns, _why_late)
+    nearly = inside * NEARLY >= params.share and long_m * NEARLY >= params.least_m
+    return _excused(verdict.about(measured=figures), run, nearly=nearly)
 
 
 def share_inside(path: Sequence[Pose], out: Sequence[float]) -> float:

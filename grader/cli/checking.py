@@ -37,7 +37,7 @@ from grader.rubric.load import LoadedRubric, needs_ros
 from grader.student.git_status import advise, read_environment
 from grader.student.git_view import write_staged
 
-TITLE = "Your marks come from what you have pushed. It differs from what was checked:"
+TITLE = "Only pushed work is marked. These changes aren't pushed yet:"
 REMARKS = "Before you submit"
 LINE_CHARS = 300
 KEPT = ".grader"

@@ -28,7 +28,7 @@ from grader.report.text import visible
 from grader.untrusted_text import line, uncommanded
 
 EARLY_TITLE = "Your files, before anything is built or run:"
-SO_FAR = "So far: the build may still change this."
+SO_FAR = "Provisional: building may change these."
 MESSAGE_CHARS = 300
 INDENT = 2
 ESCAPE = 8

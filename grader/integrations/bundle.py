@@ -60,13 +60,15 @@ class Settings(Record):
     """The file `grader.json` of an exported grader, beside the rubric's folder.
 
     `rubric` is the path of the rubric from the folder of the settings, `minutes` the platform's time limit. `modes`
-    says how a script counts if its executable bit was lost in the upload.
+    says how a script counts if its executable bit was lost in the upload. `package` is the name of the package to
+    grade, "" for the lab's.
     """
 
     rubric: str
     minutes: int
     sandbox: SandboxMode = "auto"
     modes: LostModes = "lost"
+    package: str = ""
 
     @property
     def grading_s(self) -> int:

@@ -43,7 +43,7 @@ def question(rubric: LoadedRubric, settings: Settings, image: str) -> Bundle:
     lab = add_lab(bundle, rubric, "question/tests/rubric").removeprefix("question/tests/")
     bundle.add(f"question/tests/{SETTINGS_FILE}", settings.model_copy(update={"rubric": lab}).to_json())
     bundle.add("question/info.json", _info(rubric, settings, image))
-    bundle.add("question/question.html", _page(rubric))
+    bundle.add("question/question.html", _page(rubric, settings))
     return bundle
 
 
@@ -84,9 +84,9 @@ def _info(rubric: LoadedRubric, settings: Settings, image: str) -> bytes:
     return f"{json.dumps(info, indent=4, ensure_ascii=False)}\n".encode()
 
 
-def _page(rubric: LoadedRubric) -> bytes:
+def _page(rubric: LoadedRubric, settings: Settings) -> bytes:
     text = template("question.html").decode()
-    package = html(rubric.rubric.package)
+    package = html(settings.package or rubric.rubric.package)
     return text.replace("@TITLE@", html(rubric.rubric.title)).replace("@PACKAGE@", package).encode()
 
 

@@ -33,7 +33,7 @@ Your files, before anything is built or run:
   ✓ pass         manifest  names lab1
   ✗ fail so far  talker    has no executable bit
     hint: chmod +x talker.py
-  So far: the build may still change this.
+  Provisional: building may change these.
 
 """
 
