@@ -42,6 +42,7 @@ TOGETHER = {
         "build-unknown-component+node-named-otherwise+too-fast",
         "turns-the-wrong-way",
     ),
+    "latched-map": ("build-unknown-component+node-named-otherwise+not-latched+nan-unchecked",),
     "leeds-comp3631-lab1": (
         "counter-every-second-loop+cmake-no-catkin-package+launch-malformed+talker-crlf",
         "talker-asks-input+listener-bom+manifest-malformed",
@@ -62,6 +63,10 @@ TOGETHER = {
     "own-message": (
         "field-float32+fahrenheit+no-stamp+node-named-otherwise+too-slow",
         "build-unknown-component",
+    ),
+    "params-and-namespaces": (
+        "build-unknown-component+node-named-otherwise+launch-without-a-namespace",
+        "no-default+topic-absolute",
     ),
     "sheffield-com2009-week1": (
         "publisher-not-executable+subscriber-name+manifest-malformed",

@@ -178,7 +178,8 @@ class Terminal:
             return text.append(f"\n{self._show(result.error.message)}", "not bold") if result.error else text
         points = f"{number(result.points)} of {number(result.max_points)} points"
         things = f", {plural(len(view.lost), 'thing')} to fix" if view.lost else ""
-        return Text(f"\n{points}{things}", "bold")
+        text = Text(f"\n{points}{things}", "bold")
+        return text.append("".join(f"\n{words}" for words in sentences.gate_words(result)), "not bold")
 
     def _decision(self, override: AppliedOverride, criterion: CriterionResult) -> RenderableType:
         again = sentences.look_again(override, criterion)
@@ -221,7 +222,7 @@ class Terminal:
         if criterion.status.is_open:
             return points_of(criterion)
         minus = MINUS if self._encoded(MINUS) == MINUS else "-"
-        return f"{minus}{number(criterion.max_points - criterion.points)}"
+        return f"{minus}{number(criterion.missing)}"
 
     def _advice(self, criterion: CriterionResult) -> RenderableType:
         words = self._words(criterion.message or criterion.title)
