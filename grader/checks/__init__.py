@@ -52,6 +52,7 @@ FAMILIES = (
     "connections",
     "two_copies",
     "robot_path",
+    "robot_places",
 )
 for family in FAMILIES:
     import_module(f"grader.checks.{family}")

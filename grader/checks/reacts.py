@@ -13,12 +13,12 @@ from grader.checks.support.fields import FieldPath, Reading, bounds_text, is_wit
 from grader.checks.support.lateness import excused, why_late
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.processes import observed_until_ns
-from grader.checks.support.topics import cite, no_message
+from grader.checks.support.topics import cite, misfit, no_message
 from grader.checks.support.values import differences, value_text
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import plural, significant
 
 ORDER_S = 0.1
@@ -129,6 +129,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     verdict = (
         _nothing_to_judge(package, run, effects, own, params)
         or _early(causes, effects, run, params)
+        or _never_caused(causes, run, params)
         or _unanswered(answers, run, params)
         or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.cause.words}")
     )
@@ -204,8 +205,23 @@ def _early(
     return excused(verdict.once(), run, causes[0].time_ns, first, why_late)
 
 
+def _never_caused(causes: Sequence[Reading], run: Run, params: ReactsParams) -> Verdict | None:
+    """What a simulator publishes comes of what the node does: a robot has to come to a wall to stop there."""
+    simulated = any(c.topic == params.cause.topic and c.callerid in run.grader_nodes for c in run.channels)
+    if not causes or not simulated or any(map(params.cause.holds, causes)):
+        return None
+    verdict = unjudged(
+        f"{params.cause.words} never came in this run",
+        measured=f"0 of {plural(len(causes), 'message')}",
+        hint=f"rostopic echo {params.cause.topic} shows what comes while your node runs",
+    )
+    return excused(verdict, run, run.start_ns, run.end_ns, why_late)
+
+
 def _unanswered(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Verdict | None:
     hint = f"publish on {params.effect.topic} in the callback of {params.cause.topic}"
+    if not answers and (unsent := misfit(run, params.cause.topic)):
+        return unsent
     if not answers:
         message = f"{params.cause.words} did not come, or so late that no answer could be waited for"
         return inconclusive(message, hint="grade again")
