@@ -10,7 +10,7 @@ from pydantic import Field
 from grader.checks.registry import Refers, check
 from grader.checks.support.clocks import run_seconds
 from grader.checks.support.exit_causes import explain_early_end, explain_error
-from grader.checks.support.lateness import excused, why_late
+from grader.checks.support.lateness import NEVER_LATE_S, excused, why_late
 from grader.checks.support.nodes import GlobalName, plain_type
 from grader.checks.support.text import near_names, shown
 from grader.checks.support.topics import cite, no_node, nodes_on, published_topics, topics_with
@@ -180,7 +180,10 @@ def _too_late(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | Non
         if goal.cancelled_ns
         else "do not sleep longer than asked"
     )
-    return excused(failed(message, hint=hint).once(), run, from_ns, goal.ended_ns, why_late)
+    verdict = failed(message, hint=hint)
+    if took_s > params.within_s + NEVER_LATE_S * run.warp:
+        return verdict
+    return excused(verdict.once(), run, from_ns, goal.ended_ns, why_late)
 
 
 def _no_feedback(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | None:

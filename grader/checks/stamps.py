@@ -11,7 +11,7 @@ from pydantic import Field
 from grader.checks.registry import check
 from grader.checks.support.clocks import ros_seconds
 from grader.checks.support.fields import FieldPath, no_field, readings
-from grader.checks.support.lateness import Lateness, excused
+from grader.checks.support.lateness import NEVER_LATE_S, Lateness, excused
 from grader.checks.support.nodes import PublishedTopic
 from grader.checks.support.text import shown
 from grader.checks.support.topics import cite, no_message
@@ -25,8 +25,6 @@ TICK_S = 0.05
 """A step of the fast clock: a node that asks for the time gets the last one."""
 TRANSPORT_S = 0.02
 """From the stamp to the recorder, on the wall: with a fast clock, that many times longer."""
-NEVER_LATE_S = 2.0
-"""No machine is so late with every single message (s on the wall)."""
 
 THREADS_S = 0.005
 """Two threads may send in another order than they asked for the time."""
