@@ -60,6 +60,11 @@ TOGETHER = {
         "rotation-not-copied+laser-swapped+node-named-otherwise+stamps-not-set+distance-of-base",
         "build-unknown-component+distance-ends",
     ),
+    "action-server": (
+        "field-int64+node-named-otherwise+no-feedback+preempt-not-heeded+below-zero",
+        "build-unknown-component",
+        "result-empty",
+    ),
     "own-message": (
         "field-float32+fahrenheit+no-stamp+node-named-otherwise+too-slow",
         "build-unknown-component",

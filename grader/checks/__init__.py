@@ -48,6 +48,7 @@ FAMILIES = (
     "launch_opens",
     "parameters",
     "services",
+    "actions",
     "connections",
     "two_copies",
     "robot_path",

@@ -28,6 +28,7 @@ REFERRED = {
     "sent": "topic of a probe",
     "published": "topic of the student's",
     "set": "parameter that the scenario sets",
+    "action": "action of the scenario's steps",
     "watched_s": "number",
 }
 REQUIRED = "required"

@@ -35,11 +35,21 @@ class Refers:
     `process`: a start of the student's in the scenario. `launch`: a launch file that the scenario starts. `program`:
     `package/program` of another package. `message`, `service`: a type. `field`: a field's type. `sent`: a topic on
     which the scenario's probes send. `published`: a topic on which the student publishes. `set`: a parameter that the
-    scenario sets. `watched_s`: so long the scenario has to last.
+    scenario sets. `action`: an action to which its steps send goals. `watched_s`: so long the scenario has to last.
     """
 
     to: Literal[
-        "process", "launch", "program", "message", "service", "field", "sent", "published", "set", "watched_s"
+        "process",
+        "launch",
+        "program",
+        "message",
+        "service",
+        "field",
+        "sent",
+        "published",
+        "set",
+        "action",
+        "watched_s",
     ]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
@@ -270,27 +270,30 @@ def _strays(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict 
         what = f"no pose came on {params.pose_of}" if to_s else "the run's fast clock was not recorded"
         return inconclusive(what, hint="grade again")
     slack_s = params.within_s + (TICK_S + TRANSPORT_S * run.warp if run.clock == "warped" else 0.0)
-    timed = [(to_s(t), pose) for t, pose in poses]
+    order_s, timed = ORDER_S * run.warp, [(to_s(t), pose) for t, pose in poses]
     judged = [one for one in seen if to_s(one.time_ns) >= timed[0][0] + slack_s]
-    wrong = [one for one in judged if not any(_matching(one, to_s(one.time_ns), timed, slack_s, params))]
+    wrong = [
+        one
+        for one in judged
+        for may in [_candidates(to_s(one.time_ns), timed, slack_s, order_s)]
+        if one.value is None or not any(_fits(one.value, pose, params) for pose in may)
+    ]
     if wrong:
         return _wrong_pose(run, wrong, judged, poses, params)
     until_s, last_s = to_s(observed_until_ns(run) or run.end_ns), timed[-1][0]
-    if until_s - last_s < slack_s or any(to_s(one.time_ns) >= last_s - ORDER_S for one in seen):
+    if until_s - last_s < slack_s or any(to_s(one.time_ns) >= last_s - order_s for one in seen):
         return None
     message = f"{params.name} was not sent any more after the last pose on {params.pose_of}"
     verdict = failed(message, hint=f"send it in the callback of {params.pose_of}").once()
     return excused(verdict, run, poses[0][0], run.end_ns, why_late)
 
 
-def _matching(
-    one: Seen, at_s: float, poses: Sequence[tuple[float, Transform]], slack_s: float, params: TransformParams
-) -> Iterator[bool]:
-    """Yield for each pose that the transform may have whether it has it."""
+def _candidates(
+    at_s: float, poses: Sequence[tuple[float, Transform]], slack_s: float, order_s: float
+) -> list[Transform]:
+    """Return the poses that a transform of that time may have."""
     last_s = max((t for t, _ in poses if t <= at_s), default=at_s)
-    for came_s, pose in poses:
-        if min(at_s - slack_s, last_s) <= came_s <= at_s + ORDER_S:
-            yield one.value is not None and _fits(one.value, pose, params)
+    return [pose for t, pose in poses if min(at_s - slack_s, last_s) <= t <= at_s + order_s]
 
 
 def _wrong_pose(

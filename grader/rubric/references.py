@@ -107,6 +107,8 @@ def _misfits(
         yield f'{name} does not start "{value}"{_instead(value, there)}'
     elif one.to == "sent" and value not in (there := sorted(_sent(scenario))):
         yield f"no probe of {name} sends on {value}{_instead(value, there)}"
+    elif one.to == "action" and value not in (there := _actions(scenario)):
+        yield f"no step of {name} sends a goal to {value}{_instead(value, there)}"
     elif one.to == "set" and not _is_set(value, scenario):
         there = [str(param.get("name")) for _, param in as_maps(scenario.get("params"))]
         yield f"{name} sets no parameter {value}{did_you_mean(value, there)}: add it to its params"
@@ -211,6 +213,14 @@ def _sent(scenario: dict[str, Any]) -> set[str]:
     """Return the topics on which probes send, and steps of the scenario."""
     sent = {str(probe.get("topic")) for _, probe in as_maps(scenario.get("probes"))}
     return sent | set(_topics_in(scenario.get("steps")))
+
+
+def _actions(scenario: dict[str, Any]) -> list[str]:
+    return [
+        str(as_map(step.get("action")).get("name"))
+        for _, step in as_maps(scenario.get("steps"))
+        if "action" in step
+    ]
 
 
 def _starts(scenario: dict[str, Any]) -> list[dict[str, Any]]:

@@ -100,6 +100,18 @@ def test_what_names_only_what_is_there_loads(tmp_path: Path) -> None:
             id="process-of-the-grader",
         ),
         pytest.param(
+            "check: logs, with: {text: a}",
+            "check: action-result, with: {action: /count}",
+            "39: criteria[9].with.action: no step of launch sends a goal to /count: there is none",
+            id="action",
+        ),
+        pytest.param(
+            "check: logs, with: {text: a}, scenario: launch",
+            'check: definition, with: {file: msg/A.msg, fields: {a: "std_msgs/Strin[]"}}',
+            '39: criteria[9].with.fields.a: std_msgs has no message type "Strin" (did you mean "String"?)',
+            id="type-of-a-field",
+        ),
+        pytest.param(
             "program: turtlesim/turtlesim_node",
             "program: turtlesim/turtlesim",
             '26: scenarios.launch.start[0].program: turtlesim has no program "turtlesim" '

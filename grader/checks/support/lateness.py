@@ -18,6 +18,8 @@ PERIOD_NS = 100_000_000
 STAMP = struct.Struct("<III")
 FULL = 0.9
 """The share of the processors' time from which who has work to do may wait for a turn, though sleepers wake in time."""
+NEVER_LATE_S = 2.0
+"""No machine is so late with every single message (s on the wall)."""
 LATE_MS = 100.0
 """From here on, an answer may be late for the machine's sake."""
 OWN_LEAST, OTHERS_MOST = 0.6, 0.25

@@ -19,8 +19,8 @@ from grader.wording import join_words, plural
 
 SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
 End = Literal["publishers", "subscribers"]
-LOGGED = frozenset({"logs", "hears"})
-"""Checks that also read what is logged."""
+READ_TOO = {"logs": ("/rosout",), "hears": ("/rosout",), "transform": ("/tf", "/tf_static")}
+"""Topics that a check reads, and that its parameters do not name."""
 TAKEN = {Status.FAIL, Status.PARTIAL}
 
 
@@ -180,4 +180,4 @@ def heed_losses(check: Check, facts: Mapping[str, object], verdict: Verdict) -> 
 def _topics(check: Check, params: object) -> Iterable[str]:
     """Whatever of its parameters may be the name of a topic."""
     named = dict.fromkeys(texts_in(params.model_dump() if isinstance(params, Record) else None))
-    return (*named, "/rosout") if check.name in LOGGED and "/rosout" not in named else named
+    return tuple(dict.fromkeys((*named, *READ_TOO.get(check.name, ()))))

@@ -79,7 +79,7 @@ def message_nanoseconds(script: Script, values: list[ast.expr]) -> list[Edit]:
     return [script.replace(c, NANOSECONDS) for c in _calls(values) if script.source(c) in in_seconds]
 
 
-# ---- stamps and definitions
+# ---- stamps, frames, actions and definitions
 
 OTHER_TYPES = {
     "float64": "float32",
@@ -125,6 +125,23 @@ def frames_swapped(script: Script, parent: ast.expr, child: ast.expr) -> list[Ed
     Fits every transform whose `child_frame_id` is set in the line behind its `frame_id`.
     """
     return [script.replace(parent, script.source(child)), script.replace(child, script.source(parent))]
+
+
+def _preempts(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Call]]:
+    """Find where an action server asks whether its goal was cancelled."""
+    for script in solution.scripts:
+        for call in script.of(ast.Call):
+            if isinstance(call.func, ast.Attribute) and call.func.attr == "is_preempt_requested":
+                yield script_place(script), script, call
+
+
+@operator("preempt-not-heeded", each=_preempts)
+def preempt_not_heeded(script: Script, call: ast.Call) -> list[Edit]:
+    """Goes on with an action's goal that was cancelled.
+
+    Fits every call of `is_preempt_requested()`.
+    """
+    return [script.replace(call, "False")]
 
 
 def _fields(solution: Solution) -> Iterator[tuple[CodePlace, str, InterfaceField]]:

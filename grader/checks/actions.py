@@ -1,0 +1,252 @@
+"""Whether an action server takes goals, reports on them, ends them as it should, and lets them be cancelled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, NamedTuple
+
+from pydantic import Field
+
+from grader.checks.registry import Refers, check
+from grader.checks.support.clocks import run_seconds
+from grader.checks.support.exit_causes import explain_early_end, explain_error
+from grader.checks.support.lateness import NEVER_LATE_S, excused, why_late
+from grader.checks.support.nodes import GlobalName, plain_type
+from grader.checks.support.text import near_names, shown
+from grader.checks.support.topics import cite, no_node, nodes_on, published_topics, topics_with
+from grader.checks.support.values import differences, fields_text
+from grader.evidence.events import ActorEvent
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, plural, significant
+
+HINTS = {
+    "SUCCEEDED": "end the callback with server.set_succeeded(result)",
+    "ABORTED": "end the callback with server.set_aborted(result)",
+    "PREEMPTED": "in the loop: if server.is_preempt_requested(): server.set_preempted(result), then return",
+}
+
+
+class ActionResultParams(Record):
+    """Which of the scenario's goals, and how it has to end."""
+
+    action: Annotated[GlobalName, Refers("action")]
+    """The action's name, with its slash: `/count`."""
+    goal: Annotated[int, Field(ge=1)] = 1
+    """Which of the scenario's goals for it, counted from 1."""
+    status: Literal["SUCCEEDED", "ABORTED", "PREEMPTED"] = "SUCCEEDED"
+    """The state at its end; a goal that the scenario cancels ends `PREEMPTED`."""
+    result: dict[str, Any] = Field(default_factory=dict)
+    """The fields of the result that matter, and their values."""
+    tolerance: Annotated[float, Field(ge=0)] = 1e-6
+    """How far numbers of the result may be off."""
+    feedback: Annotated[int, Field(ge=0)] = 0
+    """So many messages of feedback have to come at least."""
+    within_s: Annotated[float, Field(gt=0)] | None = None
+    """How long after the goal, or after its cancelling, the result may come; null: as long as the step waits."""
+
+    @property
+    def words(self) -> str:
+        with_result = f" with {fields_text(self.result)}" if self.result else ""
+        limit = f" within {significant(self.within_s)} s" if self.within_s else ""
+        feedback = f", {plural(self.feedback, 'feedback', 'feedbacks')} before" if self.feedback else ""
+        return f"goal {self.goal} of {self.action} {self.status}{with_result}{limit}{feedback}"
+
+
+class Goal(NamedTuple):
+    """A goal of the grader's: when it was sent, cancelled and answered; `end` is None where the run ended before."""
+
+    at_ns: int
+    value: dict[str, Any]
+    cancelled_ns: int | None
+    ended_ns: int | None
+    end: ActorEvent | None
+
+    @property
+    def name(self) -> str:
+        return f"the goal {fields_text(self.value)}"
+
+
+@check("action-result", params=ActionResultParams)
+def action_result(package: PackageFacts, run: Run, params: ActionResultParams) -> Verdict:
+    """The action server brings its goals to the right end.
+
+    What it checks
+        That a goal of the grader's ends in the right state, with the right result, in time, with feedback on
+        the way; and that a goal that is cancelled is given up.
+
+    Why it matters on a robot
+        A program that sends the robot somewhere has to be told whether it arrived, and be able to stop it. A server
+        that does not heed its cancelling drives on.
+
+    How it is measured
+        The grader sends the goals one after the other once the server listens, and reads result and feedback as
+        actionlib's own client does. Of a result, only the fields that the rubric names matter.
+
+    How to fix
+        `actionlib.SimpleActionServer(name, CountAction, execute_cb=…, auto_start=False)`, then `start()`. The callback
+        publishes feedback, looks at `is_preempt_requested()` in its loop, and ends with `set_succeeded(…)`,
+        `set_aborted(…)` or `set_preempted(…)`.
+    """
+    goals = _goals(run, params.action)
+    goal = goals[params.goal - 1] if len(goals) >= params.goal else None
+    verdict = (
+        _not_sent(package, run, goals, params)
+        if goal is None
+        else _fault(package, run, goal, params)
+        or passed(f"{goal.name} of {params.action} ends {params.status}")
+    )
+    span = (goal.at_ns, goal.ended_ns) if goal else (None, None)
+    return verdict.about(
+        expected=params.words,
+        measured=verdict.measured or (_measured(run, goal, params) if goal else "no such goal could be sent"),
+        citations=(*verdict.citations, cite(run, "/grader/actor", *span)),
+    )
+
+
+def _goals(run: Run, action: str) -> list[Goal]:
+    """Return the grader's goals for one action; each is over before the next one is sent."""
+    own = [(t, e) for t, e in run.actors if e.topic == action and e.action in {"goal", "cancel", "result"}]
+    starts = [n for n, (_, event) in enumerate(own) if event.action == "goal"]
+    found = []
+    for start, end in zip(starts, [*starts[1:], len(own)], strict=False):
+        at = {event.action: (time_ns, event) for time_ns, event in own[start:end]}
+        cancelled_ns, (ended_ns, result) = at.get("cancel", (None,))[0], at.get("result", (None, None))
+        found.append(Goal(own[start][0], own[start][1].value or {}, cancelled_ns, ended_ns, result))
+    return found
+
+
+def _fault(package: PackageFacts, run: Run, goal: Goal, params: ActionResultParams) -> Verdict | None:
+    if goal.end is None:
+        return inconclusive(f"the run ended before {goal.name} of {params.action} did", hint="grade again")
+    if goal.end.value is None:
+        return _no_result(package, run, goal, params)
+    status, hint = goal.end.detail, HINTS[params.status]
+    if status != params.status:
+        return _other_end(package, run, goal, params)
+    found = list(differences(goal.end.value, params.result, params.tolerance))
+    if found:
+        message = f"{goal.name} of {params.action} ends {status} with {join_words(map(str, found))}"
+        return failed(message, hint=f"fill the result in before you give it: {hint}")
+    return _too_late(run, goal, params) or _no_feedback(run, goal, params)
+
+
+def _no_result(package: PackageFacts, run: Run, goal: Goal, params: ActionResultParams) -> Verdict:
+    said = f"{goal.name} of {params.action} got no result"
+    kind = published_topics(run).get(f"{params.action}/result", "").removesuffix("ActionResult")
+    asked = plain_type(goal.end.type or "") if goal.end else ""
+    if kind and asked and kind != asked:
+        return unjudged(
+            f"{params.action} is of type {kind}, not {asked}", hint=f"make it a server of {asked}Action"
+        )
+    if end := explain_early_end(package, run):
+        return end.verdict(failed, f"{said}: the node ended before ({end.cause})")
+    if end := explain_error(package, run):
+        return end.verdict(failed, f"{said}: {end.cause}")
+    message = f"{said}: {shown(goal.end.detail) if goal.end else ''}"
+    verdict = failed(
+        message, hint="every way through the callback ends with set_succeeded, set_aborted or set_preempted"
+    )
+    return excused(verdict.once(), run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
+
+
+def _other_end(package: PackageFacts, run: Run, goal: Goal, params: ActionResultParams) -> Verdict:
+    status = goal.end.detail if goal.end else ""
+    how = ", though it was cancelled" if goal.cancelled_ns else ""
+    message = f"{goal.name} of {params.action} ends {shown(status)}, not {params.status}{how}"
+    if status == "ABORTED" and (end := explain_error(package, run)):
+        return end.verdict(failed, f"{message}: {end.cause}")
+    if params.status == "PREEMPTED" and goal.cancelled_ns is None:
+        verdict = failed(
+            f"{message}: it was over before it could be cancelled", hint="let it last as the handout asks"
+        )
+        return excused(verdict.once(), run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
+    return failed(message, hint=HINTS[params.status])
+
+
+def _too_late(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | None:
+    to_s, from_ns = run_seconds(run), goal.cancelled_ns or goal.at_ns
+    if params.within_s is None or goal.ended_ns is None or to_s is None:
+        return None
+    took_s = to_s(goal.ended_ns) - to_s(from_ns)
+    if took_s <= params.within_s:
+        return None
+    since = "its cancelling" if goal.cancelled_ns else "it was sent"
+    message = f"the result of {goal.name} of {params.action} comes {took_s:.2f} s after {since}"
+    hint = (
+        "look at is_preempt_requested() in each turn of the loop"
+        if goal.cancelled_ns
+        else "do not sleep longer than asked"
+    )
+    verdict = failed(message, hint=hint)
+    if took_s > params.within_s + NEVER_LATE_S * run.warp:
+        return verdict
+    return excused(verdict.once(), run, from_ns, goal.ended_ns, why_late)
+
+
+def _no_feedback(run: Run, goal: Goal, params: ActionResultParams) -> Verdict | None:
+    came = _feedback(run, goal, params)
+    if came >= params.feedback:
+        return None
+    count = plural(came, "feedback", "feedbacks")
+    message = f"{count} came on {goal.name} of {params.action}, and {params.feedback} are asked"
+    verdict = failed(message, hint="call server.publish_feedback(feedback) in each turn of the loop")
+    return (
+        verdict
+        if came == 0
+        else excused(verdict.once(), run, goal.at_ns, goal.ended_ns or run.end_ns, why_late)
+    )
+
+
+def _feedback(run: Run, goal: Goal, params: ActionResultParams) -> int:
+    """Return how much feedback came on the goal: by its id, and where that was not recorded, by its time."""
+    sent = [v for c in run.channels if c.topic == f"{params.action}/goal" and c.by_grader for v in c.values]
+    ids = [(value or {}).get("goal_id", {}).get("id") for value in sent]
+    channels = run.student_channels(f"{params.action}/feedback")
+    if len(ids) >= params.goal:
+        values = [value for channel in channels for value in channel.values if value]
+        return sum(
+            value.get("status", {}).get("goal_id", {}).get("id") == ids[params.goal - 1] for value in values
+        )
+    until_ns = goal.ended_ns or run.end_ns
+    return sum(goal.at_ns <= t <= until_ns for channel in channels for t in channel.times_ns)
+
+
+def _not_sent(package: PackageFacts, run: Run, goals: Sequence[Goal], params: ActionResultParams) -> Verdict:
+    """Return why a goal was not sent."""
+    notes = [e.detail for _, e in run.actors if e.action == "note" and e.topic == params.action]
+    if notes and any(one.path.endswith(".action") for one in package.interfaces):
+        why = shown(notes[0].partition(": ")[2] or notes[0])
+        hint = "give the .action file the names and types of the handout, and build again"
+        return unjudged(f"{params.action} cannot be used as the handout asks: {why}", hint=hint)
+    if notes:
+        return inconclusive(shown(notes[0]), hint="grade again")
+    if not nodes_on(run, f"{params.action}/goal", "subscribers"):
+        return _no_server(package, run, params)
+    if goals and (end := explain_early_end(package, run)):
+        message = f"the node ended before goal {params.goal} of {params.action} was sent: {end.cause}"
+        return end.verdict(unjudged, message)
+    message = f"only {plural(len(goals), 'goal')} could be sent to {params.action}"
+    return inconclusive(message, hint="grade again")
+
+
+def _no_server(package: PackageFacts, run: Run, params: ActionResultParams) -> Verdict:
+    what, bare = f"there is no action server {params.action}", params.action.lstrip("/")
+    servers = [t.removesuffix("/goal") for t in topics_with(run, "subscribers") if t.endswith("/goal")]
+    if near := near_names(params.action, servers):
+        hint = f"give SimpleActionServer(…) the name '{bare}'"
+        return unjudged(f"{what}; there is {join_words(near)}", hint=hint, measured=join_words(servers))
+    if absent := no_node(package, run, what):
+        return absent
+    others = f"; there is {join_words(servers)}" if servers else ""
+    hint = f"actionlib.SimpleActionServer('{bare}', …, auto_start=False), and then start()"
+    return unjudged(f"{what}{others}", hint=hint, measured=join_words(servers) or "no action server")
+
+
+def _measured(run: Run, goal: Goal, params: ActionResultParams) -> str:
+    came = plural(_feedback(run, goal, params), "feedback", "feedbacks")
+    if goal.end is None or goal.end.value is None:
+        return f"{came}, no result"
+    return f"{came}, {shown(goal.end.detail)} with {fields_text(goal.end.value)}"
