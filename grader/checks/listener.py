@@ -36,13 +36,13 @@ CALLBACK_HINT = (
 
 
 class HearsParams(Record):
-    """`template` is what a line has to say of a text, `{value}` being the message: `I heard {value}`.
-
-    Whether the template's own words are in capitals does not matter.
-    """
+    """A topic that the grader publishes on, and what the listener says of each message."""
 
     topic: Annotated[GlobalName, Refers("sent")]
+    """A topic on which a probe or a step of the scenario sends, with its slash."""
     template: str = VALUE
+    """What a line has to say of a message, `{value}` being its text: `I heard {value}`. Capitals in the template's own
+    words do not matter."""
 
 
 @check("hears", params=HearsParams)

@@ -27,18 +27,22 @@ ORDER_S = 0.1
 
 
 class Condition(Record):
-    """A message on `topic`; with `field`, one whose field is `min` to `max`, or `value` within `tolerance`.
-
-    Of a list (`ranges[*]`) `all` items have to be so, or `any` of them.
-    """
+    """A message that counts: any on the topic, or one whose `field` is `min` to `max`, or `value`."""
 
     topic: GlobalName
+    """The topic, with its slash: `/chatter`."""
     field: FieldPath | None = None
+    """As `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item. Null: any message counts."""
     min: float | None = None
+    """The least value, in the field's own unit; null: no bound."""
     max: float | None = None
+    """The greatest value, in the field's own unit; null: no bound."""
     value: float | str | bool | None = None
+    """The value itself, in place of `min` and `max`."""
     tolerance: Annotated[float, Field(ge=0)] = 0.0
+    """How much a number may differ from `value`, in the field's own unit."""
     items: Literal["all", "any"] = "all"
+    """Of a list (`ranges[*]`), whether `all` items or `any` of them have to be so."""
 
     @model_validator(mode="after")
     def _is_whole(self) -> Condition:
@@ -80,16 +84,17 @@ class Condition(Record):
 
 
 class ReactsParams(Record):
-    """Each time that `cause` begins to hold, a message for which `effect` holds has to come `within_s` (seconds).
-
-    With `not_before`, none may come before the first cause, from `within_s` after a message for which it does not hold.
-    Publish about three times `within_s` of such messages first, so that there is something to see.
-    """
+    """Cause and effect."""
 
     cause: Condition
+    """Each time that this begins to be true, an effect has to come."""
     effect: Condition
+    """What has to come."""
     within_s: Annotated[float, Field(gt=0)]
+    """So soon after the cause the effect has to come."""
     not_before: bool = True
+    """Whether an effect before the first cause is wrong: one from `within_s` after a message for which the cause is
+    not true. Publish such messages for about three times `within_s` first, so that there is something to see."""
 
 
 class Answer(NamedTuple):

@@ -42,17 +42,19 @@ MOVED_M = 0.01
 
 
 class PathParams(Record):
-    """`points` in metres, `[x, y]`, in the order in which they have to be passed.
-
-    With `relative` they are seen from the start, x being forward there and y to the left; the start itself is put
-    before them. A velocity holds until the next one, but no longer than `hold_s` (null: for ever).
-    """
+    """The way, and how the robot's velocities are read."""
 
     topic: GlobalName
+    """The topic of velocities (`geometry_msgs/Twist`) or poses, with its slash."""
     points: Annotated[tuple[tuple[Coordinate, Coordinate], ...], Field(min_length=1)]
+    """In metres, `[x, y]`, in the order in which they have to be passed."""
     tolerance_m: Annotated[float, Field(gt=0)]
+    """So far from the way and its points the robot may be."""
     relative: bool = True
+    """Whether the points are seen from the start, x being forward there and y to the left; the start itself is put
+    before them."""
     hold_s: Annotated[float, Field(gt=0)] | None = 1.0
+    """A velocity holds until the next one, but no longer than this; null: for ever."""
 
     @model_validator(mode="after")
     def _is_a_way(self) -> PathParams:

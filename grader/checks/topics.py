@@ -17,15 +17,14 @@ from grader.wording import join_words, plural
 
 
 class TopicTypeParams(Record):
-    """`topic` with its slash, `type` as `rostopic info` gives it (`std_msgs/Int8`).
-
-    `definition` is the handout's text of a `.msg` that students write themselves: fields, their types and their order
-    have to be the same.
-    """
+    """The topic and its type."""
 
     topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""
     type: Annotated[TypeName, Refers("message")]
+    """As `rostopic info` gives it: `std_msgs/Int8`."""
     definition: str | None = None
+    """The handout's text of a `.msg` that students write themselves: fields, types and order have to be the same."""
 
 
 @check("topic-type", params=TopicTypeParams, messages_only=True, heeds_losses=True)
@@ -102,9 +101,10 @@ def _other_definition(channel: Channel, params: TopicTypeParams) -> Verdict | No
 
 
 class OnlyTopicsParams(Record):
-    """`topics` that may be published: full names, or the beginning of names with `*` after it (`/square/*`)."""
+    """The topics of the lab."""
 
     topics: tuple[GlobalName, ...]
+    """Those that may be published: full names, or the beginning of names with `*` after it: `/square/*`."""
 
     def allows(self, topic: str) -> bool:
         return any(
@@ -162,9 +162,10 @@ def _publisher(run: Run, topic: str) -> str:
 
 
 class LatchedParams(Record):
-    """`topic` with its slash."""
+    """The topic."""
 
     topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""
 
 
 @check("latched", params=LatchedParams, messages_only=True, heeds_losses=True)

@@ -10,7 +10,9 @@ from rich.padding import Padding
 from rich.text import Text
 
 from grader.checks import HEADINGS, Check
+from grader.checks.parameter_docs import REQUIRED, inner_records, parameters
 from grader.errors import UsageError
+from grader.model.record import Record
 from grader.model.repair import BY_HAND, RepairKind
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible
@@ -95,7 +97,20 @@ def _check_lines(check: Check) -> Iterator[Line]:
         yield "Slips that cost it, and how to repair them by hand", 0
         for kind in slips:
             yield BY_HAND[kind], 2
+    yield from _parameter_lines(check.params, "What a rubric can set")
+    for record, words in inner_records(check.params).items():
+        yield from _parameter_lines(record, f"Keys of a {words}")
     yield "", 0
+
+
+def _parameter_lines(record: type[Record], heading: str) -> Iterator[Line]:
+    rows = parameters(record)
+    if rows:
+        yield "", 0
+        yield heading, 0
+    for one in rows:
+        default = REQUIRED if one.default == REQUIRED else f"default {one.default}"
+        yield f"{one.name} ({one.type}; {default}): {one.meaning}".replace("`", ""), 2
 
 
 def _print(lines: Iterator[Line]) -> None:

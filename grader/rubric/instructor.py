@@ -119,6 +119,7 @@ def _run(path: Path, raw: bytes) -> LineFault | None:
     """Run the file as a module of its own, which stays: records of parameters look their types up in it."""
     name = f"grader_own_{hashlib.sha256(str(path).encode() + raw).hexdigest()[:16]}"
     module = importlib.util.module_from_spec(ModuleSpec(name, _Loader(path, raw), origin=str(path)))
+    module.__file__ = str(path)
     sys.modules[name] = module
     try:
         assert module.__spec__ is not None  # noqa: S101 - made two lines above
