@@ -10,6 +10,8 @@ import sys
 def main() -> int:
     # numpy's OpenBLAS reserves memory per core, which nothing here needs, and ends the process if it gets none.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # to look for plug-ins pydantic reads what every installed package says of itself; the grader has none
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     if "_ARGCOMPLETE" in os.environ:  # a shell asks what may be typed next
         from grader.cli.completion import answer  # noqa: PLC0415 - as below
 

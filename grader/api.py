@@ -73,6 +73,7 @@ def grade(
     out: StrPath = "grader-results",
     *,
     submission_id: str | None = None,
+    package: str | None = None,
     sandbox: SandboxMode = "auto",
     static_only: bool = False,
     keep_hidden: bool = True,
@@ -83,6 +84,7 @@ def grade(
     `source` is a folder, an archive (`.zip`, `.tar.*`), a recording (`.bag`, `.mcap`) or a git URL with an optional
     `@ref`. `rubric` is what `load_rubric` takes or returns. Results go to `out/<submission id>/` and replace older
     ones; missing folders are made. `submission_id` is by default made from `source`.
+    `package` is the name of the package to grade, whatever the rubric calls it.
 
     `sandbox`: `auto` confines students' code where this machine can, `require` raises SandboxMissing (a HostError)
     where it cannot, `none` never does. `static_only` runs nothing: what only a run can show is `inconclusive`. Without
@@ -108,6 +110,7 @@ def grade(
         options = pipeline.GradeOptions(
             sandbox=sandbox,
             submission_id=submission_id,
+            package=package or "",
             static_only=static_only,
             keep_hidden=keep_hidden,
             stop=stop,

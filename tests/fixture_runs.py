@@ -28,11 +28,17 @@ GIT = shutil.which("git") or "git"
 REFERENCE = "reference"
 CORRECT = Mutant.model_construct(summary="The reference solution.", expect={}, message={}, says={})
 TOGETHER = {
+    "avoid-obstacles": ("build-unknown-component+node-named-otherwise+never-stops+too-slow",),
     "eyantra-ros-basics": (
         "chatter-own-package+cmake-no-catkin-package+hello-print+load-yaml-find+turtlesim-colour-unread+web-chromium",
         "config-nesting+hello-ends+manifest-roscpp-missing+param-clobbers",
         "cpp-crashes+hello-not-executable",
         "ok-param-one-line+param-crlf",
+    ),
+    "follow-wall": ("build-unknown-component+node-named-otherwise+drives-straight",),
+    "go-to-goal": (
+        "build-unknown-component+node-named-otherwise+round-by-the-wall+says-nothing+too-fast",
+        "stops-too-early",
     ),
     "leeds-comp3631-lab1": (
         "counter-every-second-loop+cmake-no-catkin-package+launch-malformed+talker-crlf",
@@ -46,6 +52,10 @@ TOGETHER = {
         "rate-sleep-without-brackets+listener-not-executable+manifest-no-buildtool",
         "message-constant-time+launch-namespace-apart+cmake-no-catkin-package",
         "ok-launch-terminals+talker-anonymous",
+    ),
+    "own-message": (
+        "field-float32+fahrenheit+no-stamp+node-named-otherwise+too-slow",
+        "build-unknown-component",
     ),
     "sheffield-com2009-week1": (
         "publisher-not-executable+subscriber-name+manifest-malformed",

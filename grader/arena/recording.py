@@ -19,6 +19,7 @@ from typing_extensions import Self
 from grader.arena.admission import Admission, shared_folder
 from grader.arena.asynchronous import Stop, run_together, run_until_signal
 from grader.arena.build import BUILD_EXPECTED_S, build
+from grader.arena.course_workspace import copy_course, provide_course
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.sandbox import temporary_base
@@ -172,6 +173,7 @@ class Recorder:
         async with self._admission.run(), self._admission.start():
             self._progress.step("build", "running", "catkin_make", BUILD_EXPECTED_S)
             try:
+                await provide_course(place)
                 self._place, outcome = await build(place, writer, files, faulty, last_run=last)
             except ArenaError as error:
                 if not last:
@@ -198,8 +200,15 @@ class Recorder:
         with _readable_by_all():
             prepare(folder, self._ros)
             workspace = make_workspace(
-                folder, self._submission, self.recording.facts, self._scripts(), self._sandbox
+                folder,
+                self._submission,
+                self.recording.facts,
+                self._scripts(),
+                self._sandbox,
+                course=self._rubric.packages,
             )
+            if self._beside is not None:
+                copy_course(self._beside, self._rubric.packages, folder / "course")
         named = self.recording.facts.manifest or self._submission.package
         return ProcessEnvironment(
             folder=folder,

@@ -21,6 +21,7 @@ from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.message_rate import RateBounds
+from grader.rubric.course_packages import LAUNCH_ENDINGS
 from grader.rubric.model import Param, Scenario, Start
 
 CLOCK_STEP_S = 0.05
@@ -197,7 +198,7 @@ def process_specs(start: Start, place: ProcessEnvironment, numbers: Iterator[int
             yield place.spec(start.name, ["rosparam", "load", f"{place.package_folder}/{file}"], script=file)
     elif start.program is not None:
         package, _, program = start.program.partition("/")
-        argv = ["rosrun", package, program, *start.args]
+        argv = ["roslaunch" if program.endswith(LAUNCH_ENDINGS) else "rosrun", package, program, *start.args]
         yield replace(place, env={}).spec(start.name, argv, role="grader", copy=False)
     elif start.built:
         for program in sorted(place.built.compiled)[:BUILT_PROGRAMS_MAX]:

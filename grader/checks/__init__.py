@@ -34,6 +34,8 @@ FAMILIES = (
     "messages",
     "fields",
     "reacts",
+    "stamps",
+    "definition",
     "rate",
     "counter",
     "listener",
@@ -48,6 +50,7 @@ FAMILIES = (
     "connections",
     "two_copies",
     "robot_path",
+    "robot_places",
 )
 for family in FAMILIES:
     import_module(f"grader.checks.{family}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Annotated
 
 from pydantic import Field
@@ -12,7 +13,7 @@ from grader.checks.registry import check
 from grader.checks.support.clocks import GET_TIME, WATCHED_S, clocks_at, wrong_growth
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.nodes import PublishedTopic
-from grader.checks.support.processes import early_end, is_flood, observed_until_ns
+from grader.checks.support.processes import early_end, is_flood, life_of, observed_until_ns
 from grader.checks.support.text import (
     NUMBER,
     OTHER_WORDS_SHARE,
@@ -25,7 +26,7 @@ from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, partial, passed, unjudged
+from grader.model.verdict import FileCitation, Verdict, failed, inconclusive, partial, passed, unjudged
 from grader.wording import plural
 
 ENOUGH = 3
@@ -59,7 +60,8 @@ def message(package: PackageFacts, run: Run, params: MessageParams) -> Verdict:
         Each text is compared with the template; capitals, and how many blanks stand between words, do not
         matter. The number has to grow as the clock did between the arrivals, within 1.5 s and 5 %. Whole
         seconds and seconds since the node's start will do; nanoseconds, milliseconds and a number that
-        stays the same will not. A right time in other words than the handout's earns half.
+        stays the same will not, and neither will one that counts the messages in a script that reads no
+        clock, though at 1 Hz it grows as the time does. A right time in other words than the handout's earns half.
 
     How to fix
         Build the text in each turn of the loop: `"hello world %s" % rospy.get_time()`. `rostopic echo
@@ -160,7 +162,25 @@ def _wrong_time(
         if wrong is not None:
             too_few = own_doing and wrong.status.value == "inconclusive"
             return _too_few(package, run, heard, params) if too_few else wrong
+        counted = _counted(package, run, channel, told)
+        if counted is not None:
+            return counted
     return None
+
+
+def _counted(package: PackageFacts, run: Run, channel: Channel, told: Sequence[float]) -> Verdict | None:
+    """Return the verdict on whole numbers, each the one before plus one, of a script that reads no clock. At one a
+    second they grow as the time does."""
+    if any(after - before != 1 for before, after in pairwise(told)) or told[0] != int(told[0]):
+        return None
+    one = life_of(run, channel.callerid)
+    script = one.start.script if one else None
+    slip = next((s for s in package.slips if s.kind == "no-clock" and s.file == script), None)
+    if slip is None:
+        return None
+    message = f"the number in the messages counts them ({told[0]:.0f}, {told[1]:.0f}, …) and is not a time"
+    place = FileCitation(file=slip.file, line=slip.line)
+    return failed(f"{message}: {slip.file} reads no clock", hint=GET_TIME, citations=(place,))
 
 
 def _watched_ns(run: Run, heard: Sequence[Channel]) -> int:

@@ -24,6 +24,7 @@ REFERRED = {
     "program": "`package/program`",
     "message": "message type",
     "service": "service type",
+    "field": "type of a field",
     "sent": "topic of a probe",
     "published": "topic of the student's",
     "set": "parameter that the scenario sets",

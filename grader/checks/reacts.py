@@ -18,7 +18,7 @@ from grader.checks.support.values import differences, value_text
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import plural, significant
 
 LATE_MS = 100.0
@@ -130,6 +130,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     verdict = (
         _nothing_to_judge(package, run, effects, own, params)
         or _early(causes, effects, run, params)
+        or _never_caused(causes, run, params)
         or _unanswered(answers, run, params)
         or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.cause.words}")
     )
@@ -203,6 +204,19 @@ def _early(
         return verdict
     # what ends so soon may be an older answer of a machine that was late itself
     return excused(verdict.once(), run, causes[0].time_ns, first, _why_late)
+
+
+def _never_caused(causes: Sequence[Reading], run: Run, params: ReactsParams) -> Verdict | None:
+    """What a simulator publishes comes of what the node does: a robot has to come to a wall to stop there."""
+    simulated = any(c.topic == params.cause.topic and c.callerid in run.grader_nodes for c in run.channels)
+    if not causes or not simulated or any(map(params.cause.holds, causes)):
+        return None
+    verdict = unjudged(
+        f"{params.cause.words} never came in this run",
+        measured=f"0 of {plural(len(causes), 'message')}",
+        hint=f"rostopic echo {params.cause.topic} shows what comes while your node runs",
+    )
+    return excused(verdict, run, run.start_ns, run.end_ns, _why_late)
 
 
 def _unanswered(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Verdict | None:

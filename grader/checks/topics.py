@@ -24,7 +24,8 @@ class TopicTypeParams(Record):
     type: Annotated[TypeName, Refers("message")]
     """As `rostopic info` gives it: `std_msgs/Int8`."""
     definition: str | None = None
-    """The handout's text of a `.msg` that students write themselves: fields, types and order have to be the same."""
+    """The handout's text of a `.msg` that students write themselves: fields, their types and their order have to be the
+    same; null: the type's name alone is asked for."""
 
 
 @check("topic-type", params=TopicTypeParams, messages_only=True, heeds_losses=True)

@@ -16,7 +16,7 @@ from grader.model.record import Record
 from grader.model.repair import BY_HAND, RepairKind
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible
-from grader.rubric.find import rubric_ids
+from grader.rubric.find import known_labs
 from grader.rubric.instructor import known_checks
 from grader.rubric.load import LoadedRubric, all_rubrics, load_rubric
 from grader.rubric.model import Criterion, Rubric
@@ -65,7 +65,9 @@ def print_explanation(name: str, rubric: str | None) -> None:
 
 def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]) -> UsageError:
     criteria = (c.id for r in rubrics for c in r.rubric.criteria if c.visibility == "visible")
-    near = did_you_mean(name.rpartition("/")[2], [*checks, *criteria, *(f"{lab}/" for lab in rubric_ids())])
+    near = did_you_mean(
+        name.rpartition("/")[2], [*checks, *criteria, *(f"{lab.id}/" for lab in known_labs())]
+    )
     return UsageError(
         f'there is no check or criterion "{name}"{near}',
         hint="give a check, a criterion of a lab, or LAB/criterion; grader labs lists the labs",
@@ -74,13 +76,30 @@ def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]
 
 def _criterion_lines(rubric: Rubric, criterion: Criterion) -> Iterator[Line]:
     yield f"{rubric.id}/{criterion.id}: {criterion.title}", 0
-    points = f"{number(criterion.points)} of {number(rubric.max_points)} points"
-    yield f"{points}, judged by the check {criterion.check}", 2
+    yield f"{worth_of(criterion, rubric)}, judged by the check {criterion.check}", 2
     if criterion.hint:
         yield f"hint: {criterion.hint}", 2
     if criterion.reproduce:
         yield f"see it yourself: {criterion.reproduce}", 2
     yield "", 0
+
+
+def worth_of(criterion: Criterion, rubric: Rubric) -> str:
+    """`10 of 100 points, the best 3 of 4 count`, `a bonus of 5 points`."""
+    if criterion.extra:
+        return f"a {'bonus' if criterion.bonus else 'penalty'} of {number(abs(criterion.extra))} points"
+    said = [f"{number(criterion.points)} of {number(rubric.max_points)} points"]
+    said += [
+        f"the best {group.best} of {len(group.criteria)} in {name} count"
+        for name, group in rubric.groups.items()
+        if group.best and criterion.id in group.criteria
+    ]
+    said += [
+        f"without it at most {number(gate.at_most)} points count"
+        for gate in rubric.gates
+        if gate.criterion == criterion.id
+    ]
+    return ", ".join(said)
 
 
 def _check_lines(check: Check) -> Iterator[Line]:

@@ -6,13 +6,14 @@ A path comes in, and a rubric with the folder to grade goes out; or an error tha
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from grader.cli.find_packages import Found, find, shown
 from grader.errors import UsageError
 from grader.intake import enclosing_package, find_packages
+from grader.intake.choose import is_slip
 from grader.intake.find import MANIFEST, Candidate
 from grader.intake.names import is_archive_name, listing, printable
 from grader.intake.open import is_recording
@@ -147,6 +148,8 @@ def labs_of(found: Found) -> tuple[Lab, ...]:
         bare = (c for c in found.candidates if not c.has_manifest and c.ignored_by is None)
         labs = {lab.rubric: lab for candidate in bare if (lab := _by_folder(candidate)) is not None}
     if not labs:
+        labs = {lab.rubric: lab for lab in _by_slip(found)}
+    if not labs:
         raise _none(found)
     return tuple(labs.values())
 
@@ -169,6 +172,17 @@ def _by_folder(candidate: Candidate) -> Lab | None:
     return Lab(rubric=rubric, package=candidate, why=f"the lab that its folder is named after ({name})")
 
 
+def _by_slip(found: Found) -> Iterator[Lab]:
+    """Yield the lab whose package's name is all but that of the only package here, if there is just one such lab."""
+    names = {c.name for c in found.packages}
+    known = packages_of_labs()
+    near = {(rubric, name) for name in names for rubric, package in known.items() if is_slip(name, package)}
+    if len(names) == 1 and len(near) == 1:
+        [(rubric, _)] = near
+        why = f"the lab for a package named {known[rubric]}: did you mean that name?"
+        yield Lab(rubric=rubric, package=found.packages[0], why=why)
+
+
 def _none(found: Found) -> UsageError:
     names = list(dict.fromkeys(c.name for c in found.packages))
     if not names:
@@ -180,7 +194,7 @@ def _none(found: Found) -> UsageError:
     else:
         hint = (
             f"{near} is for a package named {known[near]}: fix <name> in {MANIFEST}, "
-            f"or add --rubric {near}; all labs: {', '.join(known)}"
+            f"or add --rubric {near} --package NAME; all labs: {', '.join(known)}"
         )
     return UsageError(f"no lab is for the package {listing(names)}", hint=hint)
 

@@ -71,6 +71,15 @@ class Decoder:
         except (SerdeError, struct.error, ValueError, IndexError, OverflowError):
             return None
 
+    def from_cdr(self, data: bytes) -> bytes:
+        """Return a message of ROS 2 (little-endian CDR) as ROS 1's bytes; none where it does not fit the definition."""
+        if self._plan is None or self.decoded_bytes(len(data)) > DECODED_BYTES_MAX:
+            return b""
+        try:
+            return self._plan.from_cdr(data)
+        except (SerdeError, struct.error, ValueError, IndexError, OverflowError, AssertionError):
+            return b""
+
 
 class Encoder:
     """Makes messages of one type from its full definition. Raises ValueError for one that cannot be followed."""
@@ -100,6 +109,10 @@ class _Plan:
         if not self._types[self._type] and not data:
             return {}
         return self._plain(self._type, self._store.deserialize_ros1(data, self._name))
+
+    def from_cdr(self, data: bytes) -> bytes:
+        """Return nothing for a message without fields, of which CDR makes a byte."""
+        return bytes(self._store.cdr_to_ros1(data, self._name)) if self._types[self._type] else b""
 
     def encode(self, value: Mapping[str, Any]) -> bytes:
         if not self._types[self._type]:

@@ -29,6 +29,8 @@ OWN_NODE = re.compile(r"/grader_(recorder|actor|calibration)_[0-9a-f]{8}(_knock)
 BARE_NAME = "/grader"
 OTHER_RUNS = re.compile(r"(repaired|repeated)-[1-9]")
 """Folders of evidence beside the first runs: of a repaired copy, and of scenarios that were run once more."""
+_LINE_END = re.compile(r"\r\n|\r|\n")
+FILE_BYTES_MAX = 2_000_000
 DECODER_BYTES = 200_000
 LETTER_BYTES = 1_400
 """What a decoder takes, and for each letter of its definition: time more than memory."""
@@ -194,6 +196,17 @@ class Run:
     def lines(self, process: str) -> Iterator[tuple[int, ConsoleLine]]:
         """Yield what one process printed, with its time (ns)."""
         return ((t, line) for t, line in self.console if line.process == process)
+
+    def file_lines(self, path: str) -> list[str]:
+        """Return the lines of a text file of the package that was kept with the run of the build; none for any other.
+
+        The carriage return of a script's first line is kept: the kernel takes it for part of the program's name.
+        """
+        text = self.attachments.get(path, b"")[:FILE_BYTES_MAX].decode("utf-8-sig", errors="replace")
+        lines = _LINE_END.split(text)
+        if lines[0].startswith("#!") and text.startswith(f"{lines[0]}\r"):
+            lines[0] += "\r"
+        return lines if lines[-1] else lines[:-1]
 
     @property
     def outcome(self) -> ScenarioEvent | None:

@@ -56,7 +56,7 @@ def choose(candidates: list[Candidate], wanted: Wanted) -> Choice | None:
     bare = [c for c in bare if _in_folder(c, wanted.name) and not any(_below(p, c) for p in packages)]
     if bare:  # A workspace of the lab's name has `src/` too; the package in it has the CMakeLists.txt.
         return _best([c for c in bare if c.has_cmake] or bare, wanted)
-    near = [c for c in seen if c.manifest is not None and _is_slip(c.manifest, wanted.name)]
+    near = [c for c in seen if c.manifest is not None and is_slip(c.manifest, wanted.name)]
     return _best(near, wanted) if len({c.manifest for c in near}) == 1 else None
 
 
@@ -78,7 +78,7 @@ def _below(inner: Candidate, outer: Candidate) -> bool:
     return inner is not outer and (outer.path == "." or inner.path.startswith(f"{outer.path}/"))
 
 
-def _is_slip(name: str, wanted: str) -> bool:
+def is_slip(name: str, wanted: str) -> bool:
     """Return whether `name` is `wanted` but for capitals, `-` and `_`, and one letter.
 
     Digits are no letters: `lab2` is another lab's package than `lab1`.

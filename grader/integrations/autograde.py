@@ -81,7 +81,7 @@ def _grade(lab: Path, folder: Path, results: Path, settings: Settings) -> tuple[
     """Return the result, even if it says that the submission cannot be graded."""
     rubric = load_rubric(str(lab / settings.rubric))
     out = results / REPORTS
-    options = pipeline.GradeOptions(sandbox=settings.sandbox, submission_id=ID)
+    options = pipeline.GradeOptions(sandbox=settings.sandbox, submission_id=ID, package=settings.package)
     try:
         source = find_upload(folder, settings.modes)
         return pipeline.grade(source, rubric, out, options, Silence()), rubric

@@ -26,9 +26,7 @@ from grader.files import atomic_write
 from grader.model.record import Record
 from grader.model.result import GradingResult
 from grader.model.sandbox_mode import SandboxMode
-from grader.rubric.instructor import read_instructor
-from grader.rubric.load import LoadedRubric
-from grader.rubric.source import read_source
+from grader.rubric.load import LoadedRubric, read_beside_rubric
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -62,13 +60,15 @@ class Settings(Record):
     """The file `grader.json` of an exported grader, beside the rubric's folder.
 
     `rubric` is the path of the rubric from the folder of the settings, `minutes` the platform's time limit. `modes`
-    says how a script counts if its executable bit was lost in the upload.
+    says how a script counts if its executable bit was lost in the upload. `package` is the name of the package to
+    grade, "" for the lab's.
     """
 
     rubric: str
     minutes: int
     sandbox: SandboxMode = "auto"
     modes: LostModes = "lost"
+    package: str = ""
 
     @property
     def grading_s(self) -> int:
@@ -211,9 +211,8 @@ def add_lab(bundle: Bundle, rubric: LoadedRubric, folder: str) -> str:
     """Add the rubric's file and the files it names below `folder`. Return the rubric's path in the bundle."""
     path = f"{folder}/{rubric.path.name}"
     bundle.add(path, rubric.path.read_bytes())
-    source = read_source(rubric.path, rubric.path.name)
-    for name, data in read_instructor(source.data, rubric.path.parent).files.items():
-        bundle.add(f"{folder}/{name}", data)
+    for name, data in read_beside_rubric(rubric).items():
+        bundle.add(f"{folder}/{name}", data, executable=data.startswith(b"#!"))
     return path
 
 

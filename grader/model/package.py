@@ -139,12 +139,13 @@ class PythonSlip(Record):
     """A slip in a Python file that compiles; it shows only when the node runs.
 
     `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and
-    nodes get none.
+    nodes get none. `no-clock`: it publishes and counts, and nothing in it can tell the time; that is a slip only where
+    its messages are to tell it.
     """
 
     file: str
     line: int
-    kind: Literal["not-called", "input"]
+    kind: Literal["not-called", "input", "no-clock"]
     message: str
 
 
@@ -221,6 +222,27 @@ class LaunchFile(Record):
     unknown_tags: tuple[tuple[str, int], ...] = ()
 
 
+class InterfaceField(Record):
+    """A line of a `.msg`, `.srv` or `.action` file: a field, or a constant, which has a `value` as written.
+
+    `part` is "" in a message, else `request`, `response`, `goal`, `result` or `feedback`. `type` is as written.
+    """
+
+    part: str
+    type: str
+    name: str
+    line: int
+    value: str | None = None
+
+
+class Interface(Record):
+    """One definition of the package's own. `fault` says why it is none."""
+
+    path: str
+    fields: tuple[InterfaceField, ...]
+    fault: Fault | None = None
+
+
 class PackageFacts(Record):
     """What the package's files say; nothing of it was run."""
 
@@ -242,6 +264,8 @@ class PackageFacts(Record):
     """What was remarked when the submission was opened."""
     slips: tuple[PythonSlip, ...] = ()
     """Slips in Python files that compile."""
+    interfaces: tuple[Interface, ...] = ()
+    """The package's own `.msg`, `.srv` and `.action` files."""
 
     def file(self, path: str) -> SourceFile | None:
         """Return the file at this path, or None."""

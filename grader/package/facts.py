@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 from pathlib import Path, PurePosixPath
 
-from grader.model.package import Fault, PackageFacts, PythonSlip, SourceFile
+from grader.model.interfaces import PARTS, parse_interface
+from grader.model.package import Fault, Interface, PackageFacts, PythonSlip, SourceFile
 from grader.model.submission import SourcePackage
-from grader.package.cmake import read_cmake, refine_cmake
 from grader.package.files import Entry, Interpreters, read_files
-from grader.package.launch import read_launch_files
-from grader.package.manifest import read_manifest
 from grader.package.python import check_syntax
-from grader.package.reading import SOURCE_LIMIT_BYTES
+from grader.package.reading import SOURCE_LIMIT_BYTES, read_markup
+
+INTERFACES_MAX = 200
+INTERFACE_LIMIT_BYTES = 64_000
 
 
 def read_package(
@@ -33,8 +36,21 @@ def read_package(
     behind `env`).
     """
     entries = read_files(package, interpreters)
-    manifest, manifest_fault = read_manifest(package.folder)
-    report = check_syntax(package.folder, _python_paths(entries))
+    with ThreadPoolExecutor(1) as beside:
+        asked = beside.submit(check_syntax, package.folder, _python_paths(entries))
+        # the parsers are slow to load, and are loaded while the child reads the scripts
+        from grader.package.cmake import read_cmake  # noqa: PLC0415
+        from grader.package.launch import read_launch_files  # noqa: PLC0415
+        from grader.package.manifest import read_manifest  # noqa: PLC0415
+
+        manifest, manifest_fault = read_manifest(package.folder)
+        cmake = read_cmake(package.folder, package.name, trace=cmake_trace, root=cmake_root)
+        launch_files = read_launch_files(
+            package.folder,
+            ((e.file.path, e.path) for e in _readable(entries)),
+            (manifest.name if manifest else package.name, package.name),
+        )
+        report = asked.result()
     faults = report.faults if python_faults is None else python_faults
     files = tuple(entry.file for entry in entries)
     return PackageFacts(
@@ -42,15 +58,12 @@ def read_package(
         path=package.path,
         manifest=manifest,
         manifest_fault=manifest_fault,
-        cmake=read_cmake(package.folder, package.name, trace=cmake_trace, root=cmake_root),
+        cmake=cmake,
         files=_with_faults(files, faults),
-        launch_files=read_launch_files(
-            package.folder,
-            ((e.file.path, e.path) for e in _readable(entries)),
-            (manifest.name if manifest else package.name, package.name),
-        ),
+        launch_files=launch_files,
         hints=hints,
         slips=report.slips,
+        interfaces=_interfaces(package.folder, _readable(entries)),
     )
 
 
@@ -68,6 +81,8 @@ def with_build_facts(
     """
     changes: dict[str, object] = {}
     if cmake_trace is not None and facts.cmake is not None:
+        from grader.package.cmake import refine_cmake  # noqa: PLC0415 - slow to load
+
         names = (facts.name, PurePosixPath(facts.path).name)
         changes["cmake"] = refine_cmake(facts.cmake, names, trace=cmake_trace, root=cmake_root)
     if python_faults is not None:
@@ -85,6 +100,18 @@ def python_paths(facts: PackageFacts) -> tuple[str, ...]:
     Python by name or shebang, not too large, no link by absolute path, and a name that is valid Unicode.
     """
     return tuple(f.path for f in facts.files if _to_check(f) and not _only_here(f))
+
+
+def _interfaces(folder: Path, entries: Iterable[Entry]) -> tuple[Interface, ...]:
+    own = (entry for entry in entries if PurePosixPath(entry.file.path).suffix in PARTS)
+    return tuple(_interface(folder, entry) for entry in islice(own, INTERFACES_MAX))
+
+
+def _interface(folder: Path, entry: Entry) -> Interface:
+    data = read_markup(folder, entry.path, INTERFACE_LIMIT_BYTES)
+    if isinstance(data, Fault):
+        return Interface(path=entry.file.path, fields=(), fault=data)
+    return parse_interface(data, entry.file.path)
 
 
 def _only_here(file: SourceFile) -> bool:

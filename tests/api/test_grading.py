@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -56,6 +57,16 @@ def test_text_paths_and_loaded_rubrics_do_as_well(tmp_path: Path, monkeypatch) -
     result = grade(str(SOLUTION), lab, static_only=True)
     assert result.rubric.digest == lab.digest
     assert (tmp_path / "grader-results" / result.submission.id / "result.json").is_file()
+
+
+def test_a_package_of_another_name(tmp_path: Path) -> None:
+    shutil.copytree(SOLUTION, tmp_path / "work")
+    manifest = next((tmp_path / "work").rglob("package.xml"))
+    manifest.write_text(manifest.read_text().replace("<name>lab1<", "<name>week1<"))
+    with pytest.raises(SubmissionError, match="no package lab2"):
+        grade(tmp_path / "work", LAB, tmp_path / "out", package="lab2", static_only=True)
+    result = grade(tmp_path / "work", LAB, tmp_path / "out", package="week1", static_only=True)
+    assert result.submission.package == "week1"
 
 
 def test_where_an_event_loop_runs(tmp_path: Path) -> None:

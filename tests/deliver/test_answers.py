@@ -11,10 +11,11 @@ import pytest
 
 from grader.errors import HostError
 from grader.integrations import gradescope, prairielearn
-from grader.integrations.autograde import PLATFORMS, REPORTS, grade_upload
+from grader.integrations.autograde import ID, PLATFORMS, REPORTS, grade_upload
 from grader.integrations.bundle import SETTINGS_FILE, Platform, Settings
 from grader.model.result import ErrorInfo
 from grader.model.verdict import Status
+from grader.results import read_result
 from grader.rubric.load import LoadedRubric
 from tests.report.nasty import STEERING
 from tests.report.worst import LONG, MERMAID, rubric, worst
@@ -97,6 +98,21 @@ def test_a_platform_can_read_what_it_is_told_and_the_reports_stay_closed(name, t
     results = tmp_path / "results"
     places = (results, results / "results.json", results / REPORTS)
     assert [path.stat().st_mode & 0o777 for path in places] == [0o755, 0o644, 0o700]
+
+
+@pytest.mark.parametrize("name", PLATFORMS)
+def test_a_class_whose_packages_have_another_name_is_graded_under_that(name, tmp_path) -> None:
+    lab = Path(__file__).parents[2] / "benchmarks" / "data" / "static.yaml"
+    settings = Settings(rubric=str(lab), minutes=10, package="week1")
+    platform = laid_out(tmp_path, name, settings.to_json().decode())
+    package = tmp_path / platform.upload / "week1"
+    shutil.copytree(REFERENCE, package)
+    manifest = package / "package.xml"
+    manifest.write_text(manifest.read_text().replace("<name>lab1<", "<name>week1<"))
+    assert grade_upload(platform, tmp_path)
+    result = read_result(tmp_path / "results" / REPORTS / ID)
+    assert result is not None
+    assert (result.submission.package, result.error) == ("week1", None)
 
 
 @pytest.mark.parametrize("name", PLATFORMS)

@@ -41,7 +41,8 @@ def test_gradescope_finds_its_two_scripts_at_the_top_and_may_run_them(tmp_path) 
         assert archive.read(name).startswith(b"#!/usr/bin/env bash\n")
     assert b" 1170 " in archive.read("run_autograder")  # 20 minutes, but for the last half
     settings = json.loads(archive.read("grader.json"))
-    assert settings == {"rubric": f"rubric/{LAB}.yaml", "minutes": 20, "sandbox": "auto", "modes": "lost"}
+    given = {"rubric": f"rubric/{LAB}.yaml", "minutes": 20, "sandbox": "auto", "modes": "lost", "package": ""}
+    assert settings == given
 
 
 @pytest.mark.parametrize("script", ["gradescope-setup.sh", "run_autograder", "grade-question"])

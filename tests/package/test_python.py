@@ -131,6 +131,24 @@ def test_slips_are_found_and_named(tmp_path):
     assert "`rate.sleep()`" in slips[1].message
 
 
+@pytest.mark.parametrize(
+    ("value", "imported", "told"),
+    [
+        ("next(n)", "import itertools\nn = itertools.count()\n", True),
+        ("n + 1", "import time\ntime.sleep(1)\n", True),
+        ("n + rospy.get_time()", "", False),
+        ("n + 1", "from helper import n\n", False),
+        ("n + 1", "import time as t\nn = t.time()\n", False),
+        ("n + 1", "from time import time\nn = time()\n", False),
+        ("n", "", False),
+    ],
+)
+def test_a_script_that_counts_and_reads_no_clock(tmp_path, value, imported, told):
+    (tmp_path / "a.py").write_text(f"import rospy\n{imported}pub.publish('%s' % ({value}))\n")
+    slips = check_syntax(tmp_path, ["a.py"]).slips
+    assert [s.kind for s in slips] == ["no-clock"] * told
+
+
 def test_hostile_source_does_not_stop_the_others(tmp_path):
     (tmp_path / "bomb.py").write_text("x = " + "-" * 900_000 + "1\n")
     (tmp_path / "chain.py").write_text("x = a" + ".a" * 400_000 + "\n")

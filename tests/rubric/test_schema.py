@@ -36,6 +36,18 @@ def test_every_check_offers_its_parameters_and_its_docs():
             assert [key for key, about in keys.items() if "description" not in about] == [], name
 
 
+def test_every_key_says_what_it_means():
+    schema = rubric_schema()
+    records = {"Rubric": schema, **schema["$defs"]}
+    silent = [
+        f"{name}.{key}"
+        for name, record in records.items()
+        for key, about in record.get("properties", {}).items()
+        if "description" not in about
+    ]
+    assert silent == [], "the docstring of a field says what its key means"
+
+
 def test_a_criterion_for_a_person_is_valid():
     by_check = "    check: rate\n    with:\n      topic: /chatter\n      rate_hz: 10\n"
     assert validator().is_valid(yaml.safe_load(SOUND.replace(by_check, "    check: manual\n")))

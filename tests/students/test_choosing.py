@@ -104,13 +104,31 @@ def test_a_folder_tells_where_the_manifest_does_not(folder: str, tmp_path: Path)
     assert chosen.words.endswith("the lab that its folder is named after (it has no package.xml)")
 
 
-@pytest.mark.parametrize("name", ["lab_1", "lab-1", "lab1_ada", "my_lab1", "comp3631_lab1"])
+@pytest.mark.parametrize("name", ["lab_1", "lab-1", "labb1", "LAB_1"])
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_slip_of_the_only_name_chooses_the_lab(name: str, asked: bool, tmp_path: Path) -> None:
+    write_package(tmp_path / "work", name)
+    (chosen,) = choose_all(tmp_path / "work", None, name if asked else "")
+    assert chosen.rubric.rubric.id == "leeds-comp3631-lab1"
+    assert chosen.words.endswith("the lab for a package named lab1: did you mean that name?")
+
+
+def test_of_two_names_none_is_taken_for_a_slip_unless_it_is_asked_for(tmp_path: Path) -> None:
+    write_package(tmp_path / "one", "lab_1")
+    write_package(tmp_path / "two", "basic_coms")
+    with pytest.raises(UsageError, match="no lab is for the package"):
+        choose_all(tmp_path, None)
+    (chosen,) = choose_all(tmp_path, None, "basic_coms")
+    assert chosen.rubric.rubric.id == "mcr2-basic-comms"
+
+
+@pytest.mark.parametrize("name", ["lab1_ada", "my_lab1", "comp3631_lab1"])
 def test_a_near_miss_names_the_lab(name: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError) as caught:
         choose_all(write_package(tmp_path / "work", name), None)
     assert caught.value.message == f"no lab is for the package {name}"
     assert caught.value.hint.startswith("leeds-comp3631-lab1 is for a package named lab1: fix <name>")
-    assert "--rubric leeds-comp3631-lab1" in caught.value.hint
+    assert "--rubric leeds-comp3631-lab1 --package NAME" in caught.value.hint
 
 
 def test_without_a_near_miss_every_lab_is_named(tmp_path: Path) -> None:

@@ -28,6 +28,19 @@ TEXT_LIMIT = 300
 MESSAGE_LIMIT = 500
 SLIPS_LIMIT, ALL_SLIPS_LIMIT = 100, 1000
 """Of a file, and of all together."""
+CLOCKS = {
+    "get_time", "get_rostime", "now", "time", "time_ns", "monotonic", "monotonic_ns", "perf_counter",
+    "perf_counter_ns", "process_time", "clock", "clock_gettime", "utcnow", "today", "localtime", "gmtime",
+    "ctime", "asctime", "strftime", "times", "stamp", "header", "eval", "exec", "getattr", "__import__",
+    "import_module", "system", "popen", "Popen", "run", "check_output", "current_real",
+    "current_expected", "last_real", "last_expected", "last_time", "remaining", "wait_for_message",
+    "get_param", "get_param_cached", "Subscriber", "Timer", "vars", "globals", "__dict__", "modules",
+}  # fmt: skip
+"""Names by which a script may come to know the time, or something that it cannot be seen to be."""
+PLAIN_MODULES = {
+    "__future__", "itertools", "math", "numpy", "os", "random", "roslib", "rospy", "signal", "string",
+    "sys", "threading", "time",
+}  # fmt: skip
 PAIRS = {")": "(", "]": "[", "}": "{"}
 ENCODINGS = (SyntaxError, LookupError, UnicodeDecodeError)
 
@@ -173,7 +186,50 @@ def slips(tree):
         if name:
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             found.append({"line": node.lineno, "kind": "input", "message": message})
+    published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
+    if published is not None and counts(tree) and not knows_time(tree):
+        message = "the script counts, and reads no clock"
+        found.append({"line": published.lineno, "kind": "no-clock", "message": message})
     return sorted(found, key=lambda slip: slip["line"])[:SLIPS_LIMIT]
+
+
+def counts(tree):
+    return any(
+        (isinstance(n, ast.AugAssign) and isinstance(n.op, ast.Add))
+        or (
+            isinstance(n, ast.Call)
+            and isinstance(n.func, ast.Name)
+            and n.func.id in ("next", "range", "count")
+        )
+        or (isinstance(n, ast.BinOp) and isinstance(n.op, ast.Add))
+        or is_call(n, "count")
+        for n in ast.walk(tree)
+    )
+
+
+def knows_time(tree):
+    """Whether a script may read a clock: by name, or in a module that is not the standard one."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            if not all(is_plain(alias.name) and alias.asname is None for alias in node.names):
+                return True
+        elif isinstance(node, ast.ImportFrom):
+            names = {alias.name for alias in node.names}
+            if node.level or not is_plain(node.module or "") or names & (CLOCKS | {"*"}):
+                return True
+        elif (isinstance(node, ast.Attribute) and node.attr in CLOCKS) or (
+            isinstance(node, ast.Name) and node.id in CLOCKS - {"time"}
+        ):
+            return True
+    return False
+
+
+def is_plain(module):
+    return module in PLAIN_MODULES or module.endswith((".msg", ".srv", "_msgs"))
+
+
+def is_call(node, name):
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == name
 
 
 def uncalled(node, functions):

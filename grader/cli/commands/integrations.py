@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from grader.cli.declare import INSTRUCTORS, Argument, Flag, Option, command, loading
-from grader.cli.options import EXPORT_EXIT_CODES, SandboxOption, minutes
+from grader.cli.options import EXPORT_EXIT_CODES, PackageOption, SandboxOption, minutes
 from grader.errors import ExitCode
 from grader.model.version import ALL
 
@@ -48,6 +48,7 @@ def export_gradescope(
         ),
     ] = 10,
     assume_executable: Annotated[bool, ASSUME_EXECUTABLE] = False,
+    package: PackageOption = None,
     sandbox: SandboxOption = "auto",
 ) -> ExitCode:
     """Write an autograder's zip for Gradescope."""
@@ -59,7 +60,8 @@ def export_gradescope(
         from grader.rubric.load import load_rubric
     rubric = load_rubric(lab)
     modes: Literal["lost", "granted"] = "granted" if assume_executable else "lost"
-    data = autograder(rubric, Settings(rubric="", minutes=minutes, sandbox=sandbox, modes=modes))
+    settings = Settings(rubric="", minutes=minutes, sandbox=sandbox, modes=modes, package=package or "")
+    data = autograder(rubric, settings)
     if str(out) == STDOUT:
         sys.stdout.buffer.write(data)
         return ExitCode.PASSED
@@ -85,6 +87,7 @@ def export_prairielearn(
         int, Option("--minutes", "N", "the time limit, at most 10 (default: 10)", minutes(10))
     ] = 10,
     assume_executable: Annotated[bool, ASSUME_EXECUTABLE] = False,
+    package: PackageOption = None,
     sandbox: SandboxOption = "auto",
 ) -> ExitCode:
     """Write a question with an external grader for PrairieLearn."""
@@ -95,7 +98,7 @@ def export_prairielearn(
         from grader.rubric.load import load_rubric
     rubric = load_rubric(lab)
     modes: Literal["lost", "granted"] = "granted" if assume_executable else "lost"
-    settings = Settings(rubric="", minutes=minutes, sandbox=sandbox, modes=modes)
+    settings = Settings(rubric="", minutes=minutes, sandbox=sandbox, modes=modes, package=package or "")
     target = out or Path(f"{rubric.rubric.id}-prairielearn")
     write_question(question(rubric, settings, image), target)
     say(f"{target}: add question/ to your course's questions, and build {image} from image/")
