@@ -20,7 +20,9 @@ from grader.model.mutants import Mutant
 from grader.model.progress import Silence
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
+from grader.package.manifest import read_manifest
 from grader.pipeline import GradeOptions, grade
+from grader.ros_packages import ros_packages
 from grader.rubric.model import Rubric
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -52,6 +54,10 @@ TOGETHER = {
         "rate-sleep-without-brackets+listener-not-executable+manifest-no-buildtool",
         "message-constant-time+launch-namespace-apart+cmake-no-catkin-package",
         "ok-launch-terminals+talker-anonymous",
+    ),
+    "tf-broadcaster": (
+        "rotation-not-copied+laser-swapped+node-named-otherwise+stamps-not-set+distance-of-base",
+        "build-unknown-component+distance-ends",
     ),
     "own-message": (
         "field-float32+fahrenheit+no-stamp+node-named-otherwise+too-slow",
@@ -164,6 +170,13 @@ def workers(count: int = SIDE_BY_SIDE) -> Iterator[ProcessPoolExecutor]:
 
 def expected_points(fixture: Mutant, rubric: Rubric) -> float:
     return rubric.max_points - lost_points(fixture, rubric)
+
+
+@cache
+def lacking_packages(lab: str) -> list[str]:
+    """Return what the lab's correct package depends on and this machine does not have."""
+    manifest = read_manifest(source_of(lab, REFERENCE) / rubric_of(lab).package)[0]
+    return [one.name for one in manifest.dependencies if ros_packages().lacks(one.name)] if manifest else []
 
 
 def surprises(result: GradingResult, fixture: Mutant, rubric: Rubric) -> list[str]:

@@ -36,6 +36,7 @@ FAMILIES = (
     "reacts",
     "stamps",
     "definition",
+    "transform",
     "rate",
     "counter",
     "listener",

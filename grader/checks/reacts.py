@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from grader.checks.registry import check
 from grader.checks.support.clocks import run_seconds
 from grader.checks.support.fields import FieldPath, Reading, bounds_text, is_within, no_field, readings
-from grader.checks.support.lateness import Lateness, excused
+from grader.checks.support.lateness import excused, why_late
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.processes import observed_until_ns
 from grader.checks.support.topics import cite, misfit, no_message
@@ -21,7 +21,6 @@ from grader.model.record import Record
 from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import plural, significant
 
-LATE_MS = 100.0
 ORDER_S = 0.1
 """Two topics come over two connections: so much earlier a message may be recorded than what it answers."""
 
@@ -203,7 +202,7 @@ def _early(
     if to_s(between[-1].time_ns) >= from_s + params.within_s:
         return verdict
     # what ends so soon may be an older answer of a machine that was late itself
-    return excused(verdict.once(), run, causes[0].time_ns, first, _why_late)
+    return excused(verdict.once(), run, causes[0].time_ns, first, why_late)
 
 
 def _never_caused(causes: Sequence[Reading], run: Run, params: ReactsParams) -> Verdict | None:
@@ -216,7 +215,7 @@ def _never_caused(causes: Sequence[Reading], run: Run, params: ReactsParams) -> 
         measured=f"0 of {plural(len(causes), 'message')}",
         hint=f"rostopic echo {params.cause.topic} shows what comes while your node runs",
     )
-    return excused(verdict, run, run.start_ns, run.end_ns, _why_late)
+    return excused(verdict, run, run.start_ns, run.end_ns, why_late)
 
 
 def _unanswered(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Verdict | None:
@@ -236,10 +235,4 @@ def _unanswered(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Ve
         return verdict.once() if len(answers) == 1 else verdict
     how = "does not follow" if late is None else f"comes up to {late:.2f} s after"
     verdict = failed(f"{len(slow)} of {times} {reaction.format(how)}", hint=hint).once()
-    return excused(verdict, run, slow[0].at_ns, run.end_ns, _why_late)
-
-
-def _why_late(late: Lateness) -> str:
-    if not (late.full or late.max_ms >= LATE_MS):
-        return ""
-    return "busy" if late.full else f"late itself, by up to {late.max_ms:.0f} ms"
+    return excused(verdict, run, slow[0].at_ns, run.end_ns, why_late)

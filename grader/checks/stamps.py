@@ -141,7 +141,8 @@ def _told(value: Mapping[str, Any]) -> tuple[float, bool, str | None]:
 
 
 def _now(params: StampsParams) -> str:
-    return f"set it just before each publish: msg.{_name(params)} = rospy.Time.now()"
+    item, _, name = _name(params).rpartition("[*].")
+    return f"set it just before each publish: {'msg.' if not item else 'each '}{name} = rospy.Time.now()"
 
 
 def _nothing_to_judge(

@@ -194,7 +194,11 @@ def md5sum(type: str) -> str:  # noqa: A002 - ROS's own word
 
 @lru_cache(maxsize=1)
 def _noetic() -> Typestore:
-    return get_typestore(Stores.ROS1_NOETIC)
+    store = get_typestore(Stores.ROS1_NOETIC)
+    store.register(
+        get_types_from_msg("geometry_msgs/TransformStamped[] transforms\n", "tf2_msgs/msg/TFMessage")
+    )
+    return store
 
 
 @lru_cache(maxsize=256)

@@ -10,7 +10,7 @@ from grader.rubric.load import load_rubric
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 LABS = sorted(path.stem for path in (ROOT / "rubrics").glob("*.yaml"))
-EXAMPLES = ("own-message",)
+EXAMPLES = ("own-message", "tf-broadcaster")
 """For operators that fit no lab."""
 
 TIMER = '''\

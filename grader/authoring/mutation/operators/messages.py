@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import PurePosixPath
 
 from pydantic import Field
@@ -104,6 +105,26 @@ def stamp_not_set(script: Script, line: ast.Assign) -> list[Edit]:
     Fits every line that sets one.
     """
     return [script.remove(line)]
+
+
+def _frames(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.expr, ast.expr]]:
+    """Find what is set as a transform's parent and child, one behind the other."""
+    for script in solution.scripts:
+        lines = [line for line in script.of(ast.Assign) if isinstance(line.targets[0], ast.Attribute)]
+        for first, second in pairwise(sorted(lines, key=lambda line: line.lineno)):
+            names = [ast.unparse(line.targets[0]).rpartition(".")[2] for line in (first, second)]
+            if names == ["frame_id", "child_frame_id"]:
+                child = script.source(second.value).strip("\"'")
+                yield script_place(script, child=child), script, first.value, second.value
+
+
+@operator("frames-swapped", each=_frames)
+def frames_swapped(script: Script, parent: ast.expr, child: ast.expr) -> list[Edit]:
+    """Swaps parent and child of a transform.
+
+    Fits every transform whose `child_frame_id` is set in the line behind its `frame_id`.
+    """
+    return [script.replace(parent, script.source(child)), script.replace(child, script.source(parent))]
 
 
 def _fields(solution: Solution) -> Iterator[tuple[CodePlace, str, InterfaceField]]:
