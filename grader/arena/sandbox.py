@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 
 from grader.arena.control_groups import Cgroups
 from grader.arena.limits import RunLimits
-from grader.arena.sandbox_files import HOME, SHIMS, STANDINS
+from grader.arena.sandbox_files import HOME, RECORD, RECORD_INSIDE, RECORD_SHIM, SHIMS, STANDINS
 from grader.errors import HostError
 from grader.host_programs import find_host_program
 from grader.model.record import Record
@@ -100,7 +100,7 @@ class Sandbox(Record):
             word for name in OWN_ETC for word in ("--ro-bind", copy_of(place / "etc" / name), f"/etc/{name}")
         ]
         return [
-            *_system(ros), "--proc", "/proc", "--dev", "/dev",
+            *_system(ros), *_rosbag_record(ros, place), "--proc", "/proc", "--dev", "/dev",
             "--bind", scratch(limits.shared_bytes, limits.shared_files), "/dev/shm", "--remount-ro", "/dev",  # noqa: S108 - its own
             "--bind", scratch(limits.tmp_bytes, limits.tmp_files), "/tmp",  # noqa: S108 - its own
             "--bind", scratch(limits.home_bytes, limits.home_files), HOME, *etc,
@@ -159,6 +159,15 @@ def _system(ros: RosInstallation) -> list[Word]:
     if any(OWN_FOLDER.is_relative_to(folder) for folder in shown):
         argv += ["--size", "4096", "--tmpfs", str(OWN_FOLDER)]
     return argv
+
+
+def _rosbag_record(ros: RosInstallation, place: Path) -> Iterator[Word]:
+    """Put what makes rosbag's recorder content with a sandbox's memory in its place, and the real one aside."""
+    found = (Path(prefix) / RECORD for prefix in (*ros.prefixes, "/usr"))
+    real = next((path for path in found if path.is_file()), None)
+    if real is not None:
+        yield from ("--ro-bind", str(real), RECORD_INSIDE)
+        yield from ("--ro-bind", copy_of(place / "bin" / RECORD_SHIM), str(real))
 
 
 def is_shown(path: Path, ros: RosInstallation) -> bool:

@@ -22,6 +22,8 @@ BASE_WORKSPACE = "/run/grader/base.tar"
 LARGE = "/run/grader/large"
 SHIMS = "/run/grader/bin"
 STANDINS = "/run/grader/standins"
+RECORD, RECORD_INSIDE = "lib/rosbag/record", "/run/grader/rosbag-record"
+RECORD_SHIM = "grader-rosbag-record"
 COURSE = "/run/grader/course"
 ROS_SIDE = Path(__file__).parent / "ros"
 TERMINALS = (
@@ -78,6 +80,7 @@ def prepare(place: Path, ros: RosInstallation) -> None:
     _program(shims, "terminal.sh", "grader-terminal", TERMINALS)
     _program(shims, "open.sh", "grader-open", BROWSERS)
     _program(shims, "answers.sh", "grader-reachable", ASKING)
+    _program(shims, "rosbag_record.sh", RECORD_SHIM, ())
     shutil.copyfile(ROS_SIDE / "opener.py", shims / "grader-open.py")
     _quicker(shims, ros)
     copy_standins(place / "standins", ros)

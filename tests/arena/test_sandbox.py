@@ -344,3 +344,16 @@ def test_a_control_group_counts_only_if_it_can_be_limited(tmp_path: Path) -> Non
     assert not control_groups._usable(tmp_path / "none", "memory.max")
     assert control_groups.Cgroups().label == "a watchdog"
     assert Cgroups(memory=Cgroup(version=2, folder="/x")).label == "cgroup v2"
+
+
+@needs_sandbox
+def test_rosbag_records_in_less_memory_than_it_asks_for(tmp_path: Path) -> None:
+    code = """
+import os, subprocess
+for name, words in (("a", ["rosbag", "record"]), ("b", ["rosrun", "rosbag", "record", "--min-space", "8M"])):
+    subprocess.call([*words, "-O", "/tmp/%s.bag" % name, "--duration=1", "/rosout"])
+    print("recorded", os.path.exists("/tmp/%s.bag" % name))
+"""
+    run = run_script(tmp_path, code, limit_s=30)
+    assert [line for line in printed(run) if line.startswith("recorded")] == ["recorded True"] * 2
+    assert not [line for line in printed(run) if "space free" in line]
