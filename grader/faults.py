@@ -159,6 +159,7 @@ def _not_judged(criterion: Criterion, fault: GraderError) -> CriterionResult:
         status=Status.ERROR,
         points=0.0,
         max_points=criterion.points,
+        extra=criterion.extra,
         message=f"{lost}: {fault.message}",
         expected="",
         measured="",

@@ -27,7 +27,7 @@ from platform import python_version
 from typing import TYPE_CHECKING, TypeAlias
 
 from grader import __version__
-from grader.errors import EvidenceError, GraderError, SubmissionError, UsageError
+from grader.errors import EvidenceError, GraderError, HostError, SubmissionError, UsageError
 from grader.evidence.run import Run, console_log
 from grader.faults import NOTHING_RUN, GradingContext, classify_errors
 from grader.files import make_folder, temporary_folder
@@ -39,7 +39,7 @@ from grader.judging import judge
 from grader.judging.early import judge_files
 from grader.judging.judge import judge_all_runs
 from grader.judging.other_runs import REPAIRS, was_built
-from grader.judging.summary import notes_of, overall_status, total_points
+from grader.judging.summary import closed_gate, notes_of, overall_status, total_points
 from grader.model.figure import Figures
 from grader.model.package import PackageFacts
 from grader.model.progress import Progress, Silence
@@ -59,8 +59,10 @@ from grader.portable import wait_for_children
 from grader.report.files import write_reports
 from grader.report.view import hidden_ids
 from grader.results import EVIDENCE, Results, finish_killed
+from grader.ros_packages import look_for
 from grader.rubric.load import LoadedRubric, files_of, needs_package, needs_ros, started
-from grader.rubric.rates import rates_of
+from grader.rubric.rates import rates_of, watched_of
+from grader.wording import join_words
 
 if TYPE_CHECKING:
     from grader.arena.asynchronous import Stop
@@ -354,6 +356,7 @@ def make_recorder(
         )
     from grader.arena.recording import Recorder  # noqa: PLC0415 - see LATER
 
+    refuse_missing(rubric.rubric)
     return Recorder(
         submission,
         facts,
@@ -361,12 +364,23 @@ def make_recorder(
         evidence,
         beside=rubric.path.parent,
         rates=rates_of(rubric.rubric),
+        watched=watched_of(rubric.rubric),
         mode=options.sandbox,
         progress=progress,
         recorded=options.reused,
         stop=options.stop,
         about=about,
     )
+
+
+def refuse_missing(rubric: Rubric) -> None:
+    """Raise HostError where this machine lacks what the rubric says that the lab needs."""
+    lacking = [need for need in look_for(**rubric.needs.model_dump()) if not need.here]
+    if lacking:
+        raise HostError(
+            f"the lab needs {join_words(need.name for need in lacking)}, which this machine lacks",
+            hint="; ".join(need.install for need in lacking),
+        )
 
 
 def keep_recordings(
@@ -462,6 +476,7 @@ def assemble_result(
         rubric=RubricInfo(id=rubric.rubric.id, version=rubric.rubric.version, digest=rubric.digest),
         status=overall_status(criteria),
         points=total_points(rubric.rubric, criteria),
+        gate=closed_gate(rubric.rubric, criteria),
         max_points=rubric.rubric.max_points,
         criteria=criteria,
         environment=EnvironmentInfo(

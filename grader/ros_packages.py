@@ -6,20 +6,23 @@ What exists nowhere is a slip of the rubric's author; what exists but is not ins
 from __future__ import annotations
 
 import os
+import subprocess
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from grader.errors import RosMissing
-from grader.installable import known_packages, noetic_messages
+from grader.host_programs import HOST_ENV, find_host_program
+from grader.installable import install_command, known_packages, noetic_messages
 from grader.ros_env import RosInstallation, find_ros
 from grader.wording import closest, did_you_mean
 
 MANIFEST = "package.xml"
 STANDINS = Path(__file__).resolve().parent / "arena" / "standins"
 DEPTH_MAX = 5
+LOOK_S = 20
 NEAR_WITHOUT_ROS = 0.85
 """Where there is no ROS, only a name that is one letter off is known to be wrong."""
 IGNORED = frozenset({"CATKIN_IGNORE", "AMENT_IGNORE"})
@@ -105,6 +108,56 @@ def ros_packages() -> RosPackages:
     except RosMissing:
         ros = None
     return _read(ros.model_dump_json() if ros else "")
+
+
+class Need(NamedTuple):
+    """What a lab needs of the machine: whether it is here, and how it is installed. `kind` is `ros`, `apt` or `pip`."""
+
+    kind: str
+    name: str
+    here: bool
+    install: str
+
+
+@lru_cache(maxsize=16)
+def look_for(ros: tuple[str, ...], apt: tuple[str, ...], pip: tuple[str, ...]) -> tuple[Need, ...]:
+    """Return which of these packages are here. What this machine has no way to tell (no dpkg) counts as here."""
+    packages = ros_packages()
+    distro = packages.ros.distro if packages.ros is not None and packages.ros.kind == "setup" else ""
+    found = [Need("ros", n, n in packages.folders, install_command(n, distro)) for n in ros]
+    found += [Need("apt", n, _is_installed(n), f"apt-get install {n}") for n in apt]
+    python = packages.ros.python if packages.ros is not None else ""
+    found += [
+        Need("pip", n, _has_module(python, n), f"{python or 'python3'} -m pip install {n}") for n in pip
+    ]
+    return tuple(found)
+
+
+def _is_installed(package: str) -> bool:
+    dpkg = find_host_program("dpkg-query")
+    return dpkg is None or _prints([dpkg, "-W", "-f=${db:Status-Status}", package]) == "installed"
+
+
+def _has_module(python: str, name: str) -> bool:
+    """Return whether ROS's Python has a distribution of that name, where every user has it."""
+    script = "import importlib.metadata, sys; importlib.metadata.version(sys.argv[1]); print('here')"
+    return not python or _prints([python, "-I", "-c", script, name]) == "here"
+
+
+def _prints(command: list[str]) -> str:
+    try:
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            timeout=LOOK_S,
+            env=HOST_ENV,
+            cwd="/",
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout.decode(errors="replace").strip()
 
 
 @lru_cache(maxsize=4)

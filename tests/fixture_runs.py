@@ -20,7 +20,9 @@ from grader.model.mutants import Mutant
 from grader.model.progress import Silence
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
+from grader.package.manifest import read_manifest
 from grader.pipeline import GradeOptions, grade
+from grader.ros_packages import ros_packages
 from grader.rubric.model import Rubric
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -28,11 +30,17 @@ GIT = shutil.which("git") or "git"
 REFERENCE = "reference"
 CORRECT = Mutant.model_construct(summary="The reference solution.", expect={}, message={}, says={})
 TOGETHER = {
+    "avoid-obstacles": ("build-unknown-component+node-named-otherwise+never-stops+too-slow",),
     "eyantra-ros-basics": (
         "chatter-own-package+cmake-no-catkin-package+hello-print+load-yaml-find+turtlesim-colour-unread+web-chromium",
         "config-nesting+hello-ends+manifest-roscpp-missing+param-clobbers",
         "cpp-crashes+hello-not-executable",
         "ok-param-one-line+param-crlf",
+    ),
+    "follow-wall": ("build-unknown-component+node-named-otherwise+drives-straight",),
+    "go-to-goal": (
+        "build-unknown-component+node-named-otherwise+round-by-the-wall+says-nothing+too-fast",
+        "stops-too-early",
     ),
     "leeds-comp3631-lab1": (
         "counter-every-second-loop+cmake-no-catkin-package+launch-malformed+talker-crlf",
@@ -46,6 +54,14 @@ TOGETHER = {
         "rate-sleep-without-brackets+listener-not-executable+manifest-no-buildtool",
         "message-constant-time+launch-namespace-apart+cmake-no-catkin-package",
         "ok-launch-terminals+talker-anonymous",
+    ),
+    "tf-broadcaster": (
+        "rotation-not-copied+laser-swapped+node-named-otherwise+stamps-not-set+distance-of-base",
+        "build-unknown-component+distance-ends",
+    ),
+    "own-message": (
+        "field-float32+fahrenheit+no-stamp+node-named-otherwise+too-slow",
+        "build-unknown-component",
     ),
     "sheffield-com2009-week1": (
         "publisher-not-executable+subscriber-name+manifest-malformed",
@@ -154,6 +170,13 @@ def workers(count: int = SIDE_BY_SIDE) -> Iterator[ProcessPoolExecutor]:
 
 def expected_points(fixture: Mutant, rubric: Rubric) -> float:
     return rubric.max_points - lost_points(fixture, rubric)
+
+
+@cache
+def lacking_packages(lab: str) -> list[str]:
+    """Return what the lab's correct package depends on and this machine does not have."""
+    manifest = read_manifest(source_of(lab, REFERENCE) / rubric_of(lab).package)[0]
+    return [one.name for one in manifest.dependencies if ros_packages().lacks(one.name)] if manifest else []
 
 
 def surprises(result: GradingResult, fixture: Mutant, rubric: Rubric) -> list[str]:

@@ -161,7 +161,7 @@ def test_check_takes_a_bag(tmp_path, rubric, capsys):
         (b"#ROSBAG V2.0\nhello", "damaged or cut short"),
         (mcap_bytes(COUNT)[:-20], "cut short"),
         (b"SQLite format 3\0", "a bag of ROS 2"),
-        (mcap_bytes(COUNT, profile="ros2", encoding="cdr", schema="ros2msg"), "a recording of ROS 2"),
+        (mcap_bytes(COUNT, profile="ros2", encoding="cdr", schema="ros2idl"), "no message definition"),
         (mcap_bytes(Topic("/n", "std_msgs/Int8", [])), "holds no messages"),
     ],
 )

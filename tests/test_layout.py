@@ -24,7 +24,7 @@ ALLOWED = {
     "installable": set[str](),
     "portable": {"errors"},
     "ros_env": {"errors", "model"},
-    "ros_packages": {"errors", "installable", "ros_env", "wording"},
+    "ros_packages": {"errors", "host_programs", "installable", "ros_env", "wording"},
     "host_programs": set[str](),
     "limited_child": {"host_programs"},
     "workers": {"errors", "host_programs"},
@@ -38,13 +38,16 @@ ALLOWED = {
     "rubric": BASE | {"checks", "evidence", "files", "installable", "ros_packages"},
     "judging": BASE | {"checks", "evidence", "rubric"},
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},
-    "arena": BASE | {"evidence", "files", "host_programs", "package", "ros_env", "ros_packages", "rubric.model"},
+    "arena": BASE | {
+        "evidence", "files", "host_programs", "package", "ros_env", "ros_packages", "rubric.course_packages",
+        "rubric.model"
+    },
     "submitted_recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "repaired_copy": {"files", "judging", "model", "package", "rubric"},
     "pipeline": {
         "repaired_copy",
         *BASE, "arena", "evidence", "faults", "files", "installable", "intake", "judging", "package",
-        "report", "results", "rubric", "submitted_recordings"
+        "report", "results", "ros_packages", "rubric", "submitted_recordings"
     },
     "api": {
         *BASE, "arena.asynchronous", "evidence", "faults", "files", "judging", "pipeline", "results", "rubric"

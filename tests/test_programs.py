@@ -44,6 +44,7 @@ STARTS = {
     "cli/systemd_scope.py:_moved": Start(
         "_environment()", "'/'", "nothing: systemd is asked for this process's number"
     ),
+    "ros_packages.py:_prints": Start("HOST_ENV", "'/'", "nothing: names that the rubric gives"),
     "cli/host_support.py:_probe": Start("HOST_ENV", "'/'", "nothing"),
     "rubric/pytest_check.py:_run": Start(
         "_environment()", "folder", "nothing: the instructor's tests, beside a copy of the evidence"

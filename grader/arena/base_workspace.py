@@ -108,7 +108,7 @@ def has_base(place: ProcessEnvironment) -> bool:
 def base_spec(place: ProcessEnvironment) -> dict[str, Any]:
     """Return the process that makes one: in a sandbox as the build's, with nothing of a submission's in it."""
     argv = ["/bin/bash", "-c", SCRIPT, "bash", *catkin_make(place)]
-    bare = replace(place, env={})
+    bare = replace(place, env={}, sees_course=False)
     return bare.spec(NAME, argv, role="grader", copy=False, as_handed_in=True, collect=BASE)
 
 
@@ -155,7 +155,11 @@ def _empty(folder: Path) -> Workspace:
 
 
 def _file_name(place: ProcessEnvironment) -> str:
-    """Another one for whatever else CMake could find: another machine, other programs, another ROS."""
+    return f"workspace-{machine_digest(place)}.tar"
+
+
+def machine_digest(place: ProcessEnvironment) -> str:
+    """Return another one for whatever else CMake could find: another machine, other programs, another ROS."""
     spec = base_spec(place)
     known = {
         "grader": __version__,
@@ -165,7 +169,7 @@ def _file_name(place: ProcessEnvironment) -> str:
         "shims": [name for name in PROGRAMS if (place.folder / "bin" / name).exists()],
         "files": list(_looks(place)),
     }
-    return f"workspace-{hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()[:32]}.tar"
+    return hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()[:32]
 
 
 def _looks(place: ProcessEnvironment) -> Iterator[tuple[str, int, int, int]]:
@@ -184,11 +188,11 @@ def _entries(path: str) -> list[str]:
     return [entry for entry in path.split(os.pathsep) if entry]
 
 
-def read_kept(name: str) -> bytes | None:
+def read_kept(name: str, bytes_max: int = BYTES_MAX) -> bytes | None:
     """Return what was kept under that name; None where there is none that is whole and only this user's."""
     with suppress(OSError):
         if _is_private(_folder().lstat()):
-            return _checked(_read(name))
+            return _checked(_read(name, bytes_max))
     return None
 
 
@@ -220,11 +224,11 @@ def _is_private(status: os.stat_result) -> bool:
     return status.st_uid == os.geteuid() and stat.S_IMODE(status.st_mode) == stat.S_IRWXU
 
 
-def _read(name: str) -> bytes:
+def _read(name: str, bytes_max: int) -> bytes:
     with open_untrusted(_folder(), name) as file:
         status = os.fstat(file.fileno())
         own = status.st_uid == os.geteuid() and not status.st_mode & _OTHERS_WRITE
-        return file.read(BYTES_MAX) if own else b""
+        return file.read(bytes_max) if own else b""
 
 
 def _checked(data: bytes) -> bytes | None:

@@ -15,6 +15,7 @@ from grader.arena.sandbox import Sandbox, Word, copy_of, scratch, system_call_fi
 from grader.arena.sandbox_files import (
     BASE_WORKSPACE,
     BUILT,
+    COURSE,
     HOME,
     INSIDE_WORKSPACE,
     LARGE,
@@ -23,6 +24,7 @@ from grader.arena.sandbox_files import (
     SOURCES,
     STANDIN_SOURCES,
     STANDINS,
+    with_course,
     with_standins,
 )
 from grader.arena.workspace import Built, Workspace, read_archive, read_folder
@@ -81,7 +83,8 @@ OWN_VARIABLES = (
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessEnvironment:
-    """`folder` is this submission's own, `env` what the built workspace's `setup.bash` adds."""
+    """`folder` is this submission's own, `env` what the built workspace's `setup.bash` adds. `sees_course`: processes
+    see the packages that the rubric brings along, if it does."""
 
     folder: Path
     ros: RosInstallation
@@ -90,6 +93,12 @@ class ProcessEnvironment:
     workspace: Workspace
     package: str
     env: dict[str, str] = field(default_factory=dict)
+    sees_course: bool = True
+
+    @property
+    def course(self) -> Path:
+        """The workspace of the packages that the rubric brings along (`course_workspace.py`), if it does."""
+        return self.folder / "course"
 
     @property
     def archive(self) -> Path:
@@ -160,7 +169,7 @@ class ProcessEnvironment:
         """Folders that hold installed packages side by side, the stand-ins' last."""
         known = [Path(p) / "share" for p in self.ros.prefixes]
         known += [Path(p) for p in self.ros.env.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p]
-        return (*known, self.folder / "standins" / "share", STANDIN_SOURCES)
+        return (self.course / "src", *known, self.folder / "standins" / "share", STANDIN_SOURCES)
 
     def type_text(self, type_: str, kind: str) -> str | None:
         """Return the text of `<package>/<kind>/<Name>.<kind>`: the student's own, ROS's, or a stand-in's.
@@ -206,12 +215,14 @@ class ProcessEnvironment:
         collect_bytes: int | None = None,
         build: bool = False,
         number: int = 0,
+        binds: Sequence[Word] = (),
         **more: Any,  # noqa: ANN401 - fields of the spec
     ) -> dict[str, Any]:
         """What the arena needs to start a process. With `copy` it gets a workspace of its own: the sources with the
         repairs, or `as_handed_in`, and what the build made. `build` is the build itself, `number` says how many others
         the run starts before it. What the process writes to
-        `{collect}`, `collect_bytes` at most, becomes the file of that name in `workspace.kept`."""
+        `{collect}`, `collect_bytes` at most, becomes the file of that name in `workspace.kept`. `binds` are more
+        arguments of bubblewrap's."""
         boxed = self.sandbox.bubblewrap
         limits = self._limits(copy=copy)
         kept = None if collect is None else str(self.workspace.kept / collect)
@@ -227,7 +238,7 @@ class ProcessEnvironment:
                 ros=self.ros,
                 place=self.folder,
                 limits=limits,
-                binds=self._binds(copy=copy, as_handed_in=as_handed_in or build, output=build),
+                binds=[*self._binds(copy=copy, as_handed_in=as_handed_in or build, output=build), *binds],
                 net=role != "grader" or not as_handed_in,
             ),
             "filter": base64.b64encode(filtered).decode() if filtered else None,
@@ -258,11 +269,15 @@ class ProcessEnvironment:
         return self.limits.model_copy(update={"home_bytes": room})
 
     def _binds(self, *, copy: bool, as_handed_in: bool, output: bool) -> list[Word]:
+        course: list[Word] = (
+            ["--ro-bind", copy_of(self.course), COURSE] if self.sees_course and self.course.is_dir() else []
+        )
         if not copy:
-            return []
+            return course
         workspace = self.workspace
         sources = workspace.built / "src" if as_handed_in else workspace.repaired
         binds: list[Word] = [
+            *course,
             "--ro-bind",
             copy_of(workspace.large),
             LARGE,
@@ -304,7 +319,11 @@ class ProcessEnvironment:
         if LIBSTDBUF.exists():
             base |= {"LD_PRELOAD": str(LIBSTDBUF), "_STDBUF_O": "L", "_STDBUF_E": "L"}
         added = {name: value for name, value in self.env.items() if name not in OWN_VARIABLES}
-        merged = with_standins({**base, **self.ros.env, **added}, self.folder / "standins", self.standins)
+        merged = {**base, **self.ros.env, **added}
+        if self.sees_course and self.course.is_dir():
+            inside = COURSE if self.sandbox.bubblewrap else str(self.course)
+            merged = with_course(merged, self.course, inside)
+        merged = with_standins(merged, self.folder / "standins", self.standins)
         return {**merged, "PATH": _path(self.ros, merged.get("PATH", ""), self.shims)}
 
 

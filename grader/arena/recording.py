@@ -19,6 +19,7 @@ from typing_extensions import Self
 from grader.arena.admission import Admission, shared_folder
 from grader.arena.asynchronous import Stop, run_together, run_until_signal
 from grader.arena.build import BUILD_EXPECTED_S, build
+from grader.arena.course_workspace import copy_course, provide_course
 from grader.arena.limits import RunLimits
 from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.sandbox import temporary_base
@@ -59,9 +60,9 @@ _UMASK = threading.Lock()
 class Recorder:
     """Records one submission into a folder. Use as a context: its workspaces live as long as it does.
 
-    `rates` are judged, by scenario: a run that is to show them ends when they are clear. `recorded` is evidence, by
-    scenario, that stands for a run of it: it is copied. `stop` ends the runs from another thread. `about` is metadata
-    for all its evidence, `beside` the rubric's folder.
+    `rates` are judged, by scenario: a run that is to show them ends when they are clear. `watched` is how long nodes
+    have to be seen (s), by scenario. `recorded` is evidence, by scenario, that stands for a run of it: it is copied.
+    `stop` ends the runs from another thread. `about` is metadata for all its evidence, `beside` the rubric's folder.
     """
 
     def __init__(
@@ -75,6 +76,7 @@ class Recorder:
         progress: Progress,
         beside: Path | None = None,
         rates: Mapping[str, tuple[RateBounds, ...]] | None = None,
+        watched: Mapping[str, float] | None = None,
         recorded: Mapping[str, Path] | None = None,
         stop: Stop | None = None,
         about: Mapping[str, str] | None = None,
@@ -84,6 +86,7 @@ class Recorder:
         self._recorded = recorded or {}
         self._stop = stop
         self._rates = rates or {}
+        self._watched = watched or {}
         self._rubric = rubric
         self._beside = beside
         self._progress = progress
@@ -170,6 +173,7 @@ class Recorder:
         async with self._admission.run(), self._admission.start():
             self._progress.step("build", "running", "catkin_make", BUILD_EXPECTED_S)
             try:
+                await provide_course(place)
                 self._place, outcome = await build(place, writer, files, faulty, last_run=last)
             except ArenaError as error:
                 if not last:
@@ -196,8 +200,15 @@ class Recorder:
         with _readable_by_all():
             prepare(folder, self._ros)
             workspace = make_workspace(
-                folder, self._submission, self.recording.facts, self._scripts(), self._sandbox
+                folder,
+                self._submission,
+                self.recording.facts,
+                self._scripts(),
+                self._sandbox,
+                course=self._rubric.packages,
             )
+            if self._beside is not None:
+                copy_course(self._beside, self._rubric.packages, folder / "course")
         named = self.recording.facts.manifest or self._submission.package
         return ProcessEnvironment(
             folder=folder,
@@ -243,6 +254,7 @@ class Recorder:
                     metadata=self._metadata() | {"scenario.digest": scenario.digest},
                     tell=tell,
                     rates=self._rates.get(name, ()),
+                    watched_s=self._watched.get(name, 0.0),
                     admission=self._admission,
                     last_run=self._runs[name] == RETRIES,
                     beside=self._beside,

@@ -22,6 +22,9 @@ FULL, OTHERS_MOST = 0.9, 0.75
 times as long)."""
 HEARD_AT_MOST_S = 8.0
 """So long after the last probe and the last value that was heard, whatever else is printed."""
+SPINNING_S, TALKING_S, LOOPING_S = 1.5, 2.5, 4.0
+"""So long after the last change, nothing more is registered by programs that only wait for callbacks, by those that
+publish already, and by others that loop."""
 
 
 @dataclass
@@ -36,12 +39,24 @@ class TopicSeen:
 
 
 @dataclass
+class Rest:
+    """A process whose programs have all come to rest (`grader/arena/ros/process_tree.py`); times as in `RunState`."""
+
+    since_s: float
+    lost_before_s: float
+    programs: int
+    spins: bool
+
+
+@dataclass
 class RunState:
     """The state that conditions look at. `running` and `ended` are the student's processes, `helpers` the grader's own
     programs that run beside them, `registered` the processes of which a node has registered, `here` the nodes that are
-    registered now, `owners` the processes of all nodes so far. `lost_s` is what others
-    took of the run's time while they filled the machine: so much longer a node is waited for."""
+    registered now, `published` their topics, `talking` when each first sent a message, `owners` the processes of all
+    nodes so far. `lost_s` is what others took of the run's time while they filled the machine: so much longer a node is
+    waited for. `least_s` is how long nodes are watched, even where nothing more is to come."""
 
+    least_s: float = 0.0
     started_s: float = 0.0
     topics: dict[str, TopicSeen] = field(default_factory=lambda: defaultdict(TopicSeen))
     running: set[str] = field(default_factory=set)
@@ -56,6 +71,9 @@ class RunState:
     last_start_s: float = 0.0
     first_node_s: float = 0.0
     services: set[str] = field(default_factory=set)
+    published: set[str] = field(default_factory=set)
+    talking: dict[str, float] = field(default_factory=dict)
+    at_rest: dict[str, Rest] = field(default_factory=dict)
     opened: set[str] = field(default_factory=set)
     activity_s: float = 0.0
     news_s: float = 0.0
@@ -129,6 +147,14 @@ class RunState:
             self.active(now_s)
         self.nodes |= own
 
+    def rests(self, process: str, rest: str | None, programs: int, now_s: float) -> None:
+        """A process has come to rest (`spins` or `loops`) with so many programs, or moves again (None)."""
+        known = self.at_rest.pop(process, None)
+        if rest is not None:
+            same = known is not None and known.programs == programs
+            since_s, lost_s = (known.since_s, known.lost_before_s) if known and same else (now_s, self.lost_s)
+            self.at_rest[process] = Rest(since_s, lost_s, programs, rest == "spins")
+
     @property
     def subscribed(self) -> AbstractSet[str]:
         """The topics of the grader's to which a node has subscribed."""
@@ -143,6 +169,7 @@ class RunState:
         (self.helpers if helper else self.running).add(process)
         self.ended.discard(process)
         self.registered.discard(process)
+        self.at_rest.pop(process, None)
         self.last_start_s = now_s
 
     def exited(self, process: str, now_s: float) -> None:
@@ -174,6 +201,33 @@ class RunState:
         self.unheard = unheard
 
 
+def is_settled(live: RunState, now_s: float) -> bool:
+    """Return whether no node, topic or service is to come any more.
+
+    Every process is there with as many nodes as it has programs, all of these have come to rest, and nothing in the
+    graph has changed for a while.
+    """
+    rests = [live.at_rest.get(process) for process in live.running]
+    if not rests or not live.helpers <= live.registered:
+        return False
+    owners = [live.owners.get(node) for node in live.here]
+    for process, rest in zip(live.running, rests, strict=True):
+        if rest is None or owners.count(process) < rest.programs:
+            return False
+    first_s = max([live.first_node_s, *(live.talking[node] for node in live.nodes & live.talking.keys())])
+    if now_s < first_s + live.least_s:
+        return False
+    found = [rest for rest in rests if rest is not None]
+    since_s = max(live.graph_changed_s, live.last_start_s, live.last_sent_s, *(r.since_s for r in found))
+    lost_s = live.lost_s - min(rest.lost_before_s for rest in found)
+    talking = {live.owners.get(node) for node in live.talking}
+    patience_s = max(
+        SPINNING_S if rest.spins else TALKING_S if process in talking else LOOPING_S
+        for process, rest in zip(live.running, found, strict=True)
+    )
+    return now_s > since_s + patience_s + lost_s
+
+
 def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     """(outcome, detail) once the run has seen enough or has to give up, else None.
 
@@ -181,15 +235,7 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
     """
     until = _patient(live, until)
     starting = _is_starting(live, until, now_s)
-    enough = (
-        not starting,
-        _window(live, until, now_s),
-        _messages(live, until),
-        _connected(live, until, now_s),
-        _heard(live, until, now_s),
-        _nodes(live, until, now_s),
-        _quiet(live, until, now_s),
-    )
+    enough = (not starting, *_enough(live, until, now_s))
     if live.ended and not live.running:
         return "complete" if until.ended and all(enough) else "ended", ""
     if waits(until):
@@ -197,12 +243,23 @@ def find_outcome(live: RunState, until: Until, now_s: float) -> Outcome | None:
             return "complete", ""
     elif now_s - live.started_s > until.limit_s:
         return "complete", f"watched for {until.limit_s:g} s"
-    silent = "" if starting else _silent(live, until, now_s)
+    silent = "" if starting else _silent(live, until, now_s) or _never(live, until, now_s)
     if silent:
         return "silent", silent
     if now_s - live.started_s > until.limit_s:
         return "timeout", f"not complete after {until.limit_s:g} s"
     return None
+
+
+def _enough(live: RunState, until: Until, now_s: float) -> tuple[bool, ...]:
+    return (
+        _window(live, until, now_s),
+        _messages(live, until),
+        _connected(live, until, now_s),
+        _heard(live, until, now_s),
+        _nodes(live, until, now_s),
+        _quiet(live, until, now_s),
+    )
 
 
 def _patient(live: RunState, until: Until) -> Until:
@@ -352,6 +409,26 @@ def _silent(live: RunState, until: Until, now_s: float) -> str:
     if until.connected and changed_s and now_s > changed_s + patience_s:
         return f"the graph has not changed for {patience_s:g} s"
     return _standstill(live, until, now_s)
+
+
+def _never(live: RunState, until: Until, now_s: float) -> str:
+    """Something that is waited for cannot come, since no node is there for it, and all the rest has been seen."""
+    if not is_settled(live, now_s):
+        return ""
+    absent = {t for t in (*until.topics, *until.messages) if not live.topics[t].count} - live.published
+    absent |= {topic for topic in until.connected if topic not in live.connected_s}
+    topics = tuple(topic for topic in until.topics if topic not in absent)
+    possible = {
+        "window_s": until.window_s if topics else None,
+        "topics": topics,
+        "messages": {topic: count for topic, count in until.messages.items() if topic not in absent},
+        "connected": tuple(topic for topic in until.connected if topic not in absent),
+        "nodes": min(until.nodes, len(live.nodes)),
+    }
+    if all(_enough(live, until.model_copy(update=possible), now_s)):
+        missing = min(absent, default="")
+        return f"the graph has settled, without {missing}" if missing else "the graph has settled"
+    return ""
 
 
 def _standstill(live: RunState, until: Until, now_s: float) -> str:

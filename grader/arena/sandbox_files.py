@@ -22,6 +22,7 @@ BASE_WORKSPACE = "/run/grader/base.tar"
 LARGE = "/run/grader/large"
 SHIMS = "/run/grader/bin"
 STANDINS = "/run/grader/standins"
+COURSE = "/run/grader/course"
 ROS_SIDE = Path(__file__).parent / "ros"
 TERMINALS = (
     "gnome-terminal", "konsole", "lxterminal", "mate-terminal", "rxvt", "terminator", "tilix", "urxvt",
@@ -150,6 +151,25 @@ def with_standins(env: Mapping[str, str], copied: Path, inside: str) -> dict[str
     python = [f"{inside}/{LIBRARY}", *(f"{inside}/{SHARE}/{name}/{LIBRARY}" for name in packages)]
     added = {"ROS_PACKAGE_PATH": [f"{inside}/{SHARE}"], "PYTHONPATH": python, "CMAKE_PREFIX_PATH": [inside]}
     return {**env, **{name: _append(env.get(name, ""), entries) for name, entries in added.items()}}
+
+
+def with_course(env: Mapping[str, str], course: Path, inside: str) -> dict[str, str]:
+    """Return the environment in which ROS finds the course's workspace, which was built in the folder `course`, before
+    ROS's own packages. `inside` is where processes see it."""
+    modules = sorted(path.relative_to(course) for path in course.glob("devel/lib/python3*/*-packages"))
+    added = {
+        "ROS_PACKAGE_PATH": [f"{inside}/src"],
+        "CMAKE_PREFIX_PATH": [f"{inside}/devel"],
+        "LD_LIBRARY_PATH": [f"{inside}/devel/lib"],
+        "PYTHONPATH": [f"{inside}/{path}" for path in modules],
+    }
+    return {**env, **{name: _prepend(env.get(name, ""), entries) for name, entries in added.items()}}
+
+
+def _prepend(path: str, entries: list[str]) -> str:
+    """Entries that are there already stay where they are: the student's workspace goes before the course's."""
+    before = [entry for entry in path.split(os.pathsep) if entry]
+    return os.pathsep.join([*(entry for entry in entries if entry not in before), *before])
 
 
 def _copy(source: Path, target: Path) -> None:

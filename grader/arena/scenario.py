@@ -21,6 +21,7 @@ from grader.errors import ArenaError
 from grader.evidence.events import ActorEvent, ScenarioEvent
 from grader.evidence.writer import EvidenceWriter
 from grader.model.message_rate import RateBounds
+from grader.rubric.course_packages import LAUNCH_ENDINGS
 from grader.rubric.model import Param, Scenario, Start
 
 CLOCK_STEP_S = 0.05
@@ -31,6 +32,7 @@ HEARD_SETTLE_S = 0.3
 GRAPH_EVERY_S, GRAPH_S = 0.25, 5.0
 STARTING_S = 1.5
 EXPECTED_HZ = 10.0
+WATCHED_MORE_S = 0.5
 
 HELD_S = 0.1
 UP_S, SETTLE_S = 5.0, 0.2
@@ -61,6 +63,7 @@ async def run_scenario(
     metadata: Mapping[str, str],
     tell: Tell,
     rates: tuple[RateBounds, ...] = (),
+    watched_s: float = 0.0,
     admission: Admission | None = None,
     last_run: bool = False,
     beside: Path | None = None,
@@ -68,7 +71,8 @@ async def run_scenario(
     """Record the scenario at `path`. An arena that fails still leaves evidence, with the outcome `host`.
 
     Processes are started when `admission` lets them: others wait until they are up. A window in which nothing but
-    `rates` is to be seen ends when they are clear. `beside` is the rubric's folder.
+    `rates` is to be seen ends when they are clear. For `watched_s`, nodes are watched even where nothing more can come.
+    `beside` is the rubric's folder.
     """
     admission = admission or Admission(None)
     warp = scenario.warp if scenario.clock == "warped" else 1.0
@@ -83,6 +87,7 @@ async def run_scenario(
             return RunCost(cpu_s=0, student_cpu_s=0)
         try:
             session.live.rate(rates)
+            session.live.least_s = max(watched_s + WATCHED_MORE_S, expected_s(scenario) - STARTING_S)
             async with admission.start() as leave, session as arena:
                 arena.course(ScenarioEvent(event="begin"))
                 at_once = {spec["name"] for start, spec in starts if start.name not in scenario.started_later}
@@ -193,7 +198,7 @@ def process_specs(start: Start, place: ProcessEnvironment, numbers: Iterator[int
             yield place.spec(start.name, ["rosparam", "load", f"{place.package_folder}/{file}"], script=file)
     elif start.program is not None:
         package, _, program = start.program.partition("/")
-        argv = ["rosrun", package, program, *start.args]
+        argv = ["roslaunch" if program.endswith(LAUNCH_ENDINGS) else "rosrun", package, program, *start.args]
         yield replace(place, env={}).spec(start.name, argv, role="grader", copy=False)
     elif start.built:
         for program in sorted(place.built.compiled)[:BUILT_PROGRAMS_MAX]:

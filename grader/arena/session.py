@@ -28,7 +28,7 @@ from grader.evidence.run import is_grader_node
 from grader.evidence.writer import EvidenceChannel, EvidenceWriter
 
 ARENA = Path(__file__).parent / "ros"
-CLOCK = "/clock"
+CLOCK, ROSOUT_TOPIC = "/clock", "/rosout"
 TIME = struct.Struct("<II")
 WATCHED_MAX = 20
 NS = 1_000_000_000
@@ -253,6 +253,8 @@ class ArenaSession:
             self._clock_ns = secs * NS + nsecs
         if frame.datas and not is_grader_node(channel.callerid):
             own = channel.callerid not in self.live.helper_nodes
+            if channel.topic != ROSOUT_TOPIC:
+                self.live.talking.setdefault(channel.callerid, time.monotonic())
             if channel.topic in self._watched:
                 self._watched[channel.topic].extend(frame.datas)
             self.live.message(channel.topic, len(frame.datas), time.monotonic(), active=own)
@@ -267,6 +269,7 @@ class ArenaSession:
             picture = {key: value for key, value in record.items() if key != "connections"}
             self.live.graph(nodes, record["processes"], time.monotonic(), picture=picture)
             self.live.services = set(record["services"])
+            self.live.published = {t for t, by in record["publishers"].items() if set(by) & set(nodes)}
         elif topic == "/grader/console":
             self._killed.printed(record["process"], record["line"])
             if record["process"] in self.live.running | self.live.ended:
@@ -302,6 +305,8 @@ class ArenaSession:
             self._ready = True
         elif status == "subscribed" and not is_grader_node(fields["subscriber"]):
             self.live.subscribers.setdefault(fields["topic"], set()).add(fields["subscriber"])
+        elif status == "rest":
+            self.live.rests(fields["name"], fields["rest"], fields["programs"], time.monotonic())
         elif status == "answer":
             self._answers[fields["id"]] = fields
         elif status == "graph":

@@ -18,10 +18,12 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from typing_extensions import Self
 
+from grader.arena.run_state import is_settled
 from grader.arena.scenario_inputs import make_shots
 from grader.arena.session import NS, ArenaSession
 from grader.errors import ArenaError, EvidenceError
 from grader.evidence.events import MISFIT, ActorEvent
+from grader.model.definition import other_fields
 from grader.rubric.model import Action, Call, Play, Publish, Scenario, Start, Step, Transform, Typed, Wait
 from grader.wording import plural
 
@@ -158,7 +160,8 @@ class StepRunner:
         try:
             found = MessageType(type_, find_text or self._message_text)
         except ValueError as error:
-            self._note("note", topic, f"the grader cannot publish {type_}: {error}")
+            begin = MISFIT if self._is_own(type_) else f"the grader cannot publish {type_}: "
+            self._note("note", topic, f"{begin}{error}")
             return
         if self._md5sums.setdefault(topic, found.md5sum) != found.md5sum:
             self._note(
@@ -197,7 +200,7 @@ class StepRunner:
         live, topics = self._live, {probe.topic for probe in self._scenario.probes}
         self._tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
         patience_s = self._scenario.until.first_message_s
-        await self._arena.wait(lambda: bool(live.subscribed & topics) or not live.running, patience_s)
+        await self._come(lambda: bool(live.subscribed & topics), patience_s)
         patience_s = SUBSCRIBE_S if live.subscribed & topics else 0.0
         await self._arena.wait(lambda: topics <= live.subscribed or not live.running, patience_s)
         self._tell("sending it messages")
@@ -205,7 +208,7 @@ class StepRunner:
             if not live.running:
                 return
             if shot.topic in live.subscribed and shot.topic in self._types:
-                self._send(shot.topic, shot.value, 0, 1)
+                self._try_send(Publish(topic=shot.topic, type=shot.type), shot.value, 0, 1)
                 await asyncio.sleep(shot.pause_s)
 
     async def _publish(self, publish: Publish) -> None:
@@ -223,7 +226,8 @@ class StepRunner:
         try:
             self._send(publish.topic, value, index, total)
         except ValueError as error:
-            self._note("note", publish.topic, f"the grader cannot publish {publish.type}: {error}")
+            begin = MISFIT if self._is_own(publish.type) else f"the grader cannot publish {publish.type}: "
+            self._note("note", publish.topic, f"{begin}{error}")
             return False
         return True
 
@@ -248,13 +252,22 @@ class StepRunner:
             self._tell(f"waiting for a subscriber on {topic}")
             settled = live.subscribed & self._types.keys() and live.running <= live.registered
             patience_s = SUBSCRIBE_S if settled else self._scenario.until.first_message_s
-            await self._arena.wait(lambda: topic in live.subscribed or not live.running, patience_s)
+            await self._come(lambda: topic in live.subscribed, patience_s)
         if topic in live.subscribed:
             self._deaf.discard(topic)
             return True
         self._deaf.add(topic)
         self._note("note", topic, "nothing was published: no node has subscribed")
         return False
+
+    async def _come(
+        self, has_come: Callable[[], bool], patience_s: float, is_over: Callable[[], bool] | None = None
+    ) -> None:
+        """Wait for what a node registers, for as long as one may still do so."""
+        live, is_over = self._live, is_over or (lambda: not self._live.running)
+        await self._arena.wait(
+            lambda: has_come() or is_over() or is_settled(live, time.monotonic()), patience_s
+        )
 
     async def _begin(
         self, work: Coroutine[Any, Any, None], *, background: bool, endless: bool = False
@@ -298,7 +311,7 @@ class StepRunner:
         topics = {channel.topic for channel in channels}
         self._tell(f"waiting for a subscriber on {', '.join(sorted(topics))}")
         patience_s = self._scenario.until.first_message_s
-        await self._arena.wait(lambda: bool(topics & self._live.subscribed) or self._is_over(), patience_s)
+        await self._come(lambda: bool(topics & self._live.subscribed), patience_s, self._is_over)
         if not topics & self._live.subscribed:
             self._note("note", play.bag, "nothing was played: no node has subscribed")
             return
@@ -372,7 +385,7 @@ class StepRunner:
         arena, live, service = self._arena, self._live, call.service
         self._tell(f"waiting for the service {service}")
         patience_s = self._scenario.until.first_message_s
-        await arena.wait(lambda: service in live.services or not live.running, patience_s)
+        await self._come(lambda: service in live.services, patience_s)
         if service in live.services:
             await arena.wait(lambda: not live.running, call.delay_s)
             self._tell(f"calling {service}")
@@ -380,11 +393,18 @@ class StepRunner:
 
     async def _ask(self, call: Call) -> None:
         from grader.evidence.decode import ServiceType  # noqa: PLC0415 - numpy, which not every run needs
-        from grader.evidence.message_values import MessageType, Moment  # noqa: PLC0415 - as above
+        from grader.evidence.message_values import (  # noqa: PLC0415 - as above
+            MessageType,
+            Moment,
+        )
 
         text, fits = None, True
         try:
             text = self._arena.place.type_text(call.type, "srv")
+            differs = other_fields(call.type, text, call.definition) if text and call.definition else ""
+            if differs:
+                self._refuse(call, text, differs, fits=False)
+                return
             type_ = ServiceType(call.type, text or "", self._message_text)
             request = MessageType(f"{call.type}Request", full=type_.request)
             moment, fits = Moment(0, 1, self._arena.ros_now_ns()), False
@@ -406,14 +426,17 @@ class StepRunner:
 
     def _refuse(self, call: Call, text: str | None, error: str, *, fits: bool) -> None:
         """Note a call that cannot be made: by the fault of the student's own definition, or of this machine."""
-        package, _, name = call.type.partition("/")
-        own = (self._arena.place.workspace.repaired / package).is_dir()
-        if not own or (fits and text is not None):
+        name = call.type.partition("/")[2]
+        if not self._is_own(call.type) or (fits and text is not None):
             self._answer(call, None, f"the grader could not call it: {error}")
             return
         about = {"topic": call.service, "type": call.type, "value": call.request}
         self._arena.note(ActorEvent(action="call", actor="grader", **about))
         self._answer(call, None, MISFIT + (error if text is not None else f"srv/{name}.srv is not there"))
+
+    def _is_own(self, type_: str) -> bool:
+        """Return whether a type belongs to a package of the submission."""
+        return (self._arena.place.workspace.repaired / type_.partition("/")[0]).is_dir()
 
     # --- Actions (wiki.ros.org/actionlib/DetailedDescription) ---------------------------------------------------------
 

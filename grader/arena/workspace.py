@@ -13,7 +13,7 @@ import re
 import shutil
 import stat
 import tarfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
@@ -67,9 +67,16 @@ class Workspace(Record):
 
 
 def make_workspace(
-    place: Path, submission: Submission, facts: PackageFacts, scripts: Iterable[str], sandbox: Sandbox
+    place: Path,
+    submission: Submission,
+    facts: PackageFacts,
+    scripts: Iterable[str],
+    sandbox: Sandbox,
+    *,
+    course: Collection[str] = (),
 ) -> Workspace:
-    """Copy the packages twice below `place`; `scripts` are the paths that get their repairs in the second copy."""
+    """Copy the packages twice below `place`; `scripts` are the paths that get their repairs in the second copy.
+    A copy of a package of the `course` is left out: the course's own counts."""
     workspace = Workspace(
         built=place / "ws",
         repaired=place / "run" / "src",
@@ -80,7 +87,7 @@ def make_workspace(
     )
     workspace.kept.mkdir()
     copier = _Copier(workspace.large, Path(LARGE) if sandbox.bubblewrap else workspace.large)
-    for package in needed_packages(submission):
+    for package in needed_packages(submission, course):
         for source_tree in (workspace.built / "src", workspace.repaired):
             copier.copy(package, source_tree / _folder_name(package))
     package_copy = workspace.repaired / workspace.folder
@@ -92,7 +99,7 @@ def make_workspace(
         _replace_manifest(package_copy / "package.xml", workspace.folder)
     if not sandbox.bubblewrap:
         for path in (workspace.built, place / "home"):
-            _give_to(path, sandbox.uid)
+            give_to(path, sandbox.uid)
     return workspace.model_copy(update={"repairs": repairs, "copied_bytes": copier.copied_bytes})
 
 
@@ -101,12 +108,12 @@ def run_in_place(workspace: Workspace, sandbox: Sandbox) -> None:
     sources = workspace.built / "src"
     shutil.rmtree(sources)
     shutil.copytree(workspace.repaired, sources, symlinks=True)
-    _give_to(sources, sandbox.uid)
+    give_to(sources, sandbox.uid)
 
 
-def needed_packages(submission: Submission) -> list[SourcePackage]:
-    """The lab's package and its dependencies within the submission, the lab's first."""
-    others = {p.name: p for p in submission.packages if p.name != submission.package.name}
+def needed_packages(submission: Submission, course: Collection[str] = ()) -> list[SourcePackage]:
+    """The lab's package and its dependencies within the submission, the lab's first; none of the `course`'s."""
+    others = {p.name: p for p in submission.packages if p.name not in {submission.package.name, *course}}
     needed = [submission.package]
     for package in needed:
         manifest, _ = read_manifest(package.folder)
@@ -214,8 +221,8 @@ def _give_browsers(path: Path, facts: SourceFile) -> None:
         path.write_bytes(named)
 
 
-def _give_to(path: Path, uid: int | None) -> None:
-    """The build writes as the student: hand the tree over before anything of the student's runs."""
+def give_to(path: Path, uid: int | None) -> None:
+    """Give the tree to a user who builds in it, before anything of the student's runs. None is the grader's own."""
     if uid is None:
         return
     os.chown(path, uid, uid)

@@ -34,6 +34,9 @@ FAMILIES = (
     "messages",
     "fields",
     "reacts",
+    "stamps",
+    "definition",
+    "transform",
     "rate",
     "counter",
     "listener",
@@ -48,6 +51,7 @@ FAMILIES = (
     "connections",
     "two_copies",
     "robot_path",
+    "robot_places",
 )
 for family in FAMILIES:
     import_module(f"grader.checks.{family}")

@@ -55,9 +55,10 @@ def run_hint(reason: str) -> str:
 
 
 class BuildParams(Record):
-    """`scripts` have to be there to run after the build, paths as the handout gives them."""
+    """What the build has to leave ready to run."""
 
     scripts: tuple[str, ...] = ()
+    """Scripts that have to be there after the build; paths as the handout gives them: `src/talker.py`."""
 
 
 @check("build", params=BuildParams, run_anyway=True)

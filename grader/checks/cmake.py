@@ -21,9 +21,10 @@ BIN = "${CATKIN_PACKAGE_BIN_DESTINATION}"
 
 
 class CMakeParams(Record):
-    """`name` is the handout's name for the package, right also where the manifest has another."""
+    """The package's name in CMake."""
 
     name: str
+    """The handout's name for the package; it is right also where the manifest has another."""
 
 
 @check("cmake", params=CMakeParams, run_anyway=True)
@@ -109,9 +110,10 @@ def _first(facts: CMakeFacts, name: str) -> CMakeCall | None:
 
 
 class CMakeInstallParams(Record):
-    """`scripts` are paths as the handout gives them; a script that lies elsewhere is named by where it lies."""
+    """The scripts that are installed."""
 
     scripts: Annotated[tuple[str, ...], Field(min_length=1)]
+    """Paths as the handout gives them: `src/talker.py`. A script that lies elsewhere is named by where it lies."""
 
 
 class Lack(NamedTuple):

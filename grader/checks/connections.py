@@ -18,11 +18,14 @@ ENDS: tuple[End, End] = ("publishers", "subscribers")
 
 
 class ConnectedParams(Record):
-    """`publisher` and `subscriber` are nodes' names; an empty one is any node of the package's."""
+    """Two nodes and the topic between them."""
 
     topic: GlobalName
+    """The topic, with its slash: `/chatter`."""
     publisher: str = ""
+    """The publishing node's name; empty: any node of the package."""
     subscriber: str = ""
+    """The subscribing node's name; empty: any node of the package."""
 
     def name(self, end: End) -> str:
         return self.publisher if end == "publishers" else self.subscriber

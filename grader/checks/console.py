@@ -34,17 +34,18 @@ ROUNDING = 1e-9
 
 
 class PrintsParams(Record):
-    """`process` is the scenario's name for it. `text` is part of a line, `{number}` in it stands for any number.
-
-    `numbers` are those that have to stand there, in this order, each within `tolerance` (in the text's own unit).
-    With `exit_code`, the process has to end by itself, with this code.
-    """
+    """A line of output, and how the program ends."""
 
     process: ProcessName
+    """The scenario's name for the process."""
     text: Annotated[str, Field(min_length=1)]
+    """Part of a line; `{number}` in it stands for any number."""
     numbers: tuple[float, ...] = ()
+    """The numbers that have to stand in place of `{number}`, in this order."""
     tolerance: Annotated[float, Field(ge=0)] = 0.0
+    """How much each number may differ, in the text's own unit."""
     exit_code: int | None = None
+    """The process has to end by itself with this code; null: it may run on."""
 
     @model_validator(mode="after")
     def _has_places(self) -> PrintsParams:
@@ -154,9 +155,10 @@ def _other_end(one: Life, params: PrintsParams) -> Verdict | None:
 
 
 class CallbacksCleanParams(Record):
-    """With `process`, the scenario's name for it, only that process counts; else each of the student's."""
+    """Whose callbacks are watched."""
 
     process: ProcessName = ""
+    """The scenario's name for the process; empty: each of the student's."""
 
 
 @check("callbacks-clean", params=CallbacksCleanParams)

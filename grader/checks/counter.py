@@ -33,17 +33,25 @@ LARGEST = 2.0**64
 
 
 class StartParams(Record):
+    """Where the counting begins."""
+
     topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""
     start: int = 0
+    """The first value that the counter has to publish."""
 
 
 class StepParams(Record):
-    """`maximum` is the last value before the wrap; `rate_hz` the nominal rate, to know a flood."""
+    """How the counter goes on."""
 
     topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""
     maximum: int = 127
+    """The last value before the wrap."""
     rate_hz: Annotated[float, Field(gt=0)] = 10.0
+    """The nominal rate, to know a flood of messages from a counter."""
     min_steps: Annotated[int, Field(ge=1)] = 10
+    """So many steps have to be seen before it can be judged."""
 
 
 @check("counter-start", params=StartParams, messages_only=True, heeds_losses=True)

@@ -35,9 +35,10 @@ UNPARSED = (*SYNTAX, "ValueError")
 
 
 class ExecutableParams(Record):
-    """`path` is where the handout puts the script; it is found by its name in other folders too."""
+    """The script."""
 
     path: str
+    """Where the handout puts the script; it is found by its name in other folders too."""
 
 
 class Obstacle(NamedTuple):

@@ -31,16 +31,18 @@ VALUES_SHOWN = 4
 
 
 class FieldBoundsParams(Record):
-    """`field` as `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item.
-
-    Give `min`, `max` or both. `share` of the messages has to lie within them.
-    """
+    """A field and its bounds: `min`, `max` or both."""
 
     topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""
     field: FieldPath
+    """As `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item."""
     min: float | None = None
+    """The least value, in the field's own unit; null: no bound."""
     max: float | None = None
+    """The greatest value, in the field's own unit; null: no bound."""
     share: Annotated[float, Field(gt=0, le=1)] = 1.0
+    """The share of the messages that has to lie within the bounds, above 0 and at most 1."""
 
     @model_validator(mode="after")
     def _some_bound(self) -> FieldBoundsParams:
@@ -132,17 +134,18 @@ def _range(readings: Sequence[Reading]) -> str:
 
 
 class FieldEqualsParams(Record):
-    """`field` as `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item; `value` as in YAML.
-
-    Numbers may differ by `tolerance`, in the field's own unit. `when` says of which messages it is asked: `every` one,
-    the `first`, the `last` of the run, or `any`.
-    """
+    """A field and its value."""
 
     topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""
     field: FieldPath
+    """As `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item."""
     value: Any
+    """The right value, as in YAML: a number, text, true or false, a list or a map."""
     tolerance: Annotated[float, Field(ge=0)] = 0.0
+    """How much numbers may differ, in the field's own unit."""
     when: Literal["every", "first", "last", "any"] = "every"
+    """Which messages have to have the value: `every` one, the `first`, the `last` of the run, or `any` of them."""
 
     @property
     def words(self) -> str:

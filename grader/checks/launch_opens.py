@@ -39,12 +39,16 @@ ASSIGNED = re.compile(
 
 
 class OpensParams(Record):
-    """`program` is asked to open one of `urls`; the node of `script` runs beside it."""
+    """A page that the launch file opens."""
 
     launch: LaunchName
+    """The launch file's name, in whatever folder of the package it lies."""
     program: str = "firefox"
+    """The program that is asked to open the page."""
     urls: tuple[str, ...]
+    """The addresses of which one has to be opened."""
     script: str
+    """The script whose node has to run beside it."""
 
 
 class Page(NamedTuple):

@@ -47,12 +47,16 @@ Wanted = Mapping[str, int | float | str]
 
 
 class LaunchLoadsParams(Record):
-    """`launch` is the launch file's name; `names` are on the server once `file` is loaded, and `script` reads them."""
+    """Parameters that a launch file loads."""
 
     launch: LaunchName
+    """The launch file's name, in whatever folder of the package it lies."""
     file: str
+    """The parameter file that it loads, as YAML."""
     script: str
+    """The script that reads the parameters."""
     names: tuple[str, ...]
+    """Names of parameters that have to be on the server once the file is loaded."""
 
 
 @check("launch-loads", params=LaunchLoadsParams)

@@ -39,11 +39,14 @@ from grader.wording import join_words, plural
 
 
 class LaunchConnectsParams(Record):
-    """`launch` is the file's name, in whatever folder. `nodes` are names that have to come up."""
+    """Nodes that the launch file brings up."""
 
     launch: LaunchName
+    """The launch file's name, in whatever folder of the package it lies."""
     topic: GlobalName
+    """The topic over which the nodes are connected, with its slash."""
     nodes: tuple[str, ...] = ()
+    """Names of nodes that have to come up."""
 
 
 @check("launch-connects", params=LaunchConnectsParams, heeds_losses=True)
@@ -172,18 +175,20 @@ def over_another_topic(run: Run, topic: str, said: str = "") -> Verdict:
 
 
 class LaunchRunsParams(Record):
-    """`launch` is the file's name, in whatever folder.
-
-    `scripts` are the student's; `nodes` maps names to the packages that they have to come from; `programs` are
-    `package/program` under any name; `params` have to be where the node of the first program reads them.
-    """
+    """What the launch file brings up."""
 
     launch: LaunchName
+    """The launch file's name, in whatever folder of the package it lies."""
     topic: GlobalName | None = None
+    """A topic over which the nodes are connected, with its slash; null: none is asked for."""
     scripts: tuple[str, ...] = ()
+    """The student's scripts that have to run."""
     nodes: Annotated[dict[str, str], Field(default_factory=dict)]
+    """Names of nodes that have to come up, each with the package that it comes from."""
     programs: tuple[ProgramName, ...] = ()
+    """Programs of other packages that have to run, under any name: `turtlesim/turtlesim_node`."""
     params: Annotated[dict[str, int | float | str], Field(default_factory=dict)]
+    """Parameters and their values; they have to be where the node of the first program reads them."""
 
 
 class Wanted(NamedTuple):

@@ -24,11 +24,14 @@ from grader.wording import join_words, plural
 
 
 class LaunchXmlParams(Record):
-    """`launch` is the file's name, in whatever folder; `programs` are nodes of other packages, `package/program`."""
+    """What the launch file has to name."""
 
     launch: LaunchName
+    """The launch file's name, in whatever folder of the package it lies."""
     scripts: tuple[str, ...] = ()
+    """The student's scripts that it has to start."""
     programs: tuple[ProgramName, ...] = ()
+    """Nodes of other packages that it has to start: `turtlesim/turtlesim_node`."""
 
 
 @check("launch-xml", params=LaunchXmlParams)

@@ -23,11 +23,14 @@ OTHERS = {
 
 
 class LayoutParams(Record):
-    """All relative to the package's folder: folders and files that it holds, scripts in their right folder."""
+    """Everything relative to the package's folder."""
 
     folders: tuple[str, ...] = ()
+    """Folders that the package holds."""
     files: tuple[str, ...] = ()
+    """Files that the package holds."""
     scripts: tuple[str, ...] = ()
+    """Scripts that have to lie in their right folder: `scripts/talker.py`."""
 
 
 class Slip(NamedTuple):

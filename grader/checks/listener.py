@@ -20,7 +20,7 @@ from grader.checks.support.exit_causes import explain_early_end, explain_error
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.processes import lives, not_started
 from grader.checks.support.text import OTHER_WORDS_SHARE, VALUE, in_words, near_names, shown
-from grader.checks.support.topics import cite, topics_with
+from grader.checks.support.topics import cite, misfit, topics_with
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
@@ -36,13 +36,13 @@ CALLBACK_HINT = (
 
 
 class HearsParams(Record):
-    """`template` is what a line has to say of a text, `{value}` being the message: `I heard {value}`.
-
-    Whether the template's own words are in capitals does not matter.
-    """
+    """A topic that the grader publishes on, and what the listener says of each message."""
 
     topic: Annotated[GlobalName, Refers("sent")]
+    """A topic on which a probe or a step of the scenario sends, with its slash."""
     template: str = VALUE
+    """What a line has to say of a message, `{value}` being its text: `I heard {value}`. Capitals in the template's own
+    words do not matter."""
 
 
 @check("hears", params=HearsParams)
@@ -138,7 +138,7 @@ def never_sent(package: PackageFacts, run: Run, topic: str) -> Verdict:
         return end.verdict(unjudged, message, measured="ended")
     subscribed = topics_with(run, "subscribers")
     measured = f"subscribed to {join_words(subscribed)}" if subscribed else "no subscription"
-    verdict = _types_differ(run, topic)
+    verdict = _types_differ(run, topic) or misfit(run, topic)
     if verdict is None and topic in subscribed:
         message = f"the node subscribed to {topic}, but the grader sent nothing"
         verdict = inconclusive(message, hint="grade again")
@@ -176,7 +176,8 @@ def _types_differ(run: Run, topic: str) -> Verdict | None:
     asked = next((e for _, e in run.actors if e.action == "note" and e.topic == topic and e.type), None)
     if asked is None:
         return None
-    message = f"{asked.actor} subscribes to {topic} with {asked.type}, so that nothing arrives"
+    other = f"another definition of {asked.type}" if asked.type == asked.value else asked.type
+    message = f"{asked.actor} subscribes to {topic} with {other}, so that nothing arrives"
     wanted = f"{asked.value}, the type" if isinstance(asked.value, str) else "the type"
     return failed(message, hint=f"give rospy.Subscriber('{topic}', …) {wanted} that the handout asks for")
 

@@ -26,11 +26,14 @@ ALIKE = 0.7
 
 
 class LogsParams(Record):
-    """`text` is part of a log message, letter by letter. With `process`, only that process's nodes count."""
+    """A log message."""
 
     text: Annotated[str, Field(min_length=1)]
+    """Part of the log message, letter by letter."""
     level: Level = "info"
+    """The level at which it is logged."""
     process: ProcessName = ""
+    """Only this process's nodes count; empty: each of the student's."""
 
 
 @check("logs", params=LogsParams, messages_only=True)

@@ -16,16 +16,19 @@ LEFT_AS_MADE = "@todo.todo"
 
 
 class ManifestParams(Record):
-    """`name` is the name that the handout gives the package, `dependencies` what it has to declare for run time."""
+    """What package.xml has to say."""
 
     name: str
+    """The name that the handout gives the package."""
     dependencies: tuple[str, ...] = ()
+    """Packages that it has to declare for run time."""
 
 
 class DependenciesParams(Record):
-    """`names` are the packages that the nodes need at run time."""
+    """Packages that the nodes need."""
 
     names: tuple[str, ...]
+    """The packages that the nodes need at run time."""
 
 
 @check("manifest", params=ManifestParams, run_anyway=True)

@@ -36,10 +36,12 @@ UNFILLED = ("%s", "%d", "%f", "{}", "{0}")
 
 
 class MessageParams(Record):
-    """`template` is the whole text, `{seconds}` in it a time that grows: `hello world {seconds}`."""
+    """The text of each message."""
 
     topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""
     template: Annotated[str, Field(min_length=1)]
+    """The whole text, `{seconds}` in it being a time that grows: `hello world {seconds}`."""
 
 
 @check("message", params=MessageParams, messages_only=True, heeds_losses=True)

@@ -35,26 +35,27 @@ LOOP = "loop with `while not rospy.is_shutdown():` and catch rospy.ROSInterruptE
 
 
 class NodeLivesParams(Record):
-    """`process` is the scenario's name for it; `min_s` how long it has to live after its first message.
-
-    With `names`, one of them has to be the node's name, as `node-name` judges it.
-    """
+    """The process, and how long it has to live."""
 
     process: ProcessName
+    """The scenario's name for the process."""
     min_s: Annotated[float, Refers("watched_s")] = 5.0
+    """So long it has to live after its first message."""
     names: tuple[str, ...] = ()
+    """Names of which one has to be the node's, as `node-name` judges it; empty: any name will do."""
     anonymous: Anonymous = "allowed"
+    """Whether the node may, must or must not be anonymous."""
 
 
 class NodeNameParams(Record):
-    """`names` without the slash; anonymous ones end in `_<digits>_<digits>`, as rospy makes them.
-
-    With `process`, only that process's nodes count.
-    """
+    """The names that the node may have."""
 
     names: Annotated[tuple[str, ...], Field(min_length=1)]
+    """Names without the slash; an anonymous node ends in `_<digits>_<digits>`, as rospy makes it."""
     anonymous: Anonymous = "allowed"
+    """Whether the node may, must or must not be anonymous."""
     process: ProcessName = ""
+    """Only this process's nodes count; empty: each of the student's."""
 
 
 @check("node-lives", params=NodeLivesParams)

@@ -49,11 +49,14 @@ MISSING = object()
 
 
 class ParamsLoadedParams(Record):
-    """`process` runs `rosparam load` on `file`; `names` have to be on the server afterwards, maps taken apart."""
+    """A parameter file and what it has to hold."""
 
     process: ProcessName
+    """The process that runs `rosparam load` on the file."""
     file: str
+    """The parameter file, as YAML."""
     names: tuple[str, ...]
+    """Names that have to be on the server afterwards, maps taken apart: `/robot/speed`."""
 
 
 @check("params-loaded", params=ParamsLoadedParams)
@@ -212,10 +215,12 @@ def _is_empty(found: dict[str, object], name: str) -> bool:
 
 
 class ParamsReadParams(Record):
-    """`names` are parameters that the scenario made up; `file` is where the student keeps their usual values."""
+    """Parameters that the node has to read."""
 
     names: tuple[Annotated[GlobalName, Refers("set")], ...]
+    """Parameters that the scenario sets to made-up values, with their slash."""
     file: str = ""
+    """Where the student keeps their usual values, as YAML; empty: nowhere."""
 
 
 @check("params-read", params=ParamsReadParams)
@@ -316,12 +321,16 @@ def _are(names: Sequence[str]) -> str:
 
 
 class ParamsSetParams(Record):
-    """`name` has `value` afterwards, as a number or as text; `unchanged` keep theirs; `logged`: it is printed."""
+    """A parameter that the node sets."""
 
     name: GlobalName
+    """The parameter, with its slash."""
     value: int | float | str
+    """What it has to be afterwards, as a number or as text."""
     unchanged: tuple[GlobalName, ...] = ()
+    """Parameters that have to keep their values, with their slash."""
     logged: bool = True
+    """Whether the new value has to be printed too."""
 
 
 @check("params-set", params=ParamsSetParams)
@@ -433,10 +442,12 @@ def _not_logged(run: Run, params: ParamsSetParams) -> Verdict | None:
 
 
 class ParamValueParams(Record):
-    """`name` with its slash; `value` as in YAML: a number, text, true or false, a list or a map."""
+    """A parameter and its value."""
 
     name: GlobalName
+    """The parameter, with its slash."""
     value: Any
+    """Its value, as in YAML: a number, text, true or false, a list or a map."""
 
 
 @check("param-value", params=ParamValueParams)

@@ -37,19 +37,24 @@ Positive = Annotated[float, Field(gt=0)]
 
 
 class RateParams(Record):
-    """`tolerance` is the share by which the mean may differ; `tolerance_low` and `_high` are for one side.
-
-    `share_in_bounds` of the gaps have to lie within `gap_tolerance` of the nominal period.
-    """
+    """The nominal rate, and how far from it messages may come."""
 
     topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""
     rate_hz: Positive
+    """The nominal rate."""
     tolerance: Share = 0.05
+    """The share by which the mean may differ: 0.05 is 5 %."""
     tolerance_low: Share | None = None
+    """The same for a mean that is too low; null: `tolerance`."""
     tolerance_high: Positive | None = None
+    """The same for a mean that is too high; null: `tolerance`."""
     gap_tolerance: Share = 0.5
+    """The share of the nominal period by which a single gap may differ."""
     share_in_bounds: Share = 0.95
+    """The share of the gaps that has to lie within `gap_tolerance`."""
     min_window_s: Annotated[Positive, Refers("watched_s")] = 5.0
+    """So long messages have to be seen before the rate is judged."""
 
     @property
     def low_hz(self) -> float:

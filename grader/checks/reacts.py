@@ -10,35 +10,38 @@ from pydantic import Field, model_validator
 from grader.checks.registry import check
 from grader.checks.support.clocks import run_seconds
 from grader.checks.support.fields import FieldPath, Reading, bounds_text, is_within, no_field, readings
-from grader.checks.support.lateness import Lateness, excused
+from grader.checks.support.lateness import excused, why_late
 from grader.checks.support.nodes import GlobalName
 from grader.checks.support.processes import observed_until_ns
-from grader.checks.support.topics import cite, no_message
+from grader.checks.support.topics import cite, misfit, no_message
 from grader.checks.support.values import differences, value_text
 from grader.evidence.run import Channel, Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import Verdict, failed, inconclusive, passed
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
 from grader.wording import plural, significant
 
-LATE_MS = 100.0
 ORDER_S = 0.1
 """Two topics come over two connections: so much earlier a message may be recorded than what it answers."""
 
 
 class Condition(Record):
-    """A message on `topic`; with `field`, one whose field is `min` to `max`, or `value` within `tolerance`.
-
-    Of a list (`ranges[*]`) `all` items have to be so, or `any` of them.
-    """
+    """A message that counts: any on the topic, or one whose `field` is `min` to `max`, or `value`."""
 
     topic: GlobalName
+    """The topic, with its slash: `/chatter`."""
     field: FieldPath | None = None
+    """As `rostopic echo` shows it: `linear.x`, `ranges[0]`, or `ranges[*]` for every item. Null: any message counts."""
     min: float | None = None
+    """The least value, in the field's own unit; null: no bound."""
     max: float | None = None
+    """The greatest value, in the field's own unit; null: no bound."""
     value: float | str | bool | None = None
+    """The value itself, in place of `min` and `max`."""
     tolerance: Annotated[float, Field(ge=0)] = 0.0
+    """How much a number may differ from `value`, in the field's own unit."""
     items: Literal["all", "any"] = "all"
+    """Of a list (`ranges[*]`), whether `all` items or `any` of them have to be so."""
 
     @model_validator(mode="after")
     def _is_whole(self) -> Condition:
@@ -80,16 +83,17 @@ class Condition(Record):
 
 
 class ReactsParams(Record):
-    """Each time that `cause` begins to hold, a message for which `effect` holds has to come `within_s` (seconds).
-
-    With `not_before`, none may come before the first cause, from `within_s` after a message for which it does not hold.
-    Publish about three times `within_s` of such messages first, so that there is something to see.
-    """
+    """Cause and effect."""
 
     cause: Condition
+    """Each time that this begins to be true, an effect has to come."""
     effect: Condition
+    """What has to come."""
     within_s: Annotated[float, Field(gt=0)]
+    """So soon after the cause the effect has to come."""
     not_before: bool = True
+    """Whether an effect before the first cause is wrong: one from `within_s` after a message for which the cause is
+    not true. Publish such messages for about three times `within_s` first, so that there is something to see."""
 
 
 class Answer(NamedTuple):
@@ -125,6 +129,7 @@ def reacts(package: PackageFacts, run: Run, params: ReactsParams) -> Verdict:
     verdict = (
         _nothing_to_judge(package, run, effects, own, params)
         or _early(causes, effects, run, params)
+        or _never_caused(causes, run, params)
         or _unanswered(answers, run, params)
         or passed(f"{plural(len(answers), 'time')}, {params.effect.words} follows {params.cause.words}")
     )
@@ -197,11 +202,26 @@ def _early(
     if to_s(between[-1].time_ns) >= from_s + params.within_s:
         return verdict
     # what ends so soon may be an older answer of a machine that was late itself
-    return excused(verdict.once(), run, causes[0].time_ns, first, _why_late)
+    return excused(verdict.once(), run, causes[0].time_ns, first, why_late)
+
+
+def _never_caused(causes: Sequence[Reading], run: Run, params: ReactsParams) -> Verdict | None:
+    """What a simulator publishes comes of what the node does: a robot has to come to a wall to stop there."""
+    simulated = any(c.topic == params.cause.topic and c.callerid in run.grader_nodes for c in run.channels)
+    if not causes or not simulated or any(map(params.cause.holds, causes)):
+        return None
+    verdict = unjudged(
+        f"{params.cause.words} never came in this run",
+        measured=f"0 of {plural(len(causes), 'message')}",
+        hint=f"rostopic echo {params.cause.topic} shows what comes while your node runs",
+    )
+    return excused(verdict, run, run.start_ns, run.end_ns, why_late)
 
 
 def _unanswered(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Verdict | None:
     hint = f"publish on {params.effect.topic} in the callback of {params.cause.topic}"
+    if not answers and (unsent := misfit(run, params.cause.topic)):
+        return unsent
     if not answers:
         message = f"{params.cause.words} did not come, or so late that no answer could be waited for"
         return inconclusive(message, hint="grade again")
@@ -215,10 +235,4 @@ def _unanswered(answers: Sequence[Answer], run: Run, params: ReactsParams) -> Ve
         return verdict.once() if len(answers) == 1 else verdict
     how = "does not follow" if late is None else f"comes up to {late:.2f} s after"
     verdict = failed(f"{len(slow)} of {times} {reaction.format(how)}", hint=hint).once()
-    return excused(verdict, run, slow[0].at_ns, run.end_ns, _why_late)
-
-
-def _why_late(late: Lateness) -> str:
-    if not (late.full or late.max_ms >= LATE_MS):
-        return ""
-    return "busy" if late.full else f"late itself, by up to {late.max_ms:.0f} ms"
+    return excused(verdict, run, slow[0].at_ns, run.end_ns, why_late)

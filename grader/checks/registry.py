@@ -33,12 +33,14 @@ class Refers:
     """What a parameter stands for, in the rubric or on the machine: the rubric is refused where it is not there.
 
     `process`: a start of the student's in the scenario. `launch`: a launch file that the scenario starts. `program`:
-    `package/program` of another package. `message`, `service`: a type. `sent`: a topic on which the scenario's probes
-    send. `published`: a topic on which the student publishes. `set`: a parameter that the scenario sets. `watched_s`:
-    so long the scenario has to last.
+    `package/program` of another package. `message`, `service`: a type. `field`: a field's type. `sent`: a topic on
+    which the scenario's probes send. `published`: a topic on which the student publishes. `set`: a parameter that the
+    scenario sets. `watched_s`: so long the scenario has to last.
     """
 
-    to: Literal["process", "launch", "program", "message", "service", "sent", "published", "set", "watched_s"]
+    to: Literal[
+        "process", "launch", "program", "message", "service", "field", "sent", "published", "set", "watched_s"
+    ]
 
 
 class Reference(NamedTuple):
@@ -98,6 +100,9 @@ class Check:
             if get_origin(info.annotation) is tuple and isinstance(value, list | tuple):
                 kinds = _refers(get_args(info.annotation)[0])
                 yield from (Reference((name, n), k.to, item) for n, item in enumerate(value) for k in kinds)
+            if get_origin(info.annotation) is dict and isinstance(value, dict):
+                kinds = _refers(get_args(info.annotation)[1])
+                yield from (Reference((name, key), k.to, item) for key, item in value.items() for k in kinds)
 
 
 def _refers(annotation: object) -> list[Refers]:

@@ -12,14 +12,18 @@ from pydantic import Field, model_validator
 from grader.checks.registry import check
 from grader.checks.support.clocks import run_seconds
 from grader.checks.support.geometry import (
+    MOVED_M,
     Course,
     Point,
     Pose,
+    Spot,
     Track,
     followed,
     length_m,
     off_m,
     relative,
+    set_off_s,
+    stands,
     track,
 )
 from grader.checks.support.lateness import Lateness, excused
@@ -37,22 +41,21 @@ LATE_TURNS = 4
 """Each turn may be late: at 1.6 rad/s, 25 ms in each of four are 0.16 rad, and 0.3 m beside a line of 2 m."""
 ORIGIN = (0.0, 0.0)
 
-Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
-MOVED_M = 0.01
-
 
 class PathParams(Record):
-    """`points` in metres, `[x, y]`, in the order in which they have to be passed.
-
-    With `relative` they are seen from the start, x being forward there and y to the left; the start itself is put
-    before them. A velocity holds until the next one, but no longer than `hold_s` (null: for ever).
-    """
+    """The way, and how the robot's velocities are read."""
 
     topic: GlobalName
-    points: Annotated[tuple[tuple[Coordinate, Coordinate], ...], Field(min_length=1)]
+    """The topic of velocities (`geometry_msgs/Twist`) or poses, with its slash."""
+    points: Annotated[tuple[Spot, ...], Field(min_length=1)]
+    """In metres, `[x, y]`, in the order in which they have to be passed."""
     tolerance_m: Annotated[float, Field(gt=0)]
+    """So far from the way and its points the robot may be."""
     relative: bool = True
+    """Whether the points are seen from the start, x being forward there and y to the left; the start itself is put
+    before them."""
     hold_s: Annotated[float, Field(gt=0)] | None = 1.0
+    """A velocity holds until the next one, but no longer than this; null: for ever."""
 
     @model_validator(mode="after")
     def _is_a_way(self) -> PathParams:
@@ -176,11 +179,6 @@ def metres(distance_m: float) -> str:
     return f"{distance_m:.2f} m"
 
 
-def stands(path: Sequence[Pose]) -> bool:
-    """Return whether it never left its place."""
-    return all(math.dist(p.point, path[0].point) <= MOVED_M for p in path)
-
-
 def what_is_wrong(path: Sequence[Pose], way: Way, course: Course, *, mirror: bool) -> Words:
     """The likeliest cause; `mirror` where the way is seen from the path's own start."""
     if max(math.dist(p.point, path[0].point) for p in path) <= MOVED_M:
@@ -300,8 +298,7 @@ def _along(point: Point, start: Point, end: Point) -> tuple[float, float]:
 
 
 def _after(path: Sequence[Pose], pose: Pose) -> str:
-    moving = next((p for p in path if math.dist(p.point, path[0].point) > MOVED_M), path[0])
-    return f"{max(0.0, pose.time_s - moving.time_s):.1f} s after it set off"
+    return f"{max(0.0, pose.time_s - set_off_s(path)):.1f} s after it set off"
 
 
 def measured(path: Sequence[Pose], course: Course, way: Way) -> str:

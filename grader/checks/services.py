@@ -26,21 +26,23 @@ LOGGERS = ("/get_loggers", "/set_logger_level")
 
 
 class ServiceParams(Record):
-    """`service` with its slash, `type` as `rosservice type` gives it (`std_srvs/Trigger`)."""
+    """The service."""
 
     service: GlobalName
+    """The service, with its slash: `/add`."""
     type: Annotated[TypeName, Refers("service")]
+    """As `rosservice type` gives it: `std_srvs/Trigger`."""
 
 
 class ServiceAnswersParams(Record):
-    """`expect` has an entry for each call of the scenario, in order: the fields that matter, and their values.
-
-    Numbers may differ by `tolerance`.
-    """
+    """The service, and what it has to answer."""
 
     service: GlobalName
+    """The service, with its slash: `/add`."""
     expect: Annotated[tuple[dict[str, Any], ...], Field(min_length=1)]
+    """An entry for each call of the scenario, in order: the fields that matter, and their values."""
     tolerance: Annotated[float, Field(ge=0)] = 1e-6
+    """How much numbers may differ."""
 
 
 @check("service", params=ServiceParams)

@@ -9,6 +9,7 @@ from grader.checks.support.nodes import GlobalName, PublishedTopic, TypeName, pl
 from grader.checks.support.text import near_names
 from grader.checks.support.topics import cite, no_message, no_node, nodes_on, published_topics
 from grader.evidence.run import Channel, Run
+from grader.model.definition import other_fields
 from grader.model.package import PackageFacts
 from grader.model.record import Record
 from grader.model.verdict import Citation, Verdict, failed, inconclusive, passed
@@ -16,10 +17,15 @@ from grader.wording import join_words, plural
 
 
 class TopicTypeParams(Record):
-    """`topic` with its slash, `type` as `rostopic info` gives it (`std_msgs/Int8`)."""
+    """The topic and its type."""
 
     topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""
     type: Annotated[TypeName, Refers("message")]
+    """As `rostopic info` gives it: `std_msgs/Int8`."""
+    definition: str | None = None
+    """The handout's text of a `.msg` that students write themselves: fields, their types and their order have to be the
+    same; null: the type's name alone is asked for."""
 
 
 @check("topic-type", params=TopicTypeParams, messages_only=True, heeds_losses=True)
@@ -35,8 +41,9 @@ def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verd
         one type off, and nothing arrives, without any error on the publisher's side.
 
     How it is measured
-        By the type that the publisher itself gives when the recorder connects to it, and by the messages
-        that then come. A topic that is advertised but stays silent fails with a message of its own.
+        By the type that the publisher itself gives when the recorder connects to it (and by the definition that
+        it sends, where the rubric has the type's text), and by the messages that then come. A topic that is
+        advertised but stays silent fails with a message of its own.
 
     How to fix
         `rospy.Publisher('<topic>', <Type>, queue_size=10)` with the topic and type of the handout, and
@@ -49,6 +56,8 @@ def topic_type(package: PackageFacts, run: Run, params: TopicTypeParams) -> Verd
         verdict = _wrong_type(wrong[0], params)
     elif not heard:
         verdict = no_message(package, run, params.topic, of_node=failed)
+    elif other := next(filter(None, (_other_definition(c, params) for c in heard)), None):
+        verdict = other
     else:
         count = plural(sum(len(c.messages) for c in heard), "message")
         publishers = join_words(dict.fromkeys(c.publisher for c in heard))
@@ -81,10 +90,22 @@ def _cited(run: Run, channels: tuple[Channel, ...]) -> tuple[Citation, ...]:
     return () if run.foreign else (cite(run, "/grader/graph"),)
 
 
+def _other_definition(channel: Channel, params: TopicTypeParams) -> Verdict | None:
+    """Return the verdict where the publisher's type has the right name and other fields."""
+    wanted = params.definition
+    differs = other_fields(params.type, channel.definition, wanted) if wanted is not None else ""
+    if not differs:
+        return None
+    name = params.type.partition("/")[2]
+    message = f"{channel.publisher} publishes another {params.type} on {params.topic}: {differs}"
+    return failed(message, hint=f"give msg/{name}.msg the handout's fields, in their order, and build again")
+
+
 class OnlyTopicsParams(Record):
-    """`topics` that may be published: full names, or the beginning of names with `*` after it (`/square/*`)."""
+    """The topics of the lab."""
 
     topics: tuple[GlobalName, ...]
+    """Those that may be published: full names, or the beginning of names with `*` after it: `/square/*`."""
 
     def allows(self, topic: str) -> bool:
         return any(
@@ -142,9 +163,10 @@ def _publisher(run: Run, topic: str) -> str:
 
 
 class LatchedParams(Record):
-    """`topic` with its slash."""
+    """The topic."""
 
     topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""
 
 
 @check("latched", params=LatchedParams, messages_only=True, heeds_losses=True)

@@ -31,18 +31,20 @@ FEW = 2
 
 
 class CopiesParams(Record):
-    """`first` and `second` are processes of one script, `listener` the process that has to print both's messages.
-
-    `template` is what it has to say of each, `taken_over_score` what is earned where the second copy takes the
-    name over and the first is shut down.
-    """
+    """Two processes of one script, and the one that hears both."""
 
     first: ProcessName
+    """The process that is started first."""
     second: ProcessName
+    """The process of the same script that is started after it."""
     listener: ProcessName
+    """The process that has to print the messages of both."""
     topic: GlobalName
+    """The topic, with its slash: `/chatter`."""
     template: str = VALUE
+    """What the listener has to say of each message, `{value}` being its text."""
     taken_over_score: Annotated[float, Field(ge=0, le=1)] = 0.3333
+    """The share that is earned where the second copy takes the name over and the first is shut down."""
 
 
 class Trio(NamedTuple):

@@ -1,6 +1,6 @@
 """What `grader check` does with the packages that were chosen: grade them, or watch one, without hidden criteria.
 
-The command line comes in, a report on stdout and an exit code go out. Below the report stands how the package differs
+The command line comes in, a report on stdout and an exit code go out. Before the losses stands how the package differs
 from what is pushed; git is asked about that in a thread beside the grading, and never holds it up.
 """
 
@@ -14,24 +14,25 @@ from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from rich.console import Console, RenderableType
+from rich.console import RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
 from grader import pipeline
 from grader.cli.display import open_progress
 from grader.cli.host_support import how_to_run_nodes, warn_without_sandbox, why_nothing_runs
-from grader.cli.outcome import exit_code, settled, show, staged_code, worst
+from grader.cli.outcome import REPORT, exit_code, settled, show, staged_code, worst
 from grader.cli.output import say, say_beside
 from grader.cli.select_rubric import Chosen, only
-from grader.errors import ExitCode, UsageError
-from grader.files import check_writable, temporary_folder
+from grader.errors import ExitCode, OutputError, UsageError
+from grader.files import atomic_write, check_writable, temporary_folder
 from grader.intake import safe_name
 from grader.model.progress import Progress, Silence
 from grader.model.result import GitStatus, GradingResult, Point
-from grader.report.terminal import emit, open_console
+from grader.report.terminal import open_console
 from grader.report.text import line
-from grader.report.view import hidden_ids, without_hidden
+from grader.report.view import arrange, hidden_ids, without_hidden
+from grader.rubric.find import rubric_ids
 from grader.rubric.load import LoadedRubric, needs_ros
 from grader.student.git_status import advise, read_environment
 from grader.student.git_view import write_staged
@@ -39,6 +40,7 @@ from grader.student.git_view import write_staged
 TITLE = "Your marks come from what you have pushed. It differs from what was checked:"
 REMARKS = "Before you submit"
 LINE_CHARS = 300
+KEPT = ".grader"
 GIT_TIMEOUT_S = 10.0
 
 
@@ -52,6 +54,7 @@ class Check:
     as_json: bool
     staged: bool
     several: bool
+    full: bool = False
     told: set[str] = field(default_factory=set)
 
 
@@ -64,6 +67,7 @@ def check_packages(
     out: Path | None,
     as_json: bool,
     staged: bool,
+    full: bool = False,
 ) -> ExitCode:
     """Check the packages chosen for `path` one after the other, or watch the only one. Return the worst exit code."""
     if watch or as_json:
@@ -80,7 +84,9 @@ def check_packages(
         say_choice(chosen[0])
         source = str(Path(chosen[0].source).resolve())
         return watch_package(source, chosen[0].rubric, options, out=out, as_json=as_json)
-    check = Check(options=options, out=out, as_json=as_json, staged=staged, several=len(chosen) > 1)
+    check = Check(
+        options=options, out=out, as_json=as_json, staged=staged, several=len(chosen) > 1, full=full
+    )
     return worst(check_package(one, check) for one in chosen)
 
 
@@ -105,6 +111,8 @@ def check_package(chosen: Chosen, check: Check) -> ExitCode:
             source = str(write_staged(package, own / "index", index=os.environ.get("GIT_INDEX_FILE", "")))
             options = replace(options, submission_id=safe_name(package.resolve().name))
         unrun = "--static" if static else why_nothing_runs() if needs_ros(chosen.rubric) else ""
+        report = None if check.as_json or check.staged or static or check.out else report_place(chosen)
+        options = replace(options, files=options.files or report is not None)
         inquiry = GitInquiry(chosen.package, own / "git") if chosen.package is not None else None
         folder = check.out or own
         early = not (check.as_json or unrun)
@@ -115,11 +123,29 @@ def check_package(chosen: Chosen, check: Check) -> ExitCode:
         found = inquiry.result() if inquiry is not None else GitStatus()
         if check.as_json:
             shown = shown.model_copy(update={"standing": found})
-        hidden = len(hidden_ids(rubric))
-        code = show(shown, rubric, kept, hidden=hidden, as_json=check.as_json, static=static, unrun=unrun)
+        written = folder / result.submission.id / REPORT if report is not None else None
+        if written is not None and report is not None and written.is_file():
+            keep_report(written, report)
+        code = show(
+            shown,
+            rubric,
+            kept,
+            hidden=len(hidden_ids(rubric)),
+            as_json=check.as_json,
+            static=static,
+            unrun=unrun,
+            remarks=() if check.as_json else list(_remarks(found, check)),
+            full=check.full,
+        )
         for words in () if static or not unrun else how_to_run_nodes():
             (say_beside if check.as_json else say)(words)
-        _print_git_status(found, check)
+        for point in found.points if check.as_json else ():
+            say_beside(point.text)
+        if not (check.as_json or check.staged):
+            for words in _what_next(
+                shown, chosen, report if report is not None and report.is_file() else None
+            ):
+                say(words)
         graded = shown.status != "error"
         return staged_code(shown.criteria, rubric) if check.staged and graded else code
 
@@ -179,21 +205,47 @@ class GitInquiry:
         self._found = advise(self._package, self._base, self._environment)
 
 
-def _print_git_status(found: GitStatus, check: Check) -> None:
-    """Print what git said below the report; to stderr if stdout is for a program."""
-    if check.as_json:
-        for point in found.points:
-            say_beside(point.text)
+def report_place(chosen: Chosen) -> Path | None:
+    """Return where the last report of a package is kept: `.grader/<its folder>/report.html` beside it."""
+    beside = chosen.package or Path(chosen.source)
+    if not beside.exists():
+        return None  # a URL
+    beside = beside.resolve()
+    return beside.parent / KEPT / safe_name(beside.name) / REPORT
+
+
+def keep_report(written: Path, place: Path) -> None:
+    """Copy the report to its place, which git ignores; say so where it cannot be written."""
+    folder = place.parent.parent
+    if folder.is_symlink() or place.parent.is_symlink() or place.is_symlink():
+        say_beside(f"{place} is a link: no report is kept there")
         return
+    try:
+        atomic_write(folder / ".gitignore", b"*\n")
+        atomic_write(place, written.read_bytes())
+    except OutputError as error:
+        say_beside(error.message)
+
+
+def _what_next(result: GradingResult, chosen: Chosen, report: Path | None) -> Iterator[str]:
+    """Yield where the report is, and what explains the loss that costs most."""
+    lab = chosen.rubric
+    lost = arrange(result, lab.rubric).lost
+    if report is not None:
+        yield f"Report: {os.path.relpath(report) if report.is_relative_to(Path.cwd().parent) else report}"
+    if lost:
+        name = lost[0].criterion.id
+        known = lab.rubric.id in rubric_ids()
+        yield f"Why: grader explain {f'{lab.rubric.id}/{name}' if known else f'{name} --rubric {lab.path}'}"
+        yield "On each save: grader check --watch"
+
+
+def _remarks(found: GitStatus, check: Check) -> Iterator[RenderableType]:
+    """Yield what git said and has not been said yet, for another package."""
     points = tuple(point for point in found.points if point.text not in check.told)
     summary = found.summary if found.summary not in check.told else ""
     check.told.update({found.summary, *(point.text for point in points)})
-    print_git_points(GitStatus(points=points, summary=summary), open_console(sys.stdout))
-
-
-def print_git_points(found: GitStatus, console: Console) -> None:
-    """Print how the package differs from what is pushed."""
-    emit(console, _parts(found, console.encoding))
+    yield from _parts(GitStatus(points=points, summary=summary), open_console(sys.stdout).encoding)
 
 
 def _parts(found: GitStatus, encoding: str) -> Iterator[RenderableType]:

@@ -33,7 +33,7 @@ from grader.integrations.ci_results import (
 from grader.integrations.ci_settings import Settings, read_settings, with_pass_mark
 from grader.integrations.github import GitHub
 from grader.integrations.gitlab import GitLab
-from grader.judging.summary import overall_status, total_points
+from grader.judging.summary import overall_status, total_fields
 from grader.model.result import GradingResult
 from grader.report.sentences import without_sandbox
 from grader.report.terminal import open_console, print_report
@@ -151,8 +151,8 @@ def _counted(result: GradingResult, rubric: Rubric, *, static: bool) -> GradingR
     criteria = settled(result.criteria)
     update = {
         "criteria": criteria,
-        "points": total_points(rubric, criteria),
-        "max_points": sum(c.max_points for c in criteria),
+        **total_fields(rubric, criteria),
+        "max_points": round(sum(c.max_points for c in criteria), 6),
         "status": overall_status(criteria),
     }
     return result.model_copy(update=update)

@@ -150,9 +150,9 @@ SPECIAL: dict[tuple[str, str], Completer] = {
 
 
 def _labs() -> dict[str, Path]:
-    from grader.rubric.find import rubric_ids, rubrics_folder  # noqa: PLC0415 - a build needs only `script`
+    from grader.rubric.find import known_labs  # noqa: PLC0415 - a build needs only `script`
 
-    return {lab: rubrics_folder() / f"{lab}.yaml" for lab in rubric_ids()}
+    return {lab.id: lab.path for lab in known_labs()}
 
 
 def _checks() -> dict[str, str]:

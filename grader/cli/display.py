@@ -233,7 +233,7 @@ def _rows(verdicts: tuple[EarlyVerdict, ...], encoding: str) -> Iterator[Text]:
         row.append(f"{mark(criterion.status, encoding)} {word:{status_width}}", STYLES[criterion.status])
         row.append(f"  {visible(criterion.id):{name_width}}  {line(criterion.message, MESSAGE_CHARS)}")
         yield row
-        if criterion.points < criterion.max_points and criterion.hint:
+        if criterion.missing and criterion.hint:
             yield Text(f"{' ' * (INDENT + 2)}hint: {line(criterion.hint, MESSAGE_CHARS)}", "dim")
     if not all(verdict.final for verdict in verdicts):
         yield Text(f"{' ' * INDENT}{SO_FAR}", "dim")

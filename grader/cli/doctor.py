@@ -12,7 +12,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import IO
+from typing import IO, Literal
 
 from rich.table import Table
 from rich.text import Text
@@ -27,7 +27,7 @@ from grader.portable import cores, system, user_id
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible
 from grader.ros_env import INSTALL_HINT, RosInstallation, find_ros
-from grader.ros_packages import STANDINS, RosPackages, ros_packages
+from grader.ros_packages import STANDINS, Need, RosPackages, look_for, ros_packages
 from grader.rubric.load import LoadedRubric
 from grader.wording import join_words
 
@@ -69,10 +69,18 @@ def diagnose() -> tuple[Row, ...]:
 
 
 def diagnose_rubric(loaded: LoadedRubric) -> tuple[Row, ...]:
-    """Return a row for each ROS package that the rubric's programs and types come from."""
-    packages = ros_packages()
+    """Return a row for each ROS package that the rubric's programs and types come from, and for what it `needs`."""
+    packages, own = ros_packages(), loaded.rubric.packages
     needed = _needed(loaded)
-    return tuple(_package(name, needed[name], packages) for name in sorted(needed))
+    rows = [_package(name, needed[name], packages) for name in sorted(needed) if name not in own]
+    brought = [Row(name=n, state="ok", detail="beside the rubric; built when the lab is graded") for n in own]
+    return (*rows, *brought, *map(_need, look_for(**loaded.rubric.needs.model_dump())))
+
+
+def _need(need: Need) -> Row:
+    state: Literal["ok", "missing"] = "ok" if need.here else "missing"
+    detail = f"the rubric needs it ({need.kind})" + ("" if need.here else ": not installed")
+    return Row(name=need.name, state=state, detail=detail, fix="" if need.here else need.install)
 
 
 def _needed(loaded: LoadedRubric) -> dict[str, list[str]]:

@@ -10,11 +10,13 @@ from rich.padding import Padding
 from rich.text import Text
 
 from grader.checks import HEADINGS, Check
+from grader.checks.parameter_docs import REQUIRED, inner_records, parameters
 from grader.errors import UsageError
+from grader.model.record import Record
 from grader.model.repair import BY_HAND, RepairKind
 from grader.report.terminal import emit, open_console
 from grader.report.text import visible
-from grader.rubric.find import rubric_ids
+from grader.rubric.find import known_labs
 from grader.rubric.instructor import known_checks
 from grader.rubric.load import LoadedRubric, all_rubrics, load_rubric
 from grader.rubric.model import Criterion, Rubric
@@ -63,7 +65,9 @@ def print_explanation(name: str, rubric: str | None) -> None:
 
 def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]) -> UsageError:
     criteria = (c.id for r in rubrics for c in r.rubric.criteria if c.visibility == "visible")
-    near = did_you_mean(name.rpartition("/")[2], [*checks, *criteria, *(f"{lab}/" for lab in rubric_ids())])
+    near = did_you_mean(
+        name.rpartition("/")[2], [*checks, *criteria, *(f"{lab.id}/" for lab in known_labs())]
+    )
     return UsageError(
         f'there is no check or criterion "{name}"{near}',
         hint="give a check, a criterion of a lab, or LAB/criterion; grader labs lists the labs",
@@ -72,13 +76,30 @@ def _unknown(name: str, rubrics: list[LoadedRubric], checks: Mapping[str, Check]
 
 def _criterion_lines(rubric: Rubric, criterion: Criterion) -> Iterator[Line]:
     yield f"{rubric.id}/{criterion.id}: {criterion.title}", 0
-    points = f"{number(criterion.points)} of {number(rubric.max_points)} points"
-    yield f"{points}, judged by the check {criterion.check}", 2
+    yield f"{worth_of(criterion, rubric)}, judged by the check {criterion.check}", 2
     if criterion.hint:
         yield f"hint: {criterion.hint}", 2
     if criterion.reproduce:
         yield f"see it yourself: {criterion.reproduce}", 2
     yield "", 0
+
+
+def worth_of(criterion: Criterion, rubric: Rubric) -> str:
+    """`10 of 100 points, the best 3 of 4 count`, `a bonus of 5 points`."""
+    if criterion.extra:
+        return f"a {'bonus' if criterion.bonus else 'penalty'} of {number(abs(criterion.extra))} points"
+    said = [f"{number(criterion.points)} of {number(rubric.max_points)} points"]
+    said += [
+        f"the best {group.best} of {len(group.criteria)} in {name} count"
+        for name, group in rubric.groups.items()
+        if group.best and criterion.id in group.criteria
+    ]
+    said += [
+        f"without it at most {number(gate.at_most)} points count"
+        for gate in rubric.gates
+        if gate.criterion == criterion.id
+    ]
+    return ", ".join(said)
 
 
 def _check_lines(check: Check) -> Iterator[Line]:
@@ -95,7 +116,20 @@ def _check_lines(check: Check) -> Iterator[Line]:
         yield "Slips that cost it, and how to repair them by hand", 0
         for kind in slips:
             yield BY_HAND[kind], 2
+    yield from _parameter_lines(check.params, "What a rubric can set")
+    for record, words in inner_records(check.params).items():
+        yield from _parameter_lines(record, f"Keys of a {words}")
     yield "", 0
+
+
+def _parameter_lines(record: type[Record], heading: str) -> Iterator[Line]:
+    rows = parameters(record)
+    if rows:
+        yield "", 0
+        yield heading, 0
+    for one in rows:
+        default = REQUIRED if one.default == REQUIRED else f"default {one.default}"
+        yield f"{one.name} ({one.type}; {default}): {one.meaning}".replace("`", ""), 2
 
 
 def _print(lines: Iterator[Line]) -> None:

@@ -22,6 +22,7 @@ RUBRIC = Option("--rubric", "ID|FILE", "a lab's id or a rubric's file; see grade
 SandboxOption = Annotated[
     SandboxMode, Option("--sandbox", "", "run students' code in a sandbox: if possible, always, or never")
 ]
+AllFlag = Annotated[bool, Flag("--all", "list all criteria with what was measured, not only what was lost")]
 JsonFlag = Annotated[bool, Flag("--json", "print JSON")]
 PackageOption = Annotated[
     str | None,

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+
+from rich.console import RenderableType
 
 from grader.cli.errors import report
 from grader.cli.output import say, say_document
@@ -43,7 +45,7 @@ def worst(codes: Iterable[ExitCode]) -> ExitCode:
 def staged_code(criteria: Iterable[CriterionResult], rubric: Rubric) -> ExitCode:
     """Return the code of a pre-commit hook: any criterion that fails, fails it, whatever the pass mark is."""
     judged = settled(criteria)
-    counted = [c for c in judged if c.max_points > 0 or c.status is Status.ERROR]
+    counted = [c for c in judged if c.is_required or c.status is Status.ERROR]
     return exit_code(judged, rubric.model_copy(update={"pass_mark": None})) if counted else ExitCode.PASSED
 
 
@@ -60,7 +62,8 @@ def _in_proportion(rubric: Rubric, shown: tuple[CriterionResult, ...]) -> Rubric
     return rubric.model_copy(update={"pass_mark": round(rubric.pass_mark * share, EXACT_DIGITS)})
 
 
-REPORTS = ("report.html", "result.json", "report.md", "junit.xml", "console.log")
+REPORT = "report.html"
+REPORTS = (REPORT, "result.json", "report.md", "junit.xml", "console.log")
 
 
 def show(
@@ -72,16 +75,28 @@ def show(
     as_json: bool = False,
     static: bool = False,
     unrun: str = "",
+    remarks: Sequence[RenderableType] = (),
+    full: bool = False,
 ) -> ExitCode:
     """Print the result, from which `hidden` criteria are left out already, and return its exit code.
 
     With `static`, only the criteria that could be judged count. `unrun` says why nothing was run, on purpose or not:
-    open criteria are then only counted in the report.
+    open criteria are then only counted in the report. `remarks` stand before the losses; with `full` all criteria are
+    listed.
     """
     if as_json:
         say_document(lambda ascii_only: result_text(result, ascii_only=ascii_only))
     else:
-        print_report(result, rubric, open_console(sys.stdout), hidden=hidden, static=static, unrun=unrun)
+        print_report(
+            result,
+            rubric,
+            open_console(sys.stdout),
+            hidden=hidden,
+            static=static,
+            unrun=unrun,
+            remarks=remarks,
+            full=full,
+        )
         _paths(folder)
     if result.error is not None:
         report(GraderError(result.error.message, hint=result.error.hint))
@@ -93,10 +108,9 @@ def show(
 def _paths(folder: Path | None) -> None:
     if folder is None:
         return
-    say("")
-    say("Reports:")
-    for name in REPORTS:
-        if (folder / name).is_file():
-            say(f"  {folder / name}")
-    if (folder / "evidence").is_dir():
-        say(f"  {folder / 'evidence'}/")
+    others = [name for name in REPORTS[1:] if (folder / name).is_file()]
+    others += ["evidence/"] if (folder / "evidence").is_dir() else []
+    if (folder / REPORT).is_file():
+        say(f"Report: {folder / REPORT}")
+    if others:
+        say(f"Beside it: {', '.join(others)}")

@@ -30,6 +30,7 @@ from grader.evidence.definitions import (
     parse,
 )
 from grader.evidence.memory_budget import DECODED_BYTES_MAX
+from grader.model.definition import DIVIDER, RULE
 
 Value: TypeAlias = Any
 """What a message holds: numbers, text, bytes, lists and dicts of these."""
@@ -70,6 +71,15 @@ class Decoder:
         except (SerdeError, struct.error, ValueError, IndexError, OverflowError):
             return None
 
+    def from_cdr(self, data: bytes) -> bytes:
+        """Return a message of ROS 2 (little-endian CDR) as ROS 1's bytes; none where it does not fit the definition."""
+        if self._plan is None or self.decoded_bytes(len(data)) > DECODED_BYTES_MAX:
+            return b""
+        try:
+            return self._plan.from_cdr(data)
+        except (SerdeError, struct.error, ValueError, IndexError, OverflowError, AssertionError):
+            return b""
+
 
 class Encoder:
     """Makes messages of one type from its full definition. Raises ValueError for one that cannot be followed."""
@@ -99,6 +109,10 @@ class _Plan:
         if not self._types[self._type] and not data:
             return {}
         return self._plain(self._type, self._store.deserialize_ros1(data, self._name))
+
+    def from_cdr(self, data: bytes) -> bytes:
+        """Return nothing for a message without fields, of which CDR makes a byte."""
+        return bytes(self._store.cdr_to_ros1(data, self._name)) if self._types[self._type] else b""
 
     def encode(self, value: Mapping[str, Any]) -> bytes:
         if not self._types[self._type]:
@@ -180,7 +194,11 @@ def md5sum(type: str) -> str:  # noqa: A002 - ROS's own word
 
 @lru_cache(maxsize=1)
 def _noetic() -> Typestore:
-    return get_typestore(Stores.ROS1_NOETIC)
+    store = get_typestore(Stores.ROS1_NOETIC)
+    store.register(
+        get_types_from_msg("geometry_msgs/TransformStamped[] transforms\n", "tf2_msgs/msg/TFMessage")
+    )
+    return store
 
 
 @lru_cache(maxsize=256)
@@ -248,10 +266,8 @@ def _checked(base: str, value: Value) -> Value:
 FindText = Callable[[str], str | None]
 """From a message type to the text of its `.msg` file, None where there is none."""
 
-DIVIDER = re.compile(r"^---\s*$", re.MULTILINE)
 _TYPE = re.compile(r"^\s*([A-Za-z][\w/]*)\s*(?:\[\d*\])?\s+[A-Za-z]\w*\s*$", re.ASCII)
 _BUILT_IN = {*PRIMITIVES, "byte", "char", "time", "duration"}
-_RULE = "=" * 80
 _PARTS_MAX = 100
 
 
@@ -291,13 +307,13 @@ def full_definition(type_: str, text: str, find_text: FindText) -> str:
         parts[name] = _text_of(name, find_text)
         waiting += _needed(parts[name], name.partition("/")[0])
     sections = [text, *(f"MSG: {name}\n{part}" for name, part in parts.items())]
-    return f"\n{_RULE}\n".join(sections)
+    return f"\n{RULE}\n".join(sections)
 
 
 def _text_of(name: str, find_text: FindText) -> str:
     """Return the type's own text, without the parts that come behind it in a full definition."""
     found = find_text(name)
-    return found if found is not None else definition(name).partition(_RULE)[0]
+    return found if found is not None else definition(name).partition(RULE)[0]
 
 
 def _needed(text: str, package: str) -> list[str]:

@@ -12,7 +12,6 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple, TypeGuard
 
 from grader.evidence.decode import (
-    DIVIDER,
     Decoder,
     Encoder,
     FindText,
@@ -21,7 +20,8 @@ from grader.evidence.decode import (
 )
 from grader.evidence.definitions import MAX_DEFINITION_BYTES, PRIMITIVES, Field, parse, sections_of
 from grader.installable import noetic_messages
-from grader.wording import did_you_mean
+from grader.model.definition import DIVIDER
+from grader.wording import did_you_mean, join_words
 
 ITEMS_MAX = 1_000_000
 NS = 1_000_000_000
@@ -146,7 +146,8 @@ class _Filling:
             value = {"data": value}
         for name in value:
             if name not in known:
-                raise ValueError(f"{type_} has no field {name}{did_you_mean(str(name), known)}")
+                others = f"; its fields are {join_words(known)}" if known else ""
+                raise ValueError(f"{type_} has no field {name}{did_you_mean(str(name), known) or others}")
         return {name: self._field(known[name], item) for name, item in value.items()}
 
     def _quaternion(self, angles_deg: object) -> dict[str, float]:

@@ -29,17 +29,22 @@ OWN_NODE = re.compile(r"/grader_(recorder|actor|calibration)_[0-9a-f]{8}(_knock)
 BARE_NAME = "/grader"
 OTHER_RUNS = re.compile(r"(repaired|repeated)-[1-9]")
 """Folders of evidence beside the first runs: of a repaired copy, and of scenarios that were run once more."""
+_LINE_END = re.compile(r"\r\n|\r|\n")
+FILE_BYTES_MAX = 2_000_000
 DECODER_BYTES = 200_000
 LETTER_BYTES = 1_400
 """What a decoder takes, and for each letter of its definition: time more than memory."""
 
 
 class Message(NamedTuple):
-    """A recorded message: arrival (ns), number on its channel counted from 0, bytes as sent."""
+    """A recorded message."""
 
     log_time_ns: int
+    """When it arrived at the recorder, in ns."""
     sequence: int
+    """Its number on its channel, counted from 0."""
     data: bytes
+    """The bytes as sent."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,16 +52,24 @@ class Channel:
     """All messages of one publisher on one topic. `budget` limits the memory of their decoded values."""
 
     topic: str
+    """The topic, with its slash."""
     callerid: str
+    """The publishing node, with its slash."""
     type: str
+    """The message type: `std_msgs/Int8`."""
     md5sum: str
+    """The type's MD5 sum, as ROS computes it."""
     definition: str
+    """The type's full definition, as the publisher gave it."""
     latching: bool
+    """Whether the publisher latches the topic."""
     messages: tuple[Message, ...]
+    """All messages, in the order of their arrival."""
     budget: MemoryBudget = field(default_factory=MemoryBudget, repr=False, compare=False)
 
     @property
     def by_grader(self) -> bool:
+        """Whether one of the grader's own nodes published it."""
         exported = self.callerid == BARE_NAME and self.topic.startswith(f"{BARE_NAME}/")
         return exported or is_grader_node(self.callerid)
 
@@ -67,6 +80,7 @@ class Channel:
 
     @cached_property
     def times_ns(self) -> tuple[int, ...]:
+        """When each message arrived, in ns."""
         return tuple(m.log_time_ns for m in self.messages)
 
     @cached_property
@@ -103,29 +117,44 @@ def is_grader_node(name: str) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """`evidence` is the file's name for citations, `start_ns`/`end_ns` its first and last record's times.
-
-    `package_json` is the message of `/grader/package`; `reader.package_facts` reads it.
-    """
+    """What was recorded of one scenario."""
 
     evidence: str
+    """The file's name, for citations."""
     scenario: str
+    """The scenario's name in the rubric."""
     clock: str
+    """`real`, or `warped` where ROS's time runs faster."""
     warp: float
+    """How many seconds of ROS's time pass in one second; 1 in real time."""
     metadata: Mapping[str, str]
+    """What the recorder wrote into the file about the run; empty where another tool recorded it."""
     start_ns: int
+    """When the first record arrived, in ns. All times are the recorder's own, in real time."""
     end_ns: int
+    """When the last record arrived, in ns."""
     channels: tuple[Channel, ...] = ()
+    """Each publisher's messages on each topic."""
     processes: tuple[tuple[int, ProcessEvent], ...] = ()
+    """When (ns) each process started, and how it ended."""
     console: tuple[tuple[int, ConsoleLine], ...] = ()
+    """When (ns) which process printed what."""
     graph: tuple[tuple[int, GraphEvent], ...] = ()
+    """When (ns) the master's state changed, and to what."""
     params: tuple[tuple[int, ParamEvent], ...] = ()
+    """When (ns) which parameter was set or deleted."""
     host: tuple[tuple[int, HostEvent], ...] = ()
+    """How late and how busy the machine was, every now and then."""
     actors: tuple[tuple[int, ActorEvent], ...] = ()
+    """When (ns) the grader did what: messages, calls, goals and steps."""
     recorder: tuple[tuple[int, RecorderEvent], ...] = ()
+    """What happened to the recorder's own connections."""
     course: tuple[tuple[int, ScenarioEvent], ...] = ()
+    """The run's own course; `outcome` is its end."""
     attachments: Mapping[str, bytes] = field(default_factory=dict)
+    """Files that were kept with the run, by name."""
     package_json: bytes | None = None
+    """The package's files as they were read; ask for the fact `package` instead."""
 
     @property
     def foreign(self) -> bool:
@@ -144,6 +173,7 @@ class Run:
         return not any(OWN_NODE.fullmatch(event.caller_id) for _, event in self.params)
 
     def is_student_node(self, name: str) -> bool:
+        """Return whether a node is of the student's package: neither the grader's nor a program beside it."""
         if name == BARE_NAME and self._bare_is_grader:
             return False
         return not is_grader_node(name) and name not in self.grader_nodes
@@ -166,6 +196,17 @@ class Run:
     def lines(self, process: str) -> Iterator[tuple[int, ConsoleLine]]:
         """Yield what one process printed, with its time (ns)."""
         return ((t, line) for t, line in self.console if line.process == process)
+
+    def file_lines(self, path: str) -> list[str]:
+        """Return the lines of a text file of the package that was kept with the run of the build; none for any other.
+
+        The carriage return of a script's first line is kept: the kernel takes it for part of the program's name.
+        """
+        text = self.attachments.get(path, b"")[:FILE_BYTES_MAX].decode("utf-8-sig", errors="replace")
+        lines = _LINE_END.split(text)
+        if lines[0].startswith("#!") and text.startswith(f"{lines[0]}\r"):
+            lines[0] += "\r"
+        return lines if lines[-1] else lines[:-1]
 
     @property
     def outcome(self) -> ScenarioEvent | None:

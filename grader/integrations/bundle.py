@@ -26,9 +26,7 @@ from grader.files import atomic_write
 from grader.model.record import Record
 from grader.model.result import GradingResult
 from grader.model.sandbox_mode import SandboxMode
-from grader.rubric.instructor import read_instructor
-from grader.rubric.load import LoadedRubric
-from grader.rubric.source import read_source
+from grader.rubric.load import LoadedRubric, read_beside_rubric
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -213,9 +211,8 @@ def add_lab(bundle: Bundle, rubric: LoadedRubric, folder: str) -> str:
     """Add the rubric's file and the files it names below `folder`. Return the rubric's path in the bundle."""
     path = f"{folder}/{rubric.path.name}"
     bundle.add(path, rubric.path.read_bytes())
-    source = read_source(rubric.path, rubric.path.name)
-    for name, data in read_instructor(source.data, rubric.path.parent).files.items():
-        bundle.add(f"{folder}/{name}", data)
+    for name, data in read_beside_rubric(rubric).items():
+        bundle.add(f"{folder}/{name}", data, executable=data.startswith(b"#!"))
     return path
 
 

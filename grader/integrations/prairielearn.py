@@ -94,7 +94,7 @@ def graded(result: GradingResult, rubric: LoadedRubric) -> dict[str, Any]:
     """Return the points, or that the submission cannot be graded: then no attempt is used up."""
     if result.error is not None:
         return _invalid(result.error.message, result.error.hint)
-    counting = [c for c in result.criteria if c.max_points > 0]
+    counting = [c for c in result.criteria if c.counts]
     if all(c.status.is_open for c in counting):
         return _invalid("no criterion could be judged", "submit again")
     hidden = hidden_ids(rubric.rubric)
@@ -126,7 +126,7 @@ def _invalid(message: str, hint: str) -> dict[str, Any]:
 
 
 def _message(result: GradingResult, shown: list[CriterionResult]) -> Iterator[str]:
-    waiting = sum(c.max_points for c in shown if c.status.is_open)
+    waiting = sum(c.missing for c in shown if c.status.is_open)
     if waiting:
         yield f"{LOOK}: {number(waiting)} points are not settled yet; no points are lost for good."
     yield f"{number(result.points)} of {number(result.max_points)} points"

@@ -15,7 +15,8 @@ from grader.checks.support.topics import heed_losses
 from grader.errors import EvidenceError
 from grader.evidence.run import Run
 from grader.judging.advice import add_advice
-from grader.judging.facts import Facts, try_facts
+from grader.judging.cited_lines import show_lines
+from grader.judging.facts import PACKAGE_RUN, Facts, try_facts
 from grader.judging.other_runs import (
     judged_on_copy,
     needs_build,
@@ -24,7 +25,7 @@ from grader.judging.other_runs import (
     split_runs,
     was_built,
 )
-from grader.judging.summary import round_half_up
+from grader.judging.summary import leave_out, round_half_up
 from grader.model.result import CriterionResult, Repaired
 from grader.model.verdict import Citation, FileCitation, Status, Verdict, inconclusive
 from grader.rubric.model import Criterion, Rubric
@@ -68,9 +69,11 @@ def judge_all_runs(
         needed = needs_build(of_copy.package)
         built = not needed or was_built(first) or not was_built(repaired)
         verdicts, uses = judged_on_copy(rubric, verdicts, on_copy, repairs, built=built)
-    results = tuple(result_of(c, verdicts[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
+    build = first.get(PACKAGE_RUN)
+    shown = {name: show_lines(verdict, build) for name, verdict in verdicts.items()} if build else verdicts
+    results = tuple(result_of(c, shown[c.id], rubric.digits, uses.get(c.id)) for c in rubric.criteria)
     advised = results if facts.package is None else add_advice(results, facts.package, rubric)
-    return Judgement(advised, doubtful)
+    return Judgement(leave_out(rubric, advised), doubtful)
 
 
 def judge_facts(rubric: Rubric, facts: Facts, checks: Mapping[str, Check] = CHECKS) -> dict[str, Verdict]:
@@ -216,8 +219,9 @@ def result_of(
         check=criterion.check,
         scenario=criterion.scenario,
         status=verdict.status,
-        points=round_half_up(verdict.score * criterion.points, digits),
+        points=round_half_up(_points(criterion, verdict), digits),
         max_points=criterion.points,
+        extra=criterion.extra,
         message=verdict.message,
         expected=verdict.expected,
         measured=verdict.measured,
@@ -227,3 +231,11 @@ def result_of(
         blocked_by=verdict.blocked_by,
         repaired=repaired,
     )
+
+
+def _points(criterion: Criterion, verdict: Verdict) -> float:
+    """Return the points of a verdict: a penalty is taken off for what was found, not for what could not be judged."""
+    if criterion.penalty is None:
+        return verdict.score * (criterion.bonus or criterion.points)
+    found = verdict.status in {Status.FAIL, Status.PARTIAL}
+    return (verdict.score - 1) * criterion.penalty if found else 0.0

@@ -10,7 +10,14 @@ from datetime import datetime, timedelta, timezone
 from decimal import Decimal
 from typing import Literal
 
-from grader.judging.summary import overall_status, round_half_up, total_points
+from grader.judging.summary import (
+    leave_out,
+    overall_status,
+    round_half_up,
+    take_in,
+    total_fields,
+    total_points,
+)
 from grader.model.result import (
     AppliedOverride,
     Automatic,
@@ -44,16 +51,19 @@ def settle(
     not have are left out.
     """
     automatic = unsettled(result, rubric)
-    said = {criterion.id: _automatic(criterion) for criterion in automatic.criteria}
+    judged = take_in(automatic.criteria)
+    said = {criterion.id: _automatic(criterion) for criterion in judged}
     applied = tuple(_applied(name, overrides[name], said[name], before) for name in said if name in overrides)
     decided = {override.criterion: override for override in applied}
     criteria = tuple(
         _decided(criterion, decided[criterion.id], rubric.digits) if criterion.id in decided else criterion
-        for criterion in automatic.criteria
+        for criterion in judged
     )
+    criteria = leave_out(rubric, criteria)
     points = total_points(rubric, criteria)
     late = lateness(points, rubric, handed_in)
     update = {
+        **total_fields(rubric, criteria),
         "status": status_after_overrides(result, criteria, decided.keys()),
         "points": late.points if late else points,
         "criteria": criteria,
@@ -69,10 +79,11 @@ def unsettled(result: GradingResult, rubric: Rubric) -> GradingResult:
     if not result.overrides and result.handed_in is None and result.late is None:
         return result
     said = {override.criterion: override.automatic for override in result.overrides}
-    criteria = tuple(c.model_copy(update=dict(said[c.id])) if c.id in said else c for c in result.criteria)
+    judged = [c.model_copy(update=dict(said[c.id])) if c.id in said else c for c in take_in(result.criteria)]
+    criteria = leave_out(rubric, judged)
     update = {
         "status": status_after_overrides(result, criteria, ()),
-        "points": total_points(rubric, criteria),
+        **total_fields(rubric, criteria),
         "criteria": criteria,
         "overrides": (),
         "handed_in": None,
@@ -88,7 +99,7 @@ def status_after_overrides(
 
     What could not be graded at all stays an error until a person has decided all that counts.
     """
-    if result.error is not None and any(c.max_points > 0 and c.id not in decided for c in criteria):
+    if result.error is not None and any(c.counts and c.id not in decided for c in criteria):
         return "error"
     return overall_status(criteria)
 
@@ -119,10 +130,12 @@ def _is(earlier: AppliedOverride, override: Override) -> bool:
 def _decided(criterion: CriterionResult, override: Override, digits: int) -> CriterionResult:
     """Return the criterion with a person's points. What was expected and measured stays."""
     points = round_half_up(override.points, digits)
-    status = Status.PASS if points >= criterion.max_points else Status.PARTIAL if points > 0 else Status.FAIL
+    least = criterion.full - criterion.max_points - abs(criterion.extra)
+    status = Status.PASS if points >= criterion.full else Status.PARTIAL if points > least else Status.FAIL
     author = f" by {override.author}" if override.author else ", decided by a person"
     comment = f": {override.comment}" if override.comment else ""
-    message = f"{points:g} of {criterion.max_points:g} points{author}{comment}"
+    of = f" of {criterion.full:g}" if criterion.extra >= 0 else ""
+    message = f"{points:g}{of} points{author}{comment}"
     return criterion.model_copy(update={"status": status, "points": points, "message": message})
 
 

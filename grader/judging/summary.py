@@ -10,7 +10,7 @@ from decimal import ROUND_HALF_UP, Decimal
 from typing import Literal
 
 from grader.evidence.run import Run
-from grader.model.result import CriterionResult, GradingResult, Note
+from grader.model.result import CriterionResult, Gate, GradingResult, LeftOut, Note
 from grader.model.verdict import Status
 from grader.rubric.model import Rubric
 from grader.untrusted_text import clip, clipped, json_text, text_limit
@@ -23,9 +23,61 @@ ACTOR_CHARS = 100
 
 
 def total_points(rubric: Rubric, results: Sequence[CriterionResult]) -> float:
-    """Return the sum of the criteria's points, rounded half up to the rubric's digits."""
+    """Return the sum of the criteria's points, rounded half up to the rubric's digits: at least 0, at most what the
+    gates leave."""
+    gate = closed_gate(rubric, results)
+    return gate.at_most if gate else max(0.0, _sum(rubric, results))
+
+
+def closed_gate(rubric: Rubric, results: Sequence[CriterionResult]) -> Gate | None:
+    """Return the gate that keeps the total lowest; None where none does."""
+    lost = {r.id for r in results if r.status in {Status.FAIL, Status.BLOCKED}}
+    points = _sum(rubric, results)
+    closed = [gate for gate in rubric.gates if gate.criterion in lost and gate.at_most < points]
+    lowest = min(closed, key=lambda gate: gate.at_most, default=None)
+    return (
+        None
+        if lowest is None
+        else Gate(criterion=lowest.criterion, at_most=lowest.at_most, points_before=points)
+    )
+
+
+def total_fields(rubric: Rubric, results: Sequence[CriterionResult]) -> dict[str, object]:
+    """Return the fields of a result that these criteria come to."""
+    return {"points": total_points(rubric, results), "gate": closed_gate(rubric, results)}
+
+
+def _sum(rubric: Rubric, results: Sequence[CriterionResult]) -> float:
     total = sum((Decimal(repr(r.points)) for r in results), Decimal(0))
     return round_half_up(float(total), rubric.digits)
+
+
+def leave_out(rubric: Rubric, results: Sequence[CriterionResult]) -> tuple[CriterionResult, ...]:
+    """Return the results without the points of those that do not count, because others of their group are better.
+
+    Where two have as many points, the one that is still open counts, then the earlier one. What was left out before
+    is taken in again first.
+    """
+    found = {r.id: r for r in take_in(results)}
+    for name, group in rubric.groups.items():
+        if group.best is None:
+            continue
+        members = [found[i] for i in group.criteria if i in found]
+        members.sort(key=lambda r: (-r.points, not r.status.is_open))
+        for r in members[group.best :]:
+            left_out = LeftOut(points=r.points, max_points=r.max_points, group=name)
+            found[r.id] = r.model_copy(update={"points": 0.0, "max_points": 0.0, "left_out": left_out})
+    return tuple(found.values())
+
+
+def take_in(results: Sequence[CriterionResult]) -> tuple[CriterionResult, ...]:
+    """Return the results with the points of what was left out."""
+    return tuple(
+        r.model_copy(update={**r.left_out.model_dump(exclude={"group"}), "left_out": None})
+        if r.left_out
+        else r
+        for r in results
+    )
 
 
 def overall_status(results: Sequence[CriterionResult]) -> Literal["graded", "inconclusive", "error"]:
@@ -33,7 +85,7 @@ def overall_status(results: Sequence[CriterionResult]) -> Literal["graded", "inc
 
     Advice (0 points) does not hold up a result. No criteria at all are an error: nothing was judged.
     """
-    counting = [r for r in results if r.max_points > 0]
+    counting = [r for r in results if r.counts]
     if not counting or any(r.status is Status.ERROR for r in counting):
         return "error"
     return "inconclusive" if any(r.status.is_open for r in counting) else "graded"
@@ -43,8 +95,8 @@ def reached_pass_mark(rubric: Rubric, results: Sequence[CriterionResult]) -> boo
     """Return whether the points reach the rubric's mark; without one, every visible criterion has to pass."""
     if rubric.pass_mark is not None:
         return total_points(rubric, results) >= rubric.pass_mark
-    visible = {c.id for c in rubric.criteria if c.visibility == "visible" and c.points > 0}
-    judged = [r for r in results if r.id in visible]
+    visible = {c.id for c in rubric.criteria if c.visibility == "visible"}
+    judged = [r for r in results if r.id in visible and r.is_required]
     return bool(judged) and all(r.status is Status.PASS for r in judged)
 
 

@@ -95,6 +95,8 @@ class CriterionInfo(Record):
     """Its title."""
     max_points: float
     """The most points that can be reached."""
+    extra: float = Field(default=0.0, exclude_if=lambda value: not value)
+    """The most that a bonus adds, or minus the most that a penalty takes off. Only there for these."""
 
 
 class BatchRun(Record):

@@ -155,8 +155,36 @@ class PathFigure(Record):
     messages: int = 0
 
 
+class PlaceFigure(Record):
+    """Where a robot was, through `points` in metres, and where it had to be.
+
+    That is a `goal` within `tolerance_m`, or a region: inside `area`, or at some distance from `walls`, lines through
+    points. `wrong` is the index of the point that is worst, None where all are right, and `says` tells it in a
+    sentence.
+    """
+
+    kind: Literal["place"] = "place"
+    topic: str
+    scenario: str
+    points: tuple[tuple[float, float], ...]
+    goal: tuple[float, float] | None = None
+    tolerance_m: float = 0.0
+    area: tuple[tuple[float, float], ...] = ()
+    walls: tuple[tuple[tuple[float, float], ...], ...] = ()
+    wrong: int | None = None
+    says: str
+    messages: int = 0
+
+
 Figure = Annotated[
-    RateFigure | CounterFigure | HeardFigure | GraphFigure | ConsoleFigure | CodeFigure | PathFigure,
+    RateFigure
+    | CounterFigure
+    | HeardFigure
+    | GraphFigure
+    | ConsoleFigure
+    | CodeFigure
+    | PathFigure
+    | PlaceFigure,
     Field(discriminator="kind"),
 ]
 

@@ -49,6 +49,8 @@ class Dependency(Record):
 
 
 class Person(Record):
+    """A maintainer or author of `package.xml`."""
+
     name: str
     email: str
     line: int
@@ -220,18 +222,50 @@ class LaunchFile(Record):
     unknown_tags: tuple[tuple[str, int], ...] = ()
 
 
+class InterfaceField(Record):
+    """A line of a `.msg`, `.srv` or `.action` file: a field, or a constant, which has a `value` as written.
+
+    `part` is "" in a message, else `request`, `response`, `goal`, `result` or `feedback`. `type` is as written.
+    """
+
+    part: str
+    type: str
+    name: str
+    line: int
+    value: str | None = None
+
+
+class Interface(Record):
+    """One definition of the package's own. `fault` says why it is none."""
+
+    path: str
+    fields: tuple[InterfaceField, ...]
+    fault: Fault | None = None
+
+
 class PackageFacts(Record):
-    """All of it. `manifest` is None where `manifest_fault` says why."""
+    """What the package's files say; nothing of it was run."""
 
     name: str
+    """The package's name, from its manifest; its folder's where the manifest cannot be read."""
     path: str
+    """Where the package lay in what was handed in."""
     manifest: Manifest | None
+    """`package.xml`; None where `manifest_fault` says why."""
     manifest_fault: Fault | None
+    """Why the manifest cannot be read."""
     cmake: CMakeFacts | None
+    """`CMakeLists.txt`; None where there is none."""
     files: tuple[SourceFile, ...]
+    """All files, in the order of their paths."""
     launch_files: tuple[LaunchFile, ...]
+    """All launch files."""
     hints: tuple[str, ...] = ()
+    """What was remarked when the submission was opened."""
     slips: tuple[PythonSlip, ...] = ()
+    """Slips in Python files that compile."""
+    interfaces: tuple[Interface, ...] = ()
+    """The package's own `.msg`, `.srv` and `.action` files."""
 
     def file(self, path: str) -> SourceFile | None:
         """Return the file at this path, or None."""

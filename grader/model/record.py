@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
+from itertools import pairwise
+from textwrap import dedent
+
 from pydantic import BaseModel, ConfigDict
 from typing_extensions import Self
 
@@ -16,3 +21,28 @@ class Record(BaseModel):
         """Read what a grader wrote. Keys that only a later grader knows are ignored: without a new version of the
         format, no status and no points depend on them (docs/reference/formats.md). Raises ValidationError."""
         return cls.model_validate_json(data, extra="ignore")
+
+
+def field_docstrings(record: type) -> dict[str, str]:
+    """Return the docstrings of a class's fields by their keys; none where there is no source to read.
+
+    pydantic's `use_attribute_docstrings` gives the same, but reads all the sources whenever the grader starts.
+    """
+    texts: dict[str, str] = {}
+    fields = record.model_fields if issubclass(record, Record) else {}
+    for kind in reversed(record.__mro__):
+        if kind in {Record, BaseModel, tuple, object}:
+            continue
+        try:
+            (definition,) = ast.parse(dedent(inspect.getsource(kind))).body
+        except (OSError, TypeError):
+            continue
+        assert isinstance(definition, ast.ClassDef)  # noqa: S101 - it is one
+        for node, text in pairwise(definition.body):
+            match node, text:
+                case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
+                    key = (fields[name].serialization_alias if name in fields else "") or name.removesuffix(
+                        "_"
+                    )
+                    texts[key] = inspect.cleandoc(words).replace("\n", " ")
+    return texts

@@ -53,8 +53,8 @@ class Lateness(HandedIn):
 class Override(Record):
     """Points that a person awards for one criterion of one submission (`overrides.yaml`)."""
 
-    points: Annotated[float, Field(ge=0)]
-    """The points that count, at most the criterion's."""
+    points: float
+    """The points that count: from 0 to the criterion's, below 0 for a penalty."""
     comment: Annotated[str, Field(max_length=COMMENT_CHARS)] = ""
     """What the student reads."""
     author: Annotated[str, Field(max_length=AUTHOR_CHARS)] = ""
@@ -120,6 +120,28 @@ class Repaired(Record):
     """Whether this criterion asks for what was repaired: it loses its points, so that the others keep theirs."""
 
 
+class LeftOut(Record):
+    """What a criterion would have, if its group did not count only the best of them."""
+
+    points: float
+    """The points that it earned."""
+    max_points: float
+    """The most points that it could have earned."""
+    group: str
+    """The group's name in the rubric."""
+
+
+class Gate(Record):
+    """A criterion without which the whole is worth less."""
+
+    criterion: str
+    """The criterion's `id`."""
+    at_most: float
+    """The most points that count without it."""
+    points_before: float
+    """The points that the criteria come to."""
+
+
 class CriterionResult(Record):
     """One criterion: a line of the report."""
 
@@ -135,9 +157,13 @@ class CriterionResult(Record):
     """`pass`, `partial`, `fail`; `blocked`: another criterion keeps it from being judged; `inconclusive`: not the
     submission's fault; `error`: the check failed; `manual`: a person decides."""
     points: float
-    """The points earned, rounded as the rubric says."""
+    """The points earned, rounded as the rubric says; below 0 for a penalty that is taken off."""
     max_points: float
-    """The most points that can be reached."""
+    """The most points that can be reached; 0 for a bonus, a penalty, advice and what is left out."""
+    extra: float = Field(default=0.0, exclude_if=lambda value: not value)
+    """The most that a bonus adds, or minus the most that a penalty takes off. Only there for these."""
+    left_out: LeftOut | None = Field(default=None, exclude_if=lambda value: value is None)
+    """Only there if it does not count, because others of its group were better."""
     message: str
     """What was found, in one sentence."""
     expected: str
@@ -154,6 +180,28 @@ class CriterionResult(Record):
     """The `id` of the criterion that keeps this one from being judged. Only there if it is `blocked`."""
     repaired: Repaired | None = Field(default=None, exclude_if=lambda value: value is None)
     """What a repaired copy of the package shows of it. Only there if one was run and changes something."""
+
+    @property
+    def counts(self) -> bool:
+        """Whether it can change the total."""
+        return self.max_points > 0 or self.extra != 0
+
+    @property
+    def is_required(self) -> bool:
+        """Whether not to reach it costs points."""
+        return self.max_points > 0 or self.extra < 0
+
+    @property
+    def missing(self) -> float:
+        """The points that it lost, or that are still open."""
+        if self.status.is_open:
+            return self.max_points - self.points + abs(self.extra)
+        return max(0.0, self.max_points - self.points)
+
+    @property
+    def full(self) -> float:
+        """The points with which it is reached."""
+        return self.max_points + max(0.0, self.extra)
 
 
 class EarlyVerdict(Record):
@@ -249,9 +297,11 @@ class GradingResult(Record):
     """`graded`: every criterion worth points is decided. `inconclusive`: some are open. `error`: it could not be
     graded, and `error` says why."""
     points: float
-    """The points that count: after overrides and the late penalty."""
+    """The points that count: after overrides, a gate and the late penalty."""
     max_points: float
-    """The most points that can be reached."""
+    """The most points that can be reached, without bonuses."""
+    gate: Gate | None = Field(default=None, exclude_if=lambda value: value is None)
+    """The gate that keeps the points low. Only there if one does."""
     criteria: tuple[CriterionResult, ...]
     """The rubric's criteria, in its order."""
     environment: EnvironmentInfo

@@ -45,8 +45,10 @@ class FileCitation(Record):
     """Counted from 1; null for the whole file."""
     column: int | None = Field(default=None, exclude_if=lambda value: value is None)
     """The place in the line, counted from 1. Only there if it is known."""
+    end_column: int | None = Field(default=None, exclude_if=lambda value: value is None)
+    """Where what is meant ends, counted from 1, itself not included. Only there if it is known."""
     source: str = Field(default="", exclude_if=lambda value: not value)
-    """The line's text. Only there if there is a column and the line is short."""
+    """The line's text. Only there if something was lost and the line is short."""
 
 
 class EvidenceCitation(Record):

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 from pathlib import Path, PurePosixPath
 
-from grader.model.package import Fault, PackageFacts, PythonSlip, SourceFile
+from grader.model.interfaces import PARTS, parse_interface
+from grader.model.package import Fault, Interface, PackageFacts, PythonSlip, SourceFile
 from grader.model.submission import SourcePackage
 from grader.package.files import Entry, Interpreters, read_files
 from grader.package.python import check_syntax
-from grader.package.reading import SOURCE_LIMIT_BYTES
+from grader.package.reading import SOURCE_LIMIT_BYTES, read_markup
+
+INTERFACES_MAX = 200
+INTERFACE_LIMIT_BYTES = 64_000
 
 
 def read_package(
@@ -58,6 +63,7 @@ def read_package(
         launch_files=launch_files,
         hints=hints,
         slips=report.slips,
+        interfaces=_interfaces(package.folder, _readable(entries)),
     )
 
 
@@ -94,6 +100,18 @@ def python_paths(facts: PackageFacts) -> tuple[str, ...]:
     Python by name or shebang, not too large, no link by absolute path, and a name that is valid Unicode.
     """
     return tuple(f.path for f in facts.files if _to_check(f) and not _only_here(f))
+
+
+def _interfaces(folder: Path, entries: Iterable[Entry]) -> tuple[Interface, ...]:
+    own = (entry for entry in entries if PurePosixPath(entry.file.path).suffix in PARTS)
+    return tuple(_interface(folder, entry) for entry in islice(own, INTERFACES_MAX))
+
+
+def _interface(folder: Path, entry: Entry) -> Interface:
+    data = read_markup(folder, entry.path, INTERFACE_LIMIT_BYTES)
+    if isinstance(data, Fault):
+        return Interface(path=entry.file.path, fields=(), fault=data)
+    return parse_interface(data, entry.file.path)
 
 
 def _only_here(file: SourceFile) -> bool:

@@ -19,7 +19,7 @@ from grader.model.verdict import FileCitation, Status
 from grader.report.findings import repository_path
 from grader.report.sentences import score_words
 from grader.report.text import line
-from grader.report.view import is_students_fault, not_graded
+from grader.report.view import is_students_fault, not_graded, of_points
 from grader.rubric.model import Rubric
 from grader.wording import number
 
@@ -61,7 +61,7 @@ def _status(result: GradingResult, passed: bool) -> str:
 def _max(result: GradingResult) -> float:
     if not_graded(result):
         return result.max_points if is_students_fault(result) else 0
-    if any(c.status.is_retryable and c.max_points > 0 for c in result.criteria):
+    if any(c.status.is_retryable and c.counts for c in result.criteria):
         return 0
     return round(sum(c.max_points for c in result.criteria if not c.status.is_open), 3)
 
@@ -103,7 +103,7 @@ def _message(criterion: CriterionResult, limit: int) -> str:
     words = line(criterion.message, limit) if limit else ""
     if not criterion.status.is_open:
         return words
-    points = f"{number(criterion.max_points)} points are not settled"
+    points = f"{number(criterion.missing)} points are not settled"
     return f"A PERSON MUST LOOK: {line(criterion.id, NAME_CHARS)}: {points}{': ' if words else ''}{words}"
 
 
@@ -111,7 +111,7 @@ def _told(criterion: CriterionResult, limit: int) -> Iterator[str]:
     """Below a test that has not passed the reporter prints what stands in the place of its code."""
     if criterion.status is Status.PASS or not limit:
         return
-    points = f"{number(criterion.points)} of {number(criterion.max_points)} points"
+    points = f"{of_points(criterion)} points"
     rows = {
         f"{points}: ": criterion.message,
         "hint: ": criterion.hint,

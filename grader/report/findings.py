@@ -60,7 +60,7 @@ def findings(result: GradingResult, prefix: str = "") -> tuple[Finding, ...]:
     What could not be judged, and what another criterion explains, is none.
     """
     lost = [c for c in result.criteria if c.status in {Status.FAIL, Status.PARTIAL}]
-    lost.sort(key=lambda c: -(c.max_points - c.points))
+    lost.sort(key=lambda c: -c.missing)
     limit = text_limit(len(result.criteria), LIMIT)
     return tuple(_finding(c, result, prefix, limit) for c in lost)
 

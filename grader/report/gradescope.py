@@ -27,7 +27,7 @@ LOOK = "A PERSON MUST LOOK"
 
 def render_gradescope(result: GradingResult, rubric: Rubric) -> str:
     """JSON. Raises GraderError (exit code 3) where nothing could be judged: there must be no file then."""
-    counting = [c for c in result.criteria if c.max_points > 0]
+    counting = [c for c in result.criteria if c.counts]
     if all(c.status.is_open for c in counting) and not is_students_fault(result):
         why = result.error.message if result.error else "no criterion could be judged"
         raise GraderError(
@@ -67,9 +67,9 @@ class _Writer:
             yield f"NOT GRADED, {LOOK}: {self._text(result.error.message)}"
             yield self._text(result.error.hint)
             return
-        waiting = [c for c in shown if c.status.is_open and c.max_points > 0]
-        if any(c.status.is_open and c.max_points > 0 for c in result.criteria):
-            points = number(sum(c.max_points for c in waiting))
+        waiting = [c for c in shown if c.status.is_open and c.counts]
+        if any(c.status.is_open and c.counts for c in result.criteria):
+            points = number(sum(c.missing for c in waiting))
             what = f": {points} points are not settled yet" if waiting else ""
             yield f"{LOOK}{what}; no points are lost for good."
         hidden = len(result.criteria) - len(shown) + missing_hidden(result, self._rubric)
@@ -85,7 +85,7 @@ class _Writer:
         return {
             **({} if waits else {"score": criterion.points, "max_score": criterion.max_points}),
             "status": "passed" if criterion.status is Status.PASS else "failed",
-            "name": self._text(f"{LOOK}: {name} ({number(criterion.max_points)} points)" if waits else name),
+            "name": self._text(f"{LOOK}: {name} ({number(criterion.missing)} points)" if waits else name),
             "name_format": "text",
             "number": place,
             "output": "\n".join(self._details(criterion)),

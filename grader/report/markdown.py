@@ -159,7 +159,7 @@ class _Writer:
         yield from (f"## {title}", "")
         for loss in self._first(losses):
             c = loss.criterion
-            others = sum(other.max_points - other.points for other in (*loss.blocked, *loss.alike))
+            others = sum(other.missing for other in (*loss.blocked, *loss.alike))
             more = f", and {number(others)} more points with it" if others else ""
             words = markdown(line(c.message or c.title, min(SHORT_CHARS, self._detail.text)))
             yield f"- {self._code(c.id)}: {points_of(c)}{more}, {c.status.value}: {words}"

@@ -11,7 +11,7 @@ from grader.judging.summary import passed
 from grader.model.repair import Repair, place_of
 from grader.model.result import AppliedOverride, Automatic, CriterionResult, GradingResult, HandedIn, Note
 from grader.model.verdict import Status
-from grader.report.view import ReportView, hidden_ids, not_graded
+from grader.report.view import ReportView, hidden_ids, not_graded, points_of
 from grader.rubric.model import Rubric
 from grader.wording import join_words, number, plural
 
@@ -20,8 +20,19 @@ BY = {"roster": "as the roster says", "commit": "the commit's date", "nobody": "
 
 
 def score_words(result: GradingResult) -> tuple[str, ...]:
-    """Return the lines that stand below the score: what each repaired fault cost, and what being late cost."""
-    return (*repair_words(result), *late_words(result))
+    """Return the lines that stand below the score: a gate, what each repaired fault cost, and what being late cost."""
+    return (*gate_words(result), *repair_words(result), *late_words(result))
+
+
+def gate_words(result: GradingResult) -> tuple[str, ...]:
+    """Return a sentence for a gate that keeps the points low, or for penalties that take more than there is."""
+    if gate := result.gate:
+        before = f"{number(gate.points_before)} of {number(result.max_points)} points before"
+        return (
+            f"{before}, {number(gate.at_most)} after: without {gate.criterion}, no more than that counts",
+        )
+    below = sum(c.points for c in result.criteria)
+    return ("Penalties take no more points than there are.",) if below < 0 else ()
 
 
 def repair_words(result: GradingResult) -> tuple[str, ...]:
@@ -36,7 +47,7 @@ def repair_words(result: GradingResult) -> tuple[str, ...]:
 def _repair_words(repair: Repair, criteria: list[CriterionResult]) -> str:
     charged = [c for c in criteria if c.repaired and c.repaired.charged]
     others = [c for c in criteria if c not in charged]
-    cost = sum(c.max_points - c.points for c in charged)
+    cost = sum(c.missing for c in charged)
     place = "" if repair.file in repair.message else f" ({place_of(repair)})"
     words = f"{repair.message}{place}: this costs you {plural(cost, 'point')}"
     words += f" ({', '.join(c.id for c in charged)})" if charged else ""
@@ -46,6 +57,21 @@ def _repair_words(repair: Repair, criteria: list[CriterionResult]) -> str:
         were = "was" if len(others) == 1 else "were"
         words += f"; {join_words(c.id for c in others)} {were} judged with it repaired{earned}"
     return f"{words[:1].upper()}{words[1:]}"
+
+
+def judged_repaired(result: GradingResult) -> dict[str, list[str]]:
+    """Return by the criterion that a fault is charged to, which others were judged with it repaired."""
+    found: dict[str, list[str]] = {}
+    with_copy = [(c.id, c.repaired) for c in result.criteria if c.repaired is not None]
+    for name, charged in with_copy:
+        if charged.charged:
+            others = [
+                other
+                for other, used in with_copy
+                if not used.charged and {*used.repairs} & {*charged.repairs}
+            ]
+            found[name] = others
+    return found
 
 
 def late_words(result: GradingResult) -> tuple[str, ...]:
@@ -97,7 +123,8 @@ def look_again(override: AppliedOverride, criterion: CriterionResult) -> str:
 
 
 def _said(automatic: Automatic, criterion: CriterionResult) -> str:
-    return f"{automatic.status.value} {number(automatic.points)}/{number(criterion.max_points)}"
+    points = points_of(criterion.model_copy(update={"points": automatic.points, "left_out": None}))
+    return f"{automatic.status.value} {points}"
 
 
 def decided(result: GradingResult) -> list[tuple[AppliedOverride, CriterionResult]]:
@@ -222,7 +249,7 @@ def verdict(result: GradingResult, rubric: Rubric, hidden: int) -> tuple[str, st
     if result.status != "graded":
         return "inconclusive", "Not settled yet"
     if hidden:
-        reached = all(c.status is Status.PASS for c in result.criteria if c.max_points > 0)
+        reached = all(c.status is Status.PASS for c in result.criteria if c.is_required)
         return ("pass", "So far, so good") if reached else ("partial", "There is something to fix")
     return "fail", "Not passed yet"
 
@@ -250,14 +277,17 @@ def in_short(result: GradingResult, view: ReportView) -> str:
     if not_graded(result):
         return "Nothing could be judged."
     late = result.late.points_before - result.late.points if result.late else 0.0
-    if lost <= 0 and late <= 0 and not view.open:
+    if lost <= 0 and late <= 0 and not view.open and not result.gate:
         return "Nothing was lost: every criterion that counts is reached. Well done!"
-    said = [] if late > 0 else ["Nothing was lost."]
+    said = [] if late > 0 or result.gate else ["Nothing was lost."]
     if lost > 0:
         costs = "costs" if len(view.lost) == 1 else "cost"
         said = [f"{plural(len(view.lost), 'thing')} {costs} you {count_points(lost)}."]
     if len(view.lost) > 1:
         said.append(f"The first one alone is worth {count_points(view.lost[0].points)}.")
+    if result.gate:
+        cost = result.gate.points_before - result.gate.at_most
+        said.append(f"Without {result.gate.criterion}, {count_points(cost)} do not count.")
     if late > 0:
         said.append(f"Being late costs you {count_points(late)}.")
     if view.open:
@@ -268,7 +298,7 @@ def in_short(result: GradingResult, view: ReportView) -> str:
 
 def lost_words(criterion: CriterionResult, blocked: float) -> str:
     """`10 points lost, and 25 more in what it holds back`; points that are open are not lost."""
-    own = criterion.max_points - criterion.points
+    own = criterion.missing
     state = "still open" if criterion.status.is_open else "lost"
     said = f"{count_points(own)} {state}" if own else "costs nothing itself"
     return f"{said}, and {number(blocked)} more in what it holds back" if blocked else said

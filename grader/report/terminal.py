@@ -1,15 +1,14 @@
-"""The report in a terminal: points, what was lost, then all. Readable at 80 columns and in a pipe."""
+"""The report in a terminal: what was reached in one line, then what was lost, then the points. Readable in a pipe."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import IO
 
 from rich.cells import cell_len
 from rich.console import Console, Group, RenderableType
-from rich.padding import Padding
-from rich.table import Table
 from rich.text import Text
 
 from grader.model.result import AppliedOverride, CriterionResult, GradingResult, Note
@@ -25,14 +24,24 @@ from grader.report.sentences import (
     without_sandbox,
 )
 from grader.report.text import line, uncommanded
-from grader.report.view import Loss, arrange, not_graded, places, pointed_at, points_of
+from grader.report.view import (
+    SOURCE_CHARS,
+    Loss,
+    ReportView,
+    arrange,
+    file_places,
+    not_graded,
+    pointed_at,
+    points_of,
+)
 from grader.rubric.model import Rubric
-from grader.wording import number
+from grader.wording import number, plural
 
 LIMIT = 500
-NAME_LIMIT = 30
-NAME_CELLS, WORDS_CELLS = 20, 20
 MEASURED_LIMIT = 120
+INDENT = 2
+SOURCE_CHARS_MIN = 20
+MINUS = "\N{MINUS SIGN}"
 STYLES = {
     Status.PASS: "green",
     Status.PARTIAL: "yellow",
@@ -75,7 +84,7 @@ def emit(console: Console, parts: Iterable[RenderableType]) -> None:
     """
     with console.capture() as capture:
         for part in parts:
-            console.print(part, overflow="fold")
+            console.print(part, overflow="fold", crop=False)
     text = uncommanded("\n".join(row.rstrip() for row in capture.get().split("\n")))
     console.file.write(text.encode(console.encoding, "backslashreplace").decode(console.encoding))
 
@@ -88,18 +97,23 @@ def print_report(
     hidden: int = 0,
     static: bool = False,
     unrun: str = "",
+    remarks: Sequence[RenderableType] = (),
+    full: bool = False,
 ) -> None:
-    """Print the whole report. `hidden` is how many criteria are left out.
+    """Print the whole report. `hidden` is how many criteria are left out, `remarks` stand before the losses.
 
-    With `static`, open ones are only counted, as they are where `unrun` says why nothing was run.
+    With `static`, open ones are only counted, as they are where `unrun` says why nothing was run. With `full`, all
+    criteria are listed with what was measured.
     """
-    Terminal(console).report(result, rubric, hidden, unrun or ("--static" if static else ""))
+    Terminal(console).report(
+        result, rubric, hidden, unrun or ("--static" if static else ""), remarks, full=full
+    )
 
 
 def render_terminal(result: GradingResult, rubric: Rubric, hidden: int = 0) -> str:
     """Return the report as it is printed where there is no terminal: without colour, 80 columns wide."""
     text = io.StringIO()
-    print_report(result, rubric, open_console(text), hidden=hidden)
+    print_report(result, rubric, open_console(text), hidden=hidden, full=True)
     return text.getvalue()
 
 
@@ -109,122 +123,163 @@ class Terminal:
     def __init__(self, console: Console) -> None:
         self.console = console
 
-    def report(self, result: GradingResult, rubric: Rubric, hidden: int, unrun: str) -> None:
+    def report(
+        self,
+        result: GradingResult,
+        rubric: Rubric,
+        hidden: int,
+        unrun: str,
+        remarks: Sequence[RenderableType],
+        *,
+        full: bool,
+    ) -> None:
         view = arrange(result, rubric)
-        parts: list[RenderableType] = [self._head(result, rubric)]
         unwalled = without_sandbox(result.environment.sandbox)
-        parts += [Text(self._show(unwalled), "yellow")] if unwalled else []
-        parts += [Text(self._show(words)) for words in sentences.score_words(result)]
+        parts = [self._head(result, rubric)]
+        parts += [self._words(unwalled, indent=0, style="yellow")] if unwalled else []
+        parts += [self._words(words, indent=0) for words in sentences.late_words(result)]
         parts += self._section(
             sentences.DECIDED_TITLE, [self._decision(o, c) for o, c in sentences.decided(result)]
         )
-        parts += self._losses("Lost", view.lost)
+        parts += self._section(NOTICED_TITLE, self._noticed(result.notes))
+        parts += self._reached(result, unrun, full=full)
+        parts += self._section("Advice, costs nothing", [self._advice(c) for c in view.advice])
+        parts += [Text(f"\n{visible_words(result, hidden)}")] if hidden else []
+        parts += remarks
         if unrun:
             parts += self._unrun(view.open, unrun)
         else:
-            parts += self._losses("Still open: no points are lost for good", view.open)
-        parts += self._section("Advice, costs nothing", [self._advice(c) for c in view.advice])
-        parts += self._section(NOTICED_TITLE, self._noticed(result.notes))
-        judged = [c for c in result.criteria if not unrun or not c.status.is_open]
-        title = "All criteria that could be judged" if unrun else "All criteria"
-        parts += self._section(title, [self._table(judged)] if judged else [])
-        if hidden:
-            parts.append(Text(f"\n{visible_words(result, hidden)}"))
+            parts += self.losses("Still open: no points are lost for good", view.open)
+        parts += self.losses("Lost", view.lost, sentences.judged_repaired(result))
+        parts.append(self._score(result, view))
         emit(self.console, parts)
 
-    def _head(self, result: GradingResult, rubric: Rubric) -> Text:
+    def losses(
+        self, title: str, losses: Sequence[Loss], repaired: Mapping[str, Sequence[str]] = MappingProxyType({})
+    ) -> list[RenderableType]:
+        """Return the losses under a title, what costs most last: there the reader's eye is when all is printed.
+
+        `repaired` names what was judged with a criterion's fault repaired.
+        """
+        parts = [self._loss(loss, repaired.get(loss.criterion.id, ())) for loss in reversed(losses)]
+        return self._section(title, [x for part in parts for x in (part, Text())][:-1])
+
+    def _head(self, result: GradingResult, rubric: Rubric) -> RenderableType:
+        text = Text(f"{self._show(result.submission.id)}\n", "bold")
+        return text.append(self._show(f"{result.rubric.id}: {rubric.title}"), "not bold dim")
+
+    def _score(self, result: GradingResult, view: ReportView) -> RenderableType:
+        """`95 of 100 points, 1 thing to fix`."""
+        if not_graded(result):
+            text = Text("\nNot graded", "bold")
+            return text.append(f"\n{self._show(result.error.message)}", "not bold") if result.error else text
         points = f"{number(result.points)} of {number(result.max_points)} points"
-        title = "Not graded" if not_graded(result) else points
-        text = Text.assemble((title, "bold"), "  ", self._show(result.submission.id), "\n")
-        if result.error is not None and not_graded(result):
-            text.append(f"{self._show(result.error.message)}\n")
-        text.append(self._show(f"{result.rubric.id}: {rubric.title}"), "dim")
-        return text
+        things = f", {plural(len(view.lost), 'thing')} to fix" if view.lost else ""
+        return Text(f"\n{points}{things}", "bold")
 
     def _decision(self, override: AppliedOverride, criterion: CriterionResult) -> RenderableType:
-        head = self._line(criterion, sentences.decision(override))
         again = sentences.look_again(override, criterion)
         rows = [("check", sentences.automatic_words(override, criterion)), ("changed", again)]
-        return Group(head, Padding(self._rows(rows), (0, 0, 0, 4)))
+        return Group(
+            self._line(criterion, points_of(criterion)),
+            self._words(sentences.decision(override)),
+            *self._rows(rows),
+        )
 
     def _section(self, title: str, parts: list[RenderableType]) -> list[RenderableType]:
         return [Text(f"\n{title}", "bold"), *parts] if parts else []
-
-    def _losses(self, title: str, losses: tuple[Loss, ...]) -> list[RenderableType]:
-        width = max((cell_len(self._show(loss.criterion.id)) for loss in losses), default=0)
-        parts = [self._loss(loss, min(width, NAME_CELLS)) for loss in losses]
-        return self._section(title, [x for part in parts for x in (part, Text())][:-1])
 
     def _unrun(self, losses: tuple[Loss, ...], why: str) -> list[RenderableType]:
         points = number(sum(loss.points for loss in losses))
         still = f"criteria worth {points} points are still open" if losses else "nothing is open"
         return [Text(f"\nNothing was run ({why}): {still}.")]
 
-    def _loss(self, loss: Loss, width: int) -> RenderableType:
+    def _loss(self, loss: Loss, repaired: Sequence[str]) -> RenderableType:
+        """What was lost, as a compiler says it: the criterion and its place, the cause, the line of code, the fix."""
         c = loss.criterion
-        head = self._line(c, c.message or c.title, width)
-        rows = [("measured", c.measured), ("expected", c.expected), ("hint", c.hint), ("see", c.reproduce)]
-        rows.append(("where", ", ".join(places(c))))
-        rows.append(("also", ", ".join(f"{a.id} {points_of(a)}" for a in loss.alike)))
-        rows.append(("blocks", ", ".join(f"{b.id} {points_of(b)}" for b in loss.blocked)))
-        source = [Text(self._encoded(row)) for pair in pointed_at(c) for row in pair]
-        code = [Padding(Group(*source), (0, 0, 0, 4))] if source else []
-        return Group(head, Padding(self._rows(rows), (0, 0, 0, 4)), *code)
+        place, *others = file_places(c) or [""]
+        code = [self._code(row) for pair in pointed_at(c, self._source_chars) for row in pair]
+        alike = {a.id for a in loss.alike}
+        rows = [
+            ("expected", "" if code else c.expected),
+            ("fix", without_place(c.hint, place)),
+            ("also at", ", ".join(others)),
+            ("see", c.reproduce),
+            ("also costs", ", ".join(f"{a.id} {self._cost(a)}" for a in loss.alike)),
+            ("judged with it repaired", ", ".join(name for name in repaired if name not in alike)),
+            ("holds back", ", ".join(f"{b.id} {self._cost(b)}" for b in loss.blocked)),
+        ]
+        words = self._words(without_place(c.message, place) or c.title)
+        status = "" if c.status is Status.FAIL else c.status.value
+        return Group(self._line(c, status, self._cost(c), place), words, *code, *self._rows(rows))
+
+    def _cost(self, criterion: CriterionResult) -> str:
+        """`-5`; `0/5` where the points are not lost for good."""
+        if criterion.status.is_open:
+            return points_of(criterion)
+        minus = MINUS if self._encoded(MINUS) == MINUS else "-"
+        return f"{minus}{number(criterion.max_points - criterion.points)}"
 
     def _advice(self, criterion: CriterionResult) -> RenderableType:
-        head = self._line(criterion, criterion.message or criterion.title)
-        return Group(head, Padding(self._rows([("hint", criterion.hint)]), (0, 0, 0, 4)))
+        words = self._words(criterion.message or criterion.title)
+        return Group(self._line(criterion), words, *self._rows([("hint", criterion.hint)]))
 
     def _noticed(self, notes: tuple[Note, ...]) -> list[RenderableType]:
-        if not notes:
+        said = [self._words(f"{note_place(note)}: {note_text(note)}") for note in notes]
+        return [*said, Text(COSTS_NOTHING, "dim")] if notes else []
+
+    def _reached(self, result: GradingResult, unrun: str, *, full: bool) -> list[RenderableType]:
+        """Return how many criteria are reached; with `full`, each of those that were judged with what was measured."""
+        judged = [c for c in result.criteria if not unrun or not c.status.is_open]
+        reached = [c for c in judged if c.status is Status.PASS]
+        if full:
+            title = "All criteria that could be judged" if unrun else "All criteria"
+            return self._section(title, [self._measured(c) for c in judged])
+        if not reached:
             return []
-        return [
-            self._rows([(note_place(note), note_text(note)) for note in notes]),
-            Text(COSTS_NOTHING, "dim"),
-        ]
+        others = "" if len(reached) == len(result.criteria) else "other "
+        said = f"{plural(len(reached), f'{others}criterion', f'{others}criteria')} passed; --all shows them"
+        sign = mark(Status.PASS, self.console.encoding)
+        return [Text(f"\n{sign} {said}", STYLES[Status.PASS])]
 
-    def _line(self, criterion: CriterionResult, words: str, width: int = 0) -> RenderableType:
-        """`✗ chatter-rate  0/10  fail  /chatter came at 5.02 Hz, not 10 Hz`, wrapped in its column.
+    def _measured(self, criterion: CriterionResult) -> RenderableType:
+        measured = criterion.measured or (
+            criterion.title if criterion.status is Status.PASS else criterion.message
+        )
+        line = self._line(criterion, criterion.status.value, points_of(criterion))
+        return Group(line, self._words(measured, MEASURED_LIMIT))
 
-        Where too little room is left for the words, they stand below.
-        """
-        style = STYLES[criterion.status]
-        name = Text(f"{mark(criterion.status, self.console.encoding)} {self._show(criterion.id)}", style)
-        status = Text(criterion.status.value, style)
-        points = points_of(criterion)
-        room = self.console.width - max(name.cell_len, width + 2) - len(points) - len(status) - 6
-        if room < WORDS_CELLS:
-            head = Text.assemble(name, "  ", points, "  ", status)
-            return Group(head, Padding(Text(self._show(words)), (0, 0, 0, 4)))
-        grid = Table.grid(padding=(0, 2, 0, 0))
-        grid.add_column(no_wrap=True, min_width=width + 2)
-        grid.add_column(no_wrap=True, min_width=4)
-        grid.add_column(no_wrap=True)
-        grid.add_column(overflow="fold")
-        grid.add_row(name, Text(points), status, Text(self._show(words)))
-        return grid
+    def _line(self, criterion: CriterionResult, *more: str) -> RenderableType:
+        """`✗ chatter-rate  -10  src/talker.py:17`; the last stands below where there is no room for it."""
+        name = f"{mark(criterion.status, self.console.encoding)} {self._show(criterion.id)}"
+        style, rest = STYLES[criterion.status], [self._show(one) for one in more if one]
+        below = rest != [] and cell_len("  ".join([name, *rest])) > self.console.width
+        beside = "".join(f"  {one}" for one in (rest[:-1] if below else rest))
+        text = Text.assemble((name, style), (beside, "bold"), no_wrap=True, overflow="ignore")
+        return text.append(f"\n{' ' * INDENT}{rest[-1]}", "bold") if below else text
 
-    def _rows(self, rows: Iterable[tuple[str, str]]) -> Table:
-        grid = Table.grid(padding=(0, 2, 0, 0))
-        grid.add_column(style="dim", overflow="fold", max_width=self.console.width // 3)
-        grid.add_column(overflow="fold")
-        for name, value in rows:
-            if value:
-                grid.add_row(Text(self._show(name, NAME_LIMIT)), Text(self._show(value)))
-        return grid
+    def _words(
+        self, text: str, limit: int = LIMIT, *, name: str = "", indent: int = INDENT, style: str = ""
+    ) -> RenderableType:
+        """Return wrapped text in which no word is split, behind `name: `: it can be copied, and read aloud."""
+        label = f"{name}: " if name else ""
+        rows = wrap(label + self._show(text, limit), self.console.width - indent)
+        blank = " " * indent
+        shown = Text("\n".join(blank + row for row in rows), style, no_wrap=True, overflow="ignore")
+        shown.stylize("dim", indent, indent + len(label))
+        return shown
 
-    def _table(self, criteria: Iterable[CriterionResult]) -> Table:
-        table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False, header_style="dim", pad_edge=False)
-        table.add_column("points", justify="right", no_wrap=True)
-        table.add_column("status", no_wrap=True)
-        table.add_column("criterion", overflow="fold", max_width=self.console.width // 3)
-        table.add_column("measured", overflow="fold", ratio=1)
-        for c in criteria:
-            points = Text(points_of(c))
-            status = Text(f"{mark(c.status, self.console.encoding)} {c.status.value}", STYLES[c.status])
-            measured = c.measured or (c.title if c.status is Status.PASS else c.message)
-            table.add_row(points, status, Text(self._show(c.id)), Text(self._show(measured, MEASURED_LIMIT)))
-        return table
+    @property
+    def _source_chars(self) -> int:
+        """How much of a line of code has room beside its number."""
+        return min(SOURCE_CHARS, max(SOURCE_CHARS_MIN, self.console.width - INDENT - 10))
+
+    def _code(self, row: str) -> RenderableType:
+        return Text(" " * (INDENT + 2) + self._encoded(row), no_wrap=True, overflow="ignore")
+
+    def _rows(self, rows: Iterable[tuple[str, str]]) -> list[RenderableType]:
+        """Return `fix: …` for each row that says something: read aloud, a name belongs to its value."""
+        return [self._words(value, name=name) for name, value in rows if value]
 
     def _show(self, text: str, limit: int = LIMIT) -> str:
         """Harmless, of bounded length, and in characters that the terminal's encoding has."""
@@ -232,6 +287,25 @@ class Terminal:
 
     def _encoded(self, text: str) -> str:
         return text.encode(self.console.encoding, "backslashreplace").decode(self.console.encoding)
+
+
+def without_place(text: str, place: str) -> str:
+    """Return what is said of a place (`src/talker.py:17`) without naming it again at the beginning."""
+    file, _, number = place.rpartition(":")
+    beginnings = [f"{file}{comma} line {number}: " for comma in ("", ",")] if file else []
+    return next((text.removeprefix(one) for one in beginnings if text.startswith(one)), text)
+
+
+def wrap(text: str, width: int) -> list[str]:
+    """Return the text in lines of so many columns; a longer word stays whole, on a line of its own."""
+    rows = [""]
+    for word in text.split(" "):
+        row = f"{rows[-1]} {word}" if rows[-1] else word
+        if rows[-1] and cell_len(row) > width:
+            rows.append(word)
+        else:
+            rows[-1] = row
+    return rows
 
 
 def mark(status: Status, encoding: str) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from unicodedata import east_asian_width
 
 from grader.errors import PackageNotFound, SubmissionError
 from grader.judging.settle import lateness
+from grader.judging.summary import total_fields, total_points
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Citation, FileCitation, Status
 from grader.rubric.model import Rubric
@@ -21,7 +23,8 @@ SOURCE_CHARS = 60
 class Loss:
     """A criterion that was not reached, and those that it blocks (directly or through another).
 
-    `alike` are others that are open with the same advice: no ROS on a machine leaves a dozen of them.
+    `alike` are others of the same mistake, or that are open with the same advice: no ROS on a machine leaves a dozen
+    of them.
     """
 
     criterion: CriterionResult
@@ -31,7 +34,7 @@ class Loss:
     @property
     def points(self) -> float:
         """What it cost, the blocked ones included."""
-        return sum(c.max_points - c.points for c in (self.criterion, *self.blocked, *self.alike))
+        return sum(c.missing for c in (self.criterion, *self.blocked, *self.alike))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,13 +54,13 @@ def arrange(result: GradingResult, rubric: Rubric) -> ReportView:
     losses = [
         Loss(criterion=c, blocked=tuple(b for b in unreached if b is not c and roots[b.id] == c.id))
         for c in unreached
-        if c.id in causes or (roots[c.id] == c.id and c.max_points > 0)
+        if c.id in causes or (roots[c.id] == c.id and (c.is_required or (c.counts and c.status.is_open)))
     ]
     losses.sort(key=lambda loss: -loss.points)
     told = {c.id for loss in losses for c in (loss.criterion, *loss.blocked)}
     told |= {override.criterion for override in result.overrides}
     return ReportView(
-        lost=tuple(loss for loss in losses if not loss.criterion.status.is_open),
+        lost=_told_once([loss for loss in losses if not loss.criterion.status.is_open]),
         open=_folded([loss for loss in losses if loss.criterion.status.is_open]),
         advice=tuple(c for c in result.criteria if c.id not in told and _advises(c)),
     )
@@ -68,11 +71,32 @@ def _advises(criterion: CriterionResult) -> bool:
     return not criterion.status.is_open and bool(criterion.hint or criterion.status is not Status.PASS)
 
 
-def _folded(losses: list[Loss]) -> tuple[Loss, ...]:
-    """One entry for all that are open in the same way."""
-    groups: dict[tuple[Status, str], list[Loss]] = {}
+def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
+    """One entry for all that one mistake costs: those of the same line with the same advice, or of the same repairs.
+    What costs most in all comes first."""
+    asked_first = sorted(
+        losses, key=lambda loss: not (loss.criterion.repaired and loss.criterion.repaired.charged)
+    )
+    return tuple(sorted(_folded(asked_first, _mistake), key=lambda loss: -loss.points))
+
+
+def _mistake(loss: Loss) -> Hashable:
+    criterion = loss.criterion
+    if criterion.repaired is not None:
+        return criterion.repaired.repairs
+    lines = tuple(c for c in criterion.citations if isinstance(c, FileCitation) and c.line is not None)
+    return (criterion.hint, lines) if criterion.hint and lines else criterion.id
+
+
+def _open_alike(loss: Loss) -> Hashable:
+    return loss.criterion.status, loss.criterion.hint
+
+
+def _folded(losses: list[Loss], key: Callable[[Loss], Hashable] = _open_alike) -> tuple[Loss, ...]:
+    """One entry for all that have the same key."""
+    groups: dict[Hashable, list[Loss]] = {}
     for loss in losses:
-        groups.setdefault((loss.criterion.status, loss.criterion.hint), []).append(loss)
+        groups.setdefault(key(loss), []).append(loss)
     return tuple(
         replace(
             first,
@@ -111,8 +135,21 @@ def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric) -
 
 
 def points_of(criterion: CriterionResult) -> str:
-    """`5/10`."""
-    return f"{number(criterion.points)}/{number(criterion.max_points)}"
+    """`5/10`; `+5/+10` of a bonus, `-5` of a penalty, `not counted` of what its group leaves out."""
+    return of_points(criterion).replace(" of ", "/")
+
+
+def of_points(criterion: CriterionResult) -> str:
+    """`5 of 10`; `+5 of +10` of a bonus, `-5` of a penalty, `not counted` of what its group leaves out."""
+    if criterion.left_out is not None:
+        return "not counted"
+    if criterion.extra > 0:
+        return f"+{number(criterion.points)} of +{number(criterion.extra)}"
+    return (
+        number(criterion.points)
+        if criterion.extra
+        else f"{number(criterion.points)} of {number(criterion.max_points)}"
+    )
 
 
 def places(criterion: CriterionResult) -> list[str]:
@@ -120,30 +157,46 @@ def places(criterion: CriterionResult) -> list[str]:
     return [clip(_place(citation), PLACE_CHARS) for citation in criterion.citations[:CITATIONS_MAX]]
 
 
-def pointed_at(criterion: CriterionResult) -> list[tuple[str, str]]:
-    """Each line of a file in which a column is named, below its number, and the line with the caret below it:
+def file_places(criterion: CriterionResult) -> list[str]:
+    """Those of `places` that are files of the student's: `src/talker.py:17`."""
+    cited = [c for c in criterion.citations[:CITATIONS_MAX] if isinstance(c, FileCitation)]
+    return [clip(_place(citation), PLACE_CHARS) for citation in cited]
+
+
+def pointed_at(criterion: CriterionResult, chars: int = SOURCE_CHARS) -> list[tuple[str, str]]:
+    """Each line of a file whose text is known, behind its number, and carets below what is meant:
     `12 | print "hello"` and `   |       ^`."""
     cited = [c for c in criterion.citations[:CITATIONS_MAX] if isinstance(c, FileCitation)]
     found = []
     for citation in cited:
-        if citation.line is not None and (place := caret(citation)):
+        if citation.line is not None and (place := caret(citation, chars)):
             number = str(citation.line)
             text, below = place
             found.append((f"{number} | {text}", f"{' ' * len(number)} | {below}"))
     return found
 
 
-def caret(citation: FileCitation) -> tuple[str, str] | None:
-    """Return the visible text of the cited line, of `SOURCE_CHARS` around its column, and a caret for the line below;
-    None where there is no column."""
-    if citation.column is None or not citation.source.strip():
+def caret(citation: FileCitation, chars: int = SOURCE_CHARS) -> tuple[str, str] | None:
+    """Return the visible text of the cited line, `chars` of it around its column, and carets for the line below;
+    None where the text is not known. Without a column all of the text is meant."""
+    source = citation.source.rstrip()
+    if not source.strip():
         return None
-    before = citation.source[: max(citation.column, 1) - 1]
-    first = max(0, len(before) - SOURCE_CHARS // 2)
+    begin = (citation.column or len(source) - len(source.lstrip()) + 1) - 1
+    end = citation.end_column - 1 if citation.end_column else begin + 1 if citation.column else len(source)
+    first = max(0, begin - chars // 2) if end > chars else 0
     left = "…" if first else ""
-    text = left + visible(citation.source[first : first + SOURCE_CHARS].rstrip())
-    wide = sum(east_asian_width(c) in "WF" for c in before[first:])
-    return text, " " * (len(left + visible(before[first:])) + wide) + "^"
+    shown, meant = source[first : first + chars], source[begin : min(end, first + chars)]
+    right = "…" if len(source) > first + chars else ""
+    return left + visible(shown) + right, " " * _cells(left + source[first:begin]) + "^" * max(
+        1, _cells(meant)
+    )
+
+
+def _cells(text: str) -> int:
+    """Return how many columns of a terminal the visible text takes."""
+    shown = visible(text)
+    return len(shown) + sum(east_asian_width(letter) in "WF" for letter in shown)
 
 
 def _place(citation: Citation) -> str:
@@ -168,24 +221,25 @@ def without_hidden(result: GradingResult, rubric: Rubric) -> GradingResult:
     if len(shown) == len(result.criteria):
         return result
     decided = tuple(o for o in result.overrides if o.criterion not in hidden)
-    points = round(sum(c.points for c in shown), rubric.digits)
     visible = rubric.model_copy(update={"criteria": tuple(c for c in rubric.criteria if c.id not in hidden)})
+    points = total_points(visible, shown)
     late = lateness(points, visible, result.late) if result.late else None
     update = {
+        **total_fields(visible, shown),
         "criteria": shown,
         "overrides": decided,
         "late": late,
         "points": late.points if late else points,
-        "max_points": sum(c.max_points for c in shown),
+        "max_points": round(sum(c.max_points for c in shown), 6),
         "status": _status(result, shown, {o.criterion for o in decided}),
     }
     return result.model_copy(update=update)
 
 
 def _status(result: GradingResult, shown: tuple[CriterionResult, ...], decided: set[str]) -> str:
-    if result.error and any(c.max_points > 0 and c.id not in decided for c in shown):
+    if result.error and any(c.counts and c.id not in decided for c in shown):
         return "error"
-    statuses = {c.status for c in shown if c.max_points > 0}
+    statuses = {c.status for c in shown if c.counts}
     if not statuses or Status.ERROR in statuses:
         return "error"
     return "inconclusive" if statuses & {Status.INCONCLUSIVE, Status.MANUAL} else "graded"

@@ -19,6 +19,7 @@ from grader.wording import did_you_mean
 TOTAL_POINTS = 100
 ANSWERS = "service-answers"
 MANUAL = "manual"  # a person gives the points, no check does
+KINDS_OF_POINTS = ("points", "bonus", "penalty")
 KINDS_OF_START = ("script", "launch", "load", "program", "built")
 STRING = "std_msgs/String"
 INTEGERS = {
@@ -46,6 +47,8 @@ def cross_faults(data: object, checks: Mapping[str, Check], *, complete: bool = 
     faults += _names(criteria)
     faults += _circles(criteria)
     faults += _points(rubric, criteria)
+    faults += _groups(rubric, criteria)
+    faults += _gates(rubric, criteria)
     faults += _late(rubric)
     faults += reference_faults(rubric, checks)
     return faults
@@ -138,16 +141,95 @@ def _circle(start: str, needs: dict[str, list[str]]) -> list[str]:
 
 
 def _points(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
-    points = [c.get("points") for _, c in criteria]
-    numbers = [p for p in points if isinstance(p, int | float) and not isinstance(p, bool)]
-    if not numbers or len(numbers) < len(points):
+    for index, criterion in criteria:
+        given = [key for key in KINDS_OF_POINTS if criterion.get(key) is not None]
+        if not given:
+            yield ("criteria", index, "points"), "is missing (or bonus, or penalty)"
+        elif len(given) > 1:
+            yield (
+                ("criteria", index, given[1]),
+                f"give one of points, bonus and penalty, not {' and '.join(given)}",
+            )
+    given_points = [c.get("points", 0) for _, c in criteria]
+    if not all(_is_number(points) for points in given_points):
         return
-    total = sum(numbers)
+    total = _total(rubric, criteria)
     if abs(total - TOTAL_POINTS) > 1e-6:
         yield ("criteria",), f"the points add up to {total:g}, not to {TOTAL_POINTS}"
     mark = rubric.get("pass_mark")
     if isinstance(mark, int | float) and mark > total:
         yield ("pass_mark",), f"{mark:g} is more than all the points, {total:g}"
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _total(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) -> float:
+    """Return the most points that can be reached: those of a group in place of its criteria's."""
+    worth = {str(c.get("id")): float(c.get("points", 0)) for _, c in criteria}
+    total = 0.0
+    for group in map(as_map, as_map(rubric.get("groups")).values()):
+        found = [worth.pop(name, 0.0) for _, name in as_texts(group.get("criteria"))]
+        best, points = group.get("best"), group.get("points")
+        counted = sum(found[:best] if isinstance(best, int) else found)
+        total += points if isinstance(points, int | float) else counted
+    return total + sum(worth.values())
+
+
+def _groups(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+    """A criterion is in one group at most, and those of which the best count are alike."""
+    known = {str(c.get("id")): c for _, c in criteria}
+    other: dict[str, str] = {}
+    for name, group in as_map(rubric.get("groups")).items():
+        members = as_texts(as_map(group).get("criteria"))
+        for index, member in members:
+            at = ("groups", name, "criteria", index)
+            if member not in known:
+                yield at, f'there is no criterion "{member}"{did_you_mean(member, known)}'
+            elif member in other:
+                yield at, f'"{member}" is in the group "{other[member]}" already'
+            elif not known[member].get("points"):
+                yield at, f'"{member}" has no points that a group could count'
+            other.setdefault(member, name)
+        found = [known[m] for _, m in members if m in known]
+        yield from _best(("groups", name), as_map(group), found, rubric.get("digits", 1))
+
+
+def _best(
+    path: KeyPath, group: dict[str, Any], criteria: list[dict[str, Any]], digits: object
+) -> Iterator[Fault]:
+    best, points = group.get("best"), group.get("points")
+    if not isinstance(best, int) or best < 1:
+        return
+    if best >= len(criteria) > 0:
+        yield (*path, "best"), f"{best} of {len(criteria)} is all of them"
+    if isinstance(points, int | float) and isinstance(digits, int):
+        share = points * 10.0**digits / best
+        if abs(share - round(share)) > 1e-6:
+            yield (*path, "points"), f"{points:g} points cannot be shared out evenly to the best {best}"
+    for key, default in (("points", None), ("visibility", "visible")):
+        if len({str(c.get(key, default)) for c in criteria}) > 1:
+            yield (*path, "criteria"), f"need the same {key}, for only the best of them count"
+
+
+def _gates(rubric: dict[str, Any], criteria: list[tuple[int, dict[str, Any]]]) -> Iterator[Fault]:
+    known = {str(c.get("id")): c for _, c in criteria}
+    for index, gate in as_maps(rubric.get("gates")):
+        name, at_most = gate.get("criterion"), gate.get("at_most")
+        if isinstance(name, str) and name not in known:
+            near = did_you_mean(name, known)
+            yield ("gates", index, "criterion"), f'there is no criterion "{name}"{near}'
+        elif isinstance(name, str) and known[name].get("visibility") == "hidden":
+            yield (
+                ("gates", index, "criterion"),
+                f'"{name}" is hidden: students could not see why points are missing',
+            )
+        if isinstance(at_most, int | float) and at_most >= TOTAL_POINTS:
+            yield (
+                ("gates", index, "at_most"),
+                f"{at_most:g} keeps nothing away: the rubric has {TOTAL_POINTS} points",
+            )
 
 
 def _late(rubric: dict[str, Any]) -> Iterator[Fault]:

@@ -11,6 +11,7 @@ from typing import Annotated, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from grader.checks.parameter_docs import UNITS
 from grader.rubric.model import NAME_PATTERN, PROGRAM_PATTERN, TYPE_PATTERN
 from grader.rubric.source import Fault, KeyPath
 from grader.wording import did_you_mean, shorten
@@ -22,7 +23,6 @@ PATTERN_RULES = {
 }
 TIME = "a time with its zone, such as 2026-11-20T23:59:00+01:00"
 DAY = "a day such as 2026-11-02"
-UNITS = {"hz": "Hz", "s": "seconds", "m": "metres"}
 _NUMBER_AND_UNIT = re.compile(r"\s*(-?\d+(?:\.\d+)?)\s*([A-Za-z%]*)\s*")
 MUST_BE = {
     "string_type": "text",

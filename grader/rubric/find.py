@@ -1,14 +1,37 @@
-"""Where rubrics are: `rubrics/` of a checkout, or what travels inside the wheel."""
+"""Where rubrics are: those that come with the grader, and folders of the user's own.
+
+`rubrics/` of a checkout, or what travels inside the wheel; then the folders of `$GRADER_RUBRICS`, then those that
+`grader labs --add` has written down. Nothing is looked for where a submission lies: all of these are absolute paths.
+"""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
-from grader.errors import RubricError
+from grader.errors import RubricError, UsageError
+from grader.files import atomic_write
+from grader.rubric.source import text_at
 from grader.wording import did_you_mean
 
 PACKAGE = Path(__file__).resolve().parent.parent
 SUFFIXES = (".yaml", ".yml")
+VARIABLE = "GRADER_RUBRICS"
+SCHEMA = "grader.rubric/"
+BUILT_IN = "the grader"
+
+
+class LabFile(NamedTuple):
+    """A rubric by its id; `package` is empty where the file cannot be read. `source` says where it was found: a folder
+    of the user's, or `the grader`."""
+
+    id: str
+    path: Path
+    package: str
+    source: str = BUILT_IN
 
 
 def rubrics_folder() -> Path:
@@ -24,18 +47,112 @@ def rubric_ids() -> tuple[str, ...]:
     return tuple(sorted(p.stem for p in rubrics_folder().glob("*.yaml")))
 
 
+def own_folders() -> tuple[Path, ...]:
+    """Return the folders in which the user's own labs are. Raises UsageError for a path that is not absolute."""
+    named = [Path(entry) for entry in os.environ.get(VARIABLE, "").split(os.pathsep) if entry]
+    relative = next((path for path in named if not path.is_absolute()), None)
+    if relative is not None:
+        raise UsageError(
+            f"${VARIABLE} names {relative}, which is not an absolute path",
+            hint="what is found must not depend on the folder that the grader is started in",
+        )
+    return tuple(dict.fromkeys([*named, *_written_down()]))
+
+
+def add_folder(folder: Path) -> Path:
+    """Write a folder down, and return its absolute path. Raises UsageError where there is no rubric in it."""
+    absolute = folder.expanduser().resolve()
+    if not any(_rubrics_in(absolute)):
+        raise UsageError(
+            f"{folder} has no rubric in it", hint="give the folder in which your rubrics' files are"
+        )
+    _write_down([*(path for path in _written_down() if path != absolute), absolute])
+    return absolute
+
+
+def remove_folder(folder: Path) -> Path:
+    """Take a folder out again, and return its absolute path. Raises UsageError where it was not written down."""
+    absolute = folder.expanduser().resolve()
+    there = _written_down()
+    if absolute not in there:
+        raise UsageError(f"{absolute} is not among your folders of labs", hint="grader labs lists them")
+    _write_down([path for path in there if path != absolute])
+    return absolute
+
+
+def config_file() -> Path:
+    """Return the file that holds these folders, one a line, as the XDG base directory specification places it."""
+    named = Path(os.environ.get("XDG_CONFIG_HOME", ""))
+    home = named if named.is_absolute() else Path(os.path.expanduser("~"), ".config")  # noqa: PTH111 - never raises
+    return home / "grader" / "rubrics"
+
+
+def known_labs() -> tuple[LabFile, ...]:
+    """Return all labs: those that come with the grader in order of their ids, then the user's own."""
+    return (*_built_in(rubrics_folder()), *(lab for place in own_folders() for lab in _rubrics_in(place)))
+
+
+@cache
+def _built_in(folder: Path) -> tuple[LabFile, ...]:
+    paths = [folder / f"{name}.yaml" for name in rubric_ids()]
+    return tuple(LabFile(path.stem, path, _text(path, "package")) for path in paths)
+
+
 def locate(name_or_path: str) -> tuple[Path, str]:
-    """Return the rubric's file, and the name that messages give it. Raises RubricError."""
-    if name_or_path in rubric_ids():
-        path = rubrics_folder() / f"{name_or_path}.yaml"
-        return path, _short(path)
+    """Return the rubric's file, and the name that messages give it. Raises RubricError, and UsageError where several
+    labs have that id."""
     path = Path(name_or_path)
-    if path.suffix in SUFFIXES or "/" in name_or_path or path.is_file():
+    if path.suffix in SUFFIXES or "/" in name_or_path:
+        return path, name_or_path
+    known = known_labs()
+    found = [lab.path for lab in known if lab.id == name_or_path]
+    if len(found) > 1:
+        paths = ", ".join(_short(path) for path in found)
+        raise UsageError(
+            f"{len(found)} labs are called {name_or_path}: {paths}",
+            hint="give the file, or another id to one of them",
+        )
+    if found:
+        return found[0], _short(found[0])
+    if path.is_file():
         return path, name_or_path
     raise RubricError(
-        [f'there is no rubric "{name_or_path}"{did_you_mean(name_or_path, rubric_ids())}'],
+        [f'there is no rubric "{name_or_path}"{did_you_mean(name_or_path, [lab.id for lab in known])}'],
         hint="grader labs lists the rubrics; a rubric of your own is given by its file name",
     )
+
+
+def _rubrics_in(folder: Path) -> Iterator[LabFile]:
+    """Yield the rubrics in a folder, and one level below it. Other YAML files are left out."""
+    try:
+        paths = sorted(
+            p for p in (*folder.glob("*"), *folder.glob("*/*")) if p.suffix in SUFFIXES and p.is_file()
+        )
+    except OSError:
+        return
+    for path in paths:
+        schema, package = _text(path, "schema"), _text(path, "package")
+        if schema.startswith(SCHEMA) or (not schema and package):
+            yield LabFile(_text(path, "id") or path.stem, path, package, str(folder))
+
+
+def _text(path: Path, key: str) -> str:
+    try:
+        return text_at(path, path.name, key)
+    except RubricError:  # named where the rubric is loaded
+        return ""
+
+
+def _written_down() -> tuple[Path, ...]:
+    try:
+        lines = config_file().read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return ()
+    return tuple(Path(line) for line in lines if line.startswith("/"))
+
+
+def _write_down(folders: list[Path]) -> None:
+    atomic_write(config_file(), "".join(f"{folder}\n" for folder in folders).encode())
 
 
 def _short(path: Path) -> str:

@@ -23,6 +23,7 @@ from typing import TextIO
 from grader.checks import CHECKS, Check
 from grader.checks.registry import collecting
 from grader.model.verdict import Verdict
+from grader.rubric.course_packages import read_packages
 from grader.rubric.pytest_check import BAG, PYTHON, FileFault, pytest_check, read_beside
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps
 from grader.rubric.steps import bag_faults, played_bags
@@ -46,7 +47,7 @@ class Beside:
 
 
 def read_instructor(data: object, folder: Path) -> Beside:
-    """Reads what `checks:`, `check: pytest` and steps that play name, and runs the file of checks."""
+    """Read what `checks:`, `packages:`, `check: pytest` and steps that play name, and run the file of checks."""
     rubric = as_map(data)
     named: list[tuple[KeyPath, object]] = [(("checks",), rubric["checks"])] if "checks" in rubric else []
     named += [
@@ -56,8 +57,7 @@ def read_instructor(data: object, folder: Path) -> Beside:
     ]
     played = played_bags(rubric)
     named += [(path, play.get("bag")) for path, play in played.items()]
-    files: dict[str, bytes] = {}
-    faults: list[Fault] = []
+    files, faults = read_packages(rubric, folder)
     own = OwnChecks(complete=rubric.get("checks") is None)
     for path, name in named:
         if not isinstance(name, str):
@@ -119,6 +119,7 @@ def _run(path: Path, raw: bytes) -> LineFault | None:
     """Run the file as a module of its own, which stays: records of parameters look their types up in it."""
     name = f"grader_own_{hashlib.sha256(str(path).encode() + raw).hexdigest()[:16]}"
     module = importlib.util.module_from_spec(ModuleSpec(name, _Loader(path, raw), origin=str(path)))
+    module.__file__ = str(path)
     sys.modules[name] = module
     try:
         assert module.__spec__ is not None  # noqa: S101 - made two lines above

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Collection, Mapping
-from functools import cache
 from pathlib import Path, PurePosixPath
 
 from grader.checks import Check
@@ -14,10 +13,10 @@ from grader.model.record import Record
 from grader.model.version import RUBRIC, UPDATE, Versioned
 from grader.rubric.consistency import cross_faults
 from grader.rubric.faults import model_faults
-from grader.rubric.find import locate, rubric_ids, rubrics_folder
+from grader.rubric.find import BUILT_IN, known_labs, locate, rubric_ids, rubrics_folder
 from grader.rubric.instructor import Beside, known_checks, read_instructor, run_checks_file
 from grader.rubric.model import Criterion, Rubric
-from grader.rubric.source import Source, read_source, text_at
+from grader.rubric.source import Source, read_source
 
 
 class LoadedRubric(Record):
@@ -57,9 +56,42 @@ def load_rubric(name_or_path: str) -> LoadedRubric:
     faults = _faults(source, beside)
     if faults:
         raise RubricError(faults)
-    rubric = Rubric.model_validate_json(json.dumps(source.data), strict=True)
+    rubric = share_points(Rubric.model_validate_json(json.dumps(source.data), strict=True))
     own = beside.files[rubric.checks] if rubric.checks is not None else None
     return LoadedRubric(rubric=rubric, path=path, digest=_digest(source.raw, beside), own=own)
+
+
+def share_points(rubric: Rubric) -> Rubric:
+    """Return the rubric with the points of each group shared out to its criteria by their weights.
+
+    Shares are rounded down to the rubric's digits; what is left goes, a step at a time, to those that lost most by it.
+    """
+    weights = {c.id: c.points for c in rubric.criteria}
+    for group in rubric.groups.values():
+        if group.points is not None:
+            counted = group.best or len(group.criteria)
+            whole = group.points * len(group.criteria) / counted
+            weights |= _shares(whole, {name: weights[name] for name in group.criteria}, rubric.digits)
+    criteria = tuple(c.model_copy(update={"points": weights[c.id]}) for c in rubric.criteria)
+    return rubric.model_copy(update={"criteria": criteria})
+
+
+def _shares(whole: float, weights: dict[str, float], digits: int) -> dict[str, float]:
+    steps = round(whole * 10**digits)
+    exact = {name: steps * weight / sum(weights.values()) for name, weight in weights.items()}
+    shares = {name: int(share + 1e-9) for name, share in exact.items()}
+    for name in sorted(exact, key=lambda name: shares[name] - exact[name])[: steps - sum(shares.values())]:
+        shares[name] += 1
+    return {name: share / 10**digits for name, share in shares.items()}
+
+
+def read_beside_rubric(rubric: LoadedRubric) -> dict[str, bytes]:
+    """Return the files that a rubric brings along, by their paths from its folder: checks, tests, recordings, packages.
+
+    Raises RubricError where its file is not there any more.
+    """
+    source = read_source(rubric.path, rubric.path.name)
+    return read_instructor(source.data, rubric.path.parent).files
 
 
 def refuse_newer(source: Source, known: Versioned) -> None:
@@ -84,29 +116,18 @@ def all_rubrics() -> tuple[LoadedRubric, ...]:
 
 def find_rubric_for_package(name: str) -> str | None:
     """Return the id of the rubric for a package of that name, or None. Raises UsageError where there are several."""
-    found = [
-        rubric_id
-        for rubric_id, package in _packages(rubrics_folder()).items()
-        if package.lower() == name.lower()
-    ]
+    found = [lab for lab in known_labs() if lab.package.lower() == name.lower()]
     if len(found) > 1:
+        labs = ", ".join(lab.id if lab.source == BUILT_IN else f"{lab.id} ({lab.path})" for lab in found)
         raise UsageError(
-            f"{len(found)} rubrics are for a package named {name}: {', '.join(found)}",
-            hint="choose one with --rubric",
+            f"{len(found)} rubrics are for a package named {name}: {labs}", hint="choose one with --rubric"
         )
-    return found[0] if found else None
+    return found[0].id if found else None
 
 
 def packages_of_labs() -> dict[str, str]:
-    """By the id of each rubric that comes with the grader, the package that it is for."""
-    return dict(_packages(rubrics_folder()))
-
-
-@cache
-def _packages(folder: Path) -> dict[str, str]:
-    """The package of each rubric that comes with the grader: one line of its file, so the rest is not read."""
-    files = {name: folder / f"{name}.yaml" for name in rubric_ids()}
-    return {name: text_at(path, path.name, "package") for name, path in files.items()}
+    """By the id of each lab that is known here, the package that it is for."""
+    return {lab.id: lab.package for lab in known_labs()}
 
 
 def _faults(source: Source, beside: Beside) -> list[str]:

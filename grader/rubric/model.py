@@ -16,6 +16,7 @@ Share = Annotated[float, Field(ge=0, le=1)]
 NAME_PATTERN = r"^[a-z][a-z0-9-]*$"
 PROGRAM_PATTERN = r"^[A-Za-z][\w-]*/[\w.-]+$"
 TYPE_PATTERN = r"^[A-Za-z]\w*/[A-Za-z]\w*$"
+PACKAGE_PATTERN = r"^[A-Za-z]\w*$"
 MESSAGES_MAX = 10_000
 LINE_CHARS_MAX = 1_000
 TF_TYPE = "tf2_msgs/TFMessage"
@@ -35,95 +36,120 @@ def _of_these_times(time: datetime) -> datetime:
 Deadline = Annotated[AwareDatetime, AfterValidator(_of_these_times)]
 
 
-class Start(Record):
-    """A process of a run. Give one of `script`, `launch`, `load`, `program` and `built`.
+def _service_text(text: str | None) -> str | None:
+    if text is not None and sum(line.strip() == "---" for line in text.splitlines()) != 1:
+        raise ValueError("a service has a request and a response with one line --- between them")
+    return text
 
-    `script` is the student's file and the place where the handout wants it (`src/numeric_talker.py`); it is found
-    under `scripts/`, `src/` and anywhere else in the package too. `launch` is the launch file's name. `load` is a
-    YAML file that `rosparam load` puts on the parameter server. `program` is a node of another package, as `rosrun`
-    takes it (`turtlesim/turtlesim_node`): it is the grader's, and what it does never counts as the student's.
-    `built` starts every program that the build made (`add_executable`), as processes `<name>/<program>`.
-    `after` names an earlier start: this one waits until a node of that one is registered.
-    """
+
+class Start(Record):
+    """A process of a run. Give one of `script`, `launch`, `load`, `program` and `built`."""
 
     name: Name
+    """What the rubric's criteria and steps call the process."""
     script: str | None = None
+    """The student's file, at the place where the handout wants it: `src/talker.py`. It is found under `scripts/`,
+    `src/` and anywhere else in the package too. A C++ program by its name."""
     launch: str | None = None
+    """The launch file's name, in whatever folder of the package it lies."""
     load: str | None = None
+    """A YAML file that `rosparam load` puts on the parameter server."""
     program: Annotated[str, Field(pattern=PROGRAM_PATTERN)] | None = None
+    """A node of another package, as `rosrun` takes it (`turtlesim/turtlesim_node`), or a launch file of one
+    (`course_sim/world.launch`). It is the grader's, and what it does never counts as the student's."""
     built: bool = False
+    """Start every program that the build made (`add_executable`), as processes `<name>/<program>`."""
     args: tuple[str, ...] = ()
+    """Arguments, as for `rosrun` or `roslaunch`: `["_rate:=5", "robot:=burger"]`."""
     after: Name | None = None
+    """The name of an earlier start: this one waits until a node of that one is registered."""
 
 
 class Param(Record):
-    """Parameters that are set before anything starts. Give `file`, or `name` with `value` or `made_up`.
-
-    `file` is a YAML file of the student's, read as `rosparam load` would, each of its values replaced by one of the
-    same type that the grader makes up for this run. Names of `also` that the file lacks get made-up values too.
-    `made_up` is the type of a value for `name` that no one can guess.
-    """
+    """A parameter that is set before anything starts. Give `file`, or `name` with `value` or `made_up`."""
 
     name: str | None = None
+    """The parameter, with its slash."""
     value: Any = None
+    """Its value, as in YAML."""
     made_up: Literal["text", "integer", "number"] | None = None
+    """The type of a value for `name` that no one can guess."""
     file: str | None = None
+    """A YAML file of the student's, read as `rosparam load` would; each of its values is replaced by one of the same
+    type that the grader makes up for this run."""
     also: tuple[str, ...] = ()
+    """Names that get made-up values too where the file lacks them."""
 
 
 class Probe(Record):
     """Messages that the grader publishes once the student's node has subscribed.
 
-    `type` is any message type of ROS's own packages. Made up for this run: `text` random strings (of four and
-    more, one comes twice running), `integers` random values of the type's range; they are shuffled together with the
-    values of `among`. `values` are sent as they stand and in their order, `times` times over: the field `data`, or a
-    map of the message's fields.
+    What is made up is shuffled together with `among`; `values` come after it.
     """
 
     topic: str
+    """The topic, with its slash: `/chatter`."""
     type: Annotated[str, Field(pattern=TYPE_PATTERN)]
+    """Any message type of ROS's own packages: `std_msgs/String`."""
     text: Annotated[int, Field(ge=0)] = 0
+    """So many random strings; of four and more, one comes twice running."""
     integers: Annotated[int, Field(ge=0)] = 0
+    """So many random values of the type's range."""
     among: tuple[int, ...] = ()
+    """Values that have to be among the random ones."""
     values: tuple[Any, ...] = ()
+    """Sent as they stand and in their order: the field `data`, or a map of the message's fields."""
     times: Annotated[int, Field(ge=1, le=10_000)] = 1
+    """How often `values` are sent, one round after the other."""
     rate_hz: Annotated[float, Field(gt=0, le=100)] = 10.0
+    """Messages each second."""
 
 
 class Call(Record):
-    """A service that the grader calls `delay_s` after it is offered, after the probes and the calls before it.
-
-    Fields that `request` lacks are zero.
-    """
+    """A service that the grader calls once it is offered, after the probes and the calls before it."""
 
     service: str
+    """The service, with its slash: `/add`."""
     type: Annotated[str, Field(pattern=TYPE_PATTERN)]
+    """As `rosservice type` gives it: `std_srvs/Trigger`."""
     request: Annotated[dict[str, Any], Field(default_factory=dict)]
+    """The request's fields; those that it lacks are zero."""
+    definition: Annotated[str | None, AfterValidator(_service_text)] = None
+    """The handout's text of a `.srv` that students write themselves: where theirs has other fields, types or another
+    order, the service is not called, and the reason is said."""
     delay_s: Seconds = 0.0
+    """How long after the service is offered."""
 
 
 class Publish(Record):
     """Messages on one topic. Give `value`, the same each time, or `values`, which take turns.
 
-    `type` is a message type of ROS's, of the student's package or of one that is installed. A value is the field
-    `data`, or a map of the message's fields; what it leaves out is zero. In it, `now`, `now-2` and `now+0.5` (seconds)
-    are stamps, `.inf` and `.nan` are floats, `{from: 0, to: 1}` is a number that goes evenly from the first message to
-    the last, `{each: […]}` takes its items in turn, one for each message, and
-    `{repeat: .inf, count: 360, except: {"150-210": 0.3}}` is an array. `count` messages are sent at `rate_hz`, or
-    those of `duration_s`; without either, each value once. With `background`, the next steps begin at once; without
-    count and duration it then lasts until the run ends. Sending begins once a node has subscribed, and with
-    `latched` at once.
+    A value is the field `data`, or a map of the message's fields; what it leaves out is zero. In it, `now`, `now-2`
+    and `now+0.5` (seconds) are stamps, `.inf` and `.nan` are floats, `{from: 0, to: 1}` is a number that goes evenly
+    from the first message to the last, `{each: […]}` takes its items in turn, one for each message, and `{repeat:
+    .inf, count: 360, except: {"150-210": 0.3}}` is an array. Without `count` and `duration_s` each value is sent
+    once. Sending begins once a node has subscribed, and with `latched` at once.
     """
 
     topic: str
+    """The topic, with its slash: `/chatter`."""
     type: Annotated[str, Field(pattern=TYPE_PATTERN)]
+    """A message type of ROS's, of the student's package or of one that is installed."""
     value: Any = None
+    """What each message holds."""
     values: tuple[Any, ...] = ()
+    """What the messages hold, in turn."""
     rate_hz: Annotated[float, Field(gt=0, le=100)] = 10.0
+    """Messages each second."""
     count: Annotated[int, Field(ge=1, le=MESSAGES_MAX)] | None = None
+    """How many messages."""
     duration_s: StepSeconds | None = None
+    """How long to send."""
     latched: bool = False
+    """Whether the last message is kept for nodes that subscribe later."""
     background: bool = False
+    """Whether the next steps begin at once, beside this one. Without `count` and `duration_s` it lasts until the run
+    ends."""
 
     @property
     def in_turn(self) -> tuple[Any, ...]:
@@ -141,71 +167,83 @@ class Publish(Record):
 
 
 class Wait(Record):
-    """Give one of `seconds`, `topic` and `node`.
-
-    `seconds` are those of the run's clock. `topic`: until it has had so many `messages` in the run, or with `new`
-    since this step began. `node`: until a node of that name is registered. After `limit_s` (without it, the
-    `first_message_s` of `until`) the run goes on without it.
-    """
+    """A pause. Give one of `seconds`, `topic` and `node`."""
 
     seconds: StepSeconds | None = None
+    """So long by the run's clock."""
     topic: str | None = None
+    """Until this topic has had its messages."""
     messages: Annotated[int, Field(ge=1, le=MESSAGES_MAX)] = 1
+    """How many messages the topic has to have had in the run."""
     new: bool = False
+    """Whether only messages since this step began count."""
     node: str | None = None
+    """Until a node of this name is registered."""
     limit_s: StepSeconds | None = None
+    """After so long the run goes on without it; null: the `first_message_s` of `until`."""
 
 
 class Action(Record):
-    """A goal for an action server (actionlib), once it listens, until its result comes.
-
-    `type` is that of the `.action` file: `lab6/Count`. `cancel_after_s` cancels the goal so long after it was sent,
-    where no result has come by then. Without a result within `limit_s`, the run goes on.
-    """
+    """A goal for an action server (actionlib), once it listens, until its result comes."""
 
     name: str
+    """The name of the action, with its slash."""
     type: Annotated[str, Field(pattern=TYPE_PATTERN)]
+    """That of the `.action` file: `lab6/Count`."""
     goal: Annotated[dict[str, Any], Field(default_factory=dict)]
+    """The goal's fields; those that it lacks are zero."""
     cancel_after_s: StepSeconds | None = None
+    """Cancels the goal so long after it was sent, where no result has come by then; null: never."""
     limit_s: StepSeconds = 30.0
+    """Without a result within this, the run goes on."""
 
 
 class Play(Record):
-    """A recording (`.bag` or `.mcap`, 20 MB at most) beside the rubric, with its messages as they are, stamps too.
+    """A recording beside the rubric, with its messages as they are, stamps too.
 
-    `topics` are those that are played, all but `/clock` and `/rosout` where none is given; `speed` 2 is twice as fast.
-    With `background`, the next steps begin at once. Playing begins once a node has subscribed to one of the topics.
+    Playing begins once a node has subscribed.
     """
 
     bag: Annotated[str, Field(min_length=1)]
+    """The file: `.bag` or `.mcap`, 20 MB at most."""
     topics: tuple[str, ...] = ()
+    """Those that are played; empty: all but `/clock` and `/rosout`."""
     speed: Annotated[float, Field(gt=0, le=100)] = 1.0
+    """2 is twice as fast."""
     background: bool = False
+    """Whether the next steps begin at once, beside this one."""
 
 
 class SetParam(Record):
     """A parameter that is set in the middle of a run, on the parameter server."""
 
     name: Annotated[str, Field(min_length=1)]
+    """The parameter, with its slash."""
     value: Any
+    """Its value, as in YAML."""
 
 
 class Transform(Record):
-    """Where the frame `child` is in the frame `parent`, on `/tf`; with `static`, latched on `/tf_static`.
-
-    `translation` is x, y, z in metres, `rotation_deg` roll, pitch and yaw in degrees, as tf's are. Each may be a number
-    that changes, `{from: 0, to: 90}`. It is sent as `publish` sends: `rate_hz`, `count` or `duration_s`, `background`.
-    """
+    """Where one frame is in another, on `/tf`, or latched on `/tf_static`. Numbers may change as `publish` has them."""
 
     parent: Annotated[str, Field(min_length=1)]
+    """The frame in which it is."""
     child: Annotated[str, Field(min_length=1)]
+    """The frame that is placed."""
     translation: Annotated[tuple[Any, ...], Field(min_length=3, max_length=3)] = (0, 0, 0)
+    """x, y, z in metres; each may be a number that changes, `{from: 0, to: 1}`."""
     rotation_deg: Annotated[tuple[Any, ...], Field(min_length=3, max_length=3)] = (0, 0, 0)
+    """Roll, pitch and yaw in degrees, as tf's are; each may be a number that changes."""
     static: bool = False
+    """Whether it is sent once, latched, on `/tf_static`."""
     rate_hz: Annotated[float, Field(gt=0, le=100)] = 20.0
+    """Messages each second."""
     count: Annotated[int, Field(ge=1, le=MESSAGES_MAX)] | None = None
+    """How many messages."""
     duration_s: StepSeconds | None = None
+    """How long to send."""
     background: bool = False
+    """Whether the next steps begin at once, beside this one."""
 
     @property
     def published(self) -> Publish:
@@ -232,31 +270,43 @@ class Typed(Record):
     """A line on the standard input of a process. Only processes that a step types to have one."""
 
     process: Name
+    """The scenario's name for the process."""
     line: Annotated[str, Field(max_length=LINE_CHARS_MAX)]
+    """The line, without its end."""
 
 
 class Step(Record):
     """One thing that the grader does in a run, after the probes, the calls and the steps before it. Give one key.
 
-    `start`, `stop` (Ctrl-C), `kill` (SIGKILL) and `restart` (stop and start) name one of the scenario's `start`. What
-    a step starts before anything else names it is not started with the others.
-
-    What it did is in the evidence (`/grader/actor`). When no student's process runs any more, and no later step starts
-    one, the steps that are left are left out.
+    `start`, `stop`, `kill` and `restart` name one of the scenario's `start`. What a step starts before anything else
+    names it is not started with the others. What a step did is in the evidence (`/grader/actor`). When no student's
+    process runs any more, and no later step starts one, the steps that are left are left out.
     """
 
     publish: Publish | None = None
+    """Send messages."""
     wait: Wait | None = None
+    """Wait for a time, a topic or a node."""
     call: Call | None = None
+    """Call a service."""
     action: Action | None = None
+    """Send a goal to an action server."""
     start: Name | None = None
+    """Start this process."""
     stop: Name | None = None
+    """End this process as Ctrl-C does."""
     kill: Name | None = None
+    """End this process at once (SIGKILL)."""
     restart: Name | None = None
+    """Stop and start this process."""
     type: Typed | None = None
+    """Type a line to a process."""
     set_param: SetParam | None = None
+    """Set a parameter."""
     transform: Transform | None = None
+    """Say where a frame is (tf)."""
     play: Play | None = None
+    """Play a recording."""
 
     @property
     def published(self) -> Publish | None:
@@ -273,56 +323,69 @@ class Step(Record):
 
 
 class Until(Record):
-    """When a run has seen enough. All conditions that are given must hold.
+    """When a run has seen enough. All conditions that are given must hold; with none, it is watched for `limit_s`.
 
-    `window_s`: that long after the first message on every topic of `topics`, or until the rates that are judged there
-    are clear (a topic that stays silent stops being waited for when `silent_s` have passed since the first message on
-    another). `messages`: so many
-    messages on each topic. `connected`: a student's publisher and a student's subscriber are connected over
-    the topic, for a second. `heard`: every probe's value was printed. `nodes`: so many nodes of the student's have
-    registered. `alive_s`: that long after the student's first node registered, and half as long after the last
-    process's did. `opened`: these programs (`firefox`) were asked to open something. `ended`: these processes have
-    ended. `quiet_s`: for so long, nothing was printed, published, registered or set, and something was before.
-    A run gives up when no message came within `first_message_s`, when all that is waited for has been silent for
-    `silent_s`, when nothing in the graph has changed for the longer of the two while a connection is waited for, or
-    after `limit_s`. `alive_s`, silence and quiet do not count while a process may still become a node: until it is one,
-    or `silent_s` after its start. Where others fill the machine, this, `first_message_s` and `limit_s` are longer by
-    what they take. With no condition at all it is watched for `limit_s`.
+    What no node is there for is given up sooner: once all processes are nodes that only wait or loop, and nothing in
+    the graph has changed for 1.5 to 4 s. `alive_s`, silence and `quiet_s` do not count while a process may still
+    become a node: until it is one, or `silent_s` after its start. Where others fill the machine, this,
+    `first_message_s` and `limit_s` are longer by what they take.
     """
 
     window_s: Seconds | None = None
+    """That long after the first message on every topic of `topics`, or until the rates that are judged there are
+    clear. A topic that stays silent is waited for until `silent_s` after the first message on another."""
     topics: tuple[str, ...] = ()
+    """The topics of `window_s`, with their slash."""
     messages: Annotated[dict[str, int], Field(default_factory=dict)]
+    """So many messages on each topic: `{/chatter: 20}`."""
     connected: tuple[str, ...] = ()
+    """Topics over which a publisher and a subscriber of the student's are connected, for a second."""
     heard: bool = False
+    """Whether every probe's value has to be printed."""
     nodes: Annotated[int, Field(ge=0)] = 0
+    """So many nodes of the student's have registered."""
     alive_s: Seconds | None = None
+    """That long after the student's first node registered, and half as long after the last process's did."""
     opened: tuple[str, ...] = ()
+    """Programs that were asked to open something: `firefox`."""
     ended: tuple[Name, ...] = ()
+    """Processes that have ended."""
     quiet_s: Seconds | None = None
+    """For so long nothing was printed, published, registered or set, and something was before."""
     first_message_s: Seconds = 20.0
+    """The run gives up when no message has come within this."""
     silent_s: Seconds = 6.0
+    """The run gives up when all that is waited for has been silent for so long; where a connection is waited for, when
+    nothing in the graph has changed for the longer of this and `first_message_s`."""
     limit_s: Seconds = 60.0
+    """The run ends after this at the latest."""
 
 
 class Scenario(Record):
-    """One run in an arena. `clock` `warped` sets `/use_sim_time` and runs `/clock` `warp` times faster.
-
-    `steps` are done one after the other; `until` is looked at once they are over, and its times count from then on.
-    With `recording` in place of `start` nothing is run: it is a pattern (`*.bag`, `bags/lab3*.mcap`) for the one
-    file of the submission that is judged as this run.
-    """
+    """One run in an arena, or a recording that is handed in."""
 
     title: str
+    """What is run, in a few words."""
     recording: Annotated[str, Field(min_length=1)] | None = None
+    """In place of `start`: a pattern (`*.bag`, `bags/lab3*.mcap`) for the one file of the submission that is judged as
+    this run; nothing is run."""
     clock: Literal["real", "warped"] = "real"
+    """`warped` sets `/use_sim_time` and lets `/clock` run faster."""
     warp: Annotated[float, Field(ge=1, le=40)] = 20.0
+    """How many times faster a warped clock runs."""
     params: tuple[Param, ...] = ()
+    """Parameters that are set before anything starts."""
     start: tuple[Start, ...] = ()
+    """The processes, in the order in which they are started."""
     probes: tuple[Probe, ...] = ()
+    """Messages that the grader publishes once the student's node has subscribed."""
     calls: tuple[Call, ...] = ()
+    """Services that the grader calls."""
     steps: tuple[Step, ...] = ()
+    """What the grader does, one after the other; `until` is looked at once they are over, and its times count from
+    then on."""
     until: Annotated[Until, Field(default_factory=lambda: Until(messages={}))]
+    """When the run has seen enough."""
 
     @property
     def started_later(self) -> frozenset[str]:
@@ -337,70 +400,139 @@ class Scenario(Record):
     @property
     def digest(self) -> str:
         """The sha256 of what is run and until when: evidence of a scenario with another one says something else."""
-        left_out = (
-            {"title"} if self.steps else {"title", "steps"}
-        )  # before there were steps, none were counted
+        left_out: dict[str, Any] = {"title": True}
+        if not self.steps:  # before there were any, none were counted, and so it is with definitions
+            left_out["steps"] = True
+        if not any(call.definition for call in self.calls):
+            left_out["calls"] = {"__all__": {"definition"}}
         return sha256(self.model_dump_json(exclude=left_out).encode()).hexdigest()
 
 
 class Criterion(Record):
-    """One line of the report. `with` holds the check's own parameters.
-
-    `requires` names criteria that explain why there may be nothing to judge here: this one is then `blocked`.
-    """
+    """One line of the report. Give one of `points`, `bonus` and `penalty`."""
 
     id: Name
+    """The criterion's name in results, for programs and people."""
     title: str
-    points: Annotated[float, Field(ge=0)]
+    """What the student reads."""
+    points: Annotated[float, Field(ge=0)] = 0.0
+    """Of the rubric's 100; 0 is advice."""
+    bonus: Annotated[float, Field(gt=0)] | None = None
+    """Added to them where the check passes; not to reach it costs nothing."""
+    penalty: Annotated[float, Field(gt=0)] | None = None
+    """Taken off where the check fails; the total is never less than 0."""
     check: str
+    """The check that judges it, or `manual` where a person gives the points."""
     parameters: Annotated[dict[str, Any], Field(alias="with", default_factory=dict)]
+    """The check's own parameters."""
     scenario: Name | None = None
+    """The run that it is judged by."""
     requires: tuple[Name, ...] = ()
+    """Criteria that explain why there may be nothing to judge here: this one is then `blocked`."""
     visibility: Literal["visible", "hidden"] = "visible"
+    """Whether students see it."""
     hint: str = ""
+    """What to do, in place of the check's own hint."""
     reproduce: str = ""
+    """A command with which students can see it themselves."""
+
+    @property
+    def extra(self) -> float:
+        """What it can change beside the rubric's 100 points: a bonus, or minus a penalty."""
+        return self.bonus or -(self.penalty or 0.0)
+
+
+class Group(Record):
+    """Criteria whose points are given together."""
+
+    criteria: Annotated[tuple[Name, ...], Field(min_length=1)]
+    """The ids of the criteria."""
+    points: Annotated[float, Field(gt=0)] | None = None
+    """The group is worth so much, and the points of its criteria are their weights in it; null: each has its own
+    points."""
+    best: Annotated[int, Field(ge=1)] | None = None
+    """Only so many of its criteria count, those with the most points; all have to be worth the same then."""
+
+
+class Gate(Record):
+    """A criterion without which the whole is worth less."""
+
+    criterion: Name
+    """The criterion that has to be reached: it neither fails nor is blocked."""
+    at_most: Annotated[float, Field(ge=0)]
+    """Without it, the whole is worth at most so many points."""
 
 
 class Late(Record):
-    """What being late costs: `lost` percent for each `per` that has begun since the deadline, at most `cap` percent.
-
-    They are percents of the points that were reached, or with `of: possible` of all the rubric's points. What comes
-    at most `grace_minutes` after the deadline is in time. Later than `cut_off_days` after it, nothing counts.
-    """
+    """What being late costs: `lost` percent for each `per` that has begun since the deadline."""
 
     lost: Annotated[float, Field(ge=0, le=100)]
+    """Percent that are lost for each `per`."""
     of: Literal["reached", "possible"] = "reached"
+    """Of the points that were reached, or of all the rubric's points."""
     per: Literal["day", "hour"] = "day"
+    """For each day or each hour."""
     grace_minutes: Annotated[float, Field(ge=0, le=LATE_DAYS_MAX * 24 * 60)] = 0.0
+    """What comes at most so long after the deadline is in time."""
     cap: Annotated[float, Field(ge=0, le=100)] = 100.0
+    """At most so many percent are lost."""
     cut_off_days: Annotated[float, Field(ge=0, le=LATE_DAYS_MAX)] | None = None
+    """Later than this after the deadline nothing counts; null: always something."""
+
+
+class Needs(Record):
+    """What a lab needs of the machine."""
+
+    ros: tuple[str, ...] = ()
+    """ROS packages."""
+    apt: tuple[str, ...] = ()
+    """Debian packages."""
+    pip: tuple[str, ...] = ()
+    """Modules of ROS's Python, by their names on PyPI."""
 
 
 class Rubric(Record):
-    """A lab. `pass_mark` in points; without one, every visible criterion must be reached.
-
-    A file without `schema` is read as version 1. `digits` is how many decimals points keep. `checks` is a Python file
-    beside the rubric with checks of the instructor's own. `deadline` has a time zone; `late` says what later costs, and
-    without it nothing is lost. `repairs` has shares by kind of repair: what is judged on a copy with such a repair
-    earns that share of its points; 0 switches the repair off.
-    With `fixes: none`, `grader check --fix` repairs nothing: students are to find it themselves.
-    """
+    """A lab."""
 
     schema_: Annotated[Literal["grader.rubric/1"], Field(alias="schema")] = "grader.rubric/1"
+    """The version of the format; a file without it is read as version 1."""
     id: Name
+    """The lab's name: `leeds-comp3631-lab1`."""
     title: str
+    """What people read."""
     version: str
+    """The rubric's own version, as text."""
     package: str
+    """The name of the package that students hand in."""
     handout: str = ""
+    """Where the handout is, or what it is called."""
     pass_mark: Annotated[float, Field(ge=0)] | None = None
+    """In points; null: every visible criterion has to be reached."""
     digits: Annotated[int, Field(ge=0, le=3)] = 1
+    """How many decimals points keep."""
     checks: str | None = None
+    """A Python file beside the rubric with checks of the instructor's own."""
     deadline: Deadline | None = None
+    """When it is due, with a time zone; null: it has no deadline."""
     late: Late | None = None
+    """What being late costs; null: nothing."""
     repairs: Annotated[dict[RepairKind, Share], Field(default_factory=dict)]
+    """Shares by kind of repair: what is judged on a copy with such a repair earns that share of its points; 0 switches
+    the repair off."""
     fixes: Literal["offered", "none"] = "offered"
+    """With `none`, `grader check --fix` repairs nothing: students are to find it themselves."""
+    packages: tuple[Annotated[str, Field(pattern=PACKAGE_PATTERN)], ...] = ()
+    """Folders beside the rubric, each a ROS package of the course: nodes, messages, launch files."""
+    needs: Annotated[Needs, Field(default_factory=Needs)]
+    """What the machine has to have besides."""
+    groups: Annotated[dict[Name, Group], Field(default_factory=dict)]
+    """How criteria's points are given together, by the group's name."""
+    gates: tuple[Gate, ...] = ()
+    """Criteria without which the whole is worth less."""
     scenarios: dict[Name, Scenario]
+    """The runs, by name."""
     criteria: Annotated[tuple[Criterion, ...], Field(min_length=1)]
+    """What is judged, in the order of the report."""
 
     def share_of(self, kind: RepairKind) -> float:
         """Return the share of its points, 0 to 1, that a criterion earns on a copy with such a repair."""
@@ -408,4 +540,9 @@ class Rubric(Record):
 
     @property
     def max_points(self) -> float:
-        return sum(c.points for c in self.criteria)
+        """The most points that can be reached, without bonuses."""
+        worth = {c.id: c.points for c in self.criteria}
+        uncounted = sum(
+            worth.get(name, 0.0) for g in self.groups.values() if g.best for name in g.criteria[g.best :]
+        )
+        return round(sum(worth.values()) - uncounted, 6)

@@ -32,11 +32,14 @@ MAX_BYTES = 1_000_000
 
 
 class PytestParams(Record):
-    """`file` lies beside the rubric; `select` is what pytest's `-k` takes. The tests together have `timeout_s`."""
+    """Which tests are run."""
 
     file: str
+    """A Python file beside the rubric."""
     select: str = ""
+    """What pytest's `-k` takes: `comes_around or range`; empty: all tests."""
     timeout_s: Annotated[float, Field(gt=0, le=600)] = 60.0
+    """For all tests together."""
 
 
 class TestsBroken(Exception):

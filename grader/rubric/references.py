@@ -16,12 +16,15 @@ from grader.rubric.model import PROGRAM_PATTERN, TYPE_PATTERN, Until
 from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
 from grader.wording import closest, did_you_mean, join_words
 
-PUBLISHED_BY = {"turtlesim/turtlesim_node": re.compile(r"/turtle\d+/(pose|color_sensor)")}
+PUBLISHED_BY = {
+    "turtlesim/turtlesim_node": re.compile(r"/turtle\d+/(pose|color_sensor)"),
+    "robot_world/robot_world": re.compile(r"/(scan|base_scan|odom|base_pose_ground_truth|collision)"),
+}
 """Topics on which a program of the grader's publishes, and no one else would."""
 LAUNCH_ENDINGS = (".launch", ".xml")
 OTHER_CONDITIONS = ("messages", "connected", "heard", "nodes", "opened", "ended", "quiet_s")
 """Conditions of `until` that say nothing of how long a run lasts."""
-TYPES: Mapping[str, TypeKind] = {"message": "msg", "service": "srv"}
+TYPES: Mapping[str, TypeKind] = {"message": "msg", "field": "msg", "service": "srv"}
 LIKELY, SURE = 0.6, 0.85
 """How alike two names have to be: to be suggested, and to be taken for one with a slip."""
 _DIGITS = re.compile(r"\d+")
@@ -60,14 +63,14 @@ def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -
     """A program, or a type of messages or services. The student's own package may have any type."""
     if not isinstance(value, str):
         return
-    own = str(rubric.get("package"))
+    own = {str(rubric.get("package")), *(name for _, name in as_texts(rubric.get("packages")))}
     fault = ""
     if to == "program" and not re.fullmatch(PROGRAM_PATTERN, value):
         fault = f'name its package too, like turtlesim/turtlesim_node, not "{value}"'
-    elif to == "program" and value.partition("/")[0] != own:
+    elif to == "program" and value.partition("/")[0] not in own:
         fault = ros_packages().program_fault(value)
-    elif to in TYPES and re.fullmatch(TYPE_PATTERN, value):
-        fault = ros_packages().type_fault(value, TYPES[to], (own,))
+    elif to in TYPES and re.fullmatch(TYPE_PATTERN, value := value.partition("[")[0]):
+        fault = ros_packages().type_fault(value, TYPES[to], own)
     if fault:
         yield path, fault
 

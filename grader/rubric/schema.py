@@ -11,7 +11,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, create_model
 
 from grader.checks import HEADINGS, Check
+from grader.checks.parameter_docs import inner_records
 from grader.checks.registry import NoParams
+from grader.model.record import Record, field_docstrings
 from grader.rubric.consistency import MANUAL
 from grader.rubric.instructor import known_checks
 from grader.rubric.model import Criterion, Rubric
@@ -28,7 +30,18 @@ def rubric_schema(checks: Mapping[str, Check] | None = None) -> dict[str, Any]:
     model = create_model("Rubric", __base__=Rubric, __doc__=Rubric.__doc__, criteria=(criteria, ...))
     schema = model.model_json_schema(by_alias=True)
     schema["properties"]["scenarios"]["additionalProperties"] = False
+    _describe(model, schema)
+    for record in inner_records(model):
+        _describe(record, schema["$defs"].get(record.__name__, {}))
     return {"$schema": DIALECT, **schema, "title": "A rubric of grader"}
+
+
+def _describe(record: type[Record], schema: dict[str, Any]) -> None:
+    """Write the docstrings of a record's fields beside their types."""
+    texts = field_docstrings(record)
+    for key, found in schema.get("properties", {}).items():
+        if key in texts:
+            found.setdefault("description", texts[key])
 
 
 def _criterion(check: Check) -> type[Criterion]:

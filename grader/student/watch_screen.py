@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from datetime import datetime
 from typing import IO, TextIO
 
@@ -13,9 +13,9 @@ from rich.text import Text
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.result_json import result_text
-from grader.report.terminal import STYLES, emit, mark, open_console, print_report
+from grader.report.terminal import Terminal, emit, open_console, print_report
 from grader.report.text import line
-from grader.report.view import Loss, arrange, places, points_of
+from grader.report.view import arrange, points_of
 from grader.rubric.model import Rubric
 from grader.student.watching import Outcome, Screen
 from grader.wording import first_few, number
@@ -101,30 +101,12 @@ class TerminalScreen(Screen):
             yield Text(f"{words}: {names}", CHANGES[words])
         if not changed:
             yield Text("as before", "dim")
-        yield from self._losses("Lost", view.lost)
         if not self._static:
-            yield from self._losses("Still open: no points are lost for good", view.open)
+            yield from Terminal(self._console).losses("Still open: no points are lost for good", view.open)
         elif view.open:
             points = number(sum(loss.points for loss in view.open))
             yield Text(f"\nNothing was run (--static): criteria worth {points} points are still open.")
-
-    def _losses(self, title: str, losses: Sequence[Loss]) -> Iterable[RenderableType]:
-        if losses:
-            yield Text(f"\n{title}", "bold")
-        for loss in losses:
-            criterion = loss.criterion
-            style = STYLES[criterion.status]
-            text = Text(f"{mark(criterion.status, self._console.encoding)} ", style)
-            text.append(f"{self._show(criterion.id, NAME_CHARS)}  {points_of(criterion)}  ", style)
-            yield text.append(self._show(criterion.message or criterion.title))
-            yield from self._details(
-                [
-                    ("hint", criterion.hint),
-                    ("where", ", ".join(places(criterion))),
-                    ("also", ", ".join(f"{c.id} {points_of(c)}" for c in loss.alike)),
-                    ("blocks", ", ".join(f"{c.id} {points_of(c)}" for c in loss.blocked)),
-                ]
-            )
+        yield from Terminal(self._console).losses("Lost", view.lost)
 
     def _details(self, rows: Iterable[tuple[str, str]]) -> Iterable[RenderableType]:
         for name, words in rows:
@@ -174,7 +156,7 @@ def compare(before: GradingResult, after: GradingResult) -> dict[str, list[Crite
     earlier = {c.id: c for c in before.criteria}
     found: dict[str, list[CriterionResult]] = {words: [] for words in CHANGES}
     for criterion in after.criteria:
-        if criterion.id in earlier and criterion.max_points > 0:
+        if criterion.id in earlier and criterion.counts:
             words = _change(earlier[criterion.id], criterion)
             if words:
                 found[words].append(criterion)

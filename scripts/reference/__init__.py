@@ -7,6 +7,7 @@ from pathlib import Path
 
 from scripts.reference.checks import checks_page
 from scripts.reference.commands import commands_page, exit_codes_page
+from scripts.reference.facts import facts_page
 from scripts.reference.formats import format_pages
 from scripts.reference.labs import labs_page
 from scripts.reference.operators import operators_page
@@ -17,6 +18,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "checks.md": checks_page,
     "commands.md": commands_page,
     "exit-codes.md": exit_codes_page,
+    "facts.md": facts_page,
     "labs.md": labs_page,
     "mutation-operators.md": operators_page,
     "rubric.md": rubric_page,

@@ -10,7 +10,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from grader.model.record import Record
+from grader.model.record import Record, field_docstrings
 from grader.rubric.model import Rubric
 from scripts.reference.table import MADE, code, table
 
@@ -34,12 +34,12 @@ def _body(record: type[Record]) -> Iterator[str]:
     """Its docstring and its keys."""
     if record.__doc__:
         yield from (inspect.cleandoc(record.__doc__), "")
-    hints = typing.get_type_hints(record)
+    hints, meanings = typing.get_type_hints(record), field_docstrings(record)
     rows = [
-        (code(field.alias or name), _type(hints[name]), _default(field))
+        (code(key := field.alias or name), _type(hints[name]), _default(field), meanings.get(key, ""))
         for name, field in record.model_fields.items()
     ]
-    yield from table(("key", "type", "default"), rows)
+    yield from table(("key", "type", "default", "meaning"), rows)
 
 
 def _default(field: FieldInfo) -> str:

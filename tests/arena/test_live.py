@@ -6,7 +6,7 @@ from itertools import accumulate
 
 import pytest
 
-from grader.arena.run_state import RunState, describe_wait, find_outcome, next_look_s
+from grader.arena.run_state import RunState, describe_wait, find_outcome, is_settled, next_look_s
 from grader.model.message_rate import RateBounds
 from grader.rubric.model import Until
 
@@ -220,3 +220,94 @@ def test_waiting_is_said_in_words() -> None:
 def test_next_look_is_never_in_the_past_and_never_far() -> None:
     for now_s in (0.0, 3.0, 19.9, 100.0):
         assert 0 < next_look_s(_live(a=(1, 1.0, 2.0)), WINDOW, now_s) <= 1.001
+
+
+def _resting(**processes: tuple[str, int]) -> RunState:
+    """Each process is a node since 1 s, and at rest since 2 s, as `spins` or `loops` with so many programs."""
+    live = RunState()
+    for name in processes:
+        live.started(name, 0.0, helper=False)
+    live.graph([f"/{name}" for name in processes], {f"/{name}": name for name in processes}, 1.0)
+    for name, (rest, programs) in processes.items():
+        live.rests(name, rest, programs, 2.0)
+    return live
+
+
+@pytest.mark.parametrize(
+    ("processes", "settled_s"),
+    [
+        ({"node": ("spins", 1)}, 3.6),
+        ({"node": ("loops", 1)}, 6.1),
+        ({"node": ("spins", 1), "other": ("loops", 1)}, 6.1),
+        ({"node": ("spins", 2)}, None),  # one of its programs is no node yet
+        ({"node": (None, 1)}, None),
+    ],
+)
+def test_a_graph_settles_once_all_nodes_rest(
+    processes: dict[str, tuple[str, int]], settled_s: float | None
+) -> None:
+    live = _resting(**processes)
+    assert not is_settled(live, (settled_s or 60.0) - 0.2)
+    assert is_settled(live, settled_s or 60.0) is (settled_s is not None)
+
+
+def test_what_changes_or_works_or_starts_is_not_settled() -> None:
+    live = _resting(node=("spins", 1))
+    live.graph(["/node", "/new"], {"/node": "node", "/new": "node"}, 3.0)
+    assert not is_settled(live, 4.4)
+    assert is_settled(live, 4.6)
+    live.lost_s = 5.0  # others filled the machine
+    assert not is_settled(live, 9.4)
+    live.rests("node", None, 1, 5.0)
+    assert not is_settled(live, 60.0)
+    live.rests("node", "spins", 1, 60.0)
+    assert is_settled(live, 61.6)
+    live.started("late", 61.0, helper=False)
+    assert not is_settled(live, 90.0)
+
+
+def test_nodes_are_watched_for_the_least_time_though_nothing_more_is_to_come() -> None:
+    live = _resting(node=("spins", 1))
+    live.least_s = 5.0
+    assert not is_settled(live, 5.9)
+    assert is_settled(live, 6.0)
+    live.talking["/node"] = 4.0
+    assert not is_settled(live, 8.9)
+    assert is_settled(live, 9.0)
+
+
+def test_nodes_that_talk_already_settle_sooner_than_those_that_only_loop() -> None:
+    live = _resting(node=("loops", 1))
+    live.talking["/node"] = 1.5
+    assert not is_settled(live, 4.4)
+    assert is_settled(live, 4.6)
+
+
+@pytest.mark.parametrize(
+    ("until", "published", "outcome"),
+    [
+        (Until(messages={"/a": 10}), set(), "the graph has settled, without /a"),
+        (Until(messages={"/a": 10}), {"/a"}, None),  # it may yet send
+        (Until(connected=("/a",)), {"/a"}, "the graph has settled, without /a"),
+        (Until(nodes=2), set(), "the graph has settled"),
+        (Until(window_s=6, topics=("/a",)), set(), "the graph has settled, without /a"),
+        (Until(messages={"/a": 10}, alive_s=20), set(), None),
+        (Until(messages={"/a": 10}, ended=("node",)), set(), None),
+    ],
+)
+def test_what_never_comes_ends_the_wait_once_the_graph_has_settled(
+    until: Until, published: set[str], outcome: str | None
+) -> None:
+    live = _resting(node=("spins", 1))
+    live.published = published
+    assert find_outcome(live, until, 3.0) is None
+    assert find_outcome(live, until, 5.0) == (outcome and ("silent", outcome))
+
+
+def test_a_window_that_another_topic_needs_is_watched_to_its_end() -> None:
+    live = _resting(node=("loops", 1))
+    seen = live.topics["/a"]
+    seen.count, seen.first_s, seen.last_s = 5, 2.0, 2.5
+    until = Until(window_s=20, topics=("/a", "/b"), silent_s=30)
+    assert find_outcome(live, until, 21.9) is None
+    assert find_outcome(live, until, 22.0) == ("silent", "the graph has settled, without /b")

@@ -23,8 +23,27 @@ from grader.rubric.model import Call
         (None, "lab1/Add", ["", f"{MISFIT}srv/Add.srv is not there"]),
         ("course_msgs/Lap a\n---\n", "lab1/Add", ["the grader could not call it: "]),
         (None, "course_srvs/Add", ["the grader could not call it: "]),
+        (
+            "int32 a\nint32 b\n---\nint64 sum",
+            "lab1/Add",
+            ["", f"{MISFIT}its request has int32 a, int32 b; the"],
+        ),
+        (
+            "int64 b\nint64 a\n---\nint64 sum",
+            "lab1/Add",
+            ["", f"{MISFIT}its request has int64 b, int64 a; the"],
+        ),
+        ("int64 a\nint64 b\n---\nint32 sum", "lab1/Add", ["", f"{MISFIT}its response has int32 sum; the"]),
     ],
-    ids=["other-fields", "no-file", "a-type-that-this-machine-lacks", "another-package"],
+    ids=[
+        "other-fields",
+        "no-file",
+        "a-type-that-this-machine-lacks",
+        "another-package",
+        "other-types",
+        "other-order",
+        "other-response",
+    ],
 )
 def test_whose_definition_it_is_that_does_not_fit(
     text: str | None, type_: str, noted: list[str], tmp_path: Path
@@ -38,7 +57,9 @@ def test_whose_definition_it_is_that_does_not_fit(
     arena = SimpleNamespace(place=place, note=events.append, ros_now_ns=lambda: 0)
     runner: Any = object.__new__(StepRunner)
     runner._arena = arena
-    call = Call(service="/add", type=type_, request={"a": 2})
+    asked = " a" in (text or "").partition("---")[0].replace("Lap a", "")
+    wanted = "int64 a\nint64 b  # the second one\n---\nint64 sum\n" if asked else None
+    call = Call(service="/add", type=type_, request={"a": 2}, definition=wanted)
     asyncio.run(runner._ask(call))
     assert [event.action for event in events] == ["call", "answer"][-len(noted) :]
     assert all(event.detail.startswith(begin) for event, begin in zip(events, noted, strict=True))

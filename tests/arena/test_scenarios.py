@@ -275,3 +275,59 @@ def test_a_node_that_never_comes(tmp_path: Path) -> None:
         tmp_path, {"scripts/idle.py": SCRIPT + "import threading\nthreading.Event().wait()\n"}, scenario
     )
     assert (seen.outcome.outcome, seen.outcome.detail) == ("silent", "nothing happened for 1 s")
+
+
+SLOW_SERVER = (
+    NODE
+    + "import time\nfrom std_srvs.srv import Trigger, TriggerResponse\nrospy.init_node('slow')\n{}\n"
+    + "rospy.Service('{}', Trigger, lambda request: TriggerResponse(True, ''))\nrospy.spin()\n"
+)
+PREPARATIONS = {
+    "sleeps": "rospy.sleep(3)",
+    "works": "until = time.process_time() + 3\nwhile time.process_time() < until: pass",
+    "loops": "for _ in range(25): rospy.sleep(0.1)",
+    "waits-for-another": "rospy.wait_for_service('/late')",
+    "a-timer": "def later(_):\n    rospy.Service('/ask', Trigger, lambda r: (True, ''))\n"
+    "rospy.Timer(rospy.Duration(3), later, oneshot=True)",
+}
+
+
+def _served(tmp_path: Path, before: str, name: str, *also: str) -> Run:
+    """The grader calls `/ask` once of a node that does `before` something first, beside other scripts."""
+    files = {"scripts/slow.py": SLOW_SERVER.format(before, name)}
+    files |= {f"scripts/also{n}.py": code for n, code in enumerate(also)}
+    scenario = Scenario(
+        title="slow",
+        start=tuple(Start(name=Path(path).stem, script=Path(path).name) for path in files),
+        calls=(Call(service="/ask", type="std_srvs/Trigger"),),
+        until=Until(nodes=1),
+    )
+    return _run(tmp_path, files, scenario)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("before", PREPARATIONS.values(), ids=PREPARATIONS.keys())
+def test_a_slow_node_is_waited_for(before: str, tmp_path: Path) -> None:
+    late = NODE + "import time\ntime.sleep(3)\n" + SERVER.partition("\n")[2].replace("'enable'", "'/late'")
+    name = "other" if "Timer" in before else "ask"
+    seen = _served(tmp_path, before, name, *([late] if "late" in before else []))
+    assert [event.value for _, event in seen.actors if event.action == "answer"] == [
+        {"success": True, "message": ""}
+    ]
+
+
+def _needed_s(seen: Run) -> float:
+    """From the first registration to the end, without what others took of the machine."""
+    first_ns = next(t for t, e in seen.graph if e.processes)
+    lost = [
+        min(max(0.0, (e.busy or 0) - (e.own_busy or 0)), 0.75) for _, e in seen.host if (e.busy or 0) >= 0.9
+    ]
+    return (seen.course[-1][0] - first_ns) / 1e9 - sum(lost) / 2
+
+
+@pytest.mark.full
+def test_a_service_of_another_name_is_not_waited_for_long(tmp_path: Path) -> None:
+    right, wrong = _served(tmp_path, "", "ask"), _served(tmp_path, "", "asks")
+    assert not [event for _, event in wrong.actors if event.action == "call"]
+    assert [event for _, event in right.actors if event.action == "answer"]
+    assert _needed_s(wrong) < _needed_s(right) + 4.0

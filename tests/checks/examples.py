@@ -15,6 +15,7 @@ import yaml
 from grader.checks import CHECKS
 from grader.checks.support.topics import heed_losses
 from grader.evidence.run import Run
+from grader.model.interfaces import parse_interface
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status, Verdict
 from grader.package.launch import parse_launch_files
@@ -76,10 +77,13 @@ def runs_of(data: dict[str, Any]) -> dict[str, Run]:
 
 
 def _package(given: dict[str, Any]) -> dict[str, Any]:
-    """Launch files that are given as text (`launch: {path: xml}`) are read as those of a real package."""
+    """Launch files and definitions that are given as text (`launch: {path: xml}`) are read as of a real package."""
+    facts = {key: value for key, value in given.items() if key not in {"launch", "definitions"}}
+    if "definitions" in given:
+        read_ones = (parse_interface(text.encode(), path) for path, text in given["definitions"].items())
+        facts["interfaces"] = [one.model_dump() for one in read_ones]
     if "launch" not in given:
-        return given
-    facts = {key: value for key, value in given.items() if key != "launch"}
+        return facts
     texts = {path: text.encode() for path, text in given["launch"].items()}
     read = parse_launch_files(texts, (facts.get("name", "lab1"),))
     known = {file["path"] for file in facts.get("files", ())}

@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from grader.checks import CHECKS, HEADINGS, Check
+from grader.checks.parameter_docs import inner_records, parameters
 from grader.model.verdict import Status
 from scripts.reference.checks import checks_page
 from tests.checks.examples import LOADER, Example, differences, examples
@@ -35,6 +36,12 @@ def test_check_is_documented(check: Check) -> None:
     assert check.title.endswith(".")
     assert list(check.sections) == list(HEADINGS)
     assert all(len(text) > 20 for text in check.sections.values())
+    records = (check.params, *inner_records(check.params))
+    rows = [row for record in records for row in parameters(record)]
+    assert [row.name for row in rows if not row.meaning.endswith(".")] == [], (
+        "a field's docstring says what it means"
+    )
+    assert [row.name for row in rows if "any value" in row.type and row.name != "value"] == []
 
 
 @pytest.mark.parametrize("check", CHECKS.values(), ids=CHECKS)

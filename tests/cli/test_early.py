@@ -71,8 +71,9 @@ def decided(pipeline, monkeypatch):
 def test_check_prints_them_before_the_whole_report(lab, tmp_path, capsys) -> None:
     assert run(["check", str(tmp_path / "x.zip"), "--rubric", lab]) == 0
     out = capsys.readouterr().out
-    assert out.startswith(SHOWN + "100 of 100 points")
-    assert "All criteria" in out
+    assert out.startswith(SHOWN + "ada\n")
+    assert "criteria passed; --all shows them" in out
+    assert "\n100 of 100 points\n" in out
 
 
 @pytest.mark.usefixtures("decided")

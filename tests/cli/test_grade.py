@@ -32,8 +32,9 @@ def test_exit_code_follows_the_result(case, pipeline, lab, tmp_path, capsys):
     pipeline.outcome = passing(status, graded=graded)
     assert grade(lab, tmp_path) == code
     out = capsys.readouterr().out
-    assert status in out
-    assert str(tmp_path / "out" / "ada" / "report.md") in out
+    assert status in {"pass", "fail"} or status in out
+    assert (status == "fail") == ("✗" in out)
+    assert f"Report: {tmp_path / 'out' / 'ada' / 'report.html'}\nBeside it: result.json" in out
     assert "\x1b" not in out
 
 
@@ -126,7 +127,7 @@ def test_every_fault_of_the_rubric_has_its_line(pipeline, tmp_path, capsys):
 def test_results_go_below_this_folder_by_default(pipeline, lab, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert run(["grade", "s", "--rubric", lab, "--id", "eve", "--sandbox", "none"]) == 0
-    assert "grader-results/ada/result.json" in capsys.readouterr().out
+    assert "grader-results/ada/report.html" in capsys.readouterr().out
     options = pipeline.calls[0][3]
     assert (options.submission_id, options.sandbox, options.keep_hidden) == ("eve", "none", True)
 

@@ -57,13 +57,12 @@ def test_mcap_messages_are_counted_by_channel(tmp_path):
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        ({"profile": "ros2"}, "a recording of ROS 2"),
-        ({"profile": "", "encoding": "cdr", "schema": "ros2msg"}, "a recording of ROS 2"),
-        ({"profile": "", "encoding": "protobuf"}, "no message of ROS 1 in it, only protobuf"),
+        ({"profile": "", "encoding": "protobuf"}, "no message of ROS in it, only protobuf"),
+        ({"profile": "ros2", "encoding": "cdr", "schema": "ros2idl"}, "no message definition (ros2msg)"),
         ({"schema": "jsonschema"}, "/numeric_chatter has no message definition"),
     ],
 )
-def test_what_is_not_of_ros_1_is_refused(tmp_path, options, reason):
+def test_what_is_not_of_ros_is_refused(tmp_path, options, reason):
     (tmp_path / "lab.mcap").write_bytes(mcap_bytes(COUNT, **options))
     assert reason in refused(tmp_path / "lab.mcap")
 

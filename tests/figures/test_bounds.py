@@ -15,7 +15,15 @@ from hypothesis import strategies as st
 from grader.evidence.events import ActorEvent, ConsoleLine, ProcessEvent
 from grader.evidence.run import Message, Run
 from grader.judging import judge
-from grader.model.figure import POINTS_MAX, CounterFigure, Figures, HeardFigure, PathFigure, RateFigure
+from grader.model.figure import (
+    POINTS_MAX,
+    CounterFigure,
+    Figures,
+    HeardFigure,
+    PathFigure,
+    PlaceFigure,
+    RateFigure,
+)
 from grader.report.figures import DRAWN, figures_of
 from tests.checks.examples import runs_of
 from tests.figures.made import criterion, drawn, only
@@ -30,6 +38,8 @@ ALL = (
     criterion("counter-wrap", topic=TOPIC),
     criterion("hears", topic=TOPIC),
     criterion("path", topic=TOPIC, points=[[1, 0]], tolerance_m=0.1),
+    criterion("ends-at", topic=TOPIC, goal=[1, 0], tolerance_m=0.1),
+    criterion("stays-within", topic=TOPIC, box=[[0, 0], [1, 1]]),
 )
 
 
@@ -48,6 +58,10 @@ def sound(figures: Figures) -> None:
         elif isinstance(figure, PathFigure):
             assert 1 <= len(figure.points) <= POINTS_MAX
             assert figure.strayed is None or figure.strayed < len(figure.points)
+        elif isinstance(figure, PlaceFigure):
+            assert 1 <= len(figure.points) <= POINTS_MAX
+            assert figure.wrong is None or figure.wrong < len(figure.points)
+            assert len(figure.says) <= 300
         elif isinstance(figure, HeardFigure):
             assert len(figure.rows) <= 60
             assert all(len(row.sent) <= 200 and len(row.heard or "") <= 200 for row in figure.rows)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from grader.model.figure import POINTS_MAX, PathFigure
+from grader.model.figure import POINTS_MAX, PathFigure, PlaceFigure
 from tests.figures.made import criterion, drawn, only
 
 SQUARE = criterion("path", topic="/pose", points=[[1, 0], [1, 1]], tolerance_m=0.2)
@@ -58,3 +58,43 @@ def test_a_robot_that_waits_long_is_shown_where_it_moves() -> None:
 def test_no_way_no_figure() -> None:
     assert drawn({}, SQUARE)[0].by_criterion == {}
     assert drawn({"topics": [{"topic": "/pose"}]}, SQUARE)[0].by_criterion == {}
+
+
+WALLS = {
+    "topic": "/robot_world/walls",
+    "type": "visualization_msgs/Marker",
+    "callerid": "/robot_world",
+    "values": [{"type": 5, "points": [{}, {"x": 4.0}]}],
+}
+WORLD = {"name": "world", "role": "grader", "nodes": ["/robot_world"], "exit_s": 9}
+
+
+def test_a_goal_that_is_missed_is_drawn_on_the_map() -> None:
+    asked = criterion("ends-at", topic="/pose", goal=[2, 0], tolerance_m=0.1)
+    run = poses(*line((0, 1), (1, 1), 10), (1, 1))
+    run["topics"].append(WALLS)
+    figures, results = drawn({**run, "processes": [WORLD]}, asked)
+    figure = only(figures, "ends-at", PlaceFigure)
+    assert results["ends-at"].status.value == "fail"
+    assert (figure.goal, figure.tolerance_m) == ((2, 0), 0.1)
+    assert figure.points[figure.wrong or 0] == (1, 1)
+    assert figure.walls == (((0, 0), (4, 0)),)
+    assert figure.says == "It ends at (1, 1), which is not within 0.1 m of (2, 0)."
+
+
+def test_where_a_region_is_left_is_marked() -> None:
+    asked = criterion("stays-within", topic="/pose", box=[[0, -1], [2, 1]])
+    figures, results = drawn(poses((0, 0), (1, 0), (3, 0), (2.5, 0), (1, 0)), asked)
+    figure = only(figures, "stays-within", PlaceFigure)
+    assert results["stays-within"].status.value == "fail"
+    assert figure.area == ((0, -1), (2, -1), (2, 1), (0, 1))
+    assert figure.wrong is not None
+    assert figure.points[figure.wrong] == (3, 0)
+    assert figure.says.endswith("it is 1.00 m outside at (3, 0).")
+
+
+def test_a_path_that_is_right_has_no_mark() -> None:
+    asked = criterion("stays-within", topic="/pose", walls=[[[0, 0], [4, 0]]], min_m=0.5, max_m=2)
+    figures, _ = drawn(poses((0, 1), (1, 1)), asked)
+    figure = only(figures, "stays-within", PlaceFigure)
+    assert (figure.wrong, figure.walls) == (None, (((0, 0), (4, 0)),))

@@ -35,6 +35,7 @@ from grader.intake import IntakeLimits, open_submission, safe_name
 from grader.intake.find import manifest_name
 from grader.intake.repository import choose_ref, parse_refs
 from grader.intake.source import parse_source
+from grader.model.interfaces import parse_interface
 from grader.model.package import CMakeFacts
 from grader.model.record import Record
 from grader.package.cmake import read_cmake, refine_cmake
@@ -256,6 +257,8 @@ def definition(data: bytes) -> None:
     text, _, message = data.partition(b"\0")
     name, _, lines = text.decode("utf-8", "replace").partition("\n")
     Decoder(name, lines).decode(message)
+    for path in ("msg/A.msg", "srv/A.srv", "action/A.action"):
+        comes_back(parse_interface(text, path))
 
 
 def service(data: bytes) -> None:

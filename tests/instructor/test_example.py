@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 from grader import checks
 from grader.checks import CHECKS, registry
+from grader.cli.main import run
 from grader.evidence.reader import load_evidence
 from grader.judging import judge
 from grader.judging.summary import total_points
 from grader.model.result import CriterionResult
 from grader.model.verdict import Status
 from grader.rubric.load import load_rubric
+from tests.support.timeline import build_runs
 
 ROOT = Path(__file__).parent.parent.parent
 EXAMPLE = ROOT / "rubrics" / "examples" / "own-checks"
@@ -51,6 +56,38 @@ def test_one_that_dies_at_128_loses_what_the_page_says():
         f"hint: {counting.hint}",
     ]
     assert "```\n" + "\n".join(shown) + "\n```\n" in PAGE
+
+
+RECIPES = dict(re.findall(r"```python\n(def (test_\w+).*?)```", PAGE.partition("## Recipes")[2], re.DOTALL))
+assert len(RECIPES) == 5
+RUN = """
+topics:
+  - {topic: /cmd_vel, type: geometry_msgs/Twist, values: [{linear: {x: 0.4}}]}
+  - {topic: /status, times_s: [0.9, 1.8]}
+console: [{process: talker, line: "ready to go"}]
+processes: [{name: talker, script: src/talker.py, stopped_by: INT, exit_code: 0}]
+actors: [{action: publish, topic: /command, values: [go, stop], every_s: 0.9, at_s: 0.6}]
+"""
+
+
+@pytest.mark.parametrize(("recipe", "name"), RECIPES.items(), ids=RECIPES.values())
+def test_the_recipes_judge_a_recording(recipe, name):
+    known: dict[str, object] = {}
+    exec(recipe, known)  # noqa: S102 - the page's own code
+    found = known[name]
+    assert callable(found)
+    found(build_runs(yaml.safe_load(RUN))["run"])
+    with pytest.raises(AssertionError, match=r"\w+"):
+        found(build_runs({"topics": [], "actors": []})["run"])
+
+
+def test_explain_and_the_schema_say_what_a_parameter_means(capsys):
+    rubric = str(EXAMPLE / "own-checks.yaml")
+    assert run(["explain", "in-step", "--rubric", rubric]) == 0
+    assert "within_s (number, seconds; default 0.05): How far apart the two may be" in capsys.readouterr().out
+    assert run(["rubric", "schema", "--rubric", rubric]) == 0
+    keys = json.loads(capsys.readouterr().out)["$defs"]["InStepParams"]["properties"]
+    assert keys["within_s"]["description"] == "How far apart the two may be, one way or the other."
 
 
 def test_the_page_names_the_facts_and_what_can_be_imported():

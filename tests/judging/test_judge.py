@@ -184,7 +184,13 @@ SAID = [{"process": "turtlesim", "at_s": 0.3, "line": "ERROR: cannot open the di
         ({"exit_code": 3}, SAID, "inconclusive", "exit code 3: ERROR: cannot open the display"),
         ({"signal": 11}, [], "inconclusive", "turtlesim ended with signal 11"),
         ({"exit_code": 0}, SAID, "pass", ""),
-        ({"exit_code": 1, "exit_s": 6.9, "stopped_by": "INT"}, SAID, "pass", ""),
+        ({"exit_code": 1, "exit_s": 6.9, "stopped_by": "INT", "nodes": ["/turtlesim"]}, SAID, "pass", ""),
+        (
+            {"exit_code": 1, "exit_s": 6.9, "stopped_by": "INT"},
+            SAID,
+            "inconclusive",
+            "and never became a node: ERROR: cannot open the display",
+        ),
         (
             {"exit_code": 1},
             [{**SAID[0], "line": "shutdown request: new node registered with same name"}],
@@ -192,13 +198,14 @@ SAID = [{"process": "turtlesim", "at_s": 0.3, "line": "ERROR: cannot open the di
             "",
         ),
     ],
-    ids=["exit-code", "signal", "done", "stopped", "shut-down-by-another-node"],
+    ids=["exit-code", "signal", "done", "stopped", "no-node", "shut-down-by-another-node"],
 )
-def test_a_program_of_the_graders_that_dies_is_the_machines_fault(
+def test_a_program_of_the_graders_that_fails_is_the_machines_fault(
     end: dict[str, Any], lines: list[dict[str, Any]], status: str, how: str
 ) -> None:
     start = [{"name": "turtlesim", "program": "turtlesim/turtlesim_node"}, *SCENARIO["start"]]
-    run = {**GOOD_RUN, "processes": [*GOOD_RUN["processes"], SIMULATOR | end], "console": lines}
+    talker = {**GOOD_RUN["processes"][0], "nodes": ["/talker"]}
+    run = {**GOOD_RUN, "processes": [talker, SIMULATOR | end], "console": lines}
     found = results(
         {"runs": {"talker": run}, "package": PACKAGE}, scenarios={"talker": {**SCENARIO, "start": start}}
     )

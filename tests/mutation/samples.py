@@ -10,6 +10,8 @@ from grader.rubric.load import load_rubric
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 LABS = sorted(path.stem for path in (ROOT / "rubrics").glob("*.yaml"))
+EXAMPLES = ("own-message", "tf-broadcaster")
+"""For operators that fit no lab."""
 
 TIMER = '''\
 #!/usr/bin/python3
@@ -141,5 +143,5 @@ def script_solution(text: str, name: str = "scripts/node.py") -> Solution:
 
 
 def reference_solution(lab: str) -> Solution:
-    loaded = load_rubric(lab)
+    loaded = load_rubric(lab if lab in LABS else str(ROOT / "rubrics" / "examples" / f"{lab}.yaml"))
     return load_solution(find_reference(loaded), loaded.rubric.package)

@@ -18,7 +18,7 @@ from grader.authoring.mutation.operators import OPERATORS
 from grader.authoring.mutation.package_tree import Tree, unified_diff
 from grader.authoring.mutation.registry import Operator, operator
 from grader.authoring.mutation.solution import Reference, Site, Solution, load_solution
-from tests.mutation.samples import LABS, other_solution, reference_solution, tree_of
+from tests.mutation.samples import EXAMPLES, LABS, other_solution, reference_solution, tree_of
 
 GOLDEN = Path(__file__).parent / "golden"
 BREAK_PYTHON = {"python2-print", "tabs-and-spaces", "typographic-quote", "no-break-space", "syntax-error"}
@@ -30,7 +30,7 @@ NO_PYTHON_3 = ("broken.py", "empty.py")
 
 @pytest.fixture(scope="module")
 def solutions() -> dict[str, Solution]:
-    return {"other": other_solution(), **{lab: reference_solution(lab) for lab in LABS}}
+    return {"other": other_solution(), **{lab: reference_solution(lab) for lab in (*LABS, *EXAMPLES)}}
 
 
 def changed(solution: Solution, site: Site) -> Tree:

@@ -47,7 +47,7 @@ def test_the_terminal_has_a_section():
     out = io.StringIO()
     print_report(result(notes=NOTES), rubric(), open_console(out))
     assert "\nNoticed while it ran\n" in out.getvalue()
-    assert "real, talker.py  asked the master to shut down (refused)\n" in out.getvalue()
+    assert "  real, talker.py: asked the master to shut down (refused)\n" in out.getvalue()
     assert COSTS_NOTHING in out.getvalue()
 
 

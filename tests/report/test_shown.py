@@ -159,7 +159,7 @@ def test_of_citations_only_the_first_are_kept():
         ("\tcounter += 1", 2, "\\tcounter += 1", "  ^"),
         ("x = 语(", 6, "x = 语(", "      ^"),
         ("for i in x", 11, "for i in x", "          ^"),
-        ("a" * 100 + "`" + "b" * 100, 101, "…" + "a" * 30 + "`" + "b" * 29, " " * 31 + "^"),
+        ("a" * 100 + "`" + "b" * 100, 101, "…" + "a" * 30 + "`" + "b" * 29 + "…", " " * 31 + "^"),
     ],
 )
 def test_a_caret_stands_below_the_column(source, column, text, below):
@@ -172,8 +172,11 @@ def test_a_caret_shows_nothing_that_steers(source, column):
     assert shown is None or not any(STEERING.search(row) or "\n" in row for row in shown)
 
 
-def test_there_is_no_caret_without_a_column():
-    assert caret(FileCitation(file="talker.py", line=3, source="x = 1")) is None
+def test_carets_stand_below_all_that_is_meant():
+    line = FileCitation(file="talker.py", line=3, source='    print("I heard" + data.data)')
+    assert caret(line) == ('    print("I heard" + data.data)', "    " + "^" * 28)
+    part = line.model_copy(update={"column": 11, "end_column": 32})
+    assert caret(part) == ('    print("I heard" + data.data)', " " * 10 + "^" * 21)
     assert caret(FileCitation(file="talker.py", line=3, column=3)) is None
 
 

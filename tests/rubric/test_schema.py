@@ -31,6 +31,21 @@ def test_every_check_offers_its_parameters_and_its_docs():
         assert criterion["properties"]["check"]["const"] == name
         assert check.title in criterion["description"]
         assert "with" in criterion["properties"]
+        if check.params.model_fields:
+            keys = definitions[check.params.__name__]["properties"]
+            assert [key for key, about in keys.items() if "description" not in about] == [], name
+
+
+def test_every_key_says_what_it_means():
+    schema = rubric_schema()
+    records = {"Rubric": schema, **schema["$defs"]}
+    silent = [
+        f"{name}.{key}"
+        for name, record in records.items()
+        for key, about in record.get("properties", {}).items()
+        if "description" not in about
+    ]
+    assert silent == [], "the docstring of a field says what its key means"
 
 
 def test_a_criterion_for_a_person_is_valid():

@@ -20,7 +20,7 @@ from grader.ros_env import RosInstallation
 from grader.rubric.model import Scenario, Start, Until
 from tests.arena.support import make_place, printed, require_ros, run
 
-ALL = ("rospy_tutorials", "std_srvs", "turtlesim")
+ALL = ("robot_world", "rospy_tutorials", "std_srvs", "turtlesim")
 
 
 def _ros(*prefixes: Path, **env: str) -> RosInstallation:
@@ -49,22 +49,33 @@ def test_what_ros_knows_is_not_stood_in_for(tmp_path: Path) -> None:
     _package(tmp_path / "noetic" / "share" / "turtlesim")
     _package(tmp_path / "ws" / "src" / "ros_tutorials" / "rospy_tutorials")
     own = _package(tmp_path / "std_srvs")
-    ros = _ros(tmp_path / "noetic", ROS_PACKAGE_PATH=f"{tmp_path}/ws/src:{own}")
+    world = _package(tmp_path / "robot_world")
+    ros = _ros(tmp_path / "noetic", ROS_PACKAGE_PATH=f"{tmp_path}/ws/src:{own}:{world}")
     assert missing_packages(ros) == ()
     assert _standins(ros).detail == "not needed for any package"
-    assert missing_packages(_ros(tmp_path / "noetic")) == ("rospy_tutorials", "std_srvs")
-    assert missing_packages(_ros(ROS_PACKAGE_PATH=str(tmp_path / "noetic" / "share"))) == ALL[:2]
-    assert "rospy_tutorials, std_srvs" in _standins(_ros(tmp_path / "noetic")).detail
+    assert missing_packages(_ros(tmp_path / "noetic")) == ALL[:3]
+    assert missing_packages(_ros(ROS_PACKAGE_PATH=str(tmp_path / "noetic" / "share"))) == ALL[:3]
+    assert "robot_world, rospy_tutorials, std_srvs" in _standins(_ros(tmp_path / "noetic")).detail
 
 
 def test_a_copy_is_an_install_space_with_programs_that_run(tmp_path: Path) -> None:
     _package(tmp_path / "noetic" / "share" / "std_srvs")
     folder = tmp_path / "standins"
     copy_standins(folder, _ros(tmp_path / "noetic"))
-    assert sorted(p.name for p in (folder / "share").iterdir()) == ["rospy_tutorials", "turtlesim"]
+    assert sorted(p.name for p in (folder / "share").iterdir()) == [
+        "robot_world",
+        "rospy_tutorials",
+        "turtlesim",
+    ]
     programs = {p.name for p in folder.rglob("*") if p.is_file() and os.access(p, os.X_OK)}
     talkers = {"talker", "talker.py", "listener", "listener.py"}
-    assert programs == talkers | {"turtlesim_node", "turtle_teleop_key", "draw_square", "mimic"}
+    assert programs == talkers | {
+        "robot_world",
+        "turtlesim_node",
+        "turtle_teleop_key",
+        "draw_square",
+        "mimic",
+    }
     assert not list(folder.rglob("__pycache__"))
     assert all(p.stat().st_mode & 0o444 == 0o444 for p in folder.rglob("*"))
 

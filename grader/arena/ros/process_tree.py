@@ -35,11 +35,14 @@ def descendants(pid):
 
 
 def _children(pid):
+    return [child for thread in _threads(pid) for child in _children_of_thread(pid, thread)]
+
+
+def _threads(pid):
     try:
-        threads = os.listdir("/proc/{}/task".format(pid))
+        return os.listdir("/proc/{}/task".format(pid))
     except OSError:
         return []  # it has ended
-    return [child for thread in threads for child in _children_of_thread(pid, thread)]
 
 
 def _children_of_thread(pid, thread):
@@ -68,6 +71,34 @@ def descriptors(pid):
         return []  # it has ended, or is not ours to look into
 
 
+def waits_in(pid, thread):
+    """Where in the kernel a thread waits, or "" where that is not shown."""
+    try:
+        with open("/proc/{}/task/{}/wchan".format(pid, thread)) as file:
+            return file.read()
+    except OSError:
+        return ""
+
+
+def _wakes(pid, thread):
+    """How often a thread has waited for something so far."""
+    try:
+        with open("/proc/{}/task/{}/status".format(pid, thread), "rb") as file:
+            found = [line.split()[1] for line in file if line.startswith(b"voluntary_ctxt_switches:")]
+        return int(found[0])
+    except (OSError, IndexError, ValueError):
+        return 0
+
+
+def _late_s(pid):
+    """How long the main thread has waited for a processor so far."""
+    try:
+        with open("/proc/{}/schedstat".format(pid)) as file:
+            return int(file.read().split()[1]) / 1e9
+    except (OSError, IndexError, ValueError):
+        return 0.0
+
+
 def shared_memory(pids):
     """(bytes, maps): memory without a name that processes share, each piece once, and how many maps were looked at.
 
@@ -92,6 +123,84 @@ def resident_bytes(pid):
             return int(file.read().split()[1]) * PAGE_BYTES
     except (OSError, IndexError, ValueError):
         return 0
+
+
+LOOK_S, LOOK_RARELY_S = 0.25, 2.0
+PROGRAMS_MAX, THREADS_MAX = 30, 200
+"""Past these, a tree is not looked at closely and counts as busy."""
+ASLEEP_S = 0.8
+"""`rospy.spin()` wakes every 0.5 s."""
+WORKING = 0.4
+SPIN_HZ = 3.2
+
+
+class Rest:
+    """Whether a program has come to rest: it does little, and wakes again and again, as a loop or `spin()` does.
+
+    A long sleep is no rest, since no one knows what comes after it. `since_s` is when the rest began, or None. It
+    `spins` while its main thread wakes about twice a second (rospy), or waits for callbacks alone (roscpp).
+    """
+
+    def __init__(self, pid, now_s):
+        self._pid = pid
+        self.since_s = None
+        self.spins = False
+        self._wakes = self._wakes_before = 0
+        self._woke_s = self._looked_s = now_s
+        self._work_s = None
+        self._naps = {}
+
+    def look(self, now_s):
+        wakes, work_s = _wakes(self._pid, self._pid), cpu_s(self._pid) + _late_s(self._pid)
+        if wakes != self._wakes:
+            self._woke_s = now_s
+        napping, asleep = self._others(now_s)
+        working = self._work_s is None or work_s - self._work_s > WORKING * (now_s - self._looked_s)
+        waits = waits_in(self._pid, self._pid)
+        if working or asleep or now_s - self._woke_s > ASLEEP_S:
+            self.since_s = None
+        elif self.since_s is None:
+            self.since_s, self._wakes_before = now_s, wakes
+            self._only_callbacks, self._napping = True, False
+        if self.since_s is not None:
+            self._only_callbacks = self._only_callbacks and "futex" in waits
+            self._napping = self._napping or napping
+            rarely = wakes - self._wakes_before <= SPIN_HZ * (now_s - self.since_s) + 1
+            self.spins = not self._napping and (rarely or self._only_callbacks)
+        self._wakes, self._work_s, self._looked_s = wakes, work_s, now_s
+
+    def _others(self, now_s):
+        """Whether one of the other threads sleeps for a time, and whether for long (a timer, say)."""
+        naps, threads = {}, _threads(self._pid)
+        if len(threads) > THREADS_MAX:
+            return True, True
+        for thread in threads:
+            if thread != str(self._pid) and "nanosleep" in waits_in(self._pid, thread):
+                wakes = _wakes(self._pid, thread)
+                before = self._naps.get(thread)
+                naps[thread] = before if before and before[0] == wakes else (wakes, now_s)
+        self._naps = naps
+        return bool(naps), any(now_s - since_s > ASLEEP_S for _, since_s in naps.values())
+
+
+class TreeRest:
+    """The same of a tree: of all its programs. Shells that wait for the program that they started do not count."""
+
+    def __init__(self):
+        self._programs = {}
+
+    def look(self, pids, now_s):
+        """(rest, programs): `spins`, `loops` or None, and how many programs have no others below them."""
+        if len(pids) > PROGRAMS_MAX:
+            return None, PROGRAMS_MAX
+        pids = [pid for pid in pids if not waits_in(pid, pid).startswith("do_wait")]
+        self._programs = {pid: self._programs.get(pid) or Rest(pid, now_s) for pid in pids}
+        for program in self._programs.values():
+            program.look(now_s)
+        last = [pid for pid in pids if not _children(pid)]
+        if not last or any(program.since_s is None for program in self._programs.values()):
+            return None, len(last)
+        return "spins" if all(self._programs[pid].spins for pid in last) else "loops", len(last)
 
 
 class Groups:

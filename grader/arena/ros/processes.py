@@ -7,7 +7,18 @@ import signal
 import time
 
 from launching import launch
-from process_tree import MAPS_MAX, cpu_s, descendants, descriptors, resident_bytes, shared_memory
+from process_tree import (
+    LOOK_RARELY_S,
+    LOOK_S,
+    MAPS_MAX,
+    PROGRAMS_MAX,
+    TreeRest,
+    cpu_s,
+    descendants,
+    descriptors,
+    resident_bytes,
+    shared_memory,
+)
 
 WATCH_S = 0.5
 WORDS_BYTES = 200
@@ -49,6 +60,9 @@ class Process:
         self._spawn(spec)
         self._event("start", argv=spec["argv"], script=spec["script"], repairs=spec["repairs"])
         loop.call_later(WATCH_S, self._watch)
+        self._rest, self._rest_told = TreeRest(), None
+        if self.role == "student":
+            loop.call_later(LOOK_S, self._look)
 
     def stop(self, int_s, term_s):
         """Send INT to the whole process group, as Ctrl-C in a terminal does, TERM after `int_s`, KILL after another
@@ -200,6 +214,18 @@ class Process:
             self.loop.call_later(WATCH_S, self._watch)
         else:
             self.stop_for(excess)
+
+    def _look(self):
+        """Tell the grader when the tree comes to rest, and when it moves again."""
+        if not self.alive:
+            return
+        tree = self._tree() if self._entered else []
+        found = self._rest.look(tree, time.monotonic())
+        if found != self._rest_told:
+            self._rest_told = found
+            rest, programs = found
+            self._wire.status("rest", name=self.name, rest=rest, programs=programs)
+        self.loop.call_later(LOOK_S if len(tree) <= PROGRAMS_MAX else LOOK_RARELY_S, self._look)
 
     def _excess(self, tree):
         """What the tree has too much of, in words, or None."""

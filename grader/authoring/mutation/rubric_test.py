@@ -92,7 +92,7 @@ def _grade_reference(plan: Plan, progress: Progress) -> GradingResult:
 
 def _judge_reference(plan: Plan, result: GradingResult, progress: Progress) -> ReferenceResult:
     """Return how the reference solution fared: every criterion that is worth points has to be reached."""
-    lost = find_lost([c for c in result.criteria if c.max_points > 0])
+    lost = find_lost([c for c in result.criteria if c.counts and not c.left_out])
     said = "lost: " + ", ".join(c.id for c in lost) if lost else "everything reached"
     progress.step(REFERENCE, "failed" if lost else "done", said)
     return ReferenceResult(
@@ -180,7 +180,9 @@ def _find_uncosted(plan: Plan, results: Sequence[MutantResult]) -> tuple[str, ..
     """Return the criteria that are worth points and that no mutant fails."""
     failed = {c.id for result in results for c in result.lost if c.status in COSTING}
     criteria = plan.rubric.rubric.criteria
-    return tuple(c.id for c in criteria if c.points > 0 and c.check != "manual" and c.id not in failed)
+    return tuple(
+        c.id for c in criteria if (c.points or c.extra) and c.check != "manual" and c.id not in failed
+    )
 
 
 # ---- gradings

@@ -42,12 +42,19 @@ def run_seconds(run: Run) -> ToSeconds | None:
     if run.clock != "warped":
         return lambda time_ns: (time_ns - run.start_ns) / 1e9
     ticks = _ticks(run)
-    return _interpolated(ticks) if ticks else None
+    return _interpolated(ticks, ticks[0][1]) if ticks else None
 
 
-def _interpolated(ticks: list[tuple[int, float]]) -> ToSeconds:
+def ros_seconds(run: Run) -> ToSeconds | None:
+    """Seconds of ROS's time, as `rospy.get_time()` gives them; None where the grader's `/clock` was not recorded."""
+    if run.clock != "warped":
+        return lambda time_ns: time_ns / 1e9
+    ticks = _ticks(run)
+    return _interpolated(ticks, 0.0) if ticks else None
+
+
+def _interpolated(ticks: list[tuple[int, float]], zero_s: float) -> ToSeconds:
     times = [time_ns for time_ns, _ in ticks]
-    zero_s = ticks[0][1]
 
     def seconds(time_ns: int) -> float:
         after = bisect_right(times, time_ns)

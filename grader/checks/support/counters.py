@@ -200,13 +200,18 @@ def first_values(values: Sequence[float]) -> str:
 
 
 class WrapParams(Record):
-    """After `maximum`, or the value before it, comes `minimum`, `wraps` times; `rate_hz` is nominal."""
+    """Where the counter wraps."""
 
     topic: PublishedTopic
+    """The topic, with its slash: `/chatter`."""
     minimum: int = 0
+    """The first value after the wrap."""
     maximum: int = 127
+    """The last value before the wrap; one less will do as well."""
     wraps: Annotated[int, Field(ge=1)] = 2
+    """How often the wrap has to be seen."""
     rate_hz: Annotated[float, Field(gt=0)] = 10.0
+    """The nominal rate, to know a flood of messages from a counter."""
 
     @property
     def reset_hint(self) -> str:

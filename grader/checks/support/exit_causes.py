@@ -75,6 +75,7 @@ _MEANT = re.compile(r"did you mean `(\w+)`\?$")
 _NO_TYPE = re.compile(r"cannot import name '(\w+)' from '(\w+)\.msg'")
 HEADING = "Traceback (most recent call last):"
 _FRAME = re.compile(r'^\s+File "([^"]+)", line (\d+)')
+_CARETS = re.compile(r"    \s*([~^]*\^[~^]*)")
 _LAST = re.compile(r"^([A-Za-z_][\w.]*)(?:: ?(.*))?$")
 _LIBRARY = ("/dist-packages/", "/site-packages/", "/usr/lib/python", "<frozen", "/opt/ros/")
 
@@ -85,6 +86,8 @@ class Frame(NamedTuple):
     file: str
     line: int
     source: str = ""
+    marked: tuple[int, int] | None = None
+    """What Python's carets point at, as a slice of `source`."""
 
     @property
     def in_library(self) -> bool:
@@ -149,6 +152,8 @@ def tracebacks(lines: Sequence[str]) -> tuple[Traceback, ...]:
             frames.append(Frame(frame[1], int(frame[2])))
         elif frames and not frames[-1].source and line.startswith("    "):
             frames[-1] = frames[-1]._replace(source=line.strip())
+        elif frames and frames[-1].source and not frames[-1].marked and (carets := _CARETS.fullmatch(line)):
+            frames[-1] = frames[-1]._replace(marked=(carets.start(1) - 4, carets.end(1) - 4))
         elif first is not None and line and not line[0].isspace():
             last = _LAST.match(line)
             if last:
@@ -254,6 +259,14 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
     place = _place(found, package)
     slip = _slip(found)
     cause, hint = slip or CAUSES.get(found.kind, ("", "fix the line that is named"))
+    if (
+        any(f"'{package.name}{inner}'" in found.message for inner in ("", ".msg", ".srv"))
+        and package.interfaces
+    ):
+        hint = (
+            "the build makes the package's own messages: list them in add_message_files(…) or "
+            "add_service_files(…), call generate_messages(…), and build again"
+        )
     if lacking := _lacking(found, package):
         where = f" ({place.file}, line {place.line})" if place else ""
         cause = f"{shown(found.text)}{where}: this grading machine lacks {lacking}"
@@ -343,7 +356,13 @@ def _place(found: Traceback, package: PackageFacts) -> FileCitation | None:
     for frame in reversed(found.frames):
         path = None if frame.in_library else path_in_package(package, frame.file)
         if path is not None:
-            return FileCitation(file=path, line=frame.line)
+            place = FileCitation(file=path, line=frame.line)
+            if not frame.marked:
+                return place
+            begin, end = frame.marked
+            return place.model_copy(
+                update={"column": begin + 1, "end_column": end + 1, "source": frame.source}
+            )
     return None
 
 

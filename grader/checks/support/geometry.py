@@ -5,19 +5,39 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import Field
 
 from grader.checks.support.clocks import run_seconds
+from grader.checks.support.fields import FieldPath, NoField, values_at
 from grader.checks.support.nodes import plain_type
 from grader.checks.support.processes import observed_until_ns
 from grader.evidence.run import Channel, Run
+from grader.model.record import Record
 
 SAMPLE_M = 0.02
 SAMPLE_RAD = 0.2
 SAMPLES_MAX = 2000
 
 Point = tuple[float, float]
+Polyline = tuple[Point, ...]
+"""Straight from point to point."""
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Spot = tuple[Coordinate, Coordinate]
 FASTEST = 1e6
+MOVED_M = 0.01
+
+
+class PoseFields(Record):
+    """Where a message holds a position."""
+
+    x: FieldPath
+    """The field of x, in metres: `vector.x`."""
+    y: FieldPath
+    """The field of y, in metres."""
+    heading: FieldPath | None = None
+    """The field of the heading, in radians; null: none."""
 
 
 class Pose(NamedTuple):
@@ -100,6 +120,16 @@ def relative(path: Sequence[Pose]) -> list[Pose]:
     ]
 
 
+def stands(path: Sequence[Pose]) -> bool:
+    """Return whether it never left its place."""
+    return all(math.dist(p.point, path[0].point) <= MOVED_M for p in path)
+
+
+def set_off_s(path: Sequence[Pose]) -> float:
+    """Return when it left its first place, or else when the path begins (s)."""
+    return next((p for p in path if math.dist(p.point, path[0].point) > MOVED_M), path[0]).time_s
+
+
 def length_m(path: Sequence[Pose]) -> float:
     return sum(math.dist(a.point, b.point) for a, b in pairwise(path))
 
@@ -159,17 +189,17 @@ class Track(NamedTuple):
     fault: str = ""
 
 
-def track(run: Run, topic: str, hold_s: float | None) -> Track | None:
+def track(run: Run, topic: str, hold_s: float | None, fields: PoseFields | None = None) -> Track | None:
     """Return the path told on a topic, None where no message came (or, in a warped run, no clock)."""
     seconds = run_seconds(run)
-    channels = _publishers(run, topic)
+    channels = _publishers(run, topic, fields)
     pairs = sorted(
         (pair for c in channels for pair in zip(c.times_ns, c.values, strict=True)), key=lambda pair: pair[0]
     )
     if not pairs or seconds is None:
         return None
-    poses = [p for t, value in pairs if (p := _pose(seconds(t), value))]
-    commands = [c for t, value in pairs if (c := _command(seconds(t), value))]
+    poses = [p for t, value in pairs if (p := _pose(seconds(t), value, fields))]
+    commands = [c for t, value in pairs if not fields and (c := _command(seconds(t), value))]
     if len(poses) < len(pairs) and len(commands) < len(pairs):
         return Track(misfit=f"are {plain_type(channels[0].type)}: neither velocities nor poses")
     if not all(_finite(*one[1:]) for one in (*poses, *commands)):
@@ -180,15 +210,17 @@ def track(run: Run, topic: str, hold_s: float | None) -> Track | None:
     return Track(tuple(driven(commands, hold_s, end_s)))
 
 
-def _publishers(run: Run, topic: str) -> list[Channel]:
+def _publishers(run: Run, topic: str, fields: PoseFields | None) -> list[Channel]:
     """A simulator that the rubric starts knows the pose; otherwise the student's nodes count."""
     channels = [c for c in run.channels if c.topic == topic and c.messages and not c.by_grader]
-    simulated = [c for c in channels if c.callerid in run.grader_nodes and _pose(0, c.values[0])]
+    simulated = [c for c in channels if c.callerid in run.grader_nodes and _pose(0, c.values[0], fields)]
     return simulated or [c for c in channels if run.is_student_node(c.callerid)]
 
 
-def _pose(time_s: float, message: Any) -> Pose | None:  # noqa: ANN401 - decoded messages hold anything
+def _pose(time_s: float, message: Any, fields: PoseFields | None) -> Pose | None:  # noqa: ANN401 - decoded messages hold anything
     """`x` and `y` at the top (turtlesim/Pose, geometry_msgs/Pose2D) or in `pose`s (also nav_msgs/Odometry)."""
+    if fields is not None:
+        return _pose_at(time_s, message, fields)
     while isinstance(message, Mapping) and "pose" in message:
         message = message["pose"]
     if not isinstance(message, Mapping):
@@ -199,6 +231,16 @@ def _pose(time_s: float, message: Any) -> Pose | None:  # noqa: ANN401 - decoded
     turned = message.get("orientation")
     heading = _yaw(turned) if isinstance(turned, Mapping) else message.get("theta", 0.0)
     return Pose(time_s, place["x"], place["y"], heading)
+
+
+def _pose_at(time_s: float, message: Any, fields: PoseFields) -> Pose | None:  # noqa: ANN401 - as above
+    paths = [path for path in (fields.x, fields.y, fields.heading) if path is not None]
+    try:
+        (x,), (y,), *heading = (values_at(message, path) for path in paths)
+    except (NoField, ValueError):
+        return None
+    numbers = (x, y, *(heading[0] if heading else ()))
+    return Pose(time_s, *numbers) if all(isinstance(one, int | float) for one in numbers) else None
 
 
 def _yaw(q: Mapping[str, float]) -> float:

@@ -18,6 +18,8 @@ PERIOD_NS = 100_000_000
 STAMP = struct.Struct("<III")
 FULL = 0.9
 """The share of the processors' time from which who has work to do may wait for a turn, though sleepers wake in time."""
+LATE_MS = 100.0
+"""From here on, an answer may be late for the machine's sake."""
 OWN_LEAST, OTHERS_MOST = 0.6, 0.25
 """Shares of the processors' time of half a second: a run that took so much itself, and left so little to all others,
 made the machine late in it. One busy loop takes half of two processors, and is not it; nor is who shares the machine.
@@ -94,6 +96,13 @@ def excused(verdict: Verdict, run: Run, from_ns: int, to_ns: int, why: Callable[
     if why(whole):
         return verdict.model_copy(update={"message": f"{verdict.message}; {NO_EXCUSE}"})
     return verdict
+
+
+def why_late(late: Lateness) -> str:
+    """Return what the machine was where it was late enough to delay an answer; "" where it was not."""
+    if not (late.full or late.max_ms >= LATE_MS):
+        return ""
+    return "busy" if late.full else f"late itself, by up to {late.max_ms:.0f} ms"
 
 
 class _Window(NamedTuple):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from grader.evidence.events import ProcessEvent
 from grader.evidence.run import Run
 from grader.model.verdict import Verdict, unjudged
-from grader.wording import shorten
+from grader.wording import seconds, shorten
 
 NO_SCRIPT_HINT = "add the script to the package, and push it"
 STEPS = ("stop", "kill")
@@ -20,6 +20,8 @@ FLOOD_HZ = 100
 SILENT_AFTER_NS = 500_000_000
 TALKING_NS = 1_000_000_000
 TALKING_LINES = 5
+UP_NS = 5_000_000_000
+"""So long after its start, a program of the grader's is a node."""
 SHUT_DOWN = "shutdown request"
 LINE_CHARS = 200
 
@@ -63,11 +65,15 @@ def failed_program(run: Run, names: Collection[str]) -> str:
 
     One that another node shut down, by taking its name or by `rosnode kill`, did not fail by itself.
     """
+    owners = {process for _, event in run.graph for process in event.processes.values()}
     for start_ns, start in run.processes:
         if start.role != "grader" or start.event != "start" or start.name not in names:
             continue
         one = _life(run, start_ns, start)
         lines = [line.line.strip() for _, line in run.lines(one.name) if line.line.strip()]
+        if not one.ended_early and owners and one.name not in owners and one.until_ns(run) - start_ns > UP_NS:
+            last = f": {shorten(lines[-1], LINE_CHARS)}" if lines else ""
+            return f"{one.name} ran for {seconds(one.until_ns(run) - start_ns)} and never became a node{last}"
         if one.end is None or not one.ended_early or one.end.exit_code == 0:
             continue
         if not any(SHUT_DOWN in line for line in lines):

@@ -10,10 +10,11 @@ from grader.checks.support.exit_causes import explain_end
 from grader.checks.support.nodes import plain_type
 from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives
 from grader.checks.support.text import near_names, texts_in
+from grader.evidence.events import MISFIT
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
 from grader.model.record import Record
-from grader.model.verdict import EvidenceCitation, Status, Verdict, inconclusive, unjudged
+from grader.model.verdict import EvidenceCitation, Status, Verdict, failed, inconclusive, unjudged
 from grader.wording import join_words, plural
 
 SYSTEM_TOPICS = frozenset({"/rosout", "/rosout_agg", "/clock"})
@@ -85,7 +86,7 @@ def no_message(
     if near:
         hint = f"name the topic {topic} in rospy.Publisher(…)"
         return of_node(f"{what}; the node publishes on {join_words(near)}", measured=measured, hint=hint)
-    if absent := no_node(package, run, what) or _refused(run, topic):
+    if absent := no_node(package, run, what) or _refused(run, topic) or misfit(run):
         return absent
     if topic in published:
         hint = "call publish(…) inside the loop `while not rospy.is_shutdown():`"
@@ -93,6 +94,17 @@ def no_message(
     only = f"it publishes on {join_words(published)}; " if published else ""
     hint = f"{only}add rospy.Publisher('{topic}', …) and publish in the loop"
     return of_node(f"{what}: no node publishes on it", measured=measured, hint=hint)
+
+
+def misfit(run: Run, topic: str = "") -> Verdict | None:
+    """Return the verdict where the grader could not send anything (on that topic), because the student's own message
+    is defined otherwise."""
+    notes = (e for _, e in run.actors if e.action == "note" and e.detail.startswith(MISFIT))
+    note = next((e for e in notes if topic in {"", e.topic}), None)
+    if note is None:
+        return None
+    message = f"nothing could be sent on {note.topic}: {note.detail}"
+    return failed(message, hint="give the .msg file the names and types of the handout, and build again")
 
 
 def _refused(run: Run, topic: str) -> Verdict | None:

@@ -60,7 +60,7 @@ class BatchFolder:
             title=run.title,
             rubric_id=run.rubric.id,
             max_points=run.max_points,
-            criteria=tuple((c.id, c.title, c.max_points) for c in run.criteria),
+            criteria=tuple((c.id, c.title, c.max_points, c.extra) for c in run.criteria),
             columns=run.columns,
         )
 
@@ -105,6 +105,7 @@ def _not_judged(criterion: CriterionInfo) -> CriterionResult:
         status=Status.ERROR,
         points=0.0,
         max_points=criterion.max_points,
+        extra=criterion.extra,
         message="not judged",
         expected="",
         measured="",

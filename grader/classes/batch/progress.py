@@ -134,7 +134,7 @@ def _state(row: Row) -> str:
 
 
 def _waiting(row: Row) -> tuple[CriterionResult, ...]:
-    return tuple(c for c in row.result.criteria if c.status in OPEN and c.max_points > 0)
+    return tuple(c for c in row.result.criteria if c.status in OPEN and c.counts)
 
 
 def _open(row: Row) -> str:

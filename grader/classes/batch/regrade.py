@@ -27,7 +27,7 @@ from grader.classes.overrides import FILE as OVERRIDES
 from grader.classes.overrides import read_overrides
 from grader.errors import GraderError
 from grader.files import atomic_write
-from grader.judging.summary import overall_status, total_points
+from grader.judging.summary import overall_status, total_fields
 from grader.model.batch import Entry, Roster
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.sandbox_mode import SandboxMode
@@ -128,7 +128,7 @@ def _regrade_one(
             "rubric": describe_rubric(rubric, "")["rubric"],
             "criteria": judged.criteria,
             "status": overall_status(judged.criteria),
-            "points": total_points(rubric.rubric, judged.criteria),
+            **total_fields(rubric.rubric, judged.criteria),
             "max_points": rubric.rubric.max_points,
             "environment": before.environment.model_copy(update={"grader": __version__}),
             "overrides": (),

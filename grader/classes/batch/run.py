@@ -233,7 +233,9 @@ def describe_rubric(rubric: LoadedRubric, rubric_source: str) -> dict[str, Any]:
         "rubric_source": rubric_source,
         "title": lab.title,
         "max_points": lab.max_points,
-        "criteria": tuple(CriterionInfo(id=c.id, title=c.title, max_points=c.points) for c in lab.criteria),
+        "criteria": tuple(
+            CriterionInfo(id=c.id, title=c.title, max_points=c.points, extra=c.extra) for c in lab.criteria
+        ),
     }
 
 

@@ -31,24 +31,26 @@ HELLO = "hello"
 BLAME_SUBMISSION = (SubmissionError.kind, PackageNotFound.kind)
 
 
-class GradeRequest(Record):
-    """A job on its way to a worker. `exchange` is the URL for its results, `batch` names the client's batch.
-
-    `seen`: the job's source is a path that the client sees.
-    """
-
-    job: Job
-    exchange: str
-    batch: str
-    seen: bool
-
-
 class Parcel(Record):
     """A packed folder in the exchange, under `name`: its size in bytes and the sha256 of its bytes."""
 
     name: str
     size: int
     sha256: str
+
+
+class GradeRequest(Record):
+    """A job on its way to a worker. `exchange` is the URL for its results, `batch` names the client's batch.
+
+    `seen`: the job's source is a path that the client sees. `lab`: the rubric with the files that it brings along, if
+    any, in the exchange too.
+    """
+
+    job: Job
+    exchange: str
+    batch: str
+    seen: bool
+    lab: Parcel | None = None
 
 
 class Report(Record):

@@ -31,12 +31,14 @@ from grader.classes.cluster.exchange import (
     Report,
     check_url,
     is_machines,
+    pack,
     unpack,
 )
 from grader.errors import GraderError, HostError
+from grader.files import temporary_folder
 from grader.intake import safe_name
 from grader.results import RESULT, Results
-from grader.rubric.load import needs_ros
+from grader.rubric.load import LoadedRubric, needs_ros, read_beside_rubric
 
 PATIENCE_S = 60.0
 EXCHANGE = ".grader-exchange"
@@ -101,7 +103,8 @@ class ClusterExecutor:
             try:
                 self._exchange.greet(batch)
                 recruits = Recruits(client, self._exchange.url, batch, needs, self._say)
-                tasks = _Tasks(client, self._exchange, batch, recruits, self._patience_s)
+                lab = put_lab(first.rubric, self._exchange)
+                tasks = _Tasks(client, self._exchange, batch, recruits, self._patience_s, lab=lab)
                 yield from tasks.run(chain([first], waiting), begun)
             finally:
                 with suppress(GraderError, OSError):  # what is left is removed by the next batch
@@ -136,7 +139,10 @@ class _Tasks:
         batch: str,
         recruits: Recruits,
         patience_s: float,
+        *,
+        lab: Parcel | None = None,
     ) -> None:
+        self._lab = lab
         self._client, self._exchange, self._batch = client, exchange, batch
         self._recruits, self._patience_s = recruits, patience_s
         self._running: list[_Task] = []
@@ -182,7 +188,9 @@ class _Tasks:
     def _hand_out(self, task: _Task) -> None:
         source = Path(task.job.entry.source)
         seen = source.is_absolute() and (source.exists() or source.is_symlink())
-        request = GradeRequest(job=task.job, exchange=self._exchange.url, batch=self._batch, seen=seen)
+        request = GradeRequest(
+            job=task.job, exchange=self._exchange.url, batch=self._batch, seen=seen, lab=self._lab
+        )
         task.workers = frozenset(self._recruits.fit)
         task.future = self._client.submit(
             worker.perform,
@@ -271,6 +279,21 @@ class _Tasks:
         with suppress(Exception):  # a worker that is gone needs no dismissal
             workers = list(self._recruits.fit)
             self._client.run(worker.dismiss, self._batch, workers=workers, on_error="ignore")
+
+
+def put_lab(rubric: LoadedRubric, exchange: Exchange) -> Parcel | None:
+    """Put the rubric and what it brings along into the exchange; None where that is its file alone."""
+    files = read_beside_rubric(rubric)
+    if not files:
+        return None
+    with temporary_folder("lab") as folder:
+        packed = folder / "packed"
+        for name, data in {rubric.path.name: rubric.path.read_bytes(), **files}.items():
+            target = folder / "lab" / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(data)
+        pack(folder / "lab", packed)
+        return exchange.put(packed, "lab")
 
 
 def place(job: Job, report: Report, exchange: Exchange) -> Outcome:

@@ -20,8 +20,8 @@ from pathlib import Path
 import pydantic
 
 import grader
-from grader.classes.batch.job import Outcome, grade_job, outcome_of_ended
-from grader.classes.cluster.exchange import Exchange, GradeRequest, Parcel, Report, is_machines, pack
+from grader.classes.batch.job import Job, Outcome, grade_job, outcome_of_ended
+from grader.classes.cluster.exchange import Exchange, GradeRequest, Parcel, Report, is_machines, pack, unpack
 from grader.errors import GraderError, HostError
 from grader.files import temporary_folder
 from grader.intake import safe_name
@@ -108,8 +108,8 @@ def grade(request: GradeRequest, is_wanted: Callable[[], bool]) -> Report:
         raise HostError(f"{source} cannot be seen on {host}", hint=hint)
     parcel = None
     try:
-        with temporary_folder("run") as folder:
-            outcome = _grade_in(folder, request, is_wanted)
+        with temporary_folder("run") as folder, _lab(request) as job:
+            outcome = _grade_in(folder, request.model_copy(update={"job": job}), is_wanted)
             if is_machines(outcome):
                 outcome = outcome.model_copy(update={"message": f"{outcome.message} (on {host})"})
             if not outcome.kept and outcome.kind != "interrupted" and is_wanted():
@@ -118,6 +118,20 @@ def grade(request: GradeRequest, is_wanted: Callable[[], bool]) -> Report:
         message = getattr(error, "message", "") or str(error)
         raise HostError(f"{message} (on {host})", hint=getattr(error, "hint", "")) from error
     return Report(outcome=outcome, parcel=parcel)
+
+
+@contextmanager
+def _lab(request: GradeRequest) -> Iterator[Job]:
+    """Yield the job with its rubric where the files are that it brings along."""
+    if request.lab is None:
+        yield request.job
+        return
+    with temporary_folder("lab") as folder:
+        with Exchange(request.exchange).open(request.lab) as stream:
+            unpack(stream, request.lab, folder)
+        rubric = request.job.rubric
+        moved = rubric.model_copy(update={"path": folder / rubric.path.name})
+        yield request.job.model_copy(update={"rubric": moved})
 
 
 def _grade_in(folder: Path, request: GradeRequest, is_wanted: Callable[[], bool]) -> Outcome:

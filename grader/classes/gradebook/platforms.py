@@ -168,7 +168,7 @@ class Wanted:
 class Mark:
     """`points` by column, None where they are open; `open` says why. `late_cost` is what being late cost.
 
-    `comment` is for the student.
+    `comment` is for the student, `gated` says whether a gate keeps the points low.
     """
 
     entry: Entry
@@ -176,6 +176,7 @@ class Mark:
     open: str = ""
     comment: str = ""
     late_cost: float = 0.0
+    gated: bool = False
 
 
 def wanted_columns(book: Book, column: str, *, per_criterion: bool) -> tuple[Wanted, ...]:
@@ -184,7 +185,7 @@ def wanted_columns(book: Book, column: str, *, per_criterion: bool) -> tuple[Wan
     if not per_criterion:
         names = (column,) if column else (book.title, book.rubric_id)
         return (Wanted(title=base, names=names, max_points=book.max_points),)
-    worth = [criterion for criterion in book.criteria if criterion.max_points > 0]
+    worth = [criterion for criterion in book.criteria if criterion.max_points > 0 or criterion.extra]
     titles = [criterion.title for criterion in worth]
     return tuple(
         Wanted(
@@ -200,7 +201,7 @@ def wanted_columns(book: Book, column: str, *, per_criterion: bool) -> tuple[Wan
 
 def marks_of(book: Book, rows: Iterable[Row], *, per_criterion: bool) -> list[Mark]:
     """Every row's mark. Of a result of status `error` no points count, of an inconclusive one those that are sure."""
-    worth = [criterion.id for criterion in book.criteria if criterion.max_points > 0]
+    worth = [criterion.id for criterion in book.criteria if criterion.max_points > 0 or criterion.extra]
     return [_mark(row, worth if per_criterion else None) for row in rows]
 
 
@@ -212,6 +213,9 @@ def remarks_of(marks: Sequence[Mark], *, per_criterion: bool) -> Iterator[str]:
     late = [mark.entry.id for mark in marks if mark.late_cost]
     if per_criterion and late:
         yield f"criteria are without what being late cost: {', '.join(late)}"
+    gated = [mark.entry.id for mark in marks if mark.gated]
+    if per_criterion and gated:
+        yield f"criteria are without what a gate cost: {', '.join(gated)}"
 
 
 def _mark(row: Row, worth: Sequence[str] | None) -> Mark:
@@ -223,6 +227,7 @@ def _mark(row: Row, worth: Sequence[str] | None) -> Mark:
         open=_open(result),
         comment="; ".join(text for text in (late_text(result), comment(result)) if text),
         late_cost=cost,
+        gated=result.gate is not None,
     )
 
 

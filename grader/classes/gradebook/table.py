@@ -30,6 +30,7 @@ class BookCriterion(NamedTuple):
     id: str
     title: str
     max_points: float
+    extra: float = 0.0
 
 
 class Book(Record):
@@ -92,7 +93,7 @@ def error_text(result: GradingResult) -> str:
     """Why it could not be graded, or what a person has to look at."""
     if result.error:
         return result.error.message
-    waiting = [c.id for c in result.criteria if c.status.is_open and c.max_points > 0]
+    waiting = [c.id for c in result.criteria if c.status.is_open and c.counts]
     return f"open: {', '.join(waiting)}" if waiting else ""
 
 

@@ -60,7 +60,7 @@ def _criteria(sheet: Worksheet, book: Book, bold: Format) -> None:
     sheet.set_column(1, 1, WIDTH_MAX)
     _write(sheet, 0, names, bold)
     for number, criterion in enumerate(book.criteria, start=1):
-        _write(sheet, number, criterion)
+        _write(sheet, number, criterion[: len(names)])
     sheet.freeze_panes(1, 0)
 
 

@@ -65,7 +65,7 @@ class _Reading:
 
     def __init__(self, source: Source, rubric: Rubric, ids: Collection[str]) -> None:
         self._source = source
-        self._points = {criterion.id: criterion.points for criterion in rubric.criteria}
+        self._points = {c.id: (min(0.0, c.extra), c.points + max(0.0, c.extra)) for c in rubric.criteria}
         self._ids = {folder_key(name): name for name in ids}
         self.found: dict[str, dict[str, Override]] = {}
         self.faults: list[Fault] = list(source.faults)
@@ -111,9 +111,12 @@ class _Reading:
         if criterion not in self._points:
             near = did_you_mean(criterion, self._points)
             return [(path, f'there is no criterion "{criterion}"{near}'), *found]
-        points, most = as_map(given).get("points"), self._points[criterion]
-        if isinstance(points, int | float) and not isinstance(points, bool) and points > most:
-            found.append(((*path, "points"), f"{points:g} is more than the criterion has: {most:g}"))
+        points, (least, most) = as_map(given).get("points"), self._points[criterion]
+        if isinstance(points, int | float) and not isinstance(points, bool):
+            if points > most:
+                found.append(((*path, "points"), f"{points:g} is more than the criterion has: {most:g}"))
+            if points < least:
+                found.insert(0, ((*path, "points"), f"must be at least {least:g}, not {points:g}"))
         return found
 
 

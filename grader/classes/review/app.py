@@ -41,6 +41,8 @@ from grader.errors import GraderError, RubricError
 from grader.model.result import Override
 from grader.report.html.shell import environment, style
 from grader.report.sentences import SIGNS
+from grader.report.view import of_points
+from grader.rubric.model import Criterion
 from grader.wording import number
 
 
@@ -63,7 +65,7 @@ def create_app(review: ReviewSession, *, port: int, token: str, author: str) -> 
     app = _Pages(__name__, static_folder=None)
     app.extensions["review"] = review
     guard(app, port=port, token=token)
-    app.jinja_env.filters.update(number=number, verbatim=escape)
+    app.jinja_env.filters.update(number=number, of_points=of_points, verbatim=escape)
     app.jinja_env.globals.update(SIGNS=SIGNS, FILTERS=FILTERS)
     app.context_processor(lambda: {"csrf": session.get("csrf", ""), "author": _author(author)})
     view = _Views(review, author)
@@ -115,7 +117,7 @@ class _Views:
         form = request.form
         typed = Draft(points=form.get("points", ""), comment=form.get("comment", ""))
         try:
-            override = self._wanted(asked.points, manual=asked.check == MANUAL)
+            override = self._wanted(asked)
             waits = self._session.save(item, criterion, override, form.get("seen", ""))
         except Conflict:
             return self._not_saved(item, criterion, _draft(typed, conflict=True), 409)
@@ -169,7 +171,7 @@ class _Views:
             raise NotFound("The class has no such submission.")
         return item
 
-    def _wanted(self, most: float, *, manual: bool) -> Override | None:
+    def _wanted(self, asked: Criterion) -> Override | None:
         form = request.form
         if form.get("do") == "remove":
             return None
@@ -177,8 +179,9 @@ class _Views:
             form.get("points", ""),
             form.get("comment", ""),
             _author(self._default_author),
-            most=most,
-            reason=not manual,
+            least=min(0.0, asked.extra),
+            most=asked.points + max(0.0, asked.extra),
+            reason=asked.check != MANUAL,
         )
 
     def _page(self, item: Item, drafts: Mapping[str, Draft]) -> str:

@@ -71,16 +71,14 @@ class Card:
         """What the check says, where a person decided."""
         if self.applied is None or self.manual:
             return ""
-        return verdict(
-            self.applied.automatic.status, self.applied.automatic.points, self.criterion.max_points
-        )
+        return verdict(self.applied.automatic.status, self.applied.automatic.points, self.criterion.full)
 
     @property
     def was(self) -> str:
         """What the check said when the person decided, where it says something else now."""
         if self.applied is None or not self.applied.changed:
             return ""
-        return verdict(self.applied.was.status, self.applied.was.points, self.criterion.max_points)
+        return verdict(self.applied.was.status, self.applied.was.points, self.criterion.full)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +123,7 @@ def card(
 def _waits(card: Card, *, whole: bool) -> bool:
     """Of what could not be graded at all, only what people decide anyway waits for one."""
     status = card.criterion.status
-    return card.criterion.max_points > 0 and ((status.is_open and whole) or (card.manual and status.is_open))
+    return card.criterion.counts and ((status.is_open and whole) or (card.manual and status.is_open))
 
 
 def _nothing_lost(card: Card) -> bool:
@@ -142,23 +140,27 @@ def plain(value: float) -> str:
     return f"{value:.10f}".rstrip("0").rstrip(".")
 
 
-POINTS = re.compile(r"\d{1,9}(?:[.,]\d{0,9})?|[.,]\d{1,9}", re.ASCII)
+POINTS = re.compile(r"-?(?:\d{1,9}(?:[.,]\d{0,9})?|[.,]\d{1,9})", re.ASCII)
 
 
 class Wrong(Exception):
     """What was typed cannot be taken; the message says why."""
 
 
-def override_of(points: str, comment: str, author: str, *, most: float, reason: bool) -> Override:
+def override_of(
+    points: str, comment: str, author: str, *, least: float = 0.0, most: float, reason: bool
+) -> Override:
     """Raises Wrong. A `reason` is asked for where a check has judged."""
     text = points.strip()
     if not text:
         raise Wrong("How many points?")
-    if not POINTS.fullmatch(text):
+    if not POINTS.fullmatch(text) or (text.startswith("-") and least >= 0):
         raise Wrong("Points are a number, such as 7 or 2.5.")
     value = float(text.replace(",", "."))
     if value > most:
         raise Wrong(f"It has at most {number(most)} points.")
+    if value < least:
+        raise Wrong(f"It has at least {number(least)} points.")
     written = clean(comment)
     if len(written) > COMMENT_CHARS:
         raise Wrong(f"At most {COMMENT_CHARS} characters, please: there are {len(written)}.")

@@ -131,7 +131,7 @@ def item_of(row: Row) -> Item:
     """What the list shows of a submission."""
     result = row.result
     waiting = {
-        status: sum(c.status is status and c.max_points > 0 for c in result.criteria)
+        status: sum(c.status is status and c.counts for c in result.criteria)
         for status in (Status.MANUAL, Status.INCONCLUSIVE, Status.ERROR)
     }
     kind = result.error.kind if result.error else ""

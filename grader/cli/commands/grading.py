@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from grader.cli.declare import INSTRUCTORS, Argument, Option, command, loading
-from grader.cli.options import RUBRIC, JsonFlag, PackageOption, SandboxOption, count
+from grader.cli.options import RUBRIC, AllFlag, JsonFlag, PackageOption, SandboxOption, count
 from grader.errors import ExitCode, UsageError
 
 DEFAULT_OUT = Path("grader-results")
@@ -27,6 +27,7 @@ def grade(
     submission_id: Annotated[str | None, Option("--id", "NAME", "the submission's id")] = None,
     package: PackageOption = None,
     sandbox: SandboxOption = "auto",
+    full: AllFlag = False,
     as_json: JsonFlag = False,
 ) -> ExitCode:
     """Grade one submission: a folder, an archive, a git URL or a recording."""
@@ -52,7 +53,7 @@ def grade(
         warn_without_sandbox(sandbox, loaded)
     with open_progress(early=sys.stdout.isatty() and not as_json) as progress:
         result = pipeline.grade(source, loaded, folder, options, progress)
-    return show(result, loaded.rubric, folder / result.submission.id, as_json=as_json)
+    return show(result, loaded.rubric, folder / result.submission.id, as_json=as_json, full=full)
 
 
 @command("record", runs_code=True)

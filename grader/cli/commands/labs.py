@@ -17,15 +17,39 @@ LAB = Argument("LAB", "see grader labs")
 
 
 @command("labs", group=INSTRUCTORS)
-def labs(*, as_json: JsonFlag = False) -> ExitCode:
-    """List the labs that come with the grader."""
+def labs(
+    *,
+    add: Annotated[
+        Path | None, Option("--add", "DIR", "also look for labs in this folder, from now on")
+    ] = None,
+    remove: Annotated[Path | None, Option("--remove", "DIR", "do not look there any more")] = None,
+    as_json: JsonFlag = False,
+) -> ExitCode:
+    """List the labs that are known here, and where each comes from.
+
+    Those are the grader's own, and rubrics in the folders that --add has named or $GRADER_RUBRICS lists.
+    """
     with loading():
         from grader.cli.examples import print_labs
-        from grader.cli.output import say_json
-        from grader.rubric.load import all_rubrics
-    rubrics = [loaded.rubric for loaded in all_rubrics()]
+        from grader.cli.output import say, say_json
+        from grader.rubric.find import add_folder, known_labs, remove_folder
+        from grader.rubric.load import load_rubric
+    if add is not None:
+        say(f"{add_folder(add)}: its labs are known from now on")
+    if remove is not None:
+        say(f"{remove_folder(remove)}: its labs are no longer known")
+    if add is not None or remove is not None:
+        return ExitCode.PASSED
+    rows, faulty = [], []
+    for lab in known_labs():
+        try:
+            rows.append((load_rubric(str(lab.path)).rubric, lab.source))
+        except RubricError:  # noqa: PERF203 - one that is faulty hides no other
+            faulty.append(f"{lab.path} is faulty: grader rubric validate {lab.path}")
     if not as_json:
-        print_labs(rubrics, sys.stdout)
+        print_labs(rows, sys.stdout)
+        for line in faulty:
+            say(line)
         return ExitCode.PASSED
     say_json(
         [
@@ -36,8 +60,9 @@ def labs(*, as_json: JsonFlag = False) -> ExitCode:
                 "package": rubric.package,
                 "criteria": len(rubric.criteria),
                 "max_points": rubric.max_points,
+                "source": source,
             }
-            for rubric in rubrics
+            for rubric, source in rows
         ]
     )
     return ExitCode.PASSED

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from grader.cli.declare import STUDENTS, Argument, Flag, Option, command, loading
-from grader.cli.options import RUBRIC, STATIC, JsonFlag, PackageOption, SandboxOption
+from grader.cli.options import RUBRIC, STATIC, AllFlag, JsonFlag, PackageOption, SandboxOption
 from grader.errors import ExitCode, UsageError
 
 
@@ -41,6 +41,7 @@ def check(
         Option("--out", "DIR", "keep the results in DIR/<submission id>/ (default: only show them)"),
     ] = None,
     sandbox: SandboxOption = "auto",
+    full: AllFlag = False,
     as_json: JsonFlag = False,
 ) -> ExitCode:
     """Check your own package before you submit it.
@@ -79,7 +80,9 @@ def check(
         wrong = fix_packages(chosen, dry_run=dry_run, yes=yes)
         if dry_run:
             return ExitCode.BELOW_PASS_MARK if wrong else ExitCode.PASSED
-    return check_packages(path, chosen, options, watch=watch, out=out, as_json=as_json, staged=staged)
+    return check_packages(
+        path, chosen, options, watch=watch, out=out, as_json=as_json, staged=staged, full=full
+    )
 
 
 def _refuse_together(*pairs: tuple[bool, str, str]) -> None:

@@ -90,7 +90,9 @@ def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInf
         folder=result.submission.id if _has_reports(result) else "",
         state=_state(result),
         points=result.points,
-        letters="".join(LETTERS[found.status] if found else ABSENT for found in judged),
+        letters="".join(
+            LETTERS[found.status] if found and not found.left_out else ABSENT for found in judged
+        ),
         earned={place: found.points for place, found in enumerate(judged) if found and _unusual(found)},
         late_s=late.late_s if late else 0.0,
         late_lost=max(0.0, late.points_before - late.points) if late else 0.0,
@@ -122,7 +124,7 @@ def _state(result: GradingResult) -> State:
 
 def _still_open(criteria: Iterable[CriterionResult]) -> list[CriterionResult]:
     """What another run could decide."""
-    return [c for c in criteria if c.status.is_retryable and c.max_points > 0]
+    return [c for c in criteria if c.status.is_retryable and c.counts]
 
 
 def _why(criteria: Iterable[CriterionResult]) -> str:

@@ -20,12 +20,12 @@ from grader.model.result import CriterionResult
 from grader.model.verdict import Verdict
 from grader.report.figures.measurements import (
     heard_figures,
-    path_figures,
     rate_figures,
     start_figures,
     step_figures,
     wrap_figures,
 )
+from grader.report.figures.paths import end_figures, path_figures, region_figures
 from grader.report.figures.runs import code_figures, console_of, graph_of
 from grader.rubric.model import Criterion, Rubric
 
@@ -41,6 +41,8 @@ DRAWN: Mapping[str, Callable[..., Iterable[Figure]]] = {
     "counter-wrap": wrap_figures,
     "hears": heard_figures,
     "path": path_figures,
+    "ends-at": end_figures,
+    "stays-within": region_figures,
 }
 """By check, what takes its figures from the facts of the same names."""
 

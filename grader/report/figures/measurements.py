@@ -1,4 +1,4 @@
-"""What a check measured, by its own measure: values of a counter, a rate, a path, what a listener heard."""
+"""What a check measured, by its own measure: values of a counter, a rate, what a listener heard."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from itertools import chain
 from grader.checks.counter import StartParams, StepParams, begins_with, missed_the_first
 from grader.checks.listener import HearsParams
 from grader.checks.rate import RateParams, judged_rhythm, sleeps_explain, was_late
-from grader.checks.robot_path import PathParams
 from grader.checks.support.console_output import (
     Line,
     Probe,
@@ -31,10 +30,15 @@ from grader.checks.support.counters import (
     whose_turn,
     wrong_steps,
 )
-from grader.checks.support.geometry import Pose, followed, relative, track
 from grader.checks.support.lateness import lateness
 from grader.evidence.run import Channel, Run
-from grader.model.figure import POINTS_MAX, CounterFigure, Heard, HeardFigure, PathFigure, RateFigure
+from grader.model.figure import (
+    POINTS_MAX,
+    CounterFigure,
+    Heard,
+    HeardFigure,
+    RateFigure,
+)
 from grader.model.message_rate import Rhythm
 from grader.model.package import PackageFacts
 from grader.model.verdict import Status
@@ -233,45 +237,6 @@ def _late(run: Run, params: RateParams, found: Rhythm) -> list[tuple[int, int]]:
         stretches = [*stretches[:-1], (stretches[-1][0], to_ns)] if joined else [*stretches, (from_ns, to_ns)]
     excused = was_late(whole, params) or sleeps_explain(found, whole, params)
     return stretches or ([(begin_ns, end_ns)] if excused else [])
-
-
-NEAR = 20
-CORNERS_MAX = 100
-
-
-def path_figures(run: Run, params: PathParams) -> Iterator[PathFigure]:
-    """Seen from its start where the points are."""
-    found = track(run, params.topic, params.hold_s)
-    if found is None or not found.path:
-        return
-    taken = relative(found.path) if params.relative else list(found.path)
-    way = params.way
-    course = followed(taken, way.points, params.tolerance_m)
-    kept = _shown_poses(taken, course.strayed)
-    yield PathFigure(
-        topic=named(params.topic),
-        scenario=named(run.scenario),
-        points=tuple(_spot(taken[i].point) for i in kept),
-        corners=tuple(map(_spot, way.points[:CORNERS_MAX])),
-        tolerance_m=finite(params.tolerance_m),
-        reached=course.reached,
-        strayed=None if course.strayed is None else kept.index(course.strayed),
-        messages=sum(len(c.messages) for c in run.channels if c.topic == params.topic and not c.by_grader),
-    )
-
-
-def _spot(point: tuple[float, float]) -> tuple[float, float]:
-    return round(finite(point[0]), 4), round(finite(point[1]), 4)
-
-
-def _shown_poses(path: Sequence[Pose], strayed: int | None) -> list[int]:
-    """Its ends, what is around the place where it strays, and a fair choice of the others where it moves."""
-    every = range(len(path))
-    spots = [_spot(pose.point) for pose in path]
-    moves = [i for i in every[1:] if spots[i] != spots[i - 1]]
-    near = every[max(0, strayed - NEAR) : strayed + NEAR] if strayed is not None else ()
-    own = {every[0], every[-1], *near}
-    return sorted({*own, *spread(moves, POINTS_MAX - len(own))})
 
 
 ROWS_MAX = 60

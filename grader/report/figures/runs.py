@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -121,8 +120,6 @@ APART_MAX = 4
 """So many lines between two places are shown too, rather than left out."""
 LINES_MAX = 60
 FIGURES_MAX = 6
-BYTES_MAX = 2_000_000
-_LINE_END = re.compile(r"\r\n|\r|\n")
 
 
 def code_figures(build: Run, citations: Sequence[Citation]) -> Iterator[CodeFigure]:
@@ -130,7 +127,7 @@ def code_figures(build: Run, citations: Sequence[Citation]) -> Iterator[CodeFigu
     cited = [c for c in citations if isinstance(c, FileCitation) and c.line is not None]
     left = FIGURES_MAX
     for file in dict.fromkeys(c.file for c in cited):
-        lines = _lines(build.attachments, file)
+        lines = build.file_lines(file)
         marks = sorted({c.line or 0 for c in cited if c.file == file and 0 < (c.line or 0) <= len(lines)})
         columns = {c.line: c.column for c in cited if c.file == file and c.line and c.column}
         for group in _groups(marks):
@@ -138,15 +135,6 @@ def code_figures(build: Run, citations: Sequence[Citation]) -> Iterator[CodeFigu
                 return
             left -= 1
             yield _figure(file, lines, group, columns)
-
-
-def _lines(attachments: Mapping[str, bytes], file: str) -> list[str]:
-    data = attachments.get(file, b"")[:BYTES_MAX]
-    text = data.decode("utf-8-sig", errors="replace")
-    lines = _LINE_END.split(text)
-    if lines[0].startswith("#!") and text.startswith(f"{lines[0]}\r"):
-        lines[0] += "\r"  # for the kernel, part of the program's name
-    return lines if lines[-1] else lines[:-1]
 
 
 def _groups(marks: Sequence[int]) -> Iterator[list[int]]:

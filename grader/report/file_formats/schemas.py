@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import ast
 import inspect
 from collections.abc import Callable, Iterator, Mapping
-from itertools import pairwise
-from textwrap import dedent
 from typing import Any
 
 from grader.evidence import events
@@ -15,7 +12,7 @@ from grader.model import batch, result, verdict
 from grader.model.batch import BatchRun
 from grader.model.mutants import MutantsFile, RubricTest
 from grader.model.package import PackageFacts
-from grader.model.record import Record
+from grader.model.record import Record, field_docstrings
 from grader.model.result import GradingResult, Override
 from grader.model.similarity import Similarity
 from grader.report.file_formats.known import FORMATS, Format
@@ -63,29 +60,10 @@ def _describe(record: str, schema: Schema, about: Format) -> None:
     """Each key's own text; what graders write may have more keys than a reader knows."""
     if about.by == "grader" and schema.get("additionalProperties") is False:
         del schema["additionalProperties"]
-    texts = _field_docstrings(_RECORDS[record]) if record in _RECORDS else {}
+    texts = field_docstrings(_RECORDS[record]) if record in _RECORDS else {}
     for key, found in schema.get("properties", {}).items():
         if key in texts:
             found.setdefault("description", texts[key])
-
-
-def _field_docstrings(record: type[Record]) -> dict[str, str]:
-    """Return the docstrings of a record's fields by their keys.
-
-    pydantic's `use_attribute_docstrings` gives the same, but reads all the sources whenever the grader starts.
-    """
-    texts: dict[str, str] = {}
-    for kind in reversed(record.__mro__[:-1]):
-        if not issubclass(kind, Record) or kind is Record:
-            continue
-        (definition,) = ast.parse(dedent(inspect.getsource(kind))).body
-        assert isinstance(definition, ast.ClassDef)  # noqa: S101 - it is one
-        for node, text in pairwise(definition.body):
-            match node, text:
-                case ast.AnnAssign(target=ast.Name(id=name)), ast.Expr(value=ast.Constant(value=str(words))):
-                    key = record.model_fields[name].serialization_alias or name.removesuffix("_")
-                    texts[key] = inspect.cleandoc(words).replace("\n", " ")
-    return texts
 
 
 def _of(record: type[Record]) -> Callable[[], Schema]:
@@ -129,7 +107,7 @@ def _overrides() -> Schema:
         kept = {"title": found.pop("title"), "default": found.pop("default")}
         override["properties"][key] = {**kept, "anyOf": [dict(found), {"type": "null"}]}
     criteria = {"type": "object", "additionalProperties": {"$ref": "#/$defs/Override"}}
-    version = _field_docstrings(GradingResult)["schema"]
+    version = field_docstrings(GradingResult)["schema"]
     return {
         "description": "What people decided: by submission, then by criterion.",
         "type": "object",

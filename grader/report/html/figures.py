@@ -17,6 +17,7 @@ from grader.model.figure import (
     Heard,
     HeardFigure,
     PathFigure,
+    PlaceFigure,
     RateFigure,
 )
 from grader.report.html.graph import graph_plot, graph_rows
@@ -25,6 +26,7 @@ from grader.report.html.plots import (
     counter_words,
     path_plot,
     path_words,
+    place_plot,
     rate_plots,
     rate_words,
     wrong_steps,
@@ -219,6 +221,18 @@ def _path(figure: PathFigure, name: str) -> Drawn:
     )
 
 
+def _place(figure: PlaceFigure, name: str) -> Drawn:
+    return Drawn(
+        name=name,
+        kind="place",
+        title=f"Where {figure.topic} was, seen from above",
+        words=figure.says,
+        points=len(figure.points),
+        plots=[place_plot(figure, name)],
+        left_out=_thinned(len(figure.points), figure.messages),
+    )
+
+
 DRAWN: dict[str, Callable[..., Drawn]] = {
     "rate": _rate,
     "counter": _counter,
@@ -226,6 +240,7 @@ DRAWN: dict[str, Callable[..., Drawn]] = {
     "graph": _graph,
     "code": _code,
     "path": _path,
+    "place": _place,
 }
 
 

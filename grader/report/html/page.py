@@ -144,7 +144,9 @@ def _parts(result: GradingResult) -> dict[str, float]:
 
 def _bar(result: GradingResult) -> tuple[Part, ...]:
     whole = result.max_points or 1.0
-    return tuple(Part(kind=kind, share=100 * part / whole) for kind, part in _parts(result).items())
+    return tuple(
+        Part(kind=kind, share=min(100.0, 100 * part / whole)) for kind, part in _parts(result).items()
+    )
 
 
 def _bar_words(result: GradingResult) -> str:
@@ -293,7 +295,7 @@ class Maker:
         return kept
 
     def _loss(self, loss: Loss) -> Card:
-        blocked = sum(c.max_points - c.points for c in loss.blocked)
+        blocked = sum(c.missing for c in loss.blocked)
         return replace(
             self._card(loss.criterion, self._with_graph(loss.criterion)),
             lost=lost_words(loss.criterion, blocked),

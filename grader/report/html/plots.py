@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from markupsafe import Markup
 
-from grader.model.figure import CounterFigure, PathFigure, RateFigure
+from grader.model.figure import CounterFigure, PathFigure, PlaceFigure, RateFigure
 from grader.report.html.svg import BOTTOM, LEFT, RIGHT, TOP, Frame, dots, drawing, element, path, text
 from grader.wording import number, plural
 
@@ -149,7 +149,7 @@ def path_plot(figure: PathFigure, name: str) -> Markup | None:
     """Seen from above, as wide as it is high for the same metres; None for a robot that stood still."""
     if len(figure.points) < 2 and not figure.corners:
         return None
-    frame, scale = _frame(figure)
+    frame, scale = _frame((*figure.points, *figure.corners), figure.tolerance_m)
     corners = [(frame.x(x), frame.y(y)) for x, y in figure.corners]
     children = frame.axes("metres", "metres")
     if len(corners) > 1:
@@ -159,7 +159,7 @@ def path_plot(figure: PathFigure, name: str) -> Markup | None:
     taken = [(frame.x(x), frame.y(y)) for x, y in figure.points]
     children.append(element("path", d=path(taken), class_="line strong-line"))
     children += _corners(figure, corners)
-    children += _strayed(figure, taken)
+    children += _marked(figure.strayed, taken, "too far off")
     size = (frame.width, frame.height)
     return drawing(name, size, f"The path of {figure.topic}, seen from above", path_words(figure), *children)
 
@@ -174,11 +174,35 @@ def path_words(figure: PathFigure) -> str:
     return f"{words}. It is too far off for the first time at x {number(x, 2)}, y {number(y, 2)}."
 
 
-def _frame(figure: PathFigure) -> tuple[Frame, float]:
+def place_plot(figure: PlaceFigure, name: str) -> Markup:
+    """Seen from above, with walls, the border of the region and the goal."""
+    goal = [figure.goal] if figure.goal else []
+    around = [spot for line in figure.walls for spot in line]
+    frame, scale = _frame((*figure.points, *figure.area, *around, *goal), figure.tolerance_m)
+
+    def drawn(line: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+        return [(frame.x(x), frame.y(y)) for x, y in line]
+
+    taken = drawn(figure.points)
+    children = frame.axes("metres", "metres")
+    if figure.area:
+        children.append(element("path", d=path(drawn((*figure.area, figure.area[0]))), class_="way"))
+    for x, y in drawn(goal):
+        children.append(element("circle", cx=x, cy=y, r=max(figure.tolerance_m * scale, 4), class_="goal"))
+    lines = "".join(path(drawn(line)) if len(line) > 1 else dots(drawn(line)) for line in figure.walls)
+    if lines:
+        children.append(element("path", d=lines, class_="wall"))
+    children.append(element("path", d=path(taken), class_="line strong-line"))
+    children.append(element("circle", cx=taken[0][0], cy=taken[0][1], r=4, class_="corner"))
+    children += _marked(figure.wrong, taken, "here")
+    size = (frame.width, frame.height)
+    return drawing(name, size, f"Where {figure.topic} was, seen from above", figure.says, *children)
+
+
+def _frame(spots: Sequence[tuple[float, float]], room: float) -> tuple[Frame, float]:
     """The frame, and how many pixels a metre has in it."""
-    spots = (*figure.points, *figure.corners)
-    x_low, x_high = _edges([x for x, _ in spots], figure.tolerance_m)
-    y_low, y_high = _edges([y for _, y in spots], figure.tolerance_m)
+    x_low, x_high = _edges([x for x, _ in spots], room)
+    y_low, y_high = _edges([y for _, y in spots], room)
     wide, high = x_high - x_low, y_high - y_low
     scale = SIDE / max(high, wide / WIDEST)
     frame = Frame(
@@ -206,14 +230,14 @@ def _corners(figure: PathFigure, corners: list[tuple[float, float]]) -> Iterator
             yield text(x + 8, y - 8, "start" if i == 0 else f"{i}")
 
 
-def _strayed(figure: PathFigure, taken: list[tuple[float, float]]) -> Iterator[Markup]:
-    if figure.strayed is None:
+def _marked(index: int | None, taken: list[tuple[float, float]], words: str) -> Iterator[Markup]:
+    if index is None:
         return
-    x, y = taken[figure.strayed]
+    x, y = taken[index]
     yield element("circle", cx=x, cy=y, r=10, class_="wrong")
     right = max(spot[0] for spot in taken)
     end = "end" if x > right - 90 else "start"
-    yield text(x + (-13 if end == "end" else 13), y + 4, "too far off", class_="alarm", text_anchor=end)
+    yield text(x + (-13 if end == "end" else 13), y + 4, words, class_="alarm", text_anchor=end)
 
 
 OVER_TIME = (460.0, 230.0)

@@ -13,6 +13,7 @@ from jinja2.runtime import Context
 from markupsafe import Markup
 
 from grader.report.text import line
+from grader.report.view import of_points
 from grader.wording import number
 
 LIMIT = 1000
@@ -31,6 +32,7 @@ def environment() -> Environment:
         undefined=StrictUndefined,
     )
     made.filters["number"] = number
+    made.filters["of_points"] = of_points
     return made
 
 

@@ -8,11 +8,14 @@ from grader.checks import EvidenceCitation, Record, Run, Verdict, check, partial
 
 
 class InStepParams(Record):
-    """For each message on `first`, one on `second` comes within `within_s` seconds, before or after it."""
+    """Two topics, and how far apart their messages may come."""
 
     first: str
+    """The topic whose messages are looked at, with its slash."""
     second: str
+    """The topic on which one has to come beside each of them."""
     within_s: float = 0.05
+    """How far apart the two may be, one way or the other."""
 
 
 @check("in-step", params=InStepParams, messages_only=True)

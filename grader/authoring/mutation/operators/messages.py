@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import PurePosixPath
 
 from pydantic import Field
 
@@ -23,6 +25,8 @@ from grader.authoring.mutation.rospy_code import (
 )
 from grader.authoring.mutation.solution import CodePlace, Solution
 from grader.authoring.mutation.text_edits import Edit, misspelt_literal, texts_in
+from grader.model.interfaces import PARTS, parse_interface
+from grader.model.package import InterfaceField
 from grader.model.record import Record
 
 # ---- what a message says
@@ -73,6 +77,75 @@ def message_nanoseconds(script: Script, values: list[ast.expr]) -> list[Edit]:
     """
     in_seconds = {*SECONDS, *(f"{time}.to_sec()" for time in TIMES)}
     return [script.replace(c, NANOSECONDS) for c in _calls(values) if script.source(c) in in_seconds]
+
+
+# ---- stamps and definitions
+
+OTHER_TYPES = {
+    "float64": "float32",
+    "float32": "float64",
+    "int64": "int32",
+    "int32": "int64",
+    "uint8": "int8",
+}
+
+
+def _stamps(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.Assign]]:
+    """Find the lines that set a header's stamp."""
+    for script in solution.scripts:
+        for line in script.of(ast.Assign):
+            if isinstance(line.targets[0], ast.Attribute) and line.targets[0].attr == "stamp":
+                yield script_place(script), script, line
+
+
+@operator("stamp-not-set", each=_stamps)
+def stamp_not_set(script: Script, line: ast.Assign) -> list[Edit]:
+    """Never sets the stamp of the header.
+
+    Fits every line that sets one.
+    """
+    return [script.remove(line)]
+
+
+def _frames(solution: Solution) -> Iterator[tuple[CodePlace, Script, ast.expr, ast.expr]]:
+    """Find what is set as a transform's parent and child, one behind the other."""
+    for script in solution.scripts:
+        lines = [line for line in script.of(ast.Assign) if isinstance(line.targets[0], ast.Attribute)]
+        for first, second in pairwise(sorted(lines, key=lambda line: line.lineno)):
+            names = [ast.unparse(line.targets[0]).rpartition(".")[2] for line in (first, second)]
+            if names == ["frame_id", "child_frame_id"]:
+                child = script.source(second.value).strip("\"'")
+                yield script_place(script, child=child), script, first.value, second.value
+
+
+@operator("frames-swapped", each=_frames)
+def frames_swapped(script: Script, parent: ast.expr, child: ast.expr) -> list[Edit]:
+    """Swaps parent and child of a transform.
+
+    Fits every transform whose `child_frame_id` is set in the line behind its `frame_id`.
+    """
+    return [script.replace(parent, script.source(child)), script.replace(child, script.source(parent))]
+
+
+def _fields(solution: Solution) -> Iterator[tuple[CodePlace, str, InterfaceField]]:
+    """Find the fields of the package's own messages, services and actions."""
+    for path in solution.files:
+        if PurePosixPath(path).suffix in PARTS:
+            text = solution.text(path)
+            for field in parse_interface(text.encode(errors="surrogateescape"), path).fields:
+                if field.value is None:
+                    yield CodePlace(path=path, at={"file": path, "field": field.name}), text, field
+
+
+@operator("field-other-type", each=_fields)
+def field_other_type(text: str, field: InterfaceField) -> list[Edit]:
+    """Gives a field of its own message another type.
+
+    Fits every field of a `.msg`, `.srv` or `.action` file that is a number of a usual type.
+    """
+    start = text.index(field.type, len("".join(text.splitlines(keepends=True)[: field.line - 1])))
+    other = OTHER_TYPES.get(field.type)
+    return [Edit(start, start + len(field.type), other)] if other else []
 
 
 # ---- counters

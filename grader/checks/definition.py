@@ -1,0 +1,219 @@
+"""Whether the package's own messages, services and actions are those of the handout."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from pathlib import PurePosixPath
+from typing import Annotated, NamedTuple
+
+from pydantic import Field, model_validator
+
+from grader.checks.registry import Refers, check
+from grader.checks.support.text import shown
+from grader.model.interfaces import PARTS, parse_definition
+from grader.model.package import Interface, InterfaceField, PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import FileCitation, Verdict, failed, passed
+from grader.wording import closest, did_you_mean, join_words, plural
+
+BUILT_IN = {*(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)), "bool", "float32", "float64",
+            "string", "time", "duration"}  # fmt: skip
+OTHER_NAMES = {"byte": "int8", "char": "uint8", "Header": "std_msgs/Header"}
+FAULTS_SHOWN = 3
+FieldType = Annotated[str, Field(pattern=r"^[A-Za-z]\w*(/[A-Za-z]\w*)?(\[\d*\])?$"), Refers("field")]
+
+
+class DefinitionParams(Record):
+    """Give `fields`, `constants` or both, or the whole definition as `text`.
+
+    In a service or action, a name says its part too: `request.a`, `response.sum`, `goal.order`.
+    """
+
+    file: Annotated[str, Field(pattern=r"^(msg/\w+\.msg|srv/\w+\.srv|action/\w+\.action)$")]
+    """The file, from the package's root: `msg/Reading.msg`, `srv/AddTwoInts.srv`, `action/Count.action`."""
+    fields: dict[str, FieldType] = Field(default_factory=dict)
+    """Each field's type by its name; there may be others."""
+    constants: dict[str, str | int | float | bool] = Field(default_factory=dict)
+    """Each constant's value by its name."""
+    ordered: bool = False
+    """Whether the fields have to come in the order of `fields`."""
+    text: str = ""
+    """The whole definition, which is compared as ROS's md5 sum does: types, names, order and constants, and no others.
+    Comments and blanks do not matter.
+    """
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> DefinitionParams:
+        if bool(self.text) == bool(self.fields or self.constants):
+            raise ValueError("give fields, constants or both, or text alone")
+        self.wanted()
+        return self
+
+    def wanted(self) -> list[InterfaceField]:
+        """Return what is asked for. Raises ValueError for a part or a type that there is not."""
+        suffix = PurePosixPath(self.file).suffix
+        if self.text:
+            return list(parse_definition(self.text, suffix))
+        given = [(name, type_, None) for name, type_ in self.fields.items()]
+        given += [(name, "", str(value)) for name, value in self.constants.items()]  # type: ignore[misc]
+        found = []
+        for name, type_, value in given:
+            part, _, bare = name.rpartition(".")
+            if part not in PARTS[suffix]:
+                parts = join_words((f"{part}.{bare}" for part in PARTS[suffix]), "or")
+                raise ValueError(f'name it {parts.removeprefix(".")}, not "{name}"')
+            base = type_.partition("[")[0]
+            if base.islower() and "/" not in base and base not in {*BUILT_IN, *OTHER_NAMES}:
+                raise ValueError(f'there is no type "{type_}"{did_you_mean(base, BUILT_IN)}')
+            found.append(InterfaceField(part=part, type=type_, name=bare, value=value, line=0))
+        return found
+
+
+class _Fault(NamedTuple):
+    message: str
+    line: int | None
+    hint: str
+
+
+@check("definition", params=DefinitionParams)
+def definition(package: PackageFacts, params: DefinitionParams) -> Verdict:
+    """The package's own message, service or action is defined as the handout asks.
+
+    What it checks
+        That the file has the handout's fields, by name and type, and its constants; in their order where that
+        is asked; nothing else where the handout gives the whole definition.
+
+    Why it matters on a robot
+        Two programs understand each other only if their definitions are the same, letter by letter: a field of
+        another name or type makes another md5 sum, and ROS connects them not at all.
+
+    How it is measured
+        The file is read as ROS does. Comments and blanks do not matter; `Header` is `std_msgs/Header`, and a
+        type without a package is the package's own.
+
+    How to fix
+        One field a line, type before name: `float64 temperature`. Then list the file in `add_message_files`
+        (`add_service_files`, `add_action_files`) of CMakeLists.txt, and build again.
+    """
+    found = next((one for one in package.interfaces if one.path == params.file), None)
+    wanted = params.wanted()
+    faults = [_not_there(package, params)] if found is None else list(_faults(found, wanted, package, params))
+    if faults:
+        more = f"; and {len(faults) - FAULTS_SHOWN} more" if len(faults) > FAULTS_SHOWN else ""
+        said = "; ".join(fault.message for fault in faults[:FAULTS_SHOWN])
+        verdict = failed(f"{f'{params.file}: ' if found else ''}{said}{more}", hint=faults[0].hint)
+    else:
+        verdict = passed(f"{params.file} defines {_words(wanted)}")
+    lines = dict.fromkeys(fault.line for fault in faults) or {None: None}
+    there = found.path if found else "CMakeLists.txt"
+    return verdict.about(
+        expected=_words(wanted),
+        measured=_words(found.fields) if found and found.fields else "no field" if found else "no such file",
+        citations=tuple(FileCitation(file=there, line=line) for line in lines) if found else (),
+    )
+
+
+def _words(fields: Iterator[InterfaceField] | list[InterfaceField] | tuple[InterfaceField, ...]) -> str:
+    return shown(", ".join(f"{one.type} {_name(one)}{_value(one)}".strip() for one in fields))
+
+
+def _name(one: InterfaceField) -> str:
+    return f"{one.part}.{one.name}" if one.part else one.name
+
+
+def _value(one: InterfaceField) -> str:
+    return "" if one.value is None else f"={one.value}"
+
+
+def _not_there(package: PackageFacts, params: DefinitionParams) -> _Fault:
+    wanted = PurePosixPath(params.file)
+    near = closest(wanted.name, [PurePosixPath(one.path).name for one in package.interfaces], cutoff=0.7)
+    other = next((one.path for one in package.interfaces if PurePosixPath(one.path).name == near), "")
+    seen = f"; there is {shown(other)}" if other else ""
+    hint = (
+        f"rename it to {params.file}"
+        if other
+        else f"write {params.file}, and list {wanted.name} in CMakeLists.txt"
+    )
+    return _Fault(f"there is no {params.file}{seen}", None, hint)
+
+
+def _faults(
+    found: Interface, wanted: list[InterfaceField], package: PackageFacts, params: DefinitionParams
+) -> Iterator[_Fault]:
+    if found.fault is not None:
+        yield _Fault(shown(found.fault.message), found.fault.line, "one field a line, type before name")
+        return
+    there = {(one.part, one.name): one for one in found.fields}
+    asked = {(one.part, one.name) for one in wanted}
+    others = {key: one for key, one in there.items() if key not in asked}
+    for one in wanted:
+        yield from _differs(one, there.get((one.part, one.name)), others, package.name)
+    if params.text:
+        for one in others.values():
+            yield _Fault(f"{shown(_name(one))} (line {one.line}) is not asked for", one.line, "take it out")
+    if (params.text or params.ordered) and asked <= there.keys():
+        yield from _other_order(wanted, there)
+
+
+def _differs(
+    wanted: InterfaceField,
+    found: InterfaceField | None,
+    others: Mapping[tuple[str, str], InterfaceField],
+    package: str,
+) -> Iterator[_Fault]:
+    name, line = _name(wanted), f"{wanted.type} {wanted.name}{_value(wanted)}".strip()
+    if found is None:
+        near = closest(wanted.name, [one.name for one in others.values() if one.part == wanted.part])
+        other = others.get((wanted.part, near))
+        apart = next((one for one in others.values() if one.name == wanted.name), None)
+        if other is not None:
+            message = f"line {other.line} names it {near}, and the handout {wanted.name}"
+            yield _Fault(message, other.line, f"write `{line}`")
+        elif apart is not None:
+            message = f"{wanted.name} is in the {apart.part} (line {apart.line}), not in the {wanted.part}"
+            yield _Fault(message, apart.line, "--- divides the parts: put the field into the other one")
+        else:
+            kind = "constant" if wanted.value is not None else "field"
+            yield _Fault(f"there is no {kind} {name}", None, f"add the line `{line}`")
+    elif (wanted.value is None) != (found.value is None):
+        kinds = ("constant", "field") if wanted.value is None else ("field", "constant")
+        message = f"{name} is a {kinds[0]} (line {found.line}), and the handout asks for a {kinds[1]}"
+        yield _Fault(message, found.line, f"write `{line}`")
+    elif wanted.type and _plain(wanted.type, package) != _plain(found.type, package):
+        message = f"{name} is {found.type} (line {found.line}), and the handout asks for {wanted.type}"
+        yield _Fault(message, found.line, f"write `{line}`")
+    elif wanted.value is not None and not _equal(wanted.value, found.value or ""):
+        message = f"{name} is {shown(found.value or '')} (line {found.line}), and not {wanted.value}"
+        yield _Fault(
+            message, found.line, f"write `{found.type} {line}`" if not wanted.type else f"write `{line}`"
+        )
+
+
+def _plain(type_: str, package: str) -> str:
+    base, bracket, size = type_.partition("[")
+    base = OTHER_NAMES.get(base, base)
+    return (base if base in BUILT_IN or "/" in base else f"{package}/{base}") + bracket + size
+
+
+def _equal(wanted: str, found: str) -> bool:
+    try:
+        return float(wanted) == float(found)
+    except ValueError:
+        return wanted.lower() == found.lower() if wanted in {"True", "False"} else wanted == found
+
+
+def _other_order(
+    wanted: list[InterfaceField], there: Mapping[tuple[str, str], InterfaceField]
+) -> Iterator[_Fault]:
+    """Constants may stand anywhere."""
+    fields = [there[one.part, one.name] for one in wanted if one.value is None]
+    for part in dict.fromkeys(one.part for one in fields):
+        own = [one for one in fields if one.part == part]
+        if [one.line for one in own] != sorted(one.line for one in own):
+            first = next(b for a, b in pairwise(own) if b.line < a.line)
+            names = join_words([one.name for one in own], "then")
+            count = plural(len(own), "field")
+            message = f"the {count} come in another order: the handout has {names}"
+            yield _Fault(message, first.line, f"order the {count} as the handout does")

@@ -1,0 +1,434 @@
+"""Whether a robot ends where it was sent, and stays where it may be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, NamedTuple
+
+from pydantic import Field, model_validator
+
+from grader.checks.registry import Refers, check
+from grader.checks.robot_path import metres, spot
+from grader.checks.support.clocks import run_seconds
+from grader.checks.support.geometry import (
+    MOVED_M,
+    Point,
+    Pose,
+    PoseFields,
+    Spot,
+    Track,
+    length_m,
+    relative,
+    set_off_s,
+    stands,
+    track,
+)
+from grader.checks.support.lateness import Lateness, excused
+from grader.checks.support.nodes import GlobalName
+from grader.checks.support.processes import observed_until_ns
+from grader.checks.support.regions import Area, Band, Region, shown_walls
+from grader.checks.support.topics import cite, no_message, nodes_on
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import Status, Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, significant
+
+LATE_MS = 100.0
+STALLED_MS = 1000.0
+"""In the time of the run, which may be faster than the wall's."""
+STILL_S = 0.5
+"""A robot's speed at the end is that of so long a time."""
+SLOW_M_S = 0.02
+ROUNDING = 1e-9
+SAME_M = 0.005
+NEARLY = 1.25
+"""A loss by no more than this factor is one that a single run's timing could have made."""
+DRIVE = "publish a velocity that is not 0, again and again while it has to drive"
+
+
+class Place(Record):
+    """Whose position it is."""
+
+    topic: GlobalName
+    """The topic of poses (`nav_msgs/Odometry`, `geometry_msgs/PoseStamped`, `turtlesim/Pose`, …), of any messages with
+    `fields`, or of velocities (`geometry_msgs/Twist`), which are added up from (0, 0)."""
+    fields: PoseFields | None = None
+    """The fields of a position, in messages that are none of ROS's poses."""
+    relative: bool = False
+    """Whether positions are seen from the first one, x being forward there and y to the left."""
+    hold_s: Annotated[float, Field(gt=0)] | None = 1.0
+    """A velocity holds until the next one, but no longer than this; null: for ever."""
+
+
+class EndsAtParams(Place):
+    """The goal, and when it is looked at."""
+
+    goal: Spot
+    """`[x, y]` in metres."""
+    tolerance_m: Annotated[float, Field(gt=0)]
+    """So far from the goal it may end."""
+    heading_deg: Annotated[float, Field(ge=-360, le=360)] | None = None
+    """Where it has to look: 0 along x, 90 along y; null: anywhere."""
+    heading_tolerance_deg: Annotated[float, Field(gt=0, le=180)] = 15.0
+    """How much the heading may differ."""
+    within_s: Annotated[float, Field(gt=0)] | None = None
+    """So soon it has to be there, and stay: after the message that asked, or else after it set off."""
+    asked_on: Annotated[GlobalName, Refers("sent")] | None = None
+    """The topic on which the grader sends goals: judged is where the robot is when the next one comes. Null: at the
+    end of the run."""
+    number: Annotated[int, Field(ge=1)] = 1
+    """Which of the messages on `asked_on` asks for this goal."""
+
+    @property
+    def words(self) -> str:
+        """`within 0.1 m of (2, 0), heading 90°, in 10 s`."""
+        heading = f", heading {significant(self.heading_deg)}°" if self.heading_deg is not None else ""
+        time = f", in {significant(self.within_s)} s" if self.within_s is not None else ""
+        return f"within {significant(self.tolerance_m)} m of {spot(self.goal)}{heading}{time}"
+
+    def is_near(self, pose: Pose, tolerances: float = 1.0) -> bool:
+        return math.dist(pose.point, self.goal) <= tolerances * self.tolerance_m + ROUNDING
+
+    def off_deg(self, pose: Pose) -> float:
+        """Return by how much it looks too far to the left (degrees); 0 where the heading is not asked for."""
+        if self.heading_deg is None:
+            return 0.0
+        return math.degrees(math.remainder(pose.heading - math.radians(self.heading_deg), math.tau))
+
+    def is_there(self, pose: Pose) -> bool:
+        return self.is_near(pose) and abs(self.off_deg(pose)) <= self.heading_tolerance_deg + ROUNDING
+
+
+class Stretch(NamedTuple):
+    """Seconds of the run."""
+
+    from_s: float
+    to_s: float
+
+    def began_s(self, path: Sequence[Pose]) -> float:
+        """Return when it was asked, or else when it set off."""
+        return self.from_s if math.isfinite(self.from_s) else set_off_s(path)
+
+
+@check("ends-at", params=EndsAtParams, messages_only=True)
+def ends_at(package: PackageFacts, run: Run, params: EndsAtParams) -> Verdict:
+    """The robot ends where it was sent.
+
+    What it checks
+        That the robot's last position is within the tolerance of the goal, and where the rubric asks for it, that it
+        looks the right way and was there in time. Of several goals, each is judged when the next one is sent.
+
+    Why it matters on a robot
+        A robot that stops a hand's breadth beside its dock is not charged in the morning, and one that circles
+        around its goal never says that it is there.
+
+    How it is measured
+        By the positions that the simulator publishes, or else the package's own nodes. Velocities are added up over
+        time, along exact arcs. It is there from the first position after which none is outside the
+        tolerance. In a run with a fast clock, time is the clock's.
+
+    How to fix
+        Steer by the error: its length is `math.hypot(dx, dy)`, its direction `math.atan2(dy, dx)` minus the
+        heading, brought between -pi and pi. Publish a zero velocity once you are there.
+    """
+    found, asked = track(run, params.topic, params.hold_s, params.fields), asked_stretch(run, params)
+    verdict = _unreadable(found, package, run, params) or _not_asked(asked, run, params)
+    if verdict is None and found is not None and asked is not None:
+        judged = judged_path(found, asked, params)
+        verdict = _arrived(judged, asked, params) if judged else _too_late(asked, params)
+        verdict = _excused_end(verdict, judged, run, params) if judged else verdict
+    assert verdict is not None  # noqa: S101 - one of them always is
+    return verdict.about(
+        expected=params.words,
+        measured=verdict.measured or "no position",
+        citations=(*verdict.citations, cite(run, params.topic)),
+    )
+
+
+def judged_path(found: Track, asked: Stretch, params: EndsAtParams) -> list[Pose]:
+    """Return the path from the time at which the goal was asked for."""
+    path = relative(found.path) if params.relative else list(found.path)
+    return [pose for pose in path if asked.from_s <= pose.time_s <= asked.to_s]
+
+
+def asked_stretch(run: Run, params: EndsAtParams) -> Stretch | None:
+    """Return the time in which the robot has to get there; None where it was never asked to."""
+    to_s = run_seconds(run)
+    if to_s is None:
+        return None
+    end_s = to_s(observed_until_ns(run) or run.end_ns)
+    if params.asked_on is None:
+        return Stretch(-math.inf, end_s)
+    sent = sorted(t for c in run.channels if c.topic == params.asked_on and c.by_grader for t in c.times_ns)
+    if len(sent) < params.number:
+        return None
+    after = sent[params.number] if params.number < len(sent) else None
+    return Stretch(to_s(sent[params.number - 1]), end_s if after is None else min(end_s, to_s(after)))
+
+
+def _unreadable(found: Track | None, package: PackageFacts, run: Run, params: Place) -> Verdict | None:
+    """Return why there is no path to be judged; None where there is one."""
+    if run_seconds(run) is None:
+        return inconclusive("the run's fast clock was not recorded", hint="grade again")
+    if found is None:
+        return no_message(package, run, params.topic)
+    if found.misfit:
+        hint = f"rostopic info {params.topic} shows their type"
+        return unjudged(f"the messages on {params.topic} {found.misfit}", measured=found.misfit, hint=hint)
+    if found.fault:
+        hint = "print what you publish: a division by zero, or a square root of a negative number?"
+        return failed(f"the messages on {params.topic} {found.fault}", measured=found.fault, hint=hint)
+    return None
+
+
+def _not_asked(asked: Stretch | None, run: Run, params: EndsAtParams) -> Verdict | None:
+    if asked is not None or params.asked_on is None:
+        return None
+    if nodes_on(run, params.asked_on, "subscribers"):
+        return inconclusive(f"message {params.number} on {params.asked_on} was not sent", hint="grade again")
+    hint = f"subscribe to it: rospy.Subscriber('{params.asked_on}', …)"
+    return unjudged(f"no node listens to {params.asked_on}, so no goal could be sent", hint=hint)
+
+
+def _too_late(asked: Stretch, params: EndsAtParams) -> Verdict:
+    message = f"no position came on {params.topic} in the {asked.to_s - asked.from_s:.1f} s of this goal"
+    return inconclusive(message, hint="grade again")
+
+
+def _arrived(judged: Sequence[Pose], asked: Stretch, params: EndsAtParams) -> Verdict:
+    last = judged[-1]
+    apart_m = math.dist(last.point, params.goal)
+    figures = f"{metres(apart_m)} from the goal, at {spot(last.point)}"
+    if not params.is_there(last):
+        return _elsewhere(judged, asked, params).about(measured=figures)
+    outside = [index for index, pose in enumerate(judged) if not params.is_there(pose)]
+    came_s = judged[outside[-1] + 1 if outside else 0].time_s - asked.began_s(judged)
+    figures += f", after {came_s:.1f} s"
+    if params.within_s is not None and came_s > params.within_s + ROUNDING:
+        message = (
+            f"it is at {spot(params.goal)} after {came_s:.1f} s; {significant(params.within_s)} s are allowed"
+        )
+        hint = "drive faster while the goal is far, and turn on the shorter side"
+        return failed(message, hint=hint, measured=figures)
+    return passed(f"it ends {metres(apart_m)} from {spot(params.goal)}", measured=figures)
+
+
+def _elsewhere(judged: Sequence[Pose], asked: Stretch, params: EndsAtParams) -> Verdict:
+    """Return how it misses the goal, by the likeliest cause."""
+    last = judged[-1]
+    at = f"it ends at {spot(last.point)}, {metres(math.dist(last.point, params.goal))} from {spot(params.goal)}"
+    turned = params.off_deg(last)
+    if params.is_near(last):
+        side = "left" if turned > 0 else "right"
+        message = f"it ends at the goal, but looks {abs(turned):.0f}° too far to the {side}"
+        return failed(message, hint="once you are there, turn until the heading is right")
+    if stands(judged):
+        never = (
+            f"it never moves, and stays {metres(math.dist(last.point, params.goal))} from {spot(params.goal)}"
+        )
+        return unjudged(never, hint=DRIVE)
+    there = next((pose for pose in judged if params.is_near(pose)), None)
+    if there is not None:
+        message = f"it is there after {there.time_s - asked.began_s(judged):.1f} s, and goes on: {at}"
+        return failed(message, hint="publish a zero velocity once you are there")
+    speed_m_s = _speed_m_s(judged)
+    if speed_m_s > SLOW_M_S:
+        message = f"{at}, and is still on its way at {speed_m_s:.2f} m/s"
+        away = math.dist(last.point, params.goal) > math.dist(judged[0].point, params.goal)
+        turn = "it drives away: the angle to the goal is math.atan2(dy, dx) minus the heading, between -pi and pi"
+        return failed(message, hint=turn if away else "drive faster, or take a shorter way")
+    hint = f"stop only where the distance is less than {significant(params.tolerance_m)} m"
+    return failed(at, hint=hint)
+
+
+def _speed_m_s(path: Sequence[Pose]) -> float:
+    """Return the speed at the end."""
+    recent = [pose for pose in path if pose.time_s >= path[-1].time_s - STILL_S]
+    time_s = recent[-1].time_s - recent[0].time_s
+    return length_m(recent) / time_s if time_s > 0 else 0.0
+
+
+def _excused_end(verdict: Verdict, judged: Sequence[Pose], run: Run, params: EndsAtParams) -> Verdict:
+    """A robot that never moved has no excuse; nearly there is also who was there, but looks elsewhere, or late."""
+    if verdict.status is not Status.FAIL or stands(judged):
+        return verdict
+    return _excused(verdict, run, nearly=params.is_near(judged[-1], NEARLY))
+
+
+def _excused(verdict: Verdict, run: Run, *, nearly: bool) -> Verdict:
+    """What nearly is right counts if it is seen twice, and not where the machine was late; all else is lost, unless the
+    machine stood still for so long that a robot drives into a wall."""
+
+    def why_late(late: Lateness) -> str:
+        stalled = late.max_ms * run.warp >= STALLED_MS
+        if nearly and late.full and not stalled:
+            return "busy"
+        return (
+            f"late itself, by up to {late.max_ms:.0f} ms"
+            if stalled or (nearly and late.max_ms >= LATE_MS)
+            else ""
+        )
+
+    return excused(verdict.once() if nearly else verdict, run, run.start_ns, run.end_ns, why_late)
+
+
+class StaysWithinParams(Place):
+    """The region: give `box`, `polygon`, or `min_m`, `max_m` or both."""
+
+    box: tuple[Spot, Spot] | None = None
+    """Two opposite corners `[x, y]`, in metres."""
+    polygon: Annotated[tuple[Spot, ...], Field(min_length=3)] | None = None
+    """Its corners `[x, y]` in turn, in metres."""
+    walls: tuple[Annotated[tuple[Spot, ...], Field(min_length=1)], ...] = ()
+    """Lines through points `[x, y]`, or single points, in metres; empty: the walls that the run's simulator shows."""
+    min_m: Annotated[float, Field(ge=0)] | None = None
+    """The least distance from the nearest of the walls; null: no bound."""
+    max_m: Annotated[float, Field(gt=0)] | None = None
+    """The greatest distance from the nearest of the walls; null: no bound."""
+    share: Annotated[float, Field(gt=0, le=1)] = 1.0
+    """So much of the time it has to be inside."""
+    from_s: Annotated[float, Field(ge=0)] = 0.0
+    """The time after it sets off that does not count."""
+    least_m: Annotated[float, Field(ge=0)] = 0.0
+    """The path has to be so long."""
+
+    @model_validator(mode="after")
+    def _is_one_region(self) -> StaysWithinParams:
+        by_distance = self.min_m is not None or self.max_m is not None
+        if sum((self.box is not None, self.polygon is not None, by_distance)) != 1:
+            raise ValueError("give one of box, polygon, and min_m, max_m or both")
+        if self.walls and not by_distance:
+            raise ValueError("walls: give min_m or max_m, the distance from them")
+        if self.min_m is not None and self.max_m is not None and self.min_m >= self.max_m:
+            raise ValueError(f"min_m, {self.min_m:g}, is not less than max_m, {self.max_m:g}")
+        return self
+
+    def region(self, run: Run) -> Region:
+        """Return where it may be in this run."""
+        if self.box is not None:
+            (x0, y0), (x1, y1) = self.box
+            words = f"within the box from {spot(self.box[0])} to {spot(self.box[1])}"
+            return Area(((x0, y0), (x1, y0), (x1, y1), (x0, y1)), words)
+        if self.polygon is not None:
+            return Area(self.polygon, f"within the polygon {join_words(map(spot, self.polygon))}")
+        return Band(self.walls or shown_walls(run), self.min_m, self.max_m)
+
+
+@check("stays-within", params=StaysWithinParams, messages_only=True)
+def stays_within(package: PackageFacts, run: Run, params: StaysWithinParams) -> Verdict:
+    """The robot stays where it may be.
+
+    What it checks
+        That the robot's path stays in a region: in a box or a polygon, or at a distance from walls or points.
+
+    Why it matters on a robot
+        A robot that cuts a corner by a hand's breadth leaves its bumper there, and one that drifts away from the
+        wall that it follows has nothing to steer by.
+
+    How it is measured
+        By the positions that the simulator publishes, or else the package's own nodes; velocities are added up over
+        time. What counts is the robot's centre. A share is one of the time after it sets off, in which each
+        position holds until the next one.
+
+    How to fix
+        The report draws the path and where it leaves the region. Stop, or turn away, before the robot is there:
+        at 0.2 m/s and ten scans a second it drives 2 cm from scan to scan.
+    """
+    found, region = track(run, params.topic, params.hold_s, params.fields), params.region(run)
+    verdict = _unreadable(found, package, run, params) or _no_walls(region)
+    if verdict is None and found is not None:
+        path = placed(found, params)
+        verdict = _stays(path, region, run, params) if path else _too_short(params)
+    assert verdict is not None  # noqa: S101 - one of them always is
+    share = f" for {params.share:.0%} of the time" if params.share < 1 else ""
+    return verdict.about(
+        expected=f"{region.words}{share}",
+        measured=verdict.measured or "no position",
+        citations=(*verdict.citations, cite(run, params.topic)),
+    )
+
+
+def placed(found: Track, params: StaysWithinParams) -> list[Pose]:
+    """Return the part of the path that counts: how long it stood before it set off is no one's doing."""
+    path = relative(found.path) if params.relative else list(found.path)
+    moved = next((i for i, pose in enumerate(path) if math.dist(pose.point, path[0].point) > MOVED_M), 0)
+    from_s = path[max(0, moved - 1)].time_s + params.from_s
+    return [pose for pose in path if pose.time_s >= from_s]
+
+
+def out_along(path: Sequence[Pose], region: Region) -> list[float]:
+    """Return how far outside each pose is (m); half a centimetre is still inside, and is 0."""
+    out: list[float] = []
+    at: Point | None = None
+    for pose in path:
+        if at is None or math.dist(pose.point, at) > SAME_M:
+            at, far_m = pose.point, region.out_m(pose.point)
+        out.append(far_m if far_m > SAME_M else 0.0)
+    return out
+
+
+def _no_walls(region: Region) -> Verdict | None:
+    if not isinstance(region, Band) or region.walls:
+        return None
+    message = "no simulator of this run shows its walls, and the rubric gives none"
+    return inconclusive(message, hint="tell your instructor")
+
+
+def _too_short(params: StaysWithinParams) -> Verdict:
+    message = f"no position came on {params.topic} after the first {significant(params.from_s)} s"
+    return inconclusive(message, hint="grade again")
+
+
+def _stays(path: Sequence[Pose], region: Region, run: Run, params: StaysWithinParams) -> Verdict:
+    out, long_m = out_along(path, region), length_m(path)
+    inside = share_inside(path, out)
+    figures = f"{inside:.0%} of the time inside, {metres(max(out))} outside at most, {metres(long_m)} long"
+    if stands(path) and (params.least_m or not any(out)):
+        return unjudged("it never moves", measured=figures, hint=DRIVE)
+    if inside < params.share - ROUNDING or (params.share == 1 and any(out)):
+        verdict = _outside(path, out, region, inside, params)
+    elif long_m < params.least_m:
+        message = f"its path is {metres(long_m)} long; {significant(params.least_m)} m are asked for"
+        verdict = failed(message, hint="drive on, as long as the way is free")
+    else:
+        always = f"for {inside:.0%} of the time" if any(out) else "all the time"
+        return passed(f"it is {region.words} {always}", measured=figures)
+    nearly = inside * NEARLY >= params.share and long_m * NEARLY >= params.least_m
+    return _excused(verdict.about(measured=figures), run, nearly=nearly)
+
+
+def share_inside(path: Sequence[Pose], out: Sequence[float]) -> float:
+    """Return the share of the time in which it was inside."""
+    lasted = [b.time_s - a.time_s for a, b in pairwise(path)]
+    whole_s = sum(lasted)
+    if whole_s <= 0:
+        return sum(not far for far in out) / len(out)
+    return 1.0 if not any(out) else sum(s for s, far in zip(lasted, out, strict=False) if not far) / whole_s
+
+
+def _outside(
+    path: Sequence[Pose], out: Sequence[float], region: Region, inside: float, params: StaysWithinParams
+) -> Verdict:
+    first = next(pose for pose, far in zip(path, out, strict=True) if far)
+    peak = path[max(range(len(out)), key=out.__getitem__)]
+    where = f"{metres(max(out))} at {spot(peak.point)}"
+    after = f"{first.time_s - path[0].time_s + params.from_s:.1f} s after it set off"
+    message = f"it is not {region.words} from {spot(first.point)} on, {after}; farthest out by {where}"
+    if params.share < 1:
+        message = f"only {inside:.0%} of the time it is {region.words}: farthest out by {where}"
+    return failed(message, hint=_keep(peak.point, region))
+
+
+def _keep(point: Point, region: Region) -> str:
+    if (
+        isinstance(region, Band)
+        and region.min_m is not None
+        and Band(region.walls, region.min_m, None).out_m(point)
+    ):
+        return "turn away, or stop, earlier: look at all ranges in front of the robot, and not at the middle one alone"
+    if isinstance(region, Band):
+        return "steer towards what you follow while the distance is too large"
+    return "turn, or stop, before you are at the border"

@@ -1,0 +1,261 @@
+"""Whether messages carry the time at which they were sent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import Field
+
+from grader.checks.registry import check
+from grader.checks.support.clocks import ros_seconds
+from grader.checks.support.fields import FieldPath, no_field, readings
+from grader.checks.support.lateness import Lateness, excused
+from grader.checks.support.nodes import PublishedTopic
+from grader.checks.support.text import shown
+from grader.checks.support.topics import cite, no_message
+from grader.evidence.run import Channel, Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import Verdict, failed, inconclusive, passed, unjudged
+from grader.wording import join_words, plural, significant
+
+TICK_S = 0.05
+"""A step of the fast clock: a node that asks for the time gets the last one."""
+TRANSPORT_S = 0.02
+"""From the stamp to the recorder, on the wall: with a fast clock, that many times longer."""
+NEVER_LATE_S = 2.0
+"""No machine is so late with every single message (s on the wall)."""
+
+FEW = 3
+"""So many stamps may be whole seconds by chance, or by a period of one second."""
+
+
+class StampsParams(Record):
+    """Where the stamp is, and how near it has to be to the time at which its message came."""
+
+    topic: PublishedTopic
+    """The topic, with its slash: `/reading`."""
+    field: FieldPath = "header"
+    """A `std_msgs/Header` of the message, or a field of the type `time`: `header`, `scan.header`, `sent_at`."""
+    within_s: Annotated[float, Field(gt=0)] = 0.2
+    """How far a stamp may be from the time at which its message came, in seconds of the run's clock. With a fast clock,
+    a step of it and 0.02 s of the wall are added.
+    """
+    frame_id: str | None = None
+    """The header's `frame_id`, where the handout asks for one."""
+
+
+class Stamp(NamedTuple):
+    """A message's stamp, and the time at which it came: by ROS's clock, and by the wall's. `frame` is a header's."""
+
+    time_ns: int
+    came_s: float
+    told_s: float
+    whole: bool
+    frame: str | None
+
+    @property
+    def age_s(self) -> float:
+        return self.came_s - self.told_s
+
+
+@check("stamps", params=StampsParams, messages_only=True)
+def stamps(package: PackageFacts, run: Run, params: StampsParams) -> Verdict:
+    """Each message carries the time at which it was sent.
+
+    What it checks
+        That the stamp of every message is the node's time when it was sent: not zero, not the same again and
+        again, not another clock's, growing; and the `frame_id`, where the handout asks for one.
+
+    Why it matters on a robot
+        tf looks up where the sensor was at the time of the stamp. With a stamp of zero or an old one, a
+        measurement is thrown away, or put in the wrong place.
+
+    How it is measured
+        Each stamp is compared with the time at which its message came, by the clock that the node has: `/clock`
+        where `/use_sim_time` is set. `seq` does not matter. Stamps of zero at the beginning do not count with
+        a fast clock: the node had not heard it yet.
+
+    How to fix
+        `msg.header.stamp = rospy.Time.now()` each time just before `publish(msg)`.
+        `rostopic echo <topic>/header` shows the stamps.
+    """
+    channels = run.student_channels(params.topic)
+    each = [_stamps(run, channel, params.field) for channel in channels]
+    found = sorted(one for stamped in each for one in stamped)
+    verdict = (
+        _nothing_to_judge(package, run, channels, found, params)
+        or _zero(found, params)
+        or _constant(found, params)
+        or _other_clock(run, found, params)
+        or next((fault for stamped in each if (fault := _backwards(stamped, params))), None)
+        or _far(run, found, params)
+        or _other_frame(found, params)
+        or passed(f"the stamps of {plural(len(found), 'message')} on {params.topic} are when they were sent")
+    )
+    span = (found[0].time_ns, found[-1].time_ns) if found else (None, None)
+    frame = f", frame_id '{params.frame_id}'" if params.frame_id is not None else ""
+    return verdict.about(
+        expected=f"{_name(params)} of {params.topic} within {significant(params.within_s)} s of the message{frame}",
+        measured=verdict.measured or _ages(found),
+        citations=(*verdict.citations, cite(run, params.topic, *span)),
+    )
+
+
+def _name(params: StampsParams) -> str:
+    return f"{params.field}.stamp" if params.field.rpartition(".")[2] == "header" else params.field
+
+
+def _stamps(run: Run, channel: Channel, path: str) -> list[Stamp]:
+    """Return what of one publisher's messages has a stamp, without zeros before the node heard the fast clock."""
+    to_s = ros_seconds(run)
+    if to_s is None:
+        return []
+    found = [
+        Stamp(one.time_ns, to_s(one.time_ns), *_told(value))
+        for one in readings([channel], path, numbers=False)
+        for value in one.values
+        if _time_in(value) is not None
+    ]
+    first = next((n for n, one in enumerate(found) if one.told_s), 0) if run.clock == "warped" else 0
+    return found[first:]
+
+
+def _time_in(value: Any) -> Mapping[str, int] | None:  # noqa: ANN401 - decoded messages hold anything
+    """Return the time in a header, or in a field that is one itself."""
+    inner = value.get("stamp") if isinstance(value, Mapping) else None
+    time = inner if isinstance(inner, Mapping) else value
+    return time if isinstance(time, Mapping) and time.keys() == {"secs", "nsecs"} else None
+
+
+def _told(value: Mapping[str, Any]) -> tuple[float, bool, str | None]:
+    time = _time_in(value) or {"secs": 0, "nsecs": 0}
+    frame = value.get("frame_id")
+    return (
+        time["secs"] + time["nsecs"] / 1e9,
+        time["nsecs"] == 0,
+        frame if isinstance(frame, str) else None,
+    )
+
+
+def _now(params: StampsParams) -> str:
+    item, _, name = _name(params).rpartition("[*].")
+    return f"set it just before each publish: {'msg.' if not item else 'each '}{name} = rospy.Time.now()"
+
+
+def _nothing_to_judge(
+    package: PackageFacts, run: Run, channels: Sequence[Channel], found: Sequence[Stamp], params: StampsParams
+) -> Verdict | None:
+    if found:
+        return None
+    if not any(channel.messages for channel in channels):
+        return no_message(package, run, params.topic)
+    if ros_seconds(run) is None:
+        return inconclusive("the run's fast clock was not recorded", hint="grade again")
+    read = readings(channels, params.field, numbers=False)
+    if not any(one.values for one in read):
+        return no_field(read[0], channels)
+    kinds = join_words({channel.type for channel in channels})
+    message = f"{params.field} of {params.topic} ({kinds}) is neither a header nor a time"
+    return unjudged(message, hint=f"make {params.field} a std_msgs/Header, or a time")
+
+
+def _zero(found: Sequence[Stamp], params: StampsParams) -> Verdict | None:
+    zeros = [one for one in found if one.told_s == 0]
+    if not zeros:
+        return None
+    count = f"in {len(zeros)} of {plural(len(found), 'message')}"
+    message = f"{_name(params)} of {params.topic} is 0 {count}: it was never set"
+    return failed(message, hint=_now(params), measured=f"0 {count}")
+
+
+def _constant(found: Sequence[Stamp], params: StampsParams) -> Verdict | None:
+    first, last = found[0], found[-1]
+    if len(found) == 1 or len({one.told_s for one in found}) > 1:
+        return None
+    if last.came_s - first.came_s <= params.within_s:
+        return None
+    message = (
+        f"{_name(params)} of {params.topic} is {first.told_s:.3f} in all of {plural(len(found), 'message')}"
+    )
+    return failed(f"{message}: the time was asked for once", hint=_now(params))
+
+
+def _other_clock(run: Run, found: Sequence[Stamp], params: StampsParams) -> Verdict | None:
+    """Time of the wall in a run whose nodes live in simulated time."""
+    off = [one for one in found if abs(one.age_s) > _limit_s(run, params)]
+    if (
+        run.clock != "warped"
+        or not off
+        or any(abs(one.told_s - one.time_ns / 1e9) > params.within_s for one in off)
+    ):
+        return None
+    message = f"{_name(params)} of {params.topic} is the computer's time, and not that of /clock"
+    hint = (
+        "take the time from rospy.Time.now(), which follows /clock where /use_sim_time is set; time.time() and "
+        "datetime do not"
+    )
+    return failed(message, hint=hint)
+
+
+def _backwards(found: Sequence[Stamp], params: StampsParams) -> Verdict | None:
+    falls = [(a, b) for a, b in pairwise(found) if b.told_s < a.told_s]
+    if not falls:
+        return None
+    before, after = falls[0]
+    message = (
+        f"{_name(params)} of {params.topic} goes back {plural(len(falls), 'time')}: at first from "
+        f"{before.told_s:.3f} to {after.told_s:.3f}"
+    )
+    verdict = failed(message, hint=_now(params))
+    return verdict if len(falls) > len(found) // 4 else verdict.once()
+
+
+def _limit_s(run: Run, params: StampsParams) -> float:
+    return params.within_s + (TICK_S + TRANSPORT_S * run.warp if run.clock == "warped" else 0.0)
+
+
+def _far(run: Run, found: Sequence[Stamp], params: StampsParams) -> Verdict | None:
+    limit_s = _limit_s(run, params)
+    off = [one for one in found if abs(one.age_s) > limit_s]
+    if not off:
+        return None
+    worst = max(off, key=lambda one: abs(one.age_s))
+    how = "older" if worst.age_s > 0 else "later"
+    count = f"in {len(off)} of {plural(len(found), 'message')}"
+    message = (
+        f"{_name(params)} of {params.topic} is up to {abs(worst.age_s):.2f} s {how} than the message {count}"
+    )
+    whole = len(found) > FEW and all(one.whole for one in found)
+    verdict = failed(f"{message}: it has whole seconds only" if whole else message, hint=_now(params))
+    gross_s = limit_s + NEVER_LATE_S * run.warp
+    if whole or (len(off) == len(found) and min(abs(one.age_s) for one in off) > gross_s):
+        return verdict
+
+    def why(late: Lateness) -> str:
+        if not (late.full or late.max_ms / 1e3 * run.warp >= params.within_s / 2):
+            return ""
+        return "busy" if late.full else f"late itself, by up to {late.max_ms:.0f} ms"
+
+    return excused(verdict.once(), run, found[0].time_ns, found[-1].time_ns, why)
+
+
+def _other_frame(found: Sequence[Stamp], params: StampsParams) -> Verdict | None:
+    wrong = [one for one in found if params.frame_id is not None and one.frame != params.frame_id]
+    if not wrong:
+        return None
+    asked, seen = f"'{params.frame_id}'", wrong[0].frame
+    if seen is None:
+        message = f"{params.field} of {params.topic} is a plain time, without a frame_id"
+        return failed(message, hint=f"make {params.field} a std_msgs/Header, frame_id {asked}")
+    count = f"in {len(wrong)} of {plural(len(found), 'message')}"
+    message = f"{params.field}.frame_id of {params.topic} is '{shown(seen)}', not {asked}, {count}"
+    slash = "; tf2 takes no frames that begin with a slash" if seen == f"/{params.frame_id}" else ""
+    return failed(message, hint=f"set msg.{params.field}.frame_id = {asked}{slash}")
+
+
+def _ages(found: Iterable[Stamp]) -> str:
+    ages = [one.age_s for one in found]
+    return f"{min(ages):.2f} to {max(ages):.2f} s old" if ages else "no stamp"

@@ -1,0 +1,346 @@
+"""Whether the package sends a transform between two frames, and the right one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Annotated, NamedTuple
+
+from pydantic import Field, model_validator
+
+from grader.checks.registry import check
+from grader.checks.support.clocks import run_seconds
+from grader.checks.support.lateness import excused, why_late
+from grader.checks.support.nodes import GlobalName
+from grader.checks.support.processes import observed_until_ns
+from grader.checks.support.text import near_names, shown
+from grader.checks.support.topics import cite, no_message
+from grader.checks.support.transforms import (
+    TOPICS,
+    Sent,
+    Transform,
+    Tree,
+    Vector,
+    pose_in,
+    sent_on,
+    turn_of,
+)
+from grader.evidence.run import Run
+from grader.model.package import PackageFacts
+from grader.model.record import Record
+from grader.model.verdict import Verdict, failed, inconclusive, passed
+from grader.wording import join_words, plural, significant
+
+ORDER_S = 0.1
+"""Two topics come over two connections: so much earlier a transform may be recorded than the pose that it follows."""
+TICK_S = 0.05
+TRANSPORT_S = 0.02
+"""With a fast clock, a step of it, and what the wall takes from node to recorder."""
+FEW = 3
+"""So many transforms may be the same for the machine's sake; more were never changed."""
+Frame = Annotated[str, Field(pattern=r"^[^/\s]\S*$")]
+
+
+class TransformParams(Record):
+    """The transform from `parent` to `child`, and what it has to be: a value, or the pose on a topic."""
+
+    parent: Frame
+    """`header.frame_id`, without a slash: `base_link`."""
+    child: Frame
+    """`child_frame_id`, without a slash: `laser`."""
+    translation: Vector | None = None
+    """x, y and z, in metres."""
+    rotation_deg: Vector | None = None
+    """Roll, pitch and yaw, in degrees."""
+    pose_of: GlobalName | None = None
+    """A topic with poses that the transform follows: `geometry_msgs/Pose` (also in PoseStamped or Odometry), or a
+    message with x, y and theta (`turtlesim/Pose`).
+    """
+    within_s: Annotated[float, Field(gt=0)] = 0.3
+    """How old the pose may be that the transform has."""
+    tolerance_m: Annotated[float, Field(ge=0)] = 0.01
+    """How far the translation may be off."""
+    tolerance_deg: Annotated[float, Field(ge=0)] = 1.0
+    """How far the rotation may be off."""
+    static: bool | None = None
+    """Whether it has to be on `/tf_static`, or must not be; null: either."""
+    min_hz: Annotated[float, Field(gt=0)] | None = None
+    """How often it has to be sent at least."""
+    through: bool = False
+    """Whether it may lead through other frames, the grader's `transform` steps among them."""
+
+    @model_validator(mode="after")
+    def _one_value(self) -> TransformParams:
+        if self.pose_of is not None and (self.translation or self.rotation_deg):
+            raise ValueError("give pose_of, or translation and rotation_deg")
+        return self
+
+    @property
+    def name(self) -> str:
+        return f"the transform from {self.parent} to {self.child}"
+
+
+class Seen(NamedTuple):
+    """The transform at one time."""
+
+    time_ns: int
+    value: Transform | None
+
+
+@check("transform", params=TransformParams, messages_only=True)
+def transform(package: PackageFacts, run: Run, params: TransformParams) -> Verdict:
+    """The transform between two frames is sent, and right.
+
+    What it checks
+        That the package sends the transform from the parent frame to the child frame, with the right
+        translation and rotation, or following the poses on a topic; on `/tf_static` or often enough, where
+        the handout asks for that.
+
+    Why it matters on a robot
+        Every measurement is placed by these transforms. With parent and child swapped, or degrees in place of
+        radians, an obstacle in front of the robot is drawn behind it.
+
+    How it is measured
+        Each transform on `/tf` and `/tf_static` is compared within the tolerances. One that follows poses has
+        to be a pose of the last `within_s` seconds, or the last one, when it is sent. A path through other
+        frames is put together as tf does.
+
+    How to fix
+        `header.frame_id` is the parent and `child_frame_id` the child; the translation is the child's place seen
+        from the parent. `rosrun tf tf_echo <parent> <child>` shows it.
+    """
+    own = sent_on(run.student_channels())
+    seen = _seen(run, own, params)
+    verdict = (
+        _not_sent(package, run, own, seen, params)
+        or _other_topic(own, params)
+        or _no_rotation(seen, params)
+        or _other_value(seen, params)
+        or (_strays(run, seen, params) if params.pose_of else None)
+        or _too_seldom(run, seen, params)
+        or passed(f"{params.name} is right in {plural(len(seen), 'message')}")
+    )
+    topics = dict.fromkeys(one.topic for one in own) or (TOPICS[1] if params.static else TOPICS[0],)
+    return verdict.about(
+        expected=_expected(params),
+        measured=verdict.measured or _measured(seen, own),
+        citations=(*verdict.citations, *(cite(run, topic) for topic in topics)),
+    )
+
+
+def _seen(run: Run, own: Sequence[Sent], params: TransformParams) -> list[Seen]:
+    """Return the transform each time that it was sent, or that one of its path was."""
+    if not params.through:
+        return [Seen(s.time_ns, s.value) for s in own if (s.parent, s.child) == (params.parent, params.child)]
+    every = sent_on(run.channels)
+    tree = Tree(every)
+    found = [Seen(one.time_ns, tree.lookup(params.parent, params.child, one.time_ns)) for one in every]
+    return [one for one in found if one.value is not None]
+
+
+def _edges(own: Sequence[Sent]) -> list[tuple[str, str]]:
+    return list(dict.fromkeys((one.parent, one.child) for one in own))
+
+
+def _edge_words(edges: Sequence[tuple[str, str]]) -> str:
+    return shown(join_words([f"{parent} → {child}" for parent, child in edges]))
+
+
+def _not_sent(
+    package: PackageFacts, run: Run, own: Sequence[Sent], seen: Sequence[Seen], params: TransformParams
+) -> Verdict | None:
+    if seen:
+        return None
+    if not own:
+        return no_message(package, run, TOPICS[1] if params.static else TOPICS[0])
+    edges, wanted = _edges(own), (params.parent, params.child)
+    hint = f"header.frame_id = '{params.parent}', child_frame_id = '{params.child}'"
+    if wanted[::-1] in edges:
+        message = f"{params.name} is sent the other way round: {params.child} is the parent, {params.parent} the child"
+        return failed(message, hint=hint)
+    slashed = [edge for edge in edges if tuple(name.lstrip("/") for name in edge) == wanted]
+    if slashed:
+        message = (
+            f"the frames are {_edge_words(slashed)}: tf2 takes no names of frames that begin with a slash"
+        )
+        return failed(message, hint=hint)
+    if params.through:
+        path = [one.parent for one in Tree(sent_on(run.channels)).path(params.child, run.end_ns)]
+        up = (
+            f"{params.child} leads up to {shown(path[-1])}"
+            if path
+            else f"nothing is sent about {params.child}"
+        )
+        message = f"{params.parent} and {params.child} are not connected: {up}; there is {_edge_words(edges)}"
+        return failed(
+            message, hint="every frame has one parent: send the transform that is missing in between"
+        )
+    names = {name for edge in edges for name in edge}
+    near = [
+        f"{wrong} for {name}" for name in wanted if name not in names for wrong in near_names(name, names)
+    ]
+    other = f" ({shown(join_words(near))})" if near else ""
+    return failed(f"{params.name} is not sent; there is {_edge_words(edges)}{other}", hint=hint)
+
+
+def _other_topic(own: Sequence[Sent], params: TransformParams) -> Verdict | None:
+    pair = (params.parent, params.child)
+    topics = {one.topic for one in own if (one.parent, one.child) == pair}
+    wrong = TOPICS[0] if params.static else TOPICS[1]
+    if params.static is None or wrong not in topics:
+        return None
+    kind = "StaticTransformBroadcaster" if params.static else "TransformBroadcaster"
+    why = (
+        "it never changes"
+        if params.static
+        else "it changes, and tf takes what is static for valid at all times"
+    )
+    message = f"{params.name} is on {wrong}, and belongs on {TOPICS[1 if params.static else 0]}: {why}"
+    return failed(message, hint=f"send it with a tf2_ros.{kind}")
+
+
+def _no_rotation(seen: Sequence[Seen], params: TransformParams) -> Verdict | None:
+    wrong = [one for one in seen if one.value is None]
+    if not wrong:
+        return None
+    message = (
+        f"the rotation of {params.name} is no rotation in {len(wrong)} of {plural(len(seen), 'message')}"
+    )
+    hint = (
+        "a quaternion without rotation has w = 1.0; quaternion_from_euler(roll, pitch, yaw) gives any other"
+    )
+    return failed(f"{message}: its quaternion is 0, or holds what is no number", hint=hint)
+
+
+def _fits(value: Transform, wanted: Transform, params: TransformParams) -> bool:
+    metres, degrees = value.apart(wanted)
+    return metres <= params.tolerance_m + 1e-6 and degrees <= params.tolerance_deg + 1e-3
+
+
+def _wanted(value: Transform, params: TransformParams) -> Transform:
+    """Return the transform as asked for; what is not asked for is as it is."""
+    turn = value.turn if params.rotation_deg is None else turn_of(params.rotation_deg)
+    return Transform(params.translation or value.at, turn)
+
+
+def _other_value(seen: Sequence[Seen], params: TransformParams) -> Verdict | None:
+    values = [one.value for one in seen if one.value is not None]
+    wrong = [value for value in values if not _fits(value, _wanted(value, params), params)]
+    if not wrong or params.pose_of:
+        return None
+    value, wanted = wrong[0], _wanted(wrong[0], params)
+    count = f"in {len(wrong)} of {plural(len(seen), 'message')}"
+    hint = "the translation is in metres, and the angles of quaternion_from_euler in radians"
+    why = _why(value, wanted, params)
+    return failed(f"{params.name} is {_text(value)}, not {_text(wanted)}, {count}{why}", hint=hint)
+
+
+def _why(value: Transform, wanted: Transform, params: TransformParams) -> str:
+    if _fits(value.inverse, wanted, params):
+        return f": it is the one from {params.child} to {params.parent}"
+    as_degrees = turn_of([math.degrees(angle) for angle in wanted.rpy_deg])
+    if any(wanted.rpy_deg) and _fits(value, Transform(value.at, as_degrees), params):
+        return ": its angles are degrees where radians are asked for"
+    metres, degrees = value.apart(wanted)
+    if metres <= params.tolerance_m:
+        return f": the rotation is off by {degrees:.0f}°"
+    return ": the rotation is right" if degrees <= params.tolerance_deg else ""
+
+
+def _text(value: Transform) -> str:
+    at = ", ".join(f"{round(v, 2) + 0.0:.2f}" for v in value.at)
+    return f"({at}) m and ({', '.join(f'{round(v)}' for v in value.rpy_deg)})°"
+
+
+def _poses(run: Run, topic: str) -> list[tuple[int, Transform]]:
+    found = [
+        (t, pose)
+        for c in run.channels
+        if c.topic == topic
+        for t, value in zip(c.times_ns, c.values, strict=True)
+        if (pose := pose_in(value)) is not None
+    ]
+    return sorted(found, key=lambda one: one[0])
+
+
+def _strays(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict | None:
+    """Return what is wrong with a transform that has to follow poses."""
+    poses, to_s = _poses(run, params.pose_of or ""), run_seconds(run)
+    if not poses or to_s is None:
+        what = f"no pose came on {params.pose_of}" if to_s else "the run's fast clock was not recorded"
+        return inconclusive(what, hint="grade again")
+    slack_s = params.within_s + (TICK_S + TRANSPORT_S * run.warp if run.clock == "warped" else 0.0)
+    timed = [(to_s(t), pose) for t, pose in poses]
+    judged = [one for one in seen if to_s(one.time_ns) >= timed[0][0] + slack_s]
+    wrong = [one for one in judged if not any(_matching(one, to_s(one.time_ns), timed, slack_s, params))]
+    if wrong:
+        return _wrong_pose(run, wrong, judged, poses, params)
+    until_s, last_s = to_s(observed_until_ns(run) or run.end_ns), timed[-1][0]
+    if until_s - last_s < slack_s or any(to_s(one.time_ns) >= last_s - ORDER_S for one in seen):
+        return None
+    message = f"{params.name} was not sent any more after the last pose on {params.pose_of}"
+    verdict = failed(message, hint=f"send it in the callback of {params.pose_of}").once()
+    return excused(verdict, run, poses[0][0], run.end_ns, why_late)
+
+
+def _matching(
+    one: Seen, at_s: float, poses: Sequence[tuple[float, Transform]], slack_s: float, params: TransformParams
+) -> Iterator[bool]:
+    """Yield for each pose that the transform may have whether it has it."""
+    last_s = max((t for t, _ in poses if t <= at_s), default=at_s)
+    for came_s, pose in poses:
+        if min(at_s - slack_s, last_s) <= came_s <= at_s + ORDER_S:
+            yield one.value is not None and _fits(one.value, pose, params)
+
+
+def _wrong_pose(
+    run: Run,
+    wrong: Sequence[Seen],
+    judged: Sequence[Seen],
+    poses: Sequence[tuple[int, Transform]],
+    params: TransformParams,
+) -> Verdict:
+    first, count = wrong[0], f"in {len(wrong)} of {plural(len(judged), 'message')}"
+    value = first.value
+    pose = next((p for t, p in reversed(poses) if t <= first.time_ns), poses[0][1])
+    hint = f"send the pose of each message on {params.pose_of} at once, in its callback"
+    if value is None:
+        return failed(f"{params.name} is no transform {count}", hint=hint)
+    old = [t for t, p in poses if _fits(value, p, params) and t <= first.time_ns]
+    says = f"{params.name} is {_text(value)} while {params.pose_of} says {_text(pose)}, {count}"
+    if not old:
+        return failed(f"{says}{_why(value, pose, params)}", hint=hint)
+    verdict = failed(f"{says}: it is that of an older pose", hint=hint)
+    if len(judged) > FEW and len({_text(one.value) for one in judged if one.value}) == 1:
+        return verdict
+    verdict = verdict.once()
+    return excused(verdict, run, old[-1], wrong[-1].time_ns, why_late)
+
+
+def _too_seldom(run: Run, seen: Sequence[Seen], params: TransformParams) -> Verdict | None:
+    to_s = run_seconds(run)
+    if params.min_hz is None or to_s is None:
+        return None
+    span_s = to_s(seen[-1].time_ns) - to_s(seen[0].time_ns)
+    rate_hz = (len(seen) - 1) / span_s if span_s > 0 else 0.0
+    if rate_hz >= params.min_hz:
+        return None
+    message = f"{params.name} is sent {significant(rate_hz)} times a second, and at least {params.min_hz:g} are asked"
+    verdict = failed(message, hint="send it in a loop with rospy.Rate, or in the callback of what it follows")
+    return excused(verdict.once(), run, seen[0].time_ns, seen[-1].time_ns, why_late)
+
+
+def _expected(params: TransformParams) -> str:
+    value = f" following {params.pose_of}" if params.pose_of else ""
+    if params.translation is not None:
+        value += f" at ({', '.join(f'{v:g}' for v in params.translation)}) m"
+    if params.rotation_deg is not None:
+        value += f", turned by ({', '.join(f'{v:g}' for v in params.rotation_deg)})°"
+    return f"{params.parent} → {params.child}{value}"
+
+
+def _measured(seen: Sequence[Seen], own: Sequence[Sent]) -> str:
+    if not seen:
+        return _edge_words(_edges(own)) or "no transform"
+    last = seen[-1].value
+    return f"{plural(len(seen), 'transform')}, the last {_text(last) if last else 'without a rotation'}"

@@ -1,0 +1,68 @@
+"""Definitions of messages, services and actions (`.msg`, `.srv`, `.action`), line by line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import PurePosixPath
+
+from grader.model.package import Fault, Interface, InterfaceField
+
+FIELDS_MAX = 500
+PARTS = {".msg": ("",), ".srv": ("request", "response"), ".action": ("goal", "result", "feedback")}
+"""What a file is divided into by `---`, by its ending."""
+_TYPE = r"(?P<type>[A-Za-z]\w*(?:/[A-Za-z]\w*)?(?:\[\d{0,9}\])?)"
+_FIELD = re.compile(rf"{_TYPE}\s+(?P<name>[A-Za-z]\w*)", re.ASCII)
+_CONSTANT = re.compile(rf"{_TYPE}\s+(?P<name>[A-Za-z]\w*)\s*=\s*(?P<value>.*)", re.ASCII)
+_CHARS_MAX = 200
+
+
+def parse_interface(data: bytes, path: str) -> Interface:
+    """Return one definition from its bytes. Never raises: the first line that is none is the record's `fault`."""
+    parts = PARTS[PurePosixPath(path).suffix]
+    lines = data.decode("utf-8-sig", "replace").splitlines()
+    fields: list[InterfaceField] = []
+    number, fault = 0, None
+    for line, text in enumerate(lines, 1):
+        if text.partition("#")[0].strip() == "---":
+            number += 1
+            continue
+        one = _parse_line(text, parts[min(number, len(parts) - 1)], line)
+        if one is None and text.partition("#")[0].strip():
+            fault = fault or _no_field(text, path, line)
+        elif one is not None and len(fields) < FIELDS_MAX:
+            fields.append(one)
+    if number != len(parts) - 1:
+        fault = fault or _other_parts(path, number, parts)
+    return Interface(path=path, fields=tuple(fields), fault=fault)
+
+
+def parse_definition(text: str, suffix: str) -> Iterator[InterfaceField]:
+    """Yield the fields of a rubric's own definition. Raises ValueError for what is none."""
+    found = parse_interface(text.encode(), f"definition{suffix}")
+    if found.fault is not None:
+        raise ValueError(found.fault.message)
+    yield from found.fields
+
+
+def _parse_line(text: str, part: str, line: int) -> InterfaceField | None:
+    bare = text.partition("#")[0].strip()
+    if constant := _CONSTANT.fullmatch(text.strip() if bare.startswith("string") else bare):
+        value = constant["value"].strip()[:_CHARS_MAX]
+        return InterfaceField(part=part, type=constant["type"], name=constant["name"], value=value, line=line)
+    field = _FIELD.fullmatch(bare)
+    return field and InterfaceField(part=part, type=field["type"], name=field["name"], line=line)
+
+
+def _no_field(text: str, path: str, line: int) -> Fault:
+    shown = text.strip()[:60]
+    message = f"`{shown}` is no field: a line is a type and a name, like `float64 speed`"
+    return Fault(file=path, line=line, kind="NoField", message=message, cause=f"line {line}: {message}")
+
+
+def _other_parts(path: str, number: int, parts: tuple[str, ...]) -> Fault:
+    lines = "one line" if len(parts) == 2 else "two lines" if parts[1:] else "no line"
+    message = f"there are {number} lines `---`, and there has to be {lines}"
+    if parts[1:]:
+        message += f" between {', '.join(parts[:-1])} and {parts[-1]}"
+    return Fault(file=path, line=None, kind="OtherParts", message=message, cause=message)

@@ -1,0 +1,87 @@
+"""The ROS packages that lie beside a rubric: messages, simulators, launch files and bags of the course.
+
+Their files belong to the rubric: they are part of its digest, and go wherever it goes.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from grader.rubric.source import Fault, KeyPath, as_map, as_maps, as_texts
+from grader.wording import did_you_mean
+
+MANIFEST = "package.xml"
+FILES_MAX = 500
+BYTES_MAX = 20_000_000
+IGNORED = frozenset({"build", "devel", "install", "__pycache__"})
+LAUNCH_ENDINGS = (".launch", ".launch.xml")
+SCRIPT = b"#!"
+_NAME = re.compile(rb"<name>\s*([\w-]+)\s*</name>")
+_TARGET = re.compile(r"add_executable\s*\(\s*\"?([\w.-]+)")
+
+
+def package_files(folder: Path, name: str) -> dict[str, bytes]:
+    """Return the files of the package `name` in a rubric's folder, by their paths from there.
+
+    Raises OSError, and ValueError for more than a rubric may bring along.
+    """
+    found: dict[str, bytes] = {}
+    size = 0
+    for place, folders, files in os.walk(folder / name):
+        folders[:] = sorted(f for f in folders if f not in IGNORED and not f.startswith("."))
+        for file in sorted(files):
+            path = Path(place) / file
+            if path.is_symlink() or not path.is_file():
+                continue
+            size += path.stat().st_size
+            if size > BYTES_MAX or len(found) == FILES_MAX:
+                raise ValueError(f"is more than {BYTES_MAX // 1_000_000} MB or {FILES_MAX} files")
+            found[path.relative_to(folder).as_posix()] = path.read_bytes()
+    return found
+
+
+def read_packages(rubric: dict[str, Any], folder: Path) -> tuple[dict[str, bytes], list[Fault]]:
+    """Return the files of all packages that the rubric names, and what is wrong with them or with what starts them."""
+    read: dict[str, bytes] = {}
+    faults: list[Fault] = []
+    for index, name in as_texts(rubric.get("packages")):
+        if not re.fullmatch(r"[A-Za-z]\w*", name):
+            continue  # said elsewhere
+        try:
+            files = package_files(folder, name)
+        except (OSError, ValueError) as error:
+            faults.append((("packages", index), str(error)))
+            continue
+        read |= files
+        named = _NAME.search(files.get(f"{name}/{MANIFEST}", b""))
+        if f"{name}/{MANIFEST}" not in files:
+            faults.append((("packages", index), f"there is no {name}/{MANIFEST} beside the rubric"))
+        elif named is None or named[1].decode() != name:
+            faults.append((("packages", index), f"{name}/{MANIFEST} does not say <name>{name}</name>"))
+        else:
+            faults += _programs(rubric, name, files)
+    return read, faults
+
+
+def _programs(rubric: dict[str, Any], package: str, files: Mapping[str, bytes]) -> Iterator[Fault]:
+    """Yield a fault for each program that the package does not have."""
+    known = {path.rpartition("/")[2] for path, data in files.items() if data.startswith(SCRIPT)}
+    known |= {path.rpartition("/")[2] for path in files if path.endswith(LAUNCH_ENDINGS)}
+    cmake = files.get(f"{package}/CMakeLists.txt", b"").decode(errors="replace")
+    known |= set(_TARGET.findall(cmake))
+    for path, program in _started(rubric):
+        owner, _, name = program.partition("/")
+        if owner == package and name not in known and "${" not in cmake:
+            yield path, f'{package} has no program or launch file "{name}"{did_you_mean(name, known)}'
+
+
+def _started(rubric: dict[str, Any]) -> Iterator[tuple[KeyPath, str]]:
+    for name, scenario in as_map(rubric.get("scenarios")).items():
+        for index, start in as_maps(as_map(scenario).get("start")):
+            program = start.get("program")
+            if isinstance(program, str):
+                yield ("scenarios", name, "start", index, "program"), program

@@ -1,0 +1,141 @@
+"""A package that lies beside the rubric: students' packages build on it, import it, and cannot change it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from grader.api import grade
+from grader.errors import HostError
+from grader.evidence.reader import load_run
+from grader.model.result import GradingResult
+from tests.arena.support import needs_sandbox
+
+MANIFEST = """<package format="2"><name>{}</name><version>0.1.0</version><description>d</description>
+<maintainer email="a@example.org">a</maintainer><license>MIT</license><buildtool_depend>catkin</buildtool_depend>
+{}</package>
+"""
+CMAKE = "cmake_minimum_required(VERSION 3.0.2)\nproject({})\nfind_package(catkin REQUIRED COMPONENTS {})\n{}"
+COURSE = {
+    "package.xml": MANIFEST.format(
+        "course_sim", "<depend>message_generation</depend><depend>message_runtime</depend>"
+    ),
+    "CMakeLists.txt": CMAKE.format(
+        "course_sim",
+        "message_generation",
+        "add_message_files(FILES Level.msg)\ngenerate_messages()\ncatkin_package(CATKIN_DEPENDS message_runtime)\n",
+    ),
+    "msg/Level.msg": "float64 litres\n",
+    "nodes/tank.py": """#!/usr/bin/env python3
+import rospy
+from course_sim.msg import Level
+
+rospy.init_node("tank")
+level = rospy.Publisher("/level", Level, queue_size=1)
+rate = rospy.Rate(20)
+while not rospy.is_shutdown():
+    level.publish(2.5)
+    rate.sleep()
+""",
+    "launch/world.launch": '<launch><node pkg="course_sim" type="tank.py" name="tank"/></launch>\n',
+}
+STUDENT = {
+    "package.xml": MANIFEST.format("lab9", "<depend>course_sim</depend><depend>rospy</depend>"),
+    "CMakeLists.txt": CMAKE.format("lab9", "rospy course_sim", "catkin_package()\n"),
+    "scripts/alarm.py": """#!/usr/bin/env python3
+import course_sim
+import rospy
+from course_sim.msg import Level
+
+try:
+    open(course_sim.__path__[0] + "/mine", "w")
+    print("changed")
+except OSError as error:
+    print("refused")
+rospy.init_node("alarm")
+again = rospy.Publisher("/again", Level, queue_size=1)
+rospy.Subscriber("/level", Level, again.publish)
+rospy.spin()
+""",
+}
+RUBRIC = """schema: grader.rubric/1
+id: lab9
+title: Lab 9
+version: "1"
+package: lab9
+packages: [course_sim]
+scenarios:
+  sim:
+    title: The tank
+    start:
+      - {name: tank, program: course_sim/PROGRAM}
+      - {name: alarm, script: scripts/alarm.py}
+    until: {messages: {/again: 3}, limit_s: 20}
+criteria:
+  - {id: build, title: Builds, points: 40, check: build}
+  - id: again
+    title: Says it again
+    points: 60
+    check: topic-type
+    with: {topic: /again, type: course_sim/Level}
+    scenario: sim
+"""
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "grader"
+
+
+def graded(folder: Path, *, program: str = "tank.py", sandbox: str = "auto", **course: str) -> GradingResult:
+    """Grade the student's package by a rubric that starts this program; `course` are other files of the package."""
+    for top, files in {"lab/course_sim": {**COURSE, **course}, "alice/lab9": STUDENT}.items():
+        for name, text in files.items():
+            path = folder / top / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+            path.chmod(0o755 if top == "alice/lab9" and path.suffix == ".py" else 0o644)
+    rubric = folder / "lab" / "lab9.yaml"
+    rubric.write_text(RUBRIC.replace("PROGRAM", program))
+    return grade(folder / "alice", rubric, folder / "out", sandbox=sandbox)  # type: ignore[arg-type]
+
+
+@pytest.mark.ros
+@needs_sandbox
+def test_it_is_built_once_and_can_only_be_read(tmp_path: Path, cache: Path) -> None:
+    assert graded(tmp_path).points == 100
+    run = load_run(tmp_path / "out" / "alice" / "evidence" / "sim.mcap")
+    assert "refused" in [line.line for _, line in run.lines("alarm")]
+    (kept,) = cache.glob("course-*.tar")
+    before = kept.stat().st_ino
+    assert graded(tmp_path, program="world.launch").points == 100
+    assert [path.stat().st_ino for path in cache.glob("course-*.tar")] == [before]
+
+
+@pytest.mark.ros
+@pytest.mark.full
+def test_it_is_found_without_a_sandbox(tmp_path: Path) -> None:
+    assert graded(tmp_path, sandbox="none").points == 100
+
+
+@pytest.mark.ros
+@pytest.mark.full
+def test_a_package_that_does_not_build_is_the_courses_fault(tmp_path: Path) -> None:
+    result = graded(tmp_path, **{"CMakeLists.txt": "message(FATAL_ERROR oops)\n"})
+    assert {c.status.value for c in result.criteria} == {"inconclusive"}
+    run = load_run(tmp_path / "out" / "alice" / "evidence" / "package.mcap")
+    assert any("the lab's own packages do not build" in event.detail for _, event in run.course)
+
+
+@pytest.mark.ros
+def test_where_something_that_is_needed_is_missing_nothing_is_graded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        f"{__name__}.RUBRIC", RUBRIC.replace("packages:", "needs: {pip: [no-such-module]}\npackages:")
+    )
+    with pytest.raises(HostError, match="the lab needs no-such-module, which this machine lacks") as caught:
+        graded(tmp_path)
+    assert caught.value.hint.endswith("-m pip install no-such-module")
