@@ -32,6 +32,10 @@ from grader.model.verdict import FileCitation, Status, Verdict, failed, passed
 from grader.wording import join_words
 
 SHELL = "#!/bin/bash"
+ASSIGNED = re.compile(
+    r"(?P<file>[\w.-]+\.\w+): (?:line )?(?P<line>\d+): (?P<name>[A-Za-z_]\w*): (?:command )?not found$"
+)
+"""What bash and dash say of a name with a blank before its `=`."""
 
 
 class OpensParams(Record):
@@ -161,12 +165,25 @@ def _page(package: PackageFacts, file: LaunchFile, run: Run, params: OpensParams
         message = (
             f"{params.program} is asked to open {join_words(map(_arguments, mine))}, not {params.urls[0]}"
         )
+        if blank := _blanks(run, mine):
+            where = f"{PurePosixPath(blank['file']).name}, line {blank['line']}"
+            message += (
+                f": in {where}, the shell takes {blank['name']} for a command, since a blank follows it"
+            )
+            hint = f"write {blank['name']}=… in {where}, without blanks around the `=`"
         return failed(message, hint=hint, citations=cited)
     if slip := next(refusals(package, file), None):
         return slip.verdict(quoted(run))
     if absence := refusal(run):
         return failed(absence.why, hint=absence.hint)
     return failed(f"the script opens nothing in {params.program}{_words(package, file, run)}", hint=hint)
+
+
+def _blanks(run: Run, pages: list[Page]) -> re.Match[str] | None:
+    """Return what the shell said of `URL = …`, where no address came to the program because of that."""
+    if any(re.search(r"[./]", argument) for page in pages for argument in page.arguments):
+        return None
+    return next(filter(None, (ASSIGNED.search(bare(c.line)) for _, c in run.console)), None)
 
 
 def _words(package: PackageFacts, file: LaunchFile, run: Run) -> str:

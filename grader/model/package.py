@@ -138,14 +138,14 @@ class SourceFile(Record):
 class PythonSlip(Record):
     """A slip in a Python file that compiles; it shows only when the node runs.
 
-    `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and
-    nodes get none. `no-clock`: it publishes and counts, and nothing in it can tell the time; that is a slip only where
-    its messages are to tell it.
+    `not-called`: `rate.sleep` or `rospy.is_shutdown` without brackets. `input`: the node asks for input, and nodes
+    get none. `misspelt`: a name that the file does not define, beside one that it does. `no-clock`: it publishes
+    and counts, and nothing in it can tell the time; that is a slip only where its messages are to tell it.
     """
 
     file: str
     line: int
-    kind: Literal["not-called", "input", "no-clock"]
+    kind: Literal["not-called", "input", "no-clock", "misspelt"]
     message: str
 
 

@@ -110,7 +110,7 @@ class _RawFault(Record):
 
 class _RawSlip(Record):
     line: int
-    kind: Literal["not-called", "input", "no-clock"]
+    kind: Literal["not-called", "input", "no-clock", "misspelt"]
     message: str
 
 

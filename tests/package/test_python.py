@@ -149,6 +149,21 @@ def test_a_script_that_counts_and_reads_no_clock(tmp_path, value, imported, told
     assert [s.kind for s in slips] == ["no-clock"] * told
 
 
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("counter = 0\nprint(conter)\n", ["`conter` is defined nowhere: did you mean `counter`?"]),
+        ("def run(speed):\n    return sped\n", ["`sped` is defined nowhere: did you mean `speed`?"]),
+        ("from a import *\ncounter = 0\nprint(conter)\n", []),
+        ("counter = 0\nprint(unlike)\n", []),
+        ("try:\n    pass\nexcept Exception as error:\n    print(error, __file__)\n", []),
+    ],
+)
+def test_a_name_that_is_not_there_and_one_that_is_spelt_alike(tmp_path, text, told):
+    (tmp_path / "a.py").write_text(text)
+    assert [s.message for s in check_syntax(tmp_path, ["a.py"]).slips] == told
+
+
 def test_hostile_source_does_not_stop_the_others(tmp_path):
     (tmp_path / "bomb.py").write_text("x = " + "-" * 900_000 + "1\n")
     (tmp_path / "chain.py").write_text("x = a" + ".a" * 400_000 + "\n")

@@ -8,7 +8,9 @@ later), standard library only; nothing is imported from ROOT.
 """
 
 import ast
+import builtins
 import contextlib
+import difflib
 import io
 import json
 import os
@@ -41,6 +43,8 @@ PLAIN_MODULES = {
     "__future__", "itertools", "math", "numpy", "os", "random", "roslib", "rospy", "signal", "string",
     "sys", "threading", "time",
 }  # fmt: skip
+NAMES_LIMIT = 500
+MODULE_NAMES = {"__file__", "__builtins__", "__annotations__", "WindowsError"}
 PAIRS = {")": "(", "]": "[", "}": "{"}
 ENCODINGS = (SyntaxError, LookupError, UnicodeDecodeError)
 
@@ -174,7 +178,7 @@ def never_closed(data, line):
 
 
 def slips(tree):
-    """What compiles and is not meant: names that are not called, and questions that wait for a keyboard."""
+    """What compiles and is not meant: names that are not called or not there, questions that wait for a keyboard."""
     functions = {n.name for n in ast.walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
     found = []
     for node in ast.walk(tree):
@@ -186,11 +190,33 @@ def slips(tree):
         if name:
             message = "`%s()` waits for someone to type, and a graded node gets no input" % name
             found.append({"line": node.lineno, "kind": "input", "message": message})
+    found += misspelt(tree)
     published = next((n for n in ast.walk(tree) if is_call(n, "publish")), None)
     if published is not None and counts(tree) and not knows_time(tree):
         message = "the script counts, and reads no clock"
         found.append({"line": published.lineno, "kind": "no-clock", "message": message})
     return sorted(found, key=lambda slip: slip["line"])[:SLIPS_LIMIT]
+
+
+def misspelt(tree):
+    """Names that are used and nowhere bound, where one that is bound is spelt alike."""
+    names = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
+    own = {n.id for n in names if not isinstance(n.ctx, ast.Load)}
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.keyword):
+            bound = [getattr(node, key, None) for key in ("name", "asname", "arg", "rest")]
+            own.update(part for text in bound if isinstance(text, str) for part in text.split("."))
+        if isinstance(node, (ast.Global, ast.Nonlocal)):
+            own.update(node.names)
+    if "*" in own or len(own) > NAMES_LIMIT:
+        return
+    known = own | set(dir(builtins)) | MODULE_NAMES
+    for node in names:
+        if node.id not in known:
+            near = difflib.get_close_matches(node.id[:TEXT_LIMIT], sorted(own), 1, 0.8)
+            if near:
+                message = "`%s` is defined nowhere: did you mean `%s`?" % (node.id[:TEXT_LIMIT], near[0])
+                yield {"line": node.lineno, "kind": "misspelt", "message": message}
 
 
 def counts(tree):

@@ -70,6 +70,8 @@ _ILLEGAL_NAME = re.compile(
     r"register (publication|subscription|service)(?: topic)? \[([^\[\]]*)\] with master: "
 )
 _NO_MODULE = re.compile(r"No module named '(\w+)'$")
+_NAME = re.compile(r"name '(\w+)' is not defined")
+_MEANT = re.compile(r"did you mean `(\w+)`\?$")
 _NO_TYPE = re.compile(r"cannot import name '(\w+)' from '(\w+)\.msg'")
 HEADING = "Traceback (most recent call last):"
 _FRAME = re.compile(r'^\s+File "([^"]+)", line (\d+)')
@@ -274,6 +276,8 @@ def explain_traceback(found: Traceback, package: PackageFacts) -> Ending:
         cause = source.python_fault.cause or cause
         hint = syntax_hint(source.python_fault)
         place = source.python_fault.place
+    if place is not None and found.kind == "NameError":
+        cause, hint = _misspelt(found, place, package) or (cause, hint)
     where = f" ({place.file}, line {place.line})" if place else ""
     text = f"{shown(found.text)}{where}" + (f": {cause}" if cause else "")
     return Ending(text, hint, (place,) if place else ())
@@ -292,6 +296,18 @@ def _slip(found: Traceback) -> tuple[str, str] | None:
     if found.kind == "IndexError" and "argv" in source:
         return "it reads an argument of the command line, and is started without any", ARGUMENT_HINT
     return None
+
+
+def _misspelt(found: Traceback, place: FileCitation, package: PackageFacts) -> tuple[str, str] | None:
+    """Return the name that is meant, where the file defines one that is spelt alike."""
+    name = _NAME.search(found.message)
+    wrong = f"`{name[1]}` is defined nowhere" if name else None
+    slips = (
+        s.message for s in package.slips if (s.file, s.line, s.kind) == (place.file, place.line, "misspelt")
+    )
+    said = next((message for message in slips if wrong and message.startswith(wrong)), "")
+    near = _MEANT.search(said)
+    return (f"did you mean {near[1]}?", f"write {near[1]} in line {place.line}") if near else None
 
 
 def _other_types(name: str, package: str) -> tuple[str, str] | None:

@@ -77,7 +77,11 @@ def syntax_report() -> SearchStrategy[bytes]:
         optional={"text": words(*PYTHON_LINES), "opened": st.integers(), "mixed": st.booleans()},
     )
     slip = st.fixed_dictionaries(
-        {"line": st.integers(), "kind": words("not-called", "input", "no-clock"), "message": words("a call")}
+        {
+            "line": st.integers(),
+            "kind": words("not-called", "input", "no-clock", "misspelt"),
+            "message": words("a call"),
+        }
     )
     entry = st.fixed_dictionaries(
         {
