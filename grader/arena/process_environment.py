@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import base64
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -79,6 +81,7 @@ OWN_VARIABLES = (
     "ROSCONSOLE_CONFIG_FILE",
 )
 """The arena's to set: what a package's environment hooks say of them would lead its nodes elsewhere."""
+SOURCES_MAX, SOURCE_BYTES_MAX = 200, 256 << 10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,6 +188,12 @@ class ProcessEnvironment:
             if data is not None:
                 return data.decode(errors="replace")
         return None
+
+    def has_line(self, pattern: re.Pattern[bytes]) -> bool:
+        """Return whether a Python file of the package has it."""
+        own = self.workspace.repaired / self.workspace.folder
+        files = [path for path in islice(own.rglob("*.py"), SOURCES_MAX) if path.is_file()]
+        return any(pattern.search(read_untrusted(path, SOURCE_BYTES_MAX) or b"") for path in files)
 
     def package_file(self, file: str) -> Path | None:
         """Where a file of the package is on disk, found as `script_path` finds it."""

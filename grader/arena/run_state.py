@@ -54,9 +54,11 @@ class RunState:
     programs that run beside them, `registered` the processes of which a node has registered, `here` the nodes that are
     registered now, `published` their topics, `talking` when each first sent a message, `owners` the processes of all
     nodes so far. `lost_s` is what others took of the run's time while they filled the machine: so much longer a node is
-    waited for. `least_s` is how long nodes are watched, even where nothing more is to come."""
+    waited for. `least_s` is how long nodes are watched, even where nothing more is to come. `naps`: the package's
+    programs sleep for times of their own, which may look like `spin()` from outside."""
 
     least_s: float = 0.0
+    naps: bool = False
     started_s: float = 0.0
     topics: dict[str, TopicSeen] = field(default_factory=lambda: defaultdict(TopicSeen))
     running: set[str] = field(default_factory=set)
@@ -221,8 +223,10 @@ def is_settled(live: RunState, now_s: float) -> bool:
     since_s = max(live.graph_changed_s, live.last_start_s, live.last_sent_s, *(r.since_s for r in found))
     lost_s = live.lost_s - min(rest.lost_before_s for rest in found)
     talking = {live.owners.get(node) for node in live.talking}
+    if not talking:
+        since_s = max(since_s, live.last_line_s)  # who counts down aloud has something to come
     patience_s = max(
-        SPINNING_S if rest.spins else TALKING_S if process in talking else LOOPING_S
+        SPINNING_S if rest.spins and not live.naps else TALKING_S if process in talking else LOOPING_S
         for process, rest in zip(live.running, found, strict=True)
     )
     return now_s > since_s + patience_s + lost_s

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import time
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, suppress
@@ -24,6 +25,8 @@ from grader.model.message_rate import RateBounds
 from grader.rubric.course_packages import LAUNCH_ENDINGS
 from grader.rubric.model import Param, Scenario, Start
 
+NAPS = re.compile(rb"\bsleep\(\s*[^)\s]")
+"""A sleep of so many seconds: `rospy.sleep(0.5)`, and not `rate.sleep()`."""
 CLOCK_STEP_S = 0.05
 UNFOLLOWED_S = 2.0
 UNFOLLOWED_HZ = 15.0
@@ -87,6 +90,7 @@ async def run_scenario(
             return RunCost(cpu_s=0, student_cpu_s=0)
         try:
             session.live.rate(rates)
+            session.live.naps = place.has_line(NAPS)
             session.live.least_s = max(watched_s + WATCHED_MORE_S, expected_s(scenario) - STARTING_S)
             async with admission.start() as leave, session as arena:
                 arena.course(ScenarioEvent(event="begin"))

@@ -311,3 +311,14 @@ def test_a_window_that_another_topic_needs_is_watched_to_its_end() -> None:
     until = Until(window_s=20, topics=("/a", "/b"), silent_s=30)
     assert find_outcome(live, until, 21.9) is None
     assert find_outcome(live, until, 22.0) == ("silent", "the graph has settled, without /b")
+
+
+def test_who_naps_or_counts_aloud_is_waited_for_longer() -> None:
+    live = _resting(node=("spins", 1))
+    live.naps = True
+    assert not is_settled(live, 5.9)
+    assert is_settled(live, 6.1)
+    live.printed("3 … 2 … 1", 6.0)
+    assert not is_settled(live, 9.9)
+    live.talking["/node"] = 6.0  # who publishes may go on printing
+    assert is_settled(live, 9.9)
