@@ -139,7 +139,7 @@ class EvidenceStream:
 def _json_schema(record: type[Record]) -> bytes:
     """Return its JSON schema, as `make reference` has kept it: pydantic makes it slowly."""
     schemas = json.loads(Path(__file__).with_name(JSON_SCHEMAS).read_bytes())
-    return json.dumps(schemas[record.__name__], sort_keys=True).encode()
+    return json.dumps(schemas.get(record.__name__) or record.model_json_schema(), sort_keys=True).encode()
 
 
 def make_json_schemas() -> str:
