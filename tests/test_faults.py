@@ -211,8 +211,9 @@ def test_a_recorder_that_is_killed_each_time(out: Path, own_locks: dict[str, str
         hit.await_line("build", "done")
         while hit.process.poll() is None:
             for pid in below(hit.process.pid):
-                if re.match(ARENA, command(pid)):
-                    os.kill(pid, signal.SIGKILL)
+                with suppress(ProcessLookupError):  # it may end by itself between the look and the signal
+                    if re.match(ARENA, command(pid)):
+                        os.kill(pid, signal.SIGKILL)
         code = hit.end()
     assert code == 4, hit.err
     result = result_in(out)

@@ -112,7 +112,7 @@ def test_a_live_display_goes_on_below_them() -> None:
         steps.step("package", "done")
         steps.early(lambda: (PASSED, FAILED))
     assert "names lab1" in out.getvalue()
-    assert "package" in out.getvalue()[out.getvalue().rindex("So far:") :]
+    assert "package" in out.getvalue()[out.getvalue().rindex("Provisional:") :]
 
 
 def test_without_a_verdict_there_is_no_title(capsys) -> None:
