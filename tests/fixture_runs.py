@@ -86,6 +86,7 @@ TOGETHER = {
         "restart-fails+too-fast",
         "ok-drives-slower",
     ),
+    "unit-tests": ("build-unknown-component+forward-prints+name-not-defined+wrap-missing",),
     "york-ele00118m-lab7": (
         "sender-missing+manifest-dependency-build-only",
         "data-float+cmake-no-catkin-package",

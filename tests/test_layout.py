@@ -40,7 +40,7 @@ ALLOWED = {
     "report": BASE | {"checks", "evidence", "files", "judging", "rubric"},
     "arena": BASE | {
         "evidence", "files", "host_programs", "package", "ros_env", "ros_packages", "rubric.course_packages",
-        "rubric.model"
+        "rubric.model", "rubric.pytest_check"
     },
     "submitted_recordings": BASE | {"evidence", "files", "intake", "rubric.model"},
     "repaired_copy": {"files", "judging", "model", "package", "rubric"},

@@ -18,8 +18,11 @@ GRADER = Path(__file__).resolve().parent.parent / "grader"
 INSIDE = {
     "arena/ros/calibration.py": "a copy of the arena, which starts nothing",
     "arena/ros/__main__.py": "a copy of the template, which becomes an arena",
+    "arena/ros/functions.py": "runs behind the wall, and its copy calls a student's functions",
 }
-"""What makes a process, but starts no program of the machine's."""
+HANDED = {"arena/ros/launching.py:launch", "rubric/pytest_check.py:_run"}
+"""What gets descriptors: the wall its own, the instructor's tests the socket over which calls and values go."""
+"""What makes a process, but starts no program of the machine's outside of the sandbox."""
 
 
 class Start(NamedTuple):
@@ -47,7 +50,7 @@ STARTS = {
     "ros_packages.py:_prints": Start("HOST_ENV", "'/'", "nothing: names that the rubric gives"),
     "cli/host_support.py:_probe": Start("HOST_ENV", "'/'", "nothing"),
     "rubric/pytest_check.py:_run": Start(
-        "_environment()", "folder", "nothing: the instructor's tests, beside a copy of the evidence"
+        "_environment()", "folder", "a copy of the evidence, and values of its functions, as JSON"
     ),
     "intake/git.py:_configured_ssh": Start(
         "environment", "cwd", "nothing: the settings of the user who grades"
@@ -139,7 +142,7 @@ def test_what_a_program_outside_is_given(where: str) -> None:
     assert not words.keys() & {"shell", "preexec_fn", "executable"}
     assert "close_fds" not in words
     if "pass_fds" in words:
-        assert where == "arena/ros/launching.py:launch"
+        assert where in HANDED
 
 
 @pytest.mark.parametrize("where", STARTS)

@@ -14,6 +14,7 @@ from pathlib import Path
 from grader.arena.admission import Admission, Leave
 from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.run_state import describe_wait, find_outcome, next_look_s, waits
+from grader.arena.sandbox_files import FUNCTIONS
 from grader.arena.scenario_inputs import OVER, make_shots, settings
 from grader.arena.session import ArenaSession
 from grader.arena.static_recorder import RunCost
@@ -82,6 +83,7 @@ async def run_scenario(
     numbers = count()
     starts = [(start, spec) for start in scenario.start for spec in process_specs(start, place, numbers)]
     typed_to = {step.type.process for step in scenario.steps if step.type is not None}
+    typed_to |= {start.name for start in scenario.start if start.tests is not None}
     starts = [(start, spec | {"stdin": start.name in typed_to}) for start, spec in starts]
     with EvidenceWriter(path, scenario=name, clock=scenario.clock, warp=warp, metadata=metadata) as writer:
         session = ArenaSession(place, writer, last_run=last_run, on_lateness=admission.note_lateness)
@@ -123,7 +125,7 @@ async def _run(
                 await _await_node(start.after, scenario, arena, tell)
             arena.start(spec)
         await runner.run()
-        if scenario.steps:
+        if scenario.steps or any(start.tests for start in scenario.start):
             arena.live.steps_over(time.monotonic())
             if runner.stopped_all or (arena.live.running and not waits(scenario.until)):
                 return "complete", ""
@@ -204,6 +206,9 @@ def process_specs(start: Start, place: ProcessEnvironment, numbers: Iterator[int
         package, _, program = start.program.partition("/")
         argv = ["roslaunch" if program.endswith(LAUNCH_ENDINGS) else "rosrun", package, program, *start.args]
         yield replace(place, env={}).spec(start.name, argv, role="grader", copy=False)
+    elif start.tests is not None:
+        argv = ["python3", f"{place.shims}/{FUNCTIONS}", place.package_folder]
+        yield place.spec(start.name, argv, as_handed_in=True, number=next(numbers))
     elif start.built:
         for program in sorted(place.built.compiled)[:BUILT_PROGRAMS_MAX]:
             argv = [f"{place.devel_programs}/{program}", *start.args]

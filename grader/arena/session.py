@@ -92,6 +92,7 @@ class ArenaSession:
         self._answers: dict[int, dict[str, Any]] = {}
         self._clock_ns = 0
         self._watched: dict[str, deque[bytes]] = {}
+        self._printed: dict[str, deque[str]] = {}
 
     async def __aenter__(self) -> Self:
         argv = [self.place.ros.python, "-s", "-B", str(ARENA)]
@@ -143,6 +144,10 @@ class ArenaSession:
     def watch(self, topic: str) -> deque[bytes]:
         """Return where the latest messages on a topic will be, as they come."""
         return self._watched.setdefault(topic, deque(maxlen=WATCHED_MAX))
+
+    def watch_console(self, process: str) -> deque[str]:
+        """Return where the latest lines on a process's stdout will be, as they come."""
+        return self._printed.setdefault(process, deque(maxlen=WATCHED_MAX))
 
     def course(self, event: ScenarioEvent) -> None:
         self._writer.event("/grader/scenario", self._now_ns(), event)
@@ -271,9 +276,7 @@ class ArenaSession:
             self.live.services = set(record["services"])
             self.live.published = {t for t, by in record["publishers"].items() if set(by) & set(nodes)}
         elif topic == "/grader/console":
-            self._killed.printed(record["process"], record["line"])
-            if record["process"] in self.live.running | self.live.ended:
-                self.live.printed(record["line"], time.monotonic())
+            self._print(**record)
         elif topic == "/grader/process" and record["event"] == "exit":
             self._exited(record)
         elif topic == "/grader/host":
@@ -287,6 +290,13 @@ class ArenaSession:
         elif topic == "/grader/actor" and record["action"] == "open":
             self.live.opened.add(record["actor"])
             self.live.active(time.monotonic())
+
+    def _print(self, process: str, stream: str, line: str, **_: object) -> None:
+        self._killed.printed(process, line)
+        if stream == "stdout" and process in self._printed:
+            self._printed[process].append(line)
+        if process in self.live.running | self.live.ended:
+            self.live.printed(line, time.monotonic())
 
     def _exited(self, record: dict[str, Any]) -> None:
         name = record["name"]

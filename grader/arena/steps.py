@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from typing_extensions import Self
 
+from grader.arena.function_calls import call_functions
 from grader.arena.run_state import is_settled
 from grader.arena.scenario_inputs import make_shots
 from grader.arena.session import NS, ArenaSession
@@ -112,6 +113,9 @@ class StepRunner:
             if self._is_over():
                 break
             await self._do(step)
+        for start, spec in self._starts:
+            if start.tests is not None:
+                await call_functions(spec["name"], self._beside / start.tests, self._arena, self._tell)
         await asyncio.gather(*self._background)
 
     async def _do(self, step: Step) -> None:

@@ -130,10 +130,11 @@ class ActorEvent(Record):
     was started with the arguments `value`. `refused`: `actor`, a process where it is known, else a node, was not
     allowed what `detail` says; `limit`: it reached a limit. At most 50 of each in a run, equal ones once.
     Of steps: `set_param` is `param` in the middle of the run. `wait` waited for the topic or node `topic`, or for a
-    time, and `detail` says whether it came. `start`, `stop` (Ctrl-C) and `kill` have the process in `detail`
-    (`interrupt` is the run's end), and so has `type`, with the line that went to its standard input in `value`. `goal`,
-    `cancel` and `result` are an action's: `topic` is its name, `detail` the word for the result's status (`SUCCEEDED`),
-    or why there is none. `play`: the recording `topic` was played; its messages are on their topics.
+    time, and `detail` says whether it came. Of tests that call functions: `type` is the call, and `answer`, in
+    JSON, what came back in the process `detail`. `start`, `stop` (Ctrl-C) and `kill` have the process in `detail`
+    (`interrupt` is the run's end), and so has `type`, with the line that went to its standard input in `value`.
+    `goal`, `cancel` and `result` are an action's: `topic` is its name, `detail` the word for the result's status
+    (`SUCCEEDED`), or why there is none. `play`: the recording `topic` was played; its messages are on their topics.
     """
 
     action: Literal[

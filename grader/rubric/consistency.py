@@ -20,7 +20,7 @@ TOTAL_POINTS = 100
 ANSWERS = "service-answers"
 MANUAL = "manual"  # a person gives the points, no check does
 KINDS_OF_POINTS = ("points", "bonus", "penalty")
-KINDS_OF_START = ("script", "launch", "load", "program", "built")
+KINDS_OF_START = ("script", "launch", "load", "program", "built", "tests")
 STRING = "std_msgs/String"
 INTEGERS = {
     f"std_msgs/{prefix}Int{bits}": (low, high)
@@ -263,12 +263,16 @@ def _means(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
     if scenario.get("recording") is None:
         if scenario.get("start") in (None, []):
             yield (*path, "start"), "is missing: give start, or recording"
-        elif "until" not in scenario and not scenario.get("steps"):
+        elif "until" not in scenario and not (scenario.get("steps") or _has_tests(scenario)):
             yield (*path, "until"), "is missing"
         return
     for key in ("start", "params", "probes", "calls", "steps", "until", "clock", "warp"):
         if key in scenario:
             yield (*path, key), "is not for a scenario with a recording: nothing is run"
+
+
+def _has_tests(scenario: dict[str, Any]) -> bool:
+    return any(start.get("tests") is not None for _, start in as_maps(scenario.get("start")))
 
 
 def _starts(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:

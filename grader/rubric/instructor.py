@@ -47,13 +47,18 @@ class Beside:
 
 
 def read_instructor(data: object, folder: Path) -> Beside:
-    """Read what `checks:`, `packages:`, `check: pytest` and steps that play name, and run the file of checks."""
+    """Read what `checks:`, `packages:`, `check: pytest`, tests and steps that play name, and run the file of checks."""
     rubric = as_map(data)
     named: list[tuple[KeyPath, object]] = [(("checks",), rubric["checks"])] if "checks" in rubric else []
     named += [
         (("criteria", index, "with", "file"), as_map(criterion.get("with")).get("file"))
         for index, criterion in as_maps(rubric.get("criteria"))
         if criterion.get("check") == PYTEST
+    ]
+    named += [
+        (("scenarios", name, "start", index, "tests"), start.get("tests"))
+        for name, scenario in as_map(rubric.get("scenarios")).items()
+        for index, start in as_maps(as_map(scenario).get("start"))
     ]
     played = played_bags(rubric)
     named += [(path, play.get("bag")) for path, play in played.items()]

@@ -43,7 +43,7 @@ def _service_text(text: str | None) -> str | None:
 
 
 class Start(Record):
-    """A process of a run. Give one of `script`, `launch`, `load`, `program` and `built`."""
+    """A process of a run. Give one of `script`, `launch`, `load`, `program`, `built` and `tests`."""
 
     name: Name
     """What the rubric's criteria and steps call the process."""
@@ -59,6 +59,9 @@ class Start(Record):
     (`course_sim/world.launch`). It is the grader's, and what it does never counts as the student's."""
     built: bool = False
     """Start every program that the build made (`add_executable`), as processes `<name>/<program>`."""
+    tests: str | None = None
+    """A Python file beside the rubric with tests for pytest that call functions of the student's files. The process is
+    the one in which they are called, once the steps are over; `check: pytest` judges the same file."""
     args: tuple[str, ...] = ()
     """Arguments, as for `rosrun` or `roslaunch`: `["_rate:=5", "robot:=burger"]`."""
     after: Name | None = None
@@ -405,6 +408,8 @@ class Scenario(Record):
             left_out["steps"] = True
         if not any(call.definition for call in self.calls):
             left_out["calls"] = {"__all__": {"definition"}}
+        if not any(start.tests for start in self.start):
+            left_out["start"] = {"__all__": {"tests"}}
         return sha256(self.model_dump_json(exclude=left_out).encode()).hexdigest()
 
 

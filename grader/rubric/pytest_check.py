@@ -5,8 +5,10 @@ from __future__ import annotations
 import inspect
 import os
 import pickle
+import socket
 import subprocess
 import sys
+from contextlib import suppress
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Literal, NamedTuple
@@ -14,7 +16,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field, ValidationError
 
 import grader
-from grader.checks import Check, Evidence, Record, Verdict, failed, inconclusive, passed
+from grader.checks import Check, Evidence, FileCitation, Record, Verdict, failed, inconclusive, passed
 from grader.checks import partial as partial_
 from grader.checks.registry import parts
 from grader.files import temporary_folder
@@ -29,6 +31,7 @@ ALL_RUN = {0, 1}
 NOT_RUN = {3, 4}
 Outcome = Literal["passed", "failed", "skipped", "open"]
 MAX_BYTES = 1_000_000
+RECORDING_S = 120.0
 
 
 class PytestParams(Record):
@@ -108,6 +111,20 @@ def _session(path: Path, evidence: Evidence, params: PytestParams) -> SessionOut
     return outcome
 
 
+def record_calls(path: Path, connection: socket.socket) -> None:
+    """Run the file's tests while a run is recorded, for the calls that they make over the connection, which is closed
+    then. What comes of the tests is judged later, from the evidence."""
+    nothing = inconclusive("nothing is recorded yet")
+    evidence = Evidence({}, scenario=None, package=nothing)
+    with connection, temporary_folder("tests") as folder:
+        (folder / "evidence").write_bytes(pickle.dumps(evidence))
+        number = connection.fileno()
+        command = _command(path.resolve(), folder, PytestParams(file=path.name))
+        command += ["--grader-calls", str(number)]
+        with suppress(TestsBroken):
+            _run(command, folder, RECORDING_S, (number,))
+
+
 def _command(path: Path, folder: Path, params: PytestParams) -> list[str]:
     """pytest with nothing of the surrounding folders: no settings, no conftest.py, no cache, no other plugin."""
     own = ["-p", "grader.rubric.pytest_plugin", "--grader-evidence", str(folder / "evidence")]
@@ -130,7 +147,7 @@ def _environment() -> dict[str, str]:
     }
 
 
-def _run(command: list[str], folder: Path, timeout_s: float) -> int:
+def _run(command: list[str], folder: Path, timeout_s: float, handed: tuple[int, ...] = ()) -> int:
     """Return the exit code. What the tests started ends with them. Raises TestsBroken after `timeout_s`."""
     with (folder / "output").open("wb") as output:
         process = subprocess.Popen(
@@ -141,6 +158,7 @@ def _run(command: list[str], folder: Path, timeout_s: float) -> int:
             stdout=output,
             stderr=subprocess.STDOUT,
             start_new_session=True,
+            pass_fds=handed,
         )
         try:
             return process.wait(timeout_s)
@@ -163,7 +181,14 @@ def _last_words(folder: Path, code: int) -> str:
 def _verdict(outcome: SessionOutcome, params: PytestParams) -> Verdict:
     """Return the share of the points of the tests that passed, of those that count."""
     verdict = _judged(outcome, params)
-    return verdict.about(expected=f"the tests in {params.file} pass", measured=_sub_scores(outcome.tests))
+    lost = [t for t in outcome.tests if t.outcome == "failed"]
+    lines = dict.fromkeys((t.file, t.line) for t in lost if t.file)
+    cited = tuple(FileCitation(file=file, line=line) for file, line in lines)
+    if any(t.late for t in lost):
+        verdict = verdict.once()
+    return verdict.about(
+        expected=f"the tests in {params.file} pass", measured=_sub_scores(outcome.tests), citations=cited
+    )
 
 
 def _judged(outcome: SessionOutcome, params: PytestParams) -> Verdict:
@@ -208,7 +233,10 @@ def _sub_score(test: TestOutcome) -> str:
 
 
 class TestOutcome(Record):
-    """One test. `open`: a run that it asks for was not recorded. `message` is one line, empty where it passed."""
+    """One test. `open`: a run that it asks for was not recorded. `message` is one line, empty where it passed.
+
+    `file` and `line` are the student's where an exception came from, `late` says that a function took too long.
+    """
 
     __test__ = False
 
@@ -217,6 +245,9 @@ class TestOutcome(Record):
     outcome: Outcome
     message: str
     points: float
+    file: str = ""
+    line: int | None = None
+    late: bool = False
 
 
 class SessionOutcome(Record):

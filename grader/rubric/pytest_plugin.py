@@ -1,11 +1,12 @@
-"""The pytest plugin with the fixtures `evidence`, `run` and `package`, loaded by `-p` in a process of its own."""
+"""The pytest plugin with `evidence`, `run`, `package`, `student`; `-p` loads it in a process of its own."""
 
 from __future__ import annotations
 
 import inspect
 import pickle
 import re
-from collections.abc import Generator
+import socket
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from grader.checks import Evidence, PackageFacts, Run
 from grader.checks.all_runs import NoSuchScenario, NotRecorded
 from grader.model.verdict import Status
 from grader.rubric.pytest_check import Outcome, SessionOutcome, TestOutcome
+from grader.rubric.student_functions import Ask, StudentError, StudentFile, ask_arena, ask_evidence
 from grader.wording import shorten
 
 MESSAGE_CHARS = 200
@@ -24,9 +26,10 @@ _EVIDENCE = pytest.StashKey[Evidence]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Two options of ours: where the evidence is, and where the outcome goes."""
+    """Options of ours: where the evidence is, where the outcome goes, and the descriptor that calls go over."""
     parser.addoption("--grader-evidence", type=Path, required=True)
     parser.addoption("--grader-outcome", type=Path, required=True)
+    parser.addoption("--grader-calls", type=int, default=None)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -53,6 +56,21 @@ def run(evidence: Evidence) -> Run:
 def package(evidence: Evidence) -> PackageFacts:
     """Return what the package's files say."""
     return evidence.package
+
+
+@pytest.fixture(scope="session")
+def _ask(pytestconfig: pytest.Config) -> Ask:
+    """Return what calls a student's functions; where the run is over, what answers as they did."""
+    number = pytestconfig.getoption("--grader-calls")
+    if number is not None:
+        return ask_arena(socket.socket(fileno=number))
+    return ask_evidence(pytestconfig.stash[_EVIDENCE].run)
+
+
+@pytest.fixture
+def student(request: pytest.FixtureRequest, _ask: Ask) -> Callable[[str], StudentFile]:
+    """Return the functions of a file of the package: `student("src/kinematics.py").forward(0.1, 0.2)`."""
+    return lambda file: StudentFile(file, request.node.name, _ask)
 
 
 class _Notes:
@@ -107,10 +125,18 @@ class _Notes:
         title = (inspect.getdoc(function) or "").partition("\n")[0].strip()
         message = "" if outcome == "passed" else self._message(error, report)
         name = item.name
+        own = error if isinstance(error, StudentError) else StudentError("")
         noted = self._tests.get(item.nodeid)
         if noted is None or noted.outcome == "passed":
             self._tests[item.nodeid] = TestOutcome(
-                name=name, title=title, outcome=outcome, message=message, points=self._points(item)
+                name=name,
+                title=title,
+                outcome=outcome,
+                message=message,
+                points=self._points(item),
+                file=own.file,
+                line=own.line or None,
+                late=own.late,
             )
 
     def _points(self, item: pytest.Item) -> float:

@@ -97,14 +97,14 @@ def test_three_faults_are_all_named_with_file_and_line(tmp_path):
             "script: src/talker.py",
             "script: a.py, launch: b",
             (
-                "10: scenarios.real.start[0]: give one of script, launch, load, program and built: "
+                "10: scenarios.real.start[0]: give one of script, launch, load, program, built and tests: "
                 "script and launch are there"
             ),
         ),
         (
             ", script: src/talker.py",
             "",
-            "10: scenarios.real.start[0]: give one of script, launch, load, program and built: none is there",
+            "10: scenarios.real.start[0]: give one of script, launch, load, program, built and tests: none is there",
         ),
         (
             "    start:",

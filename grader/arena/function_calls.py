@@ -1,0 +1,71 @@
+"""Runs an instructor's tests while a run is recorded: their calls of the student's functions are made in the sandbox.
+
+```text
+pytest, with the grader's rights ⇄ socket ⇄ call_functions ⇄ stdin, stdout ⇄ ros/functions.py, in the sandbox ⇄ child
+```
+
+Each call and its answer are events of `/grader/actor`, from which the tests are judged.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import json
+import socket
+import time
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from grader.arena.session import ArenaSession
+from grader.evidence.events import ActorEvent
+
+if TYPE_CHECKING:
+    from grader.arena.steps import Tell
+
+MARK = "@grader"
+CALL_S = 15.0
+"""The process in the sandbox gives an answer sooner, as long as it lives (`LIMIT_S` in `ros/functions.py`)."""
+TOGETHER_S = 60.0
+"""What all calls may take; later ones are not made, and count as too late."""
+LATE, ENDED = json.dumps({"fault": "late"}), json.dumps({"fault": "ended"})
+
+
+async def call_functions(process: str, tests: Path, arena: ArenaSession, tell: Tell) -> None:
+    """Run the tests of the file, and call in the process what they call."""
+    from grader.rubric.pytest_check import record_calls  # noqa: PLC0415 - few runs have tests
+
+    tell(f"running {tests.name}")
+    ours, theirs = socket.socketpair()
+    reader, writer = await asyncio.open_connection(sock=ours)
+    session = asyncio.ensure_future(asyncio.to_thread(record_calls, tests, theirs))
+    try:
+        left_s = TOGETHER_S
+        for number in count():
+            line = (await reader.readline()).decode().strip()
+            if not line:
+                break
+            begun_s = time.monotonic()
+            answer = await _call(process, {"id": number, **json.loads(line)}, arena) if left_s > 0 else LATE
+            left_s -= time.monotonic() - begun_s
+            arena.note(ActorEvent(action="answer", actor="grader", value=answer, detail=process))
+            writer.write(f"{answer}\n".encode())
+    finally:
+        writer.close()
+        await session
+
+
+async def _call(process: str, request: dict[str, Any], arena: ArenaSession) -> str:
+    """Return the answer as JSON."""
+    line, printed = json.dumps(request), arena.watch_console(process)
+    printed.clear()
+    record = {"action": "type", "actor": "grader", "detail": process, "value": line}
+    arena.send(do="type", name=process, data=base64.b64encode(f"{line}\n".encode()).decode(), record=record)
+    begin = f"{MARK} {request['id']} "
+
+    def found() -> str | None:
+        return next((one.removeprefix(begin) for one in printed if one.startswith(begin)), None)
+
+    await arena.wait(lambda: found() is not None or process in arena.live.ended, CALL_S)
+    return found() or (ENDED if process in arena.live.ended else LATE)

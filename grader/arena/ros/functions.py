@@ -1,0 +1,180 @@
+"""Calls functions of a package's Python files, one JSON request a line on stdin: `functions.py PACKAGE_FOLDER`.
+
+The answers are lines on stdout, `@grader` and JSON. A request has `id`, `test`, `file`, `function`, `args` and
+`kwargs`. Each test has a child process of its own, which imports the files. What it prints goes to stderr.
+
+Standard library only, Python 3.8. This process imports nothing of the package's.
+"""
+
+import contextlib
+import importlib.util
+import json
+import os
+import select
+import signal
+import sys
+import time
+import traceback
+from pathlib import Path
+
+MARK = "@grader"
+LIMIT_S = 10.0
+ANSWER_BYTES_MAX = 3900
+MESSAGE_CHARS = 300
+
+
+def main(folder):
+    signal.signal(signal.SIGINT, lambda *_: os._exit(0))
+    child = test = None
+    for line in sys.stdin:
+        request = json.loads(line)
+        if child is None or child.ended or request["test"] != test:
+            if child is not None:
+                child.end()
+            child, test = Child(folder), request["test"]
+        print(MARK, request["id"], child.answer(line), flush=True)
+
+
+class Child:
+    """A process that imports the package's files, and calls what it is asked to."""
+
+    def __init__(self, folder):
+        requests, self._requests = os.pipe()
+        self._answers, answers = os.pipe()
+        self.ended = False
+        self._pid = os.fork()
+        if self._pid == 0:
+            os.close(self._requests)
+            os.close(self._answers)
+            serve(folder, requests, answers)
+        os.close(requests)
+        os.close(answers)
+
+    def answer(self, line):
+        """Return the answer as JSON. Without one, the child has ended, or is ended."""
+        data, until_s = b"", time.monotonic() + LIMIT_S
+        with contextlib.suppress(BrokenPipeError):  # the answers end, too
+            os.write(self._requests, line.encode())
+        while not data.endswith(b"\n"):
+            left_s = until_s - time.monotonic()
+            if left_s <= 0 or not select.select([self._answers], [], [], left_s)[0]:
+                return self._fault("late")
+            chunk = os.read(self._answers, 4096)
+            data += chunk
+            if not chunk:
+                return self._fault("ended")
+            if len(data) > ANSWER_BYTES_MAX:
+                return self._fault("long")
+        return data.decode("ascii", "replace").strip()
+
+    def _fault(self, fault):
+        self.end()
+        return json.dumps({"fault": fault})
+
+    def end(self):
+        if not self.ended:
+            self.ended = True
+            os.kill(self._pid, signal.SIGKILL)
+            os.waitpid(self._pid, 0)
+            os.close(self._requests)
+            os.close(self._answers)
+
+
+def serve(folder, requests, answers):
+    """Answer requests until there are none. What the package prints goes to stderr; its stdin is empty."""
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    os.dup2(2, 1)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    sys.argv = [""]
+    modules = {}
+    with os.fdopen(requests) as lines:
+        for line in lines:
+            data = json.dumps(answer(folder, json.loads(line), modules)).encode()
+            os.write(answers, data + b"\n")
+    os._exit(0)
+
+
+def answer(folder, request, modules):
+    name, function = request["file"], request["function"]
+    try:
+        if name not in modules:
+            path = find(folder, name)
+            if path is None:
+                return {"missing": "the package has no " + name}
+            modules[name] = load(path)
+        called = getattr(modules[name], function, None)
+        if not callable(called):
+            return {"missing": "{} has no function {}".format(name, function)}
+        given = called(*decode(request["args"]), **dict(decode(request["kwargs"])))
+    except BaseException as error:  # noqa: BLE001 - whatever the package's code raises, SystemExit too
+        return describe(error, folder)
+    try:
+        return {"value": encode(given)}
+    except Exception:  # noqa: BLE001 - a class of their own may raise anything
+        return {"other": type(given).__name__[:MESSAGE_CHARS]}
+
+
+def find(folder, name):
+    """Return the file at its place, or the one of that name that lies least deep."""
+    if (Path(folder) / name).is_file():
+        return Path(folder) / name
+    found = sorted(Path(folder).rglob(Path(name).name), key=lambda path: (len(path.parts), str(path)))
+    return next((path for path in found if path.is_file()), None)
+
+
+def load(path):
+    """Import the file, which finds what lies beside it. Its name is not `__main__`."""
+    sys.path.insert(0, str(path.parent))
+    spec = importlib.util.spec_from_file_location(path.stem, str(path))
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[path.stem] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def describe(error, folder):
+    """Return what was raised, and the last line of the package's own that took part."""
+    frames = [(frame.filename, frame.lineno) for frame in traceback.extract_tb(error.__traceback__)]
+    if isinstance(error, SyntaxError) and error.filename:
+        frames.append((error.filename, error.lineno))
+    own = [(os.path.relpath(file, folder), line) for file, line in frames if file.startswith(folder + os.sep)]
+    builtin = next(base.__name__ for base in type(error).__mro__ if base.__module__ == "builtins")
+    try:
+        message = str(error).strip().split("\n")[0]
+    except Exception:  # noqa: BLE001 - their own class
+        message = ""
+    about = {"raised": type(error).__name__, "builtin": builtin, "message": message[:MESSAGE_CHARS]}
+    return dict(about, file=own[-1][0], line=own[-1][1]) if own else about
+
+
+def encode(value):
+    """Return the value as JSON has it, tuples, sets and dicts with their names. Raises TypeError."""
+    if hasattr(value, "tolist"):  # numpy's
+        value = value.tolist()
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    if isinstance(value, list):
+        return [encode(item) for item in value]
+    if isinstance(value, tuple):
+        return {"tuple": [encode(item) for item in value]}
+    if isinstance(value, (set, frozenset)):
+        return {"set": [encode(item) for item in value]}
+    if hasattr(value, "__slots__") and hasattr(value, "_md5sum"):  # a message
+        value = {name: getattr(value, name) for name in value.__slots__}
+    if isinstance(value, dict):
+        return {"dict": [[encode(key), encode(item)] for key, item in value.items()]}
+    raise TypeError
+
+
+def decode(value):
+    """The reverse of `encode`."""
+    if isinstance(value, list):
+        return [decode(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    ((kind, items),) = value.items()
+    return {"tuple": tuple, "set": set, "dict": dict}[kind](decode(items))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,178 @@
+"""Tests of an instructor's that call a student's functions in the sandbox, recorded and judged from the evidence."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from grader.checks import Evidence
+from grader.evidence.run import Run
+from grader.model.verdict import FileCitation, Status, Verdict, inconclusive
+from grader.rubric.model import Scenario
+from grader.rubric.pytest_check import PytestParams, run_tests
+from tests.arena.support import make_place, run
+
+pytestmark = pytest.mark.ros
+FILE = "src/kinematics.py"
+STUDENTS = """\
+import os
+import sys
+import time
+import beside
+
+calls = 0
+
+
+def forward(a, b=0):
+    print("called", a)
+    return (a + b, beside.TWO)
+
+
+def divide(a, b):
+    return a / b
+
+
+def count():
+    global calls
+    calls += 1
+    return calls
+
+
+def leave():
+    print("@grader 0 {\\"value\\": 7}", flush=True)
+    os._exit(0)
+
+
+def kill():
+    os.kill(os.getppid(), 9)
+
+
+def shut():
+    sys.exit("no")
+
+
+def odd():
+    return object()
+
+
+def long():
+    return "x" * 5000
+
+
+def deep():
+    os.write(LAST, b"[" * 3000 + b"\\n")
+
+
+def stay():
+    while True:
+        time.sleep(1)
+
+
+def raised():
+    raise KeyError("joint")
+
+
+LAST = max(int(fd) for fd in os.listdir("/proc/self/fd") if os.path.exists("/proc/self/fd/" + fd))
+"""
+TESTS = """\
+import pytest
+
+FILE = "src/kinematics.py"
+
+
+def test_value(student):
+    assert student(FILE).forward(1.5, b=2) == (3.5, 2)
+    assert student("kinematics.py").forward(float("inf"))[0] == float("inf")
+
+
+def test_wrong(student):
+    found = student(FILE).divide(1, 4)
+    assert found == 0.5, f"1/4 is 0.25, not {found}"
+
+
+def test_zero(student):
+    student(FILE).divide(1, 0)
+
+
+def test_zero_is_raised(student):
+    with pytest.raises(ZeroDivisionError):
+        student(FILE).divide(1, 0)
+    with pytest.raises(KeyError):
+        student(FILE).raised()
+
+
+def test_count(student):
+    assert [student(FILE).count() for _ in range(3)] == [1, 2, 3]
+
+
+def test_count_begins_again(student):
+    assert student(FILE).count() == 1
+
+
+@pytest.mark.parametrize("name", ["leave", "shut", "odd", "long", "deep", "none"])
+def test_bad(student, name):
+    getattr(student(FILE), name)()
+
+
+def test_no_file(student):
+    student("src/other.py").forward(1)
+"""
+
+
+def _record(tmp_path: Path, tests: str, students: str = STUDENTS) -> Run:
+    (tmp_path / "test_lab.py").write_text(tests)
+    scenario = Scenario.model_validate(
+        {"title": "functions", "start": [{"name": "functions", "tests": "test_lab.py"}]}
+    )
+    with make_place({FILE: students, "src/beside.py": "TWO = 2\n"}) as place:
+        return run(place, scenario, tmp_path / "run.mcap", beside=Path(os.path.relpath(tmp_path)))
+
+
+def _judge(tmp_path: Path, seen: Run) -> Verdict:
+    evidence = Evidence({"functions": seen}, scenario="functions", package=inconclusive("not read"))
+    return run_tests(tmp_path, evidence, PytestParams(file="test_lab.py"))
+
+
+def test_functions_are_called_and_judged_from_the_evidence(tmp_path: Path) -> None:
+    seen = _record(tmp_path, TESTS)
+    assert seen.outcome is not None
+    assert seen.outcome.outcome == "complete"
+    verdict = _judge(tmp_path, seen)
+    assert verdict.status is Status.PARTIAL, verdict.hint
+    assert verdict.message == "4 of 13 tests pass; failed: test_wrong (1/4 is 0.25, not 0.25)"
+    line = STUDENTS.splitlines().index("    return a / b") + 1
+    assert FileCitation(file=FILE, line=line) in verdict.citations
+    assert f"divide(1, 0) raises ZeroDivisionError: division by zero ({FILE}:{line})" in verdict.hint
+    assert verdict == _judge(tmp_path, seen)
+
+
+@pytest.mark.parametrize(
+    ("function", "says"),
+    [
+        ("leave", "leave(): its process ended"),
+        ("shut", f"shut() raises SystemExit: no ({FILE}:"),
+        ("odd", "odd() gives back a object"),
+        ("long", "long(): gives back more than"),
+        ("deep", "deep(): its answer cannot be read"),
+        ("none", f"{FILE} has no function none"),
+        ("stay", "stay(): it did not end within its time"),
+    ],
+)
+@pytest.mark.full
+def test_what_is_no_value_is_the_students(tmp_path: Path, function: str, says: str) -> None:
+    seen = _record(tmp_path, f"def test_it(student):\n    student({FILE!r}).{function}()\n")
+    verdict = _judge(tmp_path, seen)
+    assert (verdict.status, verdict.score) == (Status.FAIL, 0)
+    assert says in verdict.hint
+    assert verdict.timing is (function == "stay")
+
+
+def test_a_call_that_was_not_recorded_is_open(tmp_path: Path) -> None:
+    seen = _record(tmp_path, f"def test_it(student):\n    assert student({FILE!r}).count() == 1\n")
+    assert _judge(tmp_path, seen).status is Status.PASS
+    (tmp_path / "test_lab.py").write_text(f"def test_it(student):\n    student({FILE!r}).forward(3)\n")
+    verdict = _judge(tmp_path, seen)
+    assert verdict.status is Status.INCONCLUSIVE
+    assert "grade again" in verdict.message
