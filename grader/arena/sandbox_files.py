@@ -8,9 +8,6 @@ import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from catkin_pkg.package import PACKAGE_MANIFEST_FILENAME
-from catkin_pkg.packages import find_package_paths
-
 from grader.ros_env import RosInstallation
 
 HOME = "/home/student"
@@ -58,6 +55,7 @@ EM = "lib/python3/dist-packages/em.py"
 STANDIN_SOURCES = Path(__file__).resolve().parent / "standins"
 SHEBANG = b"#!"
 SHARE = "share"
+MANIFEST = "package.xml"
 TWO_NAMES = {"rospy_tutorials": ("talker", "listener")}
 """Programs that the real package has with an ending, too."""
 LIBRARY = "python"
@@ -123,7 +121,7 @@ def _program(shims: Path, source: str, name: str, called: Sequence[str]) -> None
 
 def standin_packages() -> tuple[str, ...]:
     """Return every package that the grader has a stand-in for."""
-    return tuple(sorted(p.parent.name for p in STANDIN_SOURCES.glob(f"*/{PACKAGE_MANIFEST_FILENAME}")))
+    return tuple(sorted(p.parent.name for p in STANDIN_SOURCES.glob(f"*/{MANIFEST}")))
 
 
 def missing_packages(ros: RosInstallation) -> tuple[str, ...]:
@@ -206,13 +204,13 @@ def _is_program(path: Path) -> bool:
 def _installed(ros: RosInstallation) -> Iterator[str]:
     entries = [Path(entry) for entry in _package_path(ros)]
     for share in (*entries, *(Path(prefix) / SHARE for prefix in ros.prefixes)):
-        yield from (
-            name for name in standin_packages() if (share / name / PACKAGE_MANIFEST_FILENAME).is_file()
-        )
+        yield from (name for name in standin_packages() if (share / name / MANIFEST).is_file())
 
 
 def _overlaid(ros: RosInstallation) -> Iterator[str]:
     """Packages of the workspaces that a `setup.bash` is made of, which may lie deeper, or be the entry itself."""
+    from catkin_pkg.packages import find_package_paths  # noqa: PLC0415 - slow to load, and not needed to read files
+
     for entry in _package_path(ros):
         if Path(entry).name != SHARE and Path(entry).is_dir():
             yield from (Path(entry, path).resolve().name for path in find_package_paths(entry))

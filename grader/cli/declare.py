@@ -12,6 +12,7 @@ since help and completion load all of them: a command imports what it runs insid
 from __future__ import annotations
 
 import argparse
+import gc
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -151,7 +152,18 @@ def _add(parser: argparse.ArgumentParser, name: str, kind: object, spec: Spec, d
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """Hold Ctrl-C back for a moment: a compiled module that is interrupted while it loads panics."""
+    """Hold Ctrl-C back for a moment: a compiled module that is interrupted while it loads panics. What is loaded stays,
+    so that looking for garbage in between is for nothing."""
+    gc.disable()
+    try:
+        with _uninterrupted():
+            yield
+    finally:
+        gc.enable()
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
     if sys.platform == "win32":
         yield
         return

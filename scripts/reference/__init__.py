@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from grader.evidence.writer import JSON_SCHEMAS, make_json_schemas
 from scripts.reference.checks import checks_page
 from scripts.reference.commands import commands_page, exit_codes_page
 from scripts.reference.facts import facts_page
@@ -27,4 +28,5 @@ PAGES: dict[str, Callable[[], str]] = {
 
 def made() -> dict[str, str]:
     """Every file that is made, by its path below the folder of the reference."""
-    return {**{name: page() for name, page in PAGES.items()}, **format_pages()}
+    schemas = {f"../../grader/evidence/{JSON_SCHEMAS}": make_json_schemas()}
+    return {**{name: page() for name, page in PAGES.items()}, **format_pages(), **schemas}
