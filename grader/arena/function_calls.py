@@ -47,7 +47,10 @@ async def call_functions(process: str, tests: Path, arena: ArenaSession, tell: T
             if not line:
                 break
             begun_s = time.monotonic()
-            answer = await _call(process, {"id": number, **json.loads(line)}, arena) if left_s > 0 else LATE
+            request = {"id": number, **json.loads(line)}
+            call = ActorEvent(action="type", actor="grader", value=json.dumps(request), detail=process)
+            arena.note(call)
+            answer = await _call(process, request, arena) if left_s > 0 else LATE
             left_s -= time.monotonic() - begun_s
             arena.note(ActorEvent(action="answer", actor="grader", value=answer, detail=process))
             writer.write(f"{answer}\n".encode())
@@ -60,8 +63,8 @@ async def _call(process: str, request: dict[str, Any], arena: ArenaSession) -> s
     """Return the answer as JSON."""
     line, printed = json.dumps(request), arena.watch_console(process)
     printed.clear()
-    record = {"action": "type", "actor": "grader", "detail": process, "value": line}
-    arena.send(do="type", name=process, data=base64.b64encode(f"{line}\n".encode()).decode(), record=record)
+    data = base64.b64encode(f"{line}\n".encode()).decode()
+    arena.send(do="type", name=process, data=data, record=None)
     begin = f"{MARK} {request['id']} "
 
     def found() -> str | None:

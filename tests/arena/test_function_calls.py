@@ -45,8 +45,9 @@ def leave():
     os._exit(0)
 
 
-def kill():
-    os.kill(os.getppid(), 9)
+def interrupt():
+    os.kill(os.getppid(), 2)
+    time.sleep(60)
 
 
 def shut():
@@ -167,6 +168,14 @@ def test_what_is_no_value_is_the_students(tmp_path: Path, function: str, says: s
     assert (verdict.status, verdict.score) == (Status.FAIL, 0)
     assert says in verdict.hint
     assert verdict.timing is (function == "stay")
+
+
+def test_what_ends_the_process_of_all_is_the_students(tmp_path: Path) -> None:
+    tests = f"def test_it(student):\n    student({FILE!r}).interrupt()\n"
+    seen = _record(tmp_path, tests + tests.replace("test_it", "test_next"))
+    verdict = _judge(tmp_path, seen)
+    assert (verdict.status, verdict.score) == (Status.FAIL, 0)
+    assert verdict.hint.count("interrupt(): its process ended") == 2
 
 
 def test_a_call_that_was_not_recorded_is_open(tmp_path: Path) -> None:

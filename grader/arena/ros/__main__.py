@@ -164,7 +164,8 @@ class Arena:
     def _type(self, command):
         process = self._processes.get(command["name"])
         if process is not None:
-            self._wire.event("/grader/actor", command["record"])
+            if command["record"]:
+                self._wire.event("/grader/actor", command["record"])
             process.type(base64.b64decode(command["data"]))
 
     def _advertise(self, command):
