@@ -10,9 +10,10 @@ import os
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Coroutine, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
 from typing_extensions import Self
 
@@ -98,7 +99,7 @@ class Recorder:
         self.recording = Recording(folder=folder, facts=facts, ros=ros, sandbox=self._sandbox)
         self._place: ProcessEnvironment | None = None
         self._stack = ExitStack()
-        self._admission = Admission(None)
+        self._admission: Admission
         self._runs: Counter[str] = Counter()
 
     def __enter__(self) -> Self:
@@ -113,21 +114,25 @@ class Recorder:
     def record_all(self, beside_build: Callable[[], None]) -> None:
         """The package with its build, then every scenario, side by side. `beside_build` is called beside the build, in
         another thread."""
-        run_until_signal(self._record_all(beside_build), self._stop)
+        self._run(self._record_all(beside_build))
 
     def record_again(self, scenarios: Iterable[str]) -> None:
         """These scenarios once more, one after the other, with no other run on the machine."""
-        run_until_signal(self._record_alone(tuple(scenarios)), self._stop)
+        self._run(self._record_alone(tuple(scenarios)))
 
     def repeat(self, scenarios: Iterable[str], folder: Path) -> None:
         """These scenarios once more, side by side, into another folder: what was recorded before stays as well."""
         make_folder(folder)
         if self._place is not None:
             runs = [self._record_scenario(self._place, name, folder=folder) for name in scenarios]
-            run_until_signal(run_together(*runs), self._stop)
+            self._run(run_together(*runs))
+
+    def _run(self, work: Coroutine[Any, Any, None]) -> None:
+        """Each time in an event loop of its own, and so with an admission of its own."""
+        self._admission = Admission(shared_folder())
+        run_until_signal(work, self._stop)
 
     async def _record_all(self, beside_build: Callable[[], None]) -> None:
-        self._admission = Admission(shared_folder())
         names = [name for name in order_runs(self._rubric, self._rates) if name not in self._recorded]
         copy_recorded(self._recorded, self.recording.folder, self._progress)
         self._progress.step("build", "waiting", "", BUILD_EXPECTED_S)
@@ -141,7 +146,6 @@ class Recorder:
         await run_together(*(self._record_scenario(self._place, name) for name in names))
 
     async def _record_alone(self, names: tuple[str, ...]) -> None:
-        self._admission = Admission(shared_folder())
         for name in names:
             if self._place is not None:
                 await self._record_scenario(self._place, name, alone=True)

@@ -24,7 +24,7 @@ from grader.cli.host_support import how_to_run_nodes, warn_without_sandbox, why_
 from grader.cli.outcome import REPORT, exit_code, settled, show, staged_code, worst
 from grader.cli.output import say, say_beside
 from grader.cli.select_rubric import Chosen, only
-from grader.errors import ExitCode, OutputError, UsageError
+from grader.errors import ExitCode, HostError, OutputError, UsageError
 from grader.files import atomic_write, check_writable, temporary_folder
 from grader.intake import safe_name
 from grader.model.progress import Progress, Silence
@@ -223,7 +223,7 @@ def keep_report(written: Path, place: Path) -> None:
     try:
         atomic_write(folder / ".gitignore", b"*\n")
         atomic_write(place, written.read_bytes())
-    except OutputError as error:
+    except (OutputError, HostError) as error:
         say_beside(error.message)
 
 

@@ -7,14 +7,23 @@ import os
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from grader.arena import admission
+from grader.arena import admission, recording
 from grader.arena import admission as module
 from grader.arena.admission import Admission, FileLock, shared_folder
+from grader.arena.recording import Recorder
+from grader.arena.static_recorder import RunCost
+from grader.intake import open_submission
+from grader.model.progress import Silence
+from grader.pipeline import read_facts
+from grader.rubric.load import load_rubric
+
+REFERENCE = Path(__file__).parents[2] / "reference_solutions" / "leeds-comp3631-lab1"
 
 PATIENCE_S = 20.0
 
@@ -254,3 +263,29 @@ def test_the_memory_of_a_container_counts(tmp_path: Path, monkeypatch: pytest.Mo
     assert admission.available_bytes() == 1_000_000
     (tmp_path / "memory.max").write_text("max\n")
     assert admission.available_bytes() == 4000 * 1024
+
+
+@pytest.mark.ros
+def test_runs_of_a_later_loop_wait_for_each_other_as_those_of_the_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each call of a recorder has an event loop of its own. A lock knows only one loop, but only once two wait."""
+    started: list[str] = []
+
+    async def run_scenario(name: str, *_: object, admission: Admission, **__: object) -> RunCost:
+        async with admission.start():
+            started.append(name)
+            await asyncio.sleep(0)
+        return RunCost(cpu_s=0.0, student_cpu_s=0.0)
+
+    monkeypatch.setattr(recording, "run_scenario", run_scenario)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
+    rubric = load_rubric("leeds-comp3631-lab1").rubric
+    submission = open_submission(str(REFERENCE), package=rubric.package, workdir=tmp_path / "opened")
+    facts = read_facts(submission, Silence())
+    with Recorder(
+        submission, facts, rubric, tmp_path / "evidence", mode="auto", progress=Silence()
+    ) as recorder:
+        recorder.record_all(lambda: None)
+        recorder.repeat(rubric.scenarios, tmp_path / "again")
+    assert Counter(started) == dict.fromkeys(rubric.scenarios, 2)
