@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from unicodedata import east_asian_width
@@ -15,6 +16,7 @@ from grader.rubric.model import Rubric
 from grader.untrusted_text import CITATIONS_MAX, clip, visible
 from grader.wording import number
 
+NAMES_AND_NUMBERS = re.compile(r"/[\w/~]+|\d+(\.\d+)?")
 PLACE_CHARS = 300
 SOURCE_CHARS = 60
 
@@ -72,8 +74,8 @@ def _advises(criterion: CriterionResult) -> bool:
 
 
 def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
-    """One entry for all that one mistake costs: those of the same line with the same advice, or of the same repairs.
-    What costs most in all comes first."""
+    """One entry for all that one mistake costs: those with the same advice for the same line, or else for the same run
+    in the same words but for topics and numbers, and those of the same repairs. What costs most in all comes first."""
     asked_first = sorted(
         losses, key=lambda loss: not (loss.criterion.repaired and loss.criterion.repaired.charged)
     )
@@ -85,7 +87,9 @@ def _mistake(loss: Loss) -> Hashable:
     if criterion.repaired is not None:
         return criterion.repaired.repairs
     lines = tuple(c for c in criterion.citations if isinstance(c, FileCitation) and c.line is not None)
-    return (criterion.hint, lines) if criterion.hint and lines else criterion.id
+    if not criterion.hint:
+        return criterion.id
+    return criterion.hint, lines or (criterion.scenario, NAMES_AND_NUMBERS.sub("", criterion.message))
 
 
 def _open_alike(loss: Loss) -> Hashable:
@@ -161,6 +165,13 @@ def file_places(criterion: CriterionResult) -> list[str]:
     """Those of `places` that are files of the student's: `src/talker.py:17`."""
     cited = [c for c in criterion.citations[:CITATIONS_MAX] if isinstance(c, FileCitation)]
     return [clip(_place(citation), PLACE_CHARS) for citation in cited]
+
+
+def without_place(text: str, place: str) -> str:
+    """Return what is said of a place (`src/talker.py:17`) without naming it again at the beginning."""
+    file, _, number = place.rpartition(":")
+    beginnings = [f"{file}{comma} line {number}: " for comma in ("", ",")] if file else []
+    return next((text.removeprefix(one) for one in beginnings if text.startswith(one)), text)
 
 
 def pointed_at(criterion: CriterionResult, chars: int = SOURCE_CHARS) -> list[tuple[str, str]]:
