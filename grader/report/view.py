@@ -74,8 +74,8 @@ def _advises(criterion: CriterionResult) -> bool:
 
 
 def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
-    """One entry for all that one mistake costs: those with the same advice for the same line, or else for the same run
-    in the same words but for topics and numbers, and those of the same repairs. What costs most in all comes first."""
+    """One entry for all that one mistake costs: those with the same advice for the same line, or else in the same
+    words, and those of the same repairs. What costs most in all comes first."""
     asked_first = sorted(
         losses, key=lambda loss: not (loss.criterion.repaired and loss.criterion.repaired.charged)
     )
@@ -89,7 +89,10 @@ def _mistake(loss: Loss) -> Hashable:
     lines = tuple(c for c in criterion.citations if isinstance(c, FileCitation) and c.line is not None)
     if not criterion.hint:
         return criterion.id
-    return criterion.hint, lines or (criterion.scenario, NAMES_AND_NUMBERS.sub("", criterion.message))
+    said = criterion.message
+    if said.startswith("/"):  # how a topic behaves: of two topics of one run, one loop is the reason
+        said = f"{criterion.scenario} {NAMES_AND_NUMBERS.sub('', said)}"
+    return criterion.hint, lines or said
 
 
 def _open_alike(loss: Loss) -> Hashable:
