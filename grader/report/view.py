@@ -48,8 +48,9 @@ class ReportView:
     advice: tuple[CriterionResult, ...]
 
 
-def arrange(result: GradingResult, rubric: Rubric) -> ReportView:
-    """Losses by their cost, the rubric's order where they cost the same."""
+def arrange(result: GradingResult, rubric: Rubric | None = None) -> ReportView:
+    """Losses by their cost, the rubric's order where they cost the same. Results of earlier graders need the `rubric`:
+    they do not say what blocked a criterion."""
     unreached = [c for c in result.criteria if c.status is not Status.PASS]
     roots = {c.id: root_of(c, result, rubric) for c in unreached}
     causes = {root for name, root in roots.items() if root != name}
@@ -124,12 +125,12 @@ def is_students_fault(result: GradingResult) -> bool:
     return result.error is not None and result.error.kind in {SubmissionError.kind, PackageNotFound.kind}
 
 
-def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric) -> str:
+def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric | None) -> str:
     """The id of the criterion that a blocked one comes down to; its own id for any other."""
     by_id = {c.id: c for c in result.criteria}
     if criterion.blocked_by in by_id:
         return criterion.blocked_by
-    requires = {c.id: c.requires for c in rubric.criteria}
+    requires = {c.id: c.requires for c in rubric.criteria} if rubric else {}
     seen = {criterion.id}
     while criterion.status is Status.BLOCKED:
         unmet = [by_id[i] for i in requires.get(criterion.id, ()) if i in by_id and i not in seen]
