@@ -118,6 +118,8 @@ def _sites(lab: str, solution: Solution, name: str, number: int) -> list[Site]:
     rubric = rubric_of(lab).rubric
     wanted = wanted_of(rubric)
     asked = {*wanted.scripts, *wanted.dependencies, *wanted.params}
+    if name.startswith("install-") and not wanted.installed:
+        return []
     own = [
         site
         for site in OPERATORS[name].sites(solution)
