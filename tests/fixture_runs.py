@@ -73,6 +73,10 @@ TOGETHER = {
         "build-unknown-component+node-named-otherwise+launch-without-a-namespace",
         "no-default+topic-absolute",
     ),
+    "record-and-replay": (
+        "build-unknown-component+recorder-named-otherwise+steps-in-centimetres+bag-elsewhere"
+        "+node-named-otherwise+backward-counts-less+table-without-names",
+    ),
     "sheffield-com2009-week1": (
         "publisher-not-executable+subscriber-name+manifest-malformed",
         "chatter-float+subscriber-other-topic+launch-as-printed+cmake-no-catkin-package",
