@@ -74,8 +74,7 @@ TOGETHER = {
         "no-default+topic-absolute",
     ),
     "record-and-replay": (
-        "build-unknown-component+recorder-named-otherwise+steps-in-centimetres+bag-elsewhere"
-        "+node-named-otherwise+backward-counts-less+table-without-names",
+        "build-unknown-component+recorder-name+steps-in-cm+bag-elsewhere+node-name+backward-less+table-no-names",
     ),
     "sheffield-com2009-week1": (
         "publisher-not-executable+subscriber-name+manifest-malformed",
