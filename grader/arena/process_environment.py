@@ -263,6 +263,7 @@ class ProcessEnvironment:
             "script": None,
             "repairs": [],
             "stdin": False,
+            "keeps": [],
             **more,
         }
 

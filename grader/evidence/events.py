@@ -135,6 +135,7 @@ class ActorEvent(Record):
     (`interrupt` is the run's end), and so has `type`, with the line that went to its standard input in `value`.
     `goal`, `cancel` and `result` are an action's: `topic` is its name, `detail` the word for the result's status
     (`SUCCEEDED`), or why there is none. `play`: the recording `topic` was played; its messages are on their topics.
+    `left`: the process `actor` left the file `detail`, of `value` bytes; what is kept of it is an attachment.
     """
 
     action: Literal[
@@ -158,6 +159,7 @@ class ActorEvent(Record):
         "cancel",
         "result",
         "play",
+        "left",
     ]
     """What was done."""
     actor: str
