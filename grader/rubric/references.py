@@ -55,8 +55,9 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
                 f'roslaunch takes the file\'s whole name: "{launch}.launch"',
             )
         yield from _of_machine((*path, "start", index, "program"), "program", start.get("program"), rubric)
-    for index, call in as_maps(scenario.get("calls")):
-        yield from _of_machine((*path, "calls", index, "type"), "service", call.get("type"), rubric)
+    for key in ("calls", "serves"):
+        for index, one in as_maps(scenario.get(key)):
+            yield from _of_machine((*path, key, index, "type"), "service", one.get("type"), rubric)
 
 
 def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -109,6 +110,8 @@ def _misfits(
         yield f"no probe of {name} sends on {value}{_instead(value, there)}"
     elif one.to == "action" and value not in (there := _actions(scenario)):
         yield f"no step of {name} sends a goal to {value}{_instead(value, there)}"
+    elif one.to == "served" and value not in (there := _served(scenario)):
+        yield f"the grader does not offer {value} in {name}{_instead(value, there)}: add it to serves"
     elif one.to == "set" and not _is_set(value, scenario):
         there = [str(param.get("name")) for _, param in as_maps(scenario.get("params"))]
         yield f"{name} sets no parameter {value}{did_you_mean(value, there)}: add it to its params"
@@ -221,6 +224,10 @@ def _actions(scenario: dict[str, Any]) -> list[str]:
         for _, step in as_maps(scenario.get("steps"))
         if "action" in step
     ]
+
+
+def _served(scenario: dict[str, Any]) -> list[str]:
+    return [str(served.get("service")) for _, served in as_maps(scenario.get("serves"))]
 
 
 def _starts(scenario: dict[str, Any]) -> list[dict[str, Any]]:
