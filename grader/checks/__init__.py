@@ -48,6 +48,7 @@ FAMILIES = (
     "launch_opens",
     "parameters",
     "services",
+    "calls",
     "actions",
     "connections",
     "two_copies",

@@ -65,3 +65,15 @@ def test_a_service_is_offered_once(tmp_path: Path) -> None:
     served = f"{{{OWN}, fails: true}}"
     (found,) = faults(_serving(tmp_path, f"{served}, {served}"))
     assert found == "lab.yaml:11: scenarios.real.serves[1].service: /add is offered by serves[0] already"
+
+
+def test_calls_are_judged_of_a_service_that_is_offered(tmp_path: Path) -> None:
+    path = _serving(tmp_path, f"{{{OWN}, fails: true}}")
+    text = path.read_text(encoding="utf-8")
+    judged = "check: calls\n    with: {service: /ad, expect: {a: 3}}"
+    path.write_text(text.replace("check: rate\n    with: {topic: /chatter, rate_hz: 10}", judged, 1))
+    (found,) = faults(path)
+    assert found == (
+        'lab.yaml:18: criteria[0].with.service: the grader does not offer /ad in real (did you mean "/add"?): '
+        "add it to serves"
+    )
