@@ -108,7 +108,7 @@ def write_form(
     shown = without_hidden(result, rubric.rubric) if student or form == "classroom" else result
     if form == "terminal" and out == STDOUT:
         hidden = missing_hidden(shown, rubric.rubric)
-        print_report(shown, rubric.rubric, open_console(sys.stdout), hidden=hidden)
+        print_report(shown, rubric.rubric, open_console(sys.stdout), hidden=hidden, full=True)
         return ExitCode.PASSED
     where = _prefix(result, prefix) if FORMS[form].cites_lines else ""
     about = ReportInput(

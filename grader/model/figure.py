@@ -22,7 +22,8 @@ class RateFigure(Record):
     `times_s` are the arrivals but for the first, `gaps_s` the time before each; where the publisher `ends_silent`, the
     last of them is the silence at the end. `low_hz` and `high_hz` bound the mean that passes, `gap_low_s` and
     `gap_high_s` a single gap. `mean_hz` is what was measured, of so many `messages`; of a flood of them some points
-    are shown. `late` are stretches in which the machine was late.
+    are shown. `late` are stretches in which the machine was late, `died` when a publisher's process ended by itself,
+    and how.
     """
 
     kind: Literal["rate"] = "rate"
@@ -37,6 +38,7 @@ class RateFigure(Record):
     gap_low_s: float | None = None
     gap_high_s: float | None = None
     late: tuple[tuple[float, float], ...] = ()
+    died: tuple[tuple[float, str], ...] = ()
     messages: int = 0
     ends_silent: bool = False
 
@@ -45,7 +47,7 @@ class CounterFigure(Record):
     """A counter's values over time. `wraps` and `wrong` are indexes into the points: steps to the first value after a
     wrap, and steps that are not as they should be; `texts` say what is wrong with each of `wrong`, and `more_wrong`
     steps are not named. `numbers` count each point's value from 0 on its publisher: where they jump, points are left
-    out."""
+    out. `died` says when the publisher's process ended by itself, and how."""
 
     kind: Literal["counter"] = "counter"
     topic: str
@@ -58,6 +60,7 @@ class CounterFigure(Record):
     wrong: tuple[int, ...] = ()
     texts: tuple[str, ...] = ()
     more_wrong: int = 0
+    died: tuple[tuple[float, str], ...] = ()
     messages: int = 0
 
 
@@ -176,6 +179,35 @@ class PlaceFigure(Record):
     messages: int = 0
 
 
+class Stretch(Record):
+    """From when to when something was there; both are the same for a moment. `says` tells what it was, and is empty
+    for one of many alike; `wrong` marks what went wrong."""
+
+    from_s: float
+    to_s: float
+    says: str = ""
+    wrong: bool = False
+
+
+class Lane(Record):
+    """One row of a timeline: of a process, a node, a topic, a log, or of what the grader did."""
+
+    kind: Literal["process", "node", "topic", "log", "grader"]
+    name: str
+    stretches: tuple[Stretch, ...]
+
+
+class TimelineFigure(Record):
+    """What happened in a run, and when: `lanes` over `length_s`. Of the many messages of a topic, those close together
+    are one stretch. `left_out` lanes are not shown."""
+
+    kind: Literal["timeline"] = "timeline"
+    scenario: str
+    length_s: float
+    lanes: tuple[Lane, ...]
+    left_out: int = 0
+
+
 Figure = Annotated[
     RateFigure
     | CounterFigure
@@ -184,17 +216,20 @@ Figure = Annotated[
     | ConsoleFigure
     | CodeFigure
     | PathFigure
-    | PlaceFigure,
+    | PlaceFigure
+    | TimelineFigure,
     Field(discriminator="kind"),
 ]
 
 
 class Figures(Record):
-    """Of one submission: by criterion what shows its verdict, and of each scenario the graph and the console.
+    """Of one submission: by criterion what shows its verdict, and of each scenario the timeline, the graph and the
+    console.
 
     `consoles` has what the build printed too, as `package`.
     """
 
     by_criterion: dict[str, tuple[Figure, ...]] = Field(default_factory=dict)
+    timelines: dict[str, TimelineFigure] = Field(default_factory=dict)
     graphs: dict[str, GraphFigure] = Field(default_factory=dict)
     consoles: dict[str, ConsoleFigure] = Field(default_factory=dict)

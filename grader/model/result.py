@@ -8,7 +8,7 @@ from __future__ import annotations
 from datetime import date, datetime
 from typing import Annotated, Literal
 
-from pydantic import AliasChoices, AwareDatetime, Field
+from pydantic import AliasChoices, AwareDatetime, Field, SerializerFunctionWrapHandler, model_serializer
 
 from grader.model.record import Record
 from grader.model.repair import Repair
@@ -224,6 +224,15 @@ class SubmissionInfo(Record):
     """sha256 of the package's files; empty where no package was found."""
     package: str
     """The package's name; empty where none was found or needed."""
+    name: str = ""
+    """The student's name, only where the roster has one."""
+
+    @model_serializer(mode="wrap")
+    def _without_no_name(self, dump: SerializerFunctionWrapHandler) -> dict[str, str | None]:
+        data: dict[str, str | None] = dump(self)
+        if not self.name:
+            data.pop("name", None)
+        return data
 
 
 class RubricInfo(Record):

@@ -86,6 +86,14 @@ def late_words(result: GradingResult) -> tuple[str, ...]:
     return tuple(words[:1].upper() + words[1:] for words in (cost, _times(known), known.note) if words)
 
 
+def when_words(result: GradingResult) -> str:
+    """`In time`, or what being late cost; empty where nobody asked."""
+    late, known = result.late, result.late or result.handed_in
+    if known is None or known.deadline is None or known.at is None:
+        return ""
+    return (late.text[:1].upper() + late.text[1:]) if late and late.late_s > 0 else "In time"
+
+
 def _times(known: HandedIn) -> str:
     zone = (known.deadline or known.at).tzinfo if known.at else None
     at = f"submitted {_time(known.at.astimezone(zone))} ({BY[known.by]})" if known.at else ""
@@ -154,10 +162,13 @@ def visible_words(result: GradingResult, hidden: int) -> str:
 
 
 def verdict_words(result: GradingResult, rubric: Rubric, hidden: int) -> str:
-    """`Passed.` or `Not passed yet.`; empty where that is not known: something is open, or `hidden`."""
+    """`Passed.` or `Not passed yet.`; empty where that is not known, because something is open or `hidden`, and for
+    lost points where no pass mark says how many are enough."""
     if hidden or not_graded(result) or result.status != "graded":
         return ""
-    return "Passed." if passed(rubric, result) else "Not passed yet."
+    if passed(rubric, result):
+        return "Passed."
+    return "" if rubric.pass_mark is None else "Not passed yet."
 
 
 NOTICED_TITLE = "Noticed while it ran"
@@ -240,8 +251,9 @@ def count_points(value: float) -> str:
     return plural(value, "point")
 
 
-def verdict(result: GradingResult, rubric: Rubric, hidden: int) -> tuple[str, str]:
-    """Return whether it passed as a status of the page and in a few words."""
+def verdict(result: GradingResult, rubric: Rubric, hidden: int, to_fix: int) -> tuple[str, str]:
+    """Return whether it passed as a status of the page and in a few words. Without a pass mark, points are not passed
+    or failed: then it is `to_fix`, how many things there are to fix."""
     if not_graded(result):
         return "error", "Not graded"
     if not hidden and passed(rubric, result):
@@ -251,13 +263,15 @@ def verdict(result: GradingResult, rubric: Rubric, hidden: int) -> tuple[str, st
     if hidden:
         reached = all(c.status is Status.PASS for c in result.criteria if c.is_required)
         return ("pass", "So far, so good") if reached else ("partial", "There is something to fix")
+    if rubric.pass_mark is None:
+        return "partial", f"{to_fix} to fix" if to_fix else ""
     return "fail", "Not passed yet"
 
 
 def pass_mark(result: GradingResult, rubric: Rubric, hidden: int) -> str:
-    """What it takes to pass."""
+    """What it takes to pass; empty where the rubric has no pass mark."""
     if rubric.pass_mark is None:
-        return f"To pass, every {'visible ' if hidden else ''}criterion that counts has to be reached."
+        return ""
     mark = f"To pass, it takes {count_points(rubric.pass_mark)} of {number(rubric.max_points)}"
     if not_graded(result):
         return f"{mark}."

@@ -33,6 +33,7 @@ from grader.report.view import (
     not_graded,
     pointed_at,
     points_of,
+    without_place,
 )
 from grader.rubric.model import Rubric
 from grader.wording import number, plural
@@ -291,13 +292,6 @@ class Terminal:
 
     def _encoded(self, text: str) -> str:
         return text.encode(self.console.encoding, "backslashreplace").decode(self.console.encoding)
-
-
-def without_place(text: str, place: str) -> str:
-    """Return what is said of a place (`src/talker.py:17`) without naming it again at the beginning."""
-    file, _, number = place.rpartition(":")
-    beginnings = [f"{file}{comma} line {number}: " for comma in ("", ",")] if file else []
-    return next((text.removeprefix(one) for one in beginnings if text.startswith(one)), text)
 
 
 def wrap(text: str, width: int) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from unicodedata import east_asian_width
@@ -15,6 +16,7 @@ from grader.rubric.model import Rubric
 from grader.untrusted_text import CITATIONS_MAX, clip, visible
 from grader.wording import number
 
+NAMES_AND_NUMBERS = re.compile(r"/[\w/~]+|\d+(\.\d+)?")
 PLACE_CHARS = 300
 SOURCE_CHARS = 60
 
@@ -46,8 +48,9 @@ class ReportView:
     advice: tuple[CriterionResult, ...]
 
 
-def arrange(result: GradingResult, rubric: Rubric) -> ReportView:
-    """Losses by their cost, the rubric's order where they cost the same."""
+def arrange(result: GradingResult, rubric: Rubric | None = None) -> ReportView:
+    """Losses by their cost, the rubric's order where they cost the same. Results of earlier graders need the `rubric`:
+    they do not say what blocked a criterion."""
     unreached = [c for c in result.criteria if c.status is not Status.PASS]
     roots = {c.id: root_of(c, result, rubric) for c in unreached}
     causes = {root for name, root in roots.items() if root != name}
@@ -72,8 +75,8 @@ def _advises(criterion: CriterionResult) -> bool:
 
 
 def _told_once(losses: list[Loss]) -> tuple[Loss, ...]:
-    """One entry for all that one mistake costs: those of the same line with the same advice, or of the same repairs.
-    What costs most in all comes first."""
+    """One entry for all that one mistake costs: those with the same advice for the same line, or else in the same
+    words, and those of the same repairs. What costs most in all comes first."""
     asked_first = sorted(
         losses, key=lambda loss: not (loss.criterion.repaired and loss.criterion.repaired.charged)
     )
@@ -85,7 +88,12 @@ def _mistake(loss: Loss) -> Hashable:
     if criterion.repaired is not None:
         return criterion.repaired.repairs
     lines = tuple(c for c in criterion.citations if isinstance(c, FileCitation) and c.line is not None)
-    return (criterion.hint, lines) if criterion.hint and lines else criterion.id
+    if not criterion.hint:
+        return criterion.id
+    said = criterion.message
+    if said.startswith("/"):  # how a topic behaves: of two topics of one run, one loop is the reason
+        said = f"{criterion.scenario} {NAMES_AND_NUMBERS.sub('', said)}"
+    return criterion.hint, lines or said
 
 
 def _open_alike(loss: Loss) -> Hashable:
@@ -117,12 +125,12 @@ def is_students_fault(result: GradingResult) -> bool:
     return result.error is not None and result.error.kind in {SubmissionError.kind, PackageNotFound.kind}
 
 
-def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric) -> str:
+def root_of(criterion: CriterionResult, result: GradingResult, rubric: Rubric | None) -> str:
     """The id of the criterion that a blocked one comes down to; its own id for any other."""
     by_id = {c.id: c for c in result.criteria}
     if criterion.blocked_by in by_id:
         return criterion.blocked_by
-    requires = {c.id: c.requires for c in rubric.criteria}
+    requires = {c.id: c.requires for c in rubric.criteria} if rubric else {}
     seen = {criterion.id}
     while criterion.status is Status.BLOCKED:
         unmet = [by_id[i] for i in requires.get(criterion.id, ()) if i in by_id and i not in seen]
@@ -161,6 +169,13 @@ def file_places(criterion: CriterionResult) -> list[str]:
     """Those of `places` that are files of the student's: `src/talker.py:17`."""
     cited = [c for c in criterion.citations[:CITATIONS_MAX] if isinstance(c, FileCitation)]
     return [clip(_place(citation), PLACE_CHARS) for citation in cited]
+
+
+def without_place(text: str, place: str) -> str:
+    """Return what is said of a place (`src/talker.py:17`) without naming it again at the beginning."""
+    file, _, number = place.rpartition(":")
+    beginnings = [f"{file}{comma} line {number}: " for comma in ("", ",")] if file else []
+    return next((text.removeprefix(one) for one in beginnings if text.startswith(one)), text)
 
 
 def pointed_at(criterion: CriterionResult, chars: int = SOURCE_CHARS) -> list[tuple[str, str]]:

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
 
 from grader.model.batch import Entry
 from grader.report.class_page.page import write_class_page
@@ -145,10 +146,12 @@ def test_the_heat_map_tells_each_cell_by_pointer_and_key(visit, written, size) -
     said = page.locator("#heat-said")
     page.locator("#heat-scroll rect.cell").first.hover()
     assert said.inner_text().startswith(best.submission.id)
-    assert CRITERIA[0][1] in said.inner_text()
+    rows = page.locator(".heat-names li").all_inner_texts()
+    assert sorted(rows) == sorted(title for _, title, _, _ in CRITERIA)
+    assert rows[0] in said.inner_text()
     scroll = page.locator("#heat-scroll")
     scroll.press("ArrowDown")
-    assert CRITERIA[1][1] in said.inner_text()
+    assert rows[1] in said.inner_text()
     scroll.press("ArrowRight")
     assert not said.inner_text().startswith(best.submission.id)
     who = said.inner_text().split(" ")[0]
@@ -176,6 +179,15 @@ def test_diagnoses_are_largest_first_and_their_names_fold_out(visit, written) ->
     first.locator(".members a").first.wait_for()
     names = first.locator(".members a").all_inner_texts()
     assert len(names) == many[0]
+    first.locator("textarea").fill('see "lecture 3": it is there')
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    first.get_by_role("button", name="Copy it for overrides.yaml").click()
+    first.get_by_role("button", name="Copied").wait_for()
+    given = yaml.safe_load(page.evaluate("navigator.clipboard.readText()"))
+    assert sorted(given) == sorted(names)
+    assert all(
+        one["comment"] == 'see "lecture 3": it is there' for own in given.values() for one in own.values()
+    )
     first.get_by_role("button", name="Show them in the table").click()
     assert sorted(ids(page)) == sorted(names)
     page.locator("#picked button").click()
@@ -185,7 +197,7 @@ def test_diagnoses_are_largest_first_and_their_names_fold_out(visit, written) ->
 @pytest.mark.full
 def test_who_lost_a_criterion_is_shown_from_the_list_of_costs(visit, written) -> None:
     page = visit(written)
-    button = page.locator("[data-lost-show]").first
+    button = page.locator("[data-cost-show]").first
     many = int(button.inner_text())
     button.click()
     assert len(ids(page)) == many

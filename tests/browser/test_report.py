@@ -85,7 +85,7 @@ def test_the_rate_has_a_dot_for_each_gap_its_band_and_the_gaps_histogram(shown) 
 
 def test_the_counter_is_a_sawtooth_with_its_wraps_marked_and_the_wrong_step_circled(shown) -> None:
     plots = shown.locator("[data-criterion=counter-wrap] [data-figure=counter]")
-    whole = plots.locator("svg").first
+    whole = plots.locator("svg").last
     assert whole.locator("path.dots").evaluate_all(DOTS) == [[len(counter().values), True]]
     assert whole.locator("path.line").evaluate("one => one.getTotalLength()") > 1000
     assert whole.locator("line.wrap").count() == len(counter().wraps)
@@ -120,6 +120,44 @@ def test_the_cited_line_is_marked_among_those_around_it(shown) -> None:
     code = shown.locator("[data-figure=code]").first
     assert code.locator("pre .row").count() == 3
     assert code.locator("mark").all_inner_texts() == ["    rate.sleep"]
+    rows = [row.bounding_box() for row in code.locator("pre .row").all()]
+    assert [row["y"] for row in rows] == sorted({row["y"] for row in rows}), "each line below the one before"
+
+
+def test_a_timeline_is_zoomed_by_keys_buttons_and_wheel_and_scrolled(visit, written) -> None:
+    page = opened(visit(written))
+    lanes = page.locator("[data-timeline]")
+    scroll, plane = lanes.locator(".scroll"), lanes.locator(".plane")
+    whole = plane.bounding_box()["width"]
+    assert scroll.evaluate("one => one.scrollWidth - one.clientWidth") == 0, "all of it is seen first"
+    scroll.focus()
+    page.keyboard.press("+")
+    page.keyboard.press("+")
+    assert plane.bounding_box()["width"] == pytest.approx(4 * whole, rel=0.01)
+    assert lanes.locator(".axis .fine").first.is_visible()
+    before = scroll.evaluate("one => one.scrollLeft")
+    page.keyboard.press("ArrowRight")
+    page.wait_for_function("([one, was]) => one.scrollLeft > was", arg=[scroll.element_handle(), before])
+    page.keyboard.press("0")
+    assert plane.bounding_box()["width"] == pytest.approx(whole, rel=0.01)
+    lanes.get_by_role("button", name="Zoom in").click()
+    assert plane.bounding_box()["width"] == pytest.approx(2 * whole, rel=0.01)
+    lanes.get_by_role("button", name="Show all").click()
+    scroll.hover()
+    page.keyboard.down("Control")
+    page.mouse.wheel(0, -100)
+    page.keyboard.up("Control")
+    page.wait_for_function(
+        "([one, was]) => one.getBoundingClientRect().width > was", arg=[plane.element_handle(), whole]
+    )
+
+
+def test_a_timeline_says_all_without_scripts(shown) -> None:
+    said = shown.locator("[data-figure=timeline] .happened li").all_inner_texts()
+    assert said[0].split() == ["0.5", "s", "process", "talker", "started"]
+    assert "ended by itself: exit code 1" in said[-1]
+    names = shown.locator("[data-figure=timeline] .names li").all_inner_texts()
+    assert names == ["process talker", "topic /chatter"]
 
 
 @pytest.mark.full
@@ -147,7 +185,7 @@ def test_it_can_be_used_with_keys_alone(visit, written) -> None:
 @pytest.mark.full
 def test_a_link_to_a_criterion_opens_it(visit, written) -> None:
     page = visit(written)
-    link = page.locator("#criteria a").last
+    link = page.locator("#criteria > .item a").last
     target = link.get_attribute("href")
     link.click()
     assert page.locator(target).is_visible()
@@ -210,7 +248,7 @@ def test_a_real_grading_shows_what_was_recorded(visit, axe, validate, tmp_path) 
     assert plots.count() >= 1
     for plot in plots.all():
         points = int(plot.get_attribute("data-points"))
-        assert plot.locator("svg").first.locator("path.dots").evaluate_all(DOTS) == [[points, True]]
+        assert plot.locator("svg").last.locator("path.dots").evaluate_all(DOTS) == [[points, True]]
     assert page.locator("[data-criterion=counter-wrap] circle.wrong").count() >= 1
     assert page.locator("[data-figure=rate] path.dots").count() >= 1
     assert page.locator("[data-figure=graph] svg .node").count() >= 2

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 from grader.evidence.run import Run
 from grader.judging import judge
-from grader.model.figure import Figures
+from grader.model.figure import CodeFigure, Figures
 from grader.model.result import CriterionResult
 from grader.report.figures import figures_of
 from tests.judging.rubrics import rubric
@@ -36,7 +36,7 @@ def drawn(
 
 
 def only(figures: Figures, name: str, kind: type[Kind]) -> Kind:
-    """The only figure of a criterion."""
-    (figure,) = figures.by_criterion[name]
+    """The only figure of a criterion, but for lines of code that it cites."""
+    (figure,) = [one for one in figures.by_criterion[name] if kind is CodeFigure or one.kind != "code"]
     assert isinstance(figure, kind)
     return figure

@@ -106,6 +106,7 @@ def test_code(correct: tuple[Figures, dict[str, Run]]) -> None:
 def test_a_counter_whose_node_dies_at_128() -> None:
     found, _ = figures("dies-at-128")
     wrap = only(found, "counter-wrap", CounterFigure)
+    assert [words for _, words in wrap.died] == ["talker ended: ROSSerializationException"]
     assert wrap.values == tuple(range(128))
     assert wrap.wraps == ()
     assert wrap.wrong == (127,)

@@ -113,6 +113,23 @@ def test_what_is_open_for_one_reason_is_one_entry():
     assert entry.points == 15
 
 
+@pytest.mark.parametrize(
+    ("messages", "mistakes"),
+    [
+        (("the path is mirrored", "the path is mirrored"), 1),
+        (("/chatter comes in bursts: 11.5 Hz", "/numeric_chatter comes in bursts: 11.49 Hz"), 1),
+        (("no message came on /chatter", "no message came on /numeric_chatter"), 2),
+    ],
+)
+def test_one_mistake_is_told_once(messages, mistakes):
+    names = ("talker-node", "chatter-rate")
+    same = [
+        criterion(name, Status.FAIL, 0, 5, hint="do this", message=message)
+        for name, message in zip(names, messages, strict=True)
+    ]
+    assert len(arrange(result(criteria=tuple(same)), rubric()).lost) == mistakes
+
+
 def test_a_blocked_criterion_whose_cause_is_not_there_is_told_by_itself():
     alone = result(criteria=(criterion("counter-step", Status.BLOCKED, 0, 5),))
     assert [loss.criterion.id for loss in arrange(alone, rubric()).lost] == ["counter-step"]

@@ -326,11 +326,11 @@ def _died(count: Count, run: Run, package: PackageFacts, params: WrapParams) -> 
     last = count.values[-1]
     if last >= params.maximum - 1:
         message = f"the node dies at {significant(last + 1)}, where the counter should reset: {end.cause}"
-        return failed(message, hint=params.reset_hint)
+        return failed(message, hint=params.reset_hint, citations=end.citations)
     came = f"after {plural(len(count.values), 'message')}, at {significant(last)}"
     message = f"the node ended {came}, before the counter could reset twice: {end.cause}"
     of_its_own = end.by_itself and len(count.values) > params.maximum
-    return (failed if of_its_own else unjudged)(message, hint=end.hint)
+    return (failed if of_its_own else unjudged)(message, hint=end.hint, citations=end.citations)
 
 
 def _stuck(count: Count, params: WrapParams) -> Verdict | None:

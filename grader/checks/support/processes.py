@@ -77,10 +77,14 @@ def failed_program(run: Run, names: Collection[str]) -> str:
         if one.end is None or not one.ended_early or one.end.exit_code == 0:
             continue
         if not any(SHUT_DOWN in line for line in lines):
-            code, signal = one.end.exit_code, one.end.signal
-            how = f"signal {signal}" if code is None else f"exit code {code}"
-            return f"{one.name} ended with {how}" + (f": {shorten(lines[-1], LINE_CHARS)}" if lines else "")
+            last = f": {shorten(lines[-1], LINE_CHARS)}" if lines else ""
+            return f"{one.name} ended with {how_it_ended(one.end)}{last}"
     return ""
+
+
+def how_it_ended(end: ProcessEvent) -> str:
+    """`exit code 1`, or `signal 9`."""
+    return f"signal {end.signal}" if end.exit_code is None else f"exit code {end.exit_code}"
 
 
 def _life(run: Run, start_ns: int, start: ProcessEvent) -> Life:

@@ -143,6 +143,8 @@ def _grade(job: Job, folder: Path) -> Outcome:
 
     def settle_result(result: GradingResult) -> GradingResult:
         before = job.earlier.overrides if job.earlier else ()
+        named = result.submission.model_copy(update={"name": job.entry.name})
+        result = result.model_copy(update={"submission": named})
         return settle(
             result, job.rubric.rubric, overrides=job.overrides, handed_in=obtained.handed_in, before=before
         )

@@ -220,8 +220,41 @@
     const place = details.querySelector(".members");
     if (!details.open || place.childElementCount) { return; }
     data.diagnoses[details.dataset.diagnosis].forEach((member) => {
-      place.append(named(rows[member]), " ");
+      const row = rows[member];
+      const one = make("span");
+      one.append(named(row), row.name ? " " + row.name : "");
+      place.append(one, " ");
     });
+    const form = details.querySelector("form");
+    if (form) { form.hidden = false; }
+  }
+
+  // What `overrides.yaml` takes (JSON is YAML): the comment, and the points as they are
+  function commented(form) {
+    const place = criteria.findIndex((one) => one.id === form.dataset.criterion);
+    const comment = JSON.stringify(form.querySelector("textarea").value);
+    return data.diagnoses[form.dataset.comment].map((member) => {
+      const row = rows[member];
+      const points = short(earned(row, place));
+      const key = JSON.stringify(form.dataset.criterion);
+      return JSON.stringify(row.id) + ":\n  " + key + ": {points: " + points + ", comment: " + comment + "}\n";
+    }).join("");
+  }
+
+  function copyComment(event) {
+    event.preventDefault();
+    const button = event.target.querySelector("button");
+    const area = event.target.querySelector("textarea");
+    const kept = area.value;
+    const said = (done) => { find("copied").textContent = button.textContent = done ? "Copied" : "It could not be copied"; };
+    if (navigator.clipboard) {
+      navigator.clipboard.writeText(commented(event.target)).then(() => said(true), () => said(false));
+      return;
+    }
+    area.value = commented(event.target);
+    area.select();
+    said(document.execCommand("copy"));
+    area.value = kept;
   }
 
   // The heat map
@@ -239,16 +272,17 @@
 
     function words() {
       const members = data.heat[at.column].map((place) => rows[place]);
-      const title = criteria[at.row].title;
+      const criterion = data.heatRows[at.row];
+      const title = criteria[criterion].title;
       if (members.length > 1) {
-        const many = members.filter((row) => lost(row, at.row)).length;
+        const many = members.filter((row) => lost(row, criterion)).length;
         const [high, low] = [members[0].points, members[members.length - 1].points];
         const range = high === low ? short(high) : short(low) + " to " + short(high);
         return members.length + " submissions with " + range + " points — " + title + ": " + many + " lost points";
       }
       const [row] = members;
-      const letter = row.letters[at.row];
-      const points = short(earned(row, at.row)) + " of " + short(criteria[at.row].most);
+      const letter = row.letters[criterion];
+      const points = short(earned(row, criterion)) + " of " + short(criteria[criterion].most);
       const who = row.name ? row.id + " (" + row.name + ")" : row.id;
       return who + ", " + short(row.points) + " points — " + title + ": " + SIGNS[letter] + " " + WORDS[letter] + ", " + points;
     }
@@ -310,14 +344,14 @@
       goToTable();
     });
   });
-  document.querySelectorAll("[data-lost-show]").forEach((button) => {
+  document.querySelectorAll("[data-cost-show]").forEach((button) => {
+    const place = Number(button.dataset.costShow);
     button.addEventListener("click", () => {
-      showAll();
-      lostBy.value = button.dataset.lostShow;
-      update();
+      pick("Lost points by: " + criteria[place].title, data.costs[place]);
       goToTable();
     });
   });
+  document.querySelectorAll("[data-comment]").forEach((form) => form.addEventListener("submit", copyComment));
   document.querySelectorAll(".heat").forEach(heatMap);
   find("filters").hidden = false;
   table.hidden = false;

@@ -15,6 +15,7 @@ from grader.model.batch import MISSING, ROSTER, BatchRun, Entry
 from grader.model.result import GradingResult
 from grader.model.verdict import Status
 from grader.report.class_page.lines import MESSAGE_CHARS, Line, line_of
+from grader.report.view import Loss, arrange
 from grader.untrusted_text import line
 
 
@@ -56,6 +57,7 @@ def gather_anonymous(run: BatchRun, rows: Iterable[tuple[Entry, GradingResult]],
     diagnoses = [
         Diagnosis(
             criterion=found.criterion,
+            points=found.points,
             wordings=Counter([without_words(found.message, words)]),
             members=sorted(now[member] for member in found.members),
         )
@@ -93,10 +95,12 @@ def reduced(message: str) -> str:
 
 @dataclass(kw_only=True)
 class Diagnosis:
-    """One fault that many may share: `members` are the places of its submissions, `wordings` what it was called (`more`
-    where there are others). `criterion` is an id, empty for what could not be graded."""
+    """One mistake that many may share: `members` are the places of its submissions, `wordings` what it was called
+    (`more` where there are others), `points` what it cost all of them, with all that followed from it. `criterion` is
+    an id, empty for what could not be graded."""
 
     criterion: str
+    points: float = 0.0
     members: list[int] = field(default_factory=list)
     wordings: Counter[str] = field(default_factory=Counter)
     more: bool = False
@@ -106,9 +110,10 @@ class Diagnosis:
         """As most of them have it."""
         return self.wordings.most_common(1)[0][0]
 
-    def add(self, place: int, message: str) -> None:
+    def add(self, place: int, message: str, points: float) -> None:
         """One more submission."""
         self.members.append(place)
+        self.points += points
         if message in self.wordings or len(self.wordings) < WORDINGS_MAX:
             self.wordings[message] += 1
         else:
@@ -122,30 +127,32 @@ class Diagnoses:
         self._found: dict[tuple[str, str], Diagnosis] = {}
 
     def add(self, place: int, result: GradingResult) -> None:
-        """All faults of one submission. What only follows from another fault (`blocked`) is none of its own."""
-        for criterion, message in _faults(result):
+        """All mistakes of one submission. What only follows from another one is none of its own."""
+        for criterion, message, points in _mistakes(result):
             text = line(message, MESSAGE_CHARS)
             key = criterion, reduced(text)
             found = self._found.setdefault(key, Diagnosis(criterion=criterion))
-            found.add(place, text)
+            found.add(place, text, points)
 
     def largest_first(self) -> list[Diagnosis]:
         """All of them; those of one size in the order in which they were found."""
-        return sorted(self._found.values(), key=lambda found: -len(found.members))
+        return sorted(self._found.values(), key=lambda found: (-len(found.members), -found.points))
 
 
-def _faults(result: GradingResult) -> Iterator[tuple[str, str]]:
-    """Of each criterion what the check said, or why nothing could be graded, with no criterion. What a person decided
-    keeps the words of the check."""
+def _mistakes(result: GradingResult) -> Iterator[tuple[str, str, float]]:
+    """Of each mistake the criterion that asks for it, what its check said, and the points that it cost in all; or why
+    nothing could be graded, with no criterion. What a person decided keeps the words of the check."""
     if result.error is not None:
         if result.error.kind not in {MISSING, ROSTER}:
-            yield "", result.error.message
+            yield "", result.error.message, 0.0
         return
     said = {override.criterion: override.automatic.message for override in result.overrides}
-    for criterion in result.criteria:
-        if criterion.status in LOST:
-            message = said.get(criterion.id, criterion.message)
-            yield criterion.id, message or criterion.measured or criterion.title
+    view = arrange(result)
+    advice = (Loss(criterion=criterion) for criterion in view.advice if criterion.status in LOST)
+    for loss in (*view.lost, *advice):
+        criterion = loss.criterion
+        message = said.get(criterion.id, criterion.message)
+        yield criterion.id, message or criterion.measured or criterion.title, loss.points
 
 
 SALT = ".anonymous-salt"

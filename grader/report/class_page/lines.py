@@ -11,6 +11,7 @@ from grader.model.batch import MISSING, ROSTER, CriterionInfo, Entry
 from grader.model.result import CriterionResult, GradingResult
 from grader.model.verdict import Status
 from grader.report.sentences import without_sandbox
+from grader.report.view import arrange
 from grader.untrusted_text import line
 
 REPORT = "report.html"
@@ -46,7 +47,8 @@ class Line:
 
     `state` is `manual` where only a person's points are missing, `missing` where it is not graded yet. `letters` has
     one of `LETTERS` for each criterion of the rubric, in its order. `earned` are the points of criteria, by place,
-    where they are not those of the status. `folder` holds its reports, if there are any. `unwalled` says that it ran
+    where they are not those of the status. `caused` are the points that each mistake cost in all, by the place of the
+    criterion that asks for it. `folder` holds its reports, if there are any. `unwalled` says that it ran
     without a sandbox. Seconds.
     """
 
@@ -58,6 +60,7 @@ class Line:
     points: float
     letters: str
     earned: Mapping[int, float]
+    caused: Mapping[int, float]
     late_s: float
     late_lost: float
     decided: int
@@ -94,6 +97,7 @@ def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInf
             LETTERS[found.status] if found and not found.left_out else ABSENT for found in judged
         ),
         earned={place: found.points for place, found in enumerate(judged) if found and _unusual(found)},
+        caused=_caused(result, criteria),
         late_s=late.late_s if late else 0.0,
         late_lost=max(0.0, late.points_before - late.points) if late else 0.0,
         decided=len(result.overrides),
@@ -103,6 +107,14 @@ def line_of(entry: Entry, result: GradingResult, criteria: Sequence[CriterionInf
         why=_why(result.criteria),
         problem=_problem(result),
     )
+
+
+def _caused(result: GradingResult, criteria: Sequence[CriterionInfo]) -> dict[int, float]:
+    if result.error is not None:
+        return {}
+    places = {criterion.id: place for place, criterion in enumerate(criteria)}
+    lost = arrange(result).lost
+    return {places[loss.criterion.id]: loss.points for loss in lost if loss.criterion.id in places}
 
 
 def link_to(one: Line) -> str:

@@ -20,7 +20,17 @@ from grader.model.batch import BatchRun, CriterionInfo, Entry
 from grader.model.result import GradingResult
 from grader.report.class_page.gather import SALT_BYTES, Diagnosis, Gathered, gather, gather_anonymous
 from grader.report.class_page.lines import CHARS, LETTERS, REPORT, Line, link_to
-from grader.report.class_page.statistics import costs, heat_map, histogram, most_first, span, spread, timing
+from grader.report.class_page.statistics import (
+    Cost,
+    HeatMap,
+    costs,
+    heat_map,
+    histogram,
+    most_first,
+    span,
+    spread,
+    timing,
+)
 from grader.report.class_page.todo import todos
 from grader.report.html.shell import environment, policy, script, style
 from grader.report.sentences import SIGNS
@@ -84,7 +94,7 @@ def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
         "points": points,
         "histogram": histogram(points) if points else "",
         "costs": most_first(cost),
-        "unlost": [one.criterion.title for one in cost if one.judged and not one.lost and not one.open],
+        "unlost": [one.criterion.title for one in cost if one.judged and not one.touched],
         "late": [one for one in lines if one.late_s > 0],
         "shared": shared,
         "alone": alone,
@@ -95,7 +105,8 @@ def _page(run: BatchRun, found: Gathered, out: Path | None) -> str:
             lines,
             run.criteria,
             [one.found.members for one in (*shared, *alone)],
-            heat.columns if heat else (),
+            cost,
+            heat,
         ),
     }
     return _template().render(parts)
@@ -121,11 +132,11 @@ def _listed(run: BatchRun, found: Sequence[Diagnosis]) -> tuple[list[Listed], li
 def _columns(lines: Sequence[Line]) -> Iterator[tuple[str, str]]:
     """The table's, as the script knows them and as they are called; what no one has is left out."""
     yield "id", "Submission"
+    yield "points", "Points"
     if any(one.name for one in lines):
         yield "name", "Name"
     if any(one.group for one in lines):
         yield "group", "Group"
-    yield "points", "Points"
     yield "letters", "Criteria"
     yield "state", "Status"
     if any(one.late_s > 0 for one in lines):
@@ -164,14 +175,18 @@ def page_data(
     lines: Iterable[Line],
     criteria: Iterable[CriterionInfo],
     diagnoses: Iterable[Sequence[int]],
-    columns: Iterable[Sequence[int]],
+    costs: Iterable[Cost],
+    heat: HeatMap | None,
 ) -> Markup:
-    """`rows` (each as `COLUMNS` says), `criteria`, and by places in `rows` the members of diagnoses and heat map."""
+    """`rows` (each as `COLUMNS` says), `criteria`, and by places in `rows` the members of diagnoses, costs and the heat
+    map, whose rows are places in `criteria`."""
     data = {
         "rows": [_row(one) for one in lines],
         "criteria": [[line(c.id, CHARS), line(c.title, CHARS), c.max_points] for c in criteria],
         "diagnoses": [list(members) for members in diagnoses],
-        "heat": [list(column) for column in columns],
+        "costs": [cost.by for cost in costs],
+        "heat": [list(column) for column in heat.columns] if heat else [],
+        "heatRows": list(heat.rows) if heat else [],
     }
     return in_script(json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")))
 

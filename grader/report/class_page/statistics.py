@@ -4,71 +4,64 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from statistics import fmean, median
 
 from markupsafe import Markup
 
 from grader.model.batch import BatchRun, CriterionInfo
-from grader.report.class_page.lines import LETTERS, Line
+from grader.report.class_page.lines import LETTERS, LOST, Line
 from grader.report.html import svg
 from grader.wording import number
 
 
 @dataclass(kw_only=True)
 class Cost:
-    """What one criterion cost all submissions that were judged. `partly`, `failed` and `blocked` count them; `open`
-    those whose points are not settled yet."""
+    """What the mistakes in one criterion cost all submissions that were judged, with what followed from them.
+
+    `by` are the places of the submissions that made them, `touched` counts those that have not all of its points, or
+    not yet, for whatever reason.
+    """
 
     place: int
     criterion: CriterionInfo
     judged: int = 0
     points: float = 0.0
-    partly: int = 0
-    failed: int = 0
-    blocked: int = 0
-    open: int = 0
-
-    @property
-    def lost(self) -> int:
-        """How many submissions lost points by it, or would have if it were worth any."""
-        return self.partly + self.failed + self.blocked
+    by: list[int] = field(default_factory=list)
+    touched: int = 0
 
     @property
     def share(self) -> float:
-        """How many of those that were judged, in percent."""
-        return 100 * self.lost / self.judged if self.judged else 0.0
+        """How many of those that were judged made them, in percent."""
+        return 100 * len(self.by) / self.judged if self.judged else 0.0
 
 
 def costs(lines: Iterable[Line], criteria: Sequence[CriterionInfo]) -> list[Cost]:
     """Of each criterion, in the rubric's order."""
     found = [Cost(place=place, criterion=criterion) for place, criterion in enumerate(criteria)]
-    for line in lines:
+    for place, line in enumerate(lines):
         if line.judged:
             for cost in found:
-                _add(cost, line)
+                _add(cost, place, line)
     return found
 
 
 def most_first(found: Iterable[Cost]) -> list[Cost]:
-    """Those that cost anything: most points first, then what most submissions lost."""
+    """Those that cost anything: most points first, then what most submissions lost by."""
     return sorted(
-        (cost for cost in found if cost.lost), key=lambda cost: (-cost.points, -cost.lost, cost.place)
+        (cost for cost in found if cost.by), key=lambda cost: (-cost.points, -len(cost.by), cost.place)
     )
 
 
-def _add(cost: Cost, line: Line) -> None:
+def _add(cost: Cost, place: int, line: Line) -> None:
     letter = line.letters[cost.place]
     if letter == "n":
         return
     cost.judged += 1
-    cost.partly += letter == "a"
-    cost.failed += letter == "f"
-    cost.blocked += letter == "b"
-    cost.open += letter in "iem"
-    if letter in "afb":
-        most = cost.criterion.max_points
-        cost.points += max(0.0, most - line.points_of(cost.place, most))
+    cost.touched += letter != "p"
+    if cost.place in line.caused:
+        cost.by.append(place)
+        cost.points += line.caused[cost.place]
 
 
 BINS_MAX = 20
@@ -223,17 +216,18 @@ ROW = 22
 ONE_EACH_MAX = 500
 COLUMNS_MAX = 120
 TICK = 64
-WIDTHS = ((40, 22), (60, 15), (120, 7), (160, 5), (225, 4), (304, 3), (ONE_EACH_MAX, 2))
-"""Up to so many submissions, a column is so wide."""
+WIDE, NARROW = 900, 2
+"""So wide is the whole, as far as a column has at least so much (pixels)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class HeatMap:
     """`columns` are the places of the submissions in each column: one each, or a group of those with about as many
-    points. `step` and `row` are the size of a cell."""
+    points, and `rows` those of the criteria, both most points left first. `step` and `row` are the size of a cell."""
 
     drawing: Markup
     columns: Sequence[Sequence[int]]
+    rows: Sequence[int]
     step: int
     row: int = ROW
     letters: str = ""
@@ -250,10 +244,12 @@ def heat_map(lines: Sequence[Line], criteria: Sequence[CriterionInfo]) -> HeatMa
     if not order or not criteria:
         return None
     columns = _columns(order)
-    step = next((width for most, width in WIDTHS if len(columns) <= most), WIDTHS[-1][1])
+    step = max(NARROW, WIDE // len(columns))
+    lost = [sum(lines[p].letters[place] in LOST for p in order) for place in range(len(criteria))]
+    places = sorted(range(len(criteria)), key=lambda place: lost[place])
     rows = [
-        svg.element("g", *_cells(lines, place, columns, step), transform=f"translate(0 {place * ROW})")
-        for place in range(len(criteria))
+        svg.element("g", *_cells(lines, place, columns, step), transform=f"translate(0 {i * ROW})")
+        for i, place in enumerate(places)
     ]
     size = (max(len(columns) * step, 40), len(criteria) * ROW + 20)
     words = f"{len(criteria)} criteria by {len(order)} submissions, most points first."
@@ -261,7 +257,7 @@ def heat_map(lines: Sequence[Line], criteria: Sequence[CriterionInfo]) -> HeatMa
     drawing = svg.drawing("heat-map", size, "Heat map", words, *rows, *ticks)
     there = {letter for place in order for letter in lines[place].letters}
     letters = "".join(letter for letter in LETTERS.values() if letter in there)
-    return HeatMap(drawing=drawing, columns=columns, step=step, letters=letters)
+    return HeatMap(drawing=drawing, columns=columns, rows=places, step=step, letters=letters)
 
 
 def _columns(order: Sequence[int]) -> list[Sequence[int]]:
@@ -281,7 +277,7 @@ def _cells(lines: Sequence[Line], row: int, columns: Sequence[Sequence[int]], st
 
 def _shade(letters: Sequence[str]) -> str:
     """`q0` where no one lost anything, to `q5` where all did."""
-    lost = sum(letter in "afb" for letter in letters)
+    lost = sum(letter in LOST for letter in letters)
     return f"q{-(-5 * lost // len(letters))}"
 
 

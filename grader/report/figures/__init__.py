@@ -27,6 +27,7 @@ from grader.report.figures.measurements import (
 )
 from grader.report.figures.paths import end_figures, path_figures, region_figures
 from grader.report.figures.runs import code_figures, console_of, graph_of
+from grader.report.figures.timeline import timeline_of
 from grader.rubric.model import Criterion, Rubric
 
 FIGURES_MAX = 4
@@ -60,6 +61,7 @@ def figures_of(rubric: Rubric, runs: Mapping[str, Run], criteria: Sequence[Crite
     }
     return Figures(
         by_criterion=_by_criterion(rubric, facts, on_copy or facts, criteria) if facts else {},
+        timelines=_each(timeline_of, {name: run for name, run in shown.items() if name != PACKAGE_RUN}),
         graphs=_each(graph_of, {name: run for name, run in shown.items() if name != PACKAGE_RUN}),
         consoles=_each(console_of, shown),
     )

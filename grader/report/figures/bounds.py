@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from grader.evidence.run import Run
+from grader.evidence.run import BARE_NAME, Run, is_grader_node
 from grader.wording import shorten
 
 NAME_LETTERS = 200
@@ -29,6 +29,11 @@ def named(text: object) -> str:
 def finite(value: float) -> float:
     """A number that can be drawn and written as JSON; what is none is 0."""
     return max(-LARGEST, min(LARGEST, value)) if value == value else 0.0  # noqa: PLR0124 - NaN is not itself
+
+
+def is_drawn(name: str) -> bool:
+    """Return whether a node or a topic is none of the grader's own."""
+    return name not in {"", BARE_NAME} and not name.startswith(f"{BARE_NAME}/") and not is_grader_node(name)
 
 
 def second(run: Run, time_ns: int) -> float:

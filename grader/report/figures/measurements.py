@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
 from grader.checks.counter import StartParams, StepParams, begins_with, missed_the_first
@@ -30,7 +30,10 @@ from grader.checks.support.counters import (
     whose_turn,
     wrong_steps,
 )
+from grader.checks.support.exit_causes import process_tracebacks
 from grader.checks.support.lateness import lateness
+from grader.checks.support.processes import how_it_ended, life_of
+from grader.evidence.events import ProcessEvent
 from grader.evidence.run import Channel, Run
 from grader.model.figure import (
     POINTS_MAX,
@@ -134,8 +137,24 @@ def _counter_figure(
         wrong=tuple(places[i] for i, _ in shown),
         texts=tuple(short(text, TEXT_LETTERS) for _, text in shown),
         more_wrong=len(marks) - len(shown),
+        died=tuple(own_ends(run, [count.callerid])),
         messages=len(count.values),
     )
+
+
+def own_ends(run: Run, nodes: Iterable[str]) -> Iterator[tuple[float, str]]:
+    """Yield when (s) the processes of these nodes ended by themselves, and how, in a few words."""
+    ended = {one.name: one for one in (life_of(run, node) for node in nodes) if one and one.ended_early}
+    for one in ended.values():
+        if one.end_ns is not None and one.end is not None:
+            yield second(run, one.end_ns), short(f"{one.name} ended: {_how(run, one.name, one.end)}")
+
+
+def _how(run: Run, name: str, end: ProcessEvent) -> str:
+    if end.exit_code == 0:
+        return "exit code 0"
+    found = process_tracebacks(run, name)
+    return found[-1].kind if found else how_it_ended(end)
 
 
 def _whole(value: float) -> float:
@@ -202,6 +221,7 @@ def _rate_figure(run: Run, params: RateParams, found: Rhythm, channels: Sequence
         gap_low_s=finite(low_ns / 1e9),
         gap_high_s=finite(high_ns / 1e9),
         late=tuple((second(run, a), second(run, b)) for a, b in _late(run, params, found)),
+        died=tuple(own_ends(run, [c.callerid for c in channels])),
         messages=len(found.times_ns),
         ends_silent=bool(silent),
     )

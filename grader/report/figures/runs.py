@@ -8,10 +8,10 @@ from typing import NamedTuple
 from grader.checks.support.text import SHOWN_BEFORE_CHARS, bare
 from grader.checks.support.topics import SYSTEM_TOPICS
 from grader.evidence.events import GraphEvent
-from grader.evidence.run import BARE_NAME, Run, is_grader_node
+from grader.evidence.run import Run
 from grader.model.figure import CodeFigure, ConsoleFigure, ConsoleLine, Edge, GraphFigure
 from grader.model.verdict import Citation, FileCitation
-from grader.report.figures.bounds import LINE_LETTERS, named, second, short, spread
+from grader.report.figures.bounds import LINE_LETTERS, is_drawn, named, second, short, spread
 
 NODES_MAX = 40
 TOPICS_MAX = 40
@@ -66,17 +66,12 @@ def _edges(run: Run, states: Sequence[GraphEvent]) -> Iterator[_Edge]:
 
 
 def _is_drawn(node: str, topic: str) -> bool:
-    system = topic in SYSTEM_TOPICS or topic.startswith(f"{BARE_NAME}/")
-    return not system and _is_node(node)
-
-
-def _is_node(name: str) -> bool:
-    return name not in {"", BARE_NAME} and not is_grader_node(name)
+    return topic not in SYSTEM_TOPICS and is_drawn(topic) and is_drawn(node)
 
 
 def _nodes(states: Sequence[GraphEvent], edges: Sequence[_Edge]) -> Iterator[str]:
     for state in states:
-        yield from filter(_is_node, state.nodes)
+        yield from filter(is_drawn, state.nodes)
     yield from (edge.node for edge in edges)
 
 

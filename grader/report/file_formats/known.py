@@ -59,6 +59,7 @@ FORMATS: dict[str, Format] = {
             by="grader",
             says="`schema`",
             newer=f"{_UNREADABLE}; in a class, before anything is written",
+            additions=(Addition(1, "SubmissionInfo.name", "no roster gave a name"),),
         ),
         Format(
             is_=version.EVIDENCE,

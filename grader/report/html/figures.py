@@ -19,6 +19,7 @@ from grader.model.figure import (
     PathFigure,
     PlaceFigure,
     RateFigure,
+    TimelineFigure,
 )
 from grader.report.html.graph import graph_plot, graph_rows
 from grader.report.html.plots import (
@@ -31,6 +32,7 @@ from grader.report.html.plots import (
     rate_words,
     wrong_steps,
 )
+from grader.report.html.timeline import Timeline, timeline, timeline_plot, timeline_words
 from grader.report.text import clip
 from grader.wording import plural
 
@@ -43,7 +45,8 @@ GRAPH_ROWS_MAX = 100
 
 @dataclass(frozen=True, kw_only=True)
 class Drawn:
-    """`name` is its id on the page, `points` how many points, rows or lines it has. `same_as` is the id of an earlier
+    """`name` is its id on the page, `points` how many points, rows or lines it has. The first of at most two `plots` is
+    the more telling one; `second` says what the other shows. `same_as` is the id of an earlier
     figure that shows the same; then nothing else is drawn. `left_out` says what is not shown, of a console after
     `gap_at` lines."""
 
@@ -53,11 +56,13 @@ class Drawn:
     words: str = ""
     points: int = 0
     plots: Sequence[Markup] = ()
+    second: str = ""
     rows: Sequence[object] = ()
     notes: Sequence[str] = ()
     gap_at: int = 0
     left_out: str = ""
     same_as: str = ""
+    timeline: Timeline | None = None
 
 
 @dataclass(kw_only=True)
@@ -124,6 +129,7 @@ def _rate(figure: RateFigure, name: str) -> Drawn:
         words=rate_words(figure),
         points=len(figure.gaps_s),
         plots=rate_plots(figure, name),
+        second="How long the gaps are",
         left_out=_thinned(len(figure.gaps_s), figure.messages - 1),
     )
 
@@ -136,6 +142,7 @@ def _counter(figure: CounterFigure, name: str) -> Drawn:
         words=counter_words(figure),
         points=len(figure.values),
         plots=counter_plots(figure, name),
+        second="All values",
         notes=tuple(wrong_steps(figure)),
         left_out=_thinned(len(figure.values), figure.messages),
     )
@@ -233,6 +240,19 @@ def _place(figure: PlaceFigure, name: str) -> Drawn:
     )
 
 
+def _timeline(figure: TimelineFigure, name: str) -> Drawn:
+    return Drawn(
+        name=name,
+        kind="timeline",
+        title="What happened, and when",
+        words=timeline_words(figure),
+        points=len(figure.lanes),
+        plots=[timeline_plot(figure, name)],
+        timeline=timeline(figure),
+        left_out=f"{figure.left_out} more are not shown." if figure.left_out else "",
+    )
+
+
 DRAWN: dict[str, Callable[..., Drawn]] = {
     "rate": _rate,
     "counter": _counter,
@@ -241,6 +261,7 @@ DRAWN: dict[str, Callable[..., Drawn]] = {
     "code": _code,
     "path": _path,
     "place": _place,
+    "timeline": _timeline,
 }
 
 

@@ -5,20 +5,19 @@
 
 from __future__ import annotations
 
-import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from grader.model.figure import Figure, Figures
 from grader.model.result import CriterionResult, GradingResult
-from grader.model.verdict import FileCitation
+from grader.model.verdict import FileCitation, Status
 from grader.report import sentences
 from grader.report.html.figures import Drawer, Drawn, code_places
-from grader.report.html.shell import environment, policy, script, style
+from grader.report.html.shell import environment, policy, prose, script, style
 from grader.report.sentences import (
     ADVICE,
     MEANINGS,
@@ -29,7 +28,17 @@ from grader.report.sentences import (
     without_sandbox,
 )
 from grader.report.text import line
-from grader.report.view import Loss, ReportView, arrange, hidden_ids, not_graded, places, points_of
+from grader.report.view import (
+    Loss,
+    ReportView,
+    arrange,
+    file_places,
+    hidden_ids,
+    not_graded,
+    places,
+    points_of,
+    without_place,
+)
 from grader.rubric.model import Rubric
 from grader.wording import number
 
@@ -44,7 +53,8 @@ class Part:
 
 @dataclass(frozen=True, kw_only=True)
 class Head:
-    """What stands at the top, in words. `again` is the command that judges it again."""
+    """What stands at the top, in words. `when` says whether it came in time, `late` all that is known of that, below.
+    `again` is the command that judges it again."""
 
     score: str
     status: str
@@ -55,6 +65,7 @@ class Head:
     mark_at: float | None
     pass_mark: str
     unwalled: str
+    when: str
     late: tuple[str, ...]
     short: str
     left_out: str
@@ -108,7 +119,7 @@ def _rendered(result: GradingResult, rubric: Rubric, head: Head, page: Page, lim
 
 def _head(result: GradingResult, rubric: Rubric, view: ReportView, hidden: int) -> Head:
     graded = not not_graded(result)
-    status, verdict = sentences.verdict(result, rubric, hidden)
+    status, verdict = sentences.verdict(result, rubric, hidden, len(view.lost))
     score = (
         f"{number(result.points)} of {sentences.count_points(result.max_points)}" if graded else "Not graded"
     )
@@ -125,7 +136,8 @@ def _head(result: GradingResult, rubric: Rubric, view: ReportView, hidden: int) 
         else None,
         pass_mark=sentences.pass_mark(result, rubric, hidden),
         unwalled=without_sandbox(result.environment.sandbox),
-        late=sentences.score_words(result),
+        when=sentences.when_words(result),
+        late=sentences.late_words(result),
         short=sentences.in_short(result, view),
         left_out=visible_words(result, hidden) if graded else "",
         fault=sentences.FAULTS[sentences.blame(result.error.kind)] if result.error else "",
@@ -178,7 +190,6 @@ Docs = Mapping[str, Mapping[str, str]]
 """Of each check by name the sections of its docstring, by their headings."""
 MATTERS, MEASURED, FIX = "Why it matters on a robot", "How it is measured", "How to fix"
 NOTHING = Markup()
-CODE = re.compile(r"`([^`]+)`")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -208,10 +219,12 @@ DETAILS = (
 @dataclass(frozen=True, kw_only=True)
 class Card:
     """One criterion. `anchor` is its id on the page. `lost` says what it cost, with what it holds back; `advice` is the
-    title of its hint."""
+    title of its hint. `code` are the lines that it cites, `figures` what was measured, the most telling first.
+    `repaired` were judged with its fault repaired."""
 
     anchor: str
     criterion: CriterionResult
+    message: str
     hidden: bool
     advice: str
     sign: str
@@ -223,36 +236,40 @@ class Card:
     fix: Markup = NOTHING
     hint: Markup = NOTHING
     where: Sequence[str] = ()
+    code: Sequence[Drawn] = ()
     figures: Sequence[Drawn] = ()
     blocked: Sequence[Card] = ()
     alike: Sequence[Card] = ()
+    repaired: Sequence[Card] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ran:
-    """One scenario: what was printed, and who was joined with whom."""
+    """One scenario: what happened when, who was joined with whom, and what was printed."""
 
     anchor: str
     name: str
     title: str
+    timeline: Drawn | None
     graph: Drawn | None
     console: Drawn | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Page:
-    """`lost`, `open` and `advice` are cards that stand for themselves, `rest` all other criteria, folded.
+    """`lost`, `open` and `advice` are cards that stand for themselves. `others` are all other criteria, and `passed`
+    those of them that were reached, folded.
 
-    `cut` criteria have no card, and `beyond` have no row in the `table` either.
+    Criteria in `brief` have no card, only a line, and `beyond` not even that.
     """
 
     lost: Sequence[Card]
     open: Sequence[Card]
     advice: Sequence[Card]
-    rest: Sequence[Card]
-    table: Sequence[Card]
+    others: Sequence[Card]
+    passed: Sequence[Card]
+    brief: Sequence[Card]
     ran: Sequence[Ran]
-    cut: int = 0
     beyond: int = 0
 
 
@@ -266,6 +283,8 @@ class Maker:
         self._figures = figures if detail.figures else Figures()
         self._drawer = Drawer(console_chars=detail.console)
         self._hidden = hidden_ids(rubric)
+        self._by_id = {c.id: c for c in result.criteria}
+        self._repaired = sentences.judged_repaired(result)
         self._anchors = {c.id: f"criterion-{i}" for i, c in enumerate(result.criteria, start=1)}
         self._room = detail.cards
 
@@ -275,18 +294,19 @@ class Maker:
         still = [self._loss(loss) for loss in self._first(view.open if whole else ())]
         advice = [self._card(criterion) for criterion in self._first(view.advice)]
         shown = {card.criterion.id for card in (*lost, *still, *advice)}
-        others = [c for c in self._result.criteria if c.id not in shown] if whole else []
-        rest = [self._card(criterion) for criterion in self._first(others)]
-        told = shown | {card.criterion.id for card in rest}
+        others = [c for c in self._result.criteria if c.id not in shown]
+        rest = [self._card(criterion) for criterion in self._first(others if whole else ())]
+        room = max(0, self._detail.rows - len(shown) - len(rest))
+        cut = others[len(rest) :]
         return Page(
             lost=lost,
             open=still,
             advice=advice,
-            rest=rest,
-            table=[self._short(c, linked=c.id in told) for c in self._result.criteria[: self._detail.rows]],
+            others=[card for card in rest if card.criterion.status is not Status.PASS],
+            passed=[card for card in rest if card.criterion.status is Status.PASS],
+            brief=[self._short(c, linked=False) for c in cut[:room]],
             ran=list(self._ran()),
-            cut=len(self._result.criteria) - len(told) if whole else 0,
-            beyond=max(0, len(self._result.criteria) - self._detail.rows),
+            beyond=len(cut[room:]),
         )
 
     def _first(self, items: Sequence[T]) -> Sequence[T]:
@@ -296,11 +316,14 @@ class Maker:
 
     def _loss(self, loss: Loss) -> Card:
         blocked = sum(c.missing for c in loss.blocked)
+        told = {c.id for c in loss.alike}
+        repaired = [self._by_id[i] for i in self._repaired.get(loss.criterion.id, ()) if i not in told]
         return replace(
             self._card(loss.criterion, self._with_graph(loss.criterion)),
             lost=lost_words(loss.criterion, blocked),
             blocked=[self._short(c) for c in loss.blocked],
             alike=[self._short(c) for c in loss.alike],
+            repaired=[self._short(c) for c in repaired],
         )
 
     def _with_graph(self, criterion: CriterionResult) -> list[Figure]:
@@ -314,20 +337,26 @@ class Maker:
     def _card(self, criterion: CriterionResult, figures: Sequence[Figure] | None = None) -> Card:
         own = self._figures.by_criterion.get(criterion.id, ()) if figures is None else figures
         docs = self._docs.get(criterion.check, {})
+        drawn = [self._drawer.draw(figure) for figure in own]
+        code = [figure for figure in drawn if figure.kind == "code"]
+        place = next(iter(file_places(criterion)), "") if code else ""
         return replace(
             self._short(criterion),
+            message=without_place(criterion.message, place),
             why=self._prose(docs.get(MATTERS, "")),
             how=self._prose(docs.get(MEASURED, "")),
             fix=self._prose(docs.get(FIX, "")) if criterion.status in MENDED else NOTHING,
-            hint=self._prose(criterion.hint),
+            hint=self._prose(without_place(criterion.hint, place)),
             where=self._where(criterion),
-            figures=[self._drawer.draw(figure) for figure in own],
+            code=code,
+            figures=[figure for figure in drawn if figure.kind != "code"],
         )
 
     def _short(self, criterion: CriterionResult, *, linked: bool = True) -> Card:
         return Card(
             anchor=self._anchors[criterion.id] if linked else "",
             criterion=criterion,
+            message=criterion.message,
             hidden=criterion.id in self._hidden,
             advice=ADVICE.get(criterion.status, "What to do"),
             sign=SIGNS[criterion.status],
@@ -356,19 +385,13 @@ class Maker:
             graph, console = self._figures.graphs.get(name), self._figures.consoles.get(name)
             graph = graph if graph and graph.nodes else None
             console = console if console and console.lines else None
-            if graph or console:
+            when = self._figures.timelines.get(name)
+            if graph or console or when:
                 yield Ran(
                     anchor=f"run-{i}",
                     name=name,
                     title="The build" if name == "package" else titles.get(name, name),
+                    timeline=self._drawer.draw(when) if when else None,
                     graph=self._drawer.draw(graph) if graph else None,
                     console=self._drawer.draw(console) if console else None,
                 )
-
-
-def prose(text: str) -> Markup:
-    """Return a text with what stands between backticks as code."""
-    parts = CODE.split(text)
-    return Markup("").join(
-        Markup("<code>{}</code>").format(part) if i % 2 else escape(part) for i, part in enumerate(parts)
-    )

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
-import math
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 
 from markupsafe import Markup
 
 from grader.model.figure import CounterFigure, PathFigure, PlaceFigure, RateFigure
-from grader.report.html.svg import BOTTOM, LEFT, RIGHT, TOP, Frame, dots, drawing, element, path, text
+from grader.report.html.svg import (
+    BOTTOM,
+    LEFT,
+    RIGHT,
+    TOP,
+    Frame,
+    dots,
+    drawing,
+    element,
+    from_log,
+    path,
+    text,
+    to_log,
+)
 from grader.wording import number, plural
 
 WHOLE = (760.0, 240.0)
@@ -17,12 +30,14 @@ MANY = 40
 AROUND = 6
 LABELS_MAX = 12
 TEXTS_MAX = 3
+DWARFS = 10
+TINY_S = 1e-6
 FAR = 10**15
 """Larger values are drawn at the edge: the frame has no more digits."""
 
 
 def counter_plots(figure: CounterFigure, name: str) -> list[Markup]:
-    """The whole of it, and where it is long the surroundings of the first wrong step, or of the first wrap."""
+    """Where it is long, the surroundings of the first wrong step, or of the first wrap; then the whole of it."""
     count = len(figure.values)
     if count < 2:
         return []
@@ -32,7 +47,9 @@ def counter_plots(figure: CounterFigure, name: str) -> list[Markup]:
         first = max(0, around[0] - AROUND)
         near = range(first, min(count, around[0] + AROUND + 1))
         what = "wrong step" if figure.wrong else "wrap"
-        drawn.append(_plot(figure, f"{name}-close", near, CLOSE, f"{figure.topic} around the first {what}"))
+        drawn.insert(
+            0, _plot(figure, f"{name}-close", near, CLOSE, f"{figure.topic} around the first {what}")
+        )
     return drawn
 
 
@@ -77,13 +94,15 @@ def _plot(figure: CounterFigure, name: str, shown: range, size: tuple[float, flo
     if size == WHOLE:
         low, high = min(low, 0.0), max(high, 1.0)
     pad = (high - low) * 0.14 or 1.0
+    died = _around(figure.died, times[0], times[-1])
     frame = Frame(
         width=size[0],
         height=size[1],
         x_low=times[0],
-        x_high=times[-1],
+        x_high=max(times[-1], *(at for at, _ in died), times[0] + TINY_S),
         y_low=low - (pad if low != 0 else 0),
         y_high=high + pad,
+        log_y=_dwarfed(values),
     )
     points = [(frame.x(t), frame.y(v)) for t, v in zip(times, values, strict=True)]
     at = dict(zip(shown, points, strict=True))
@@ -91,16 +110,38 @@ def _plot(figure: CounterFigure, name: str, shown: range, size: tuple[float, flo
     named = len(points) <= 2 * AROUND + 1
     children = frame.axes("seconds since the run began", "value")
     children += _wraps(figure, frame, at)
+    children += _deaths(died, frame)
     children.append(element("path", d="".join(map(path, _whole(figure, at))), class_="line"))
-    children.append(element("path", d=dots(points), class_="dots" if few else "dots small"))
     if named:
         children += [
             text(x, y - 9, number(figure.values[i]), text_anchor="middle")
             for i, (x, y) in at.items()
             if i not in figure.wrong
         ]
+    children.append(element("path", d=dots(points), class_="dots" if few else "dots small"))
     children += _wrong(figure, frame, at)
     return drawing(name, size, title, counter_words(figure), *children)
+
+
+def _dwarfed(values: Sequence[float]) -> bool:
+    """Return whether few of the values leave no room to the others on a linear axis."""
+    sizes = sorted(map(abs, values))
+    return sizes[-1] > DWARFS * max(sizes[int(0.9 * (len(sizes) - 1))], 1.0)
+
+
+def _around(died: Sequence[tuple[float, str]], from_s: float, to_s: float) -> list[tuple[float, str]]:
+    """Those ends that lie in a plot, or not far behind what it shows."""
+    beyond = to_s + max(0.5 * (to_s - from_s), 1.0)
+    return [(at, words) for at, words in died if from_s <= at <= beyond][:1]
+
+
+def _deaths(died: Sequence[tuple[float, str]], frame: Frame) -> Iterator[Markup]:
+    """Where a process ended by itself: nothing comes after that."""
+    for at, words in died:
+        x = frame.x(at)
+        end = "end" if x > (LEFT + frame.right) / 2 else "start"
+        yield element("line", x1=x, x2=x, y1=TOP, y2=frame.bottom, class_="died")
+        yield text(x + (-6 if end == "end" else 6), frame.bottom - 8, words, class_="alarm", text_anchor=end)
 
 
 def _whole(figure: CounterFigure, at: dict[int, tuple[float, float]]) -> Iterator[list[tuple[float, float]]]:
@@ -243,8 +284,10 @@ def _marked(index: int | None, taken: list[tuple[float, float]], words: str) -> 
 OVER_TIME = (460.0, 230.0)
 HISTOGRAM = (330.0, 230.0)
 BINS = 30
-TOO_FAR = 3.0
-"""So many times the bound: what lies farther is drawn at the edge."""
+TOO_FAR = 5.0
+"""Where a value is so many times the bound, the axis is logarithmic."""
+FASTEST_S = 1e-5
+"""A shorter gap is drawn as one of this length."""
 
 
 def rate_plots(figure: RateFigure, name: str) -> list[Markup]:
@@ -288,14 +331,20 @@ def _ms(seconds: float) -> str:
 
 
 def _over_time(figure: RateFigure, name: str) -> Markup:
-    rates = [1 / gap if gap > 0 else math.inf for gap in figure.gaps_s]
+    rates = [1 / gap if gap > FASTEST_S else 1 / FASTEST_S for gap in figure.gaps_s]
+    begin = max(0.0, figure.times_s[0] - figure.gaps_s[0])
+    last = max(*figure.times_s, begin + TINY_S)
+    died = _around(figure.died, begin, last)
+    highest = max(figure.high_hz, figure.mean_hz or 0.0)
+    log = max(rates) > TOO_FAR * highest
     frame = Frame(
         width=OVER_TIME[0],
         height=OVER_TIME[1],
-        x_low=0,
-        x_high=max(figure.times_s) or 1.0,
+        x_low=begin,
+        x_high=max(last, *(at for at, _ in died), last),
         y_low=0,
-        y_high=_top(rates, figure),
+        y_high=(1.5 if log else 1.2) * max(highest, *rates),
+        log_y=log,
     )
     across = (frame.x_low, frame.x_high)
     children = [_hatching(name)]
@@ -303,24 +352,15 @@ def _over_time(figure: RateFigure, name: str) -> Markup:
     children += [
         frame.box(stretch, (0, frame.y_high), fill=f"url(#{name}-late)", class_="late")
         for stretch in figure.late
+        if stretch[1] > begin and stretch[0] < frame.x_high
     ]
     children += frame.axes("seconds since the run began", "Hz")
     points = [(frame.x(t), frame.y(r)) for t, r in zip(figure.times_s, rates, strict=True)]
     children.append(element("path", d=dots(points), class_="dots"))
-    children.append(
-        text(frame.x(0) + 5, frame.y(figure.high_hz) - 5, f"{_allowed(figure)} passes", class_="good")
-    )
+    children.append(text(LEFT + 5, frame.y(figure.high_hz) - 5, f"{_allowed(figure)} passes", class_="good"))
     children += _mean(frame, figure.mean_hz)
-    beyond = sum(rate > frame.y_high for rate in rates)
-    if beyond:
-        children.append(text(frame.right, TOP - 9, f"{beyond} above the edge", text_anchor="end"))
+    children += _deaths(died, frame)
     return drawing(name, OVER_TIME, f"Rate of {figure.topic} over time", rate_words(figure), *children)
-
-
-def _top(rates: Sequence[float], figure: RateFigure) -> float:
-    """Return the highest rate, but not where a few messages that came together would flatten all others."""
-    most = TOO_FAR * max(figure.high_hz, figure.mean_hz or 0.0)
-    return 1.2 * max(figure.high_hz, figure.mean_hz or 0.0, min(max(rates), most))
 
 
 def _mean(frame: Frame, mean_hz: float | None) -> list[Markup]:
@@ -348,36 +388,35 @@ def _hatching(name: str) -> Markup:
 
 
 def _histogram(figure: RateFigure, name: str) -> Markup:
-    longest = _longest(figure)
+    bound = figure.gap_high_s or 2 / figure.low_hz
+    log = max(figure.gaps_s) > TOO_FAR * bound
+    longest_ms = 1.1e3 * max(1.2 * bound, *figure.gaps_s)
+    edges = [_part(i / BINS, longest_ms, log=log) for i in range(BINS + 1)]
     counts = [0] * BINS
     for gap in figure.gaps_s:
-        counts[min(int(gap / longest * BINS), BINS - 1)] += 1
+        counts[min(bisect_right(edges, gap * 1000) - 1, BINS - 1)] += 1
     frame = Frame(
         width=HISTOGRAM[0],
         height=HISTOGRAM[1],
         x_low=0,
-        x_high=longest * 1000,
+        x_high=longest_ms,
         y_low=0,
         y_high=1.15 * max(counts),
+        log_x=log,
     )
-    width = frame.x_high / BINS
     children = _gap_bounds(figure, frame)
     children += frame.axes("milliseconds from message to message", "messages")
     children += [
-        frame.box((i * width, (i + 1) * width), (0, count), class_="column")
+        frame.box((edges[i], edges[i + 1]), (0, count), class_="column")
         for i, count in enumerate(counts)
         if count
     ]
-    longer = sum(gap > longest for gap in figure.gaps_s)
-    if longer:
-        children.append(text(frame.right, TOP - 9, f"{longer} longer, in the last bar", text_anchor="end"))
     words = f"{len(figure.gaps_s)} gaps. {rate_words(figure)}"
     return drawing(name, HISTOGRAM, f"Gaps between messages on {figure.topic}", words, *children)
 
 
-def _longest(figure: RateFigure) -> float:
-    bound = figure.gap_high_s or 2 / figure.low_hz
-    return 1.1 * max(1.2 * bound, min(max(figure.gaps_s), TOO_FAR * bound))
+def _part(share: float, whole: float, *, log: bool) -> float:
+    return from_log(share * to_log(whole)) if log else share * whole
 
 
 def _gap_bounds(figure: RateFigure, frame: Frame) -> list[Markup]:

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from functools import cache
 from importlib.resources import files
 from typing import Any
 
 from jinja2 import DictLoader, Environment, StrictUndefined, pass_context
 from jinja2.runtime import Context
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from grader.report.text import line
 from grader.report.view import of_points
 from grader.wording import number
 
 LIMIT = 1000
+CODE = re.compile(r"`([^`]+)`")
 SUFFIX = ".html"
 
 
@@ -33,6 +35,7 @@ def environment() -> Environment:
     )
     made.filters["number"] = number
     made.filters["of_points"] = of_points
+    made.filters["code"] = _code
     return made
 
 
@@ -75,6 +78,19 @@ def _templates() -> dict[str, str]:
 def _unindented(text: str) -> str:
     """Without the blanks that lines begin with: no page of ours needs them."""
     return "\n".join(row.strip() for row in text.splitlines())
+
+
+def prose(text: str) -> Markup:
+    """Return a text with what stands between backticks as code."""
+    parts = CODE.split(text)
+    return Markup("").join(
+        Markup("<code>{}</code>").format(part) if i % 2 else escape(part) for i, part in enumerate(parts)
+    )
+
+
+@pass_context
+def _code(context: Context, text: str) -> Markup:
+    return prose(line(text, context.get("limit", LIMIT)))
 
 
 @pass_context

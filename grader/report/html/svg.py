@@ -81,7 +81,10 @@ TINY = 1e-12
 
 @dataclass(frozen=True, kw_only=True)
 class Frame:
-    """`width` and `height` in pixels of the drawing; the other values are those at its edges."""
+    """`width` and `height` in pixels of the drawing; the other values are those at its edges.
+
+    An axis may be logarithmic, for values among which some dwarf the others: see `to_log`.
+    """
 
     width: float
     height: float
@@ -89,6 +92,8 @@ class Frame:
     x_high: float
     y_low: float
     y_high: float
+    log_x: bool = False
+    log_y: bool = False
 
     @property
     def right(self) -> float:
@@ -100,13 +105,12 @@ class Frame:
 
     def x(self, value: float) -> float:
         """Return the pixel of a value; one outside of the frame lies on its edge."""
-        share = (value - self.x_low) / ((self.x_high - self.x_low) or 1.0)
-        return LEFT + min(max(share, 0.0), 1.0) * (self.right - LEFT)
+        return LEFT + _share(value, self.x_low, self.x_high, log=self.log_x) * (self.right - LEFT)
 
     def y(self, value: float) -> float:
         """As `x`, from the bottom up."""
-        share = (value - self.y_low) / ((self.y_high - self.y_low) or 1.0)
-        return self.bottom - min(max(share, 0.0), 1.0) * (self.bottom - TOP)
+        share = _share(value, self.y_low, self.y_high, log=self.log_y)
+        return self.bottom - share * (self.bottom - TOP)
 
     def box(self, x: tuple[float, float], y: tuple[float, float], **attributes: str | float) -> Markup:
         """Return a rectangle between values, at least a pixel wide and high."""
@@ -124,18 +128,46 @@ class Frame:
     def axes(self, x_label: str, y_label: str) -> list[Markup]:
         """Lines across at the ticks, their numbers, and what they are numbers of."""
         parts = []
-        for value in ticks(self.y_low, self.y_high):
+        for value in (log_ticks if self.log_y else ticks)(self.y_low, self.y_high):
             y = self.y(value)
             parts.append(element("line", x1=LEFT, x2=self.right, y1=y, y2=y, class_="grid"))
             parts.append(text(LEFT - 6, y + 4, number(value), text_anchor="end"))
-        for value in ticks(self.x_low, self.x_high):
+        for value in (log_ticks if self.log_x else ticks)(self.x_low, self.x_high):
             x = self.x(value)
             parts.append(element("line", x1=x, x2=x, y1=self.bottom, y2=self.bottom + 4, class_="axis"))
             parts.append(text(x, self.bottom + 17, number(value), text_anchor="middle"))
         parts.append(element("line", x1=LEFT, x2=self.right, y1=self.bottom, y2=self.bottom, class_="axis"))
+        x_label, y_label = (
+            f"{label} (logarithmic)" if log else label
+            for label, log in ((x_label, self.log_x), (y_label, self.log_y))
+        )
         parts.append(text(self.right, self.height - 6, x_label, text_anchor="end"))
         parts.append(text(2, 13, y_label))
         return parts
+
+
+def to_log(value: float) -> float:
+    """Return the logarithm of 1 more than the value's size, with its sign: values around 0 have a place too."""
+    return math.copysign(math.log10(1 + abs(value)), value)
+
+
+def from_log(value: float) -> float:
+    """Return the value of which `to_log` is this."""
+    return math.copysign(10 ** abs(value) - 1, value)
+
+
+def _share(value: float, low: float, high: float, *, log: bool) -> float:
+    if log:
+        value, low, high = to_log(value), to_log(low), to_log(high)
+    return min(max((value - low) / ((high - low) or 1.0), 0.0), 1.0)
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Powers of ten from `low` to `high`, at most about `TICKS`, 0 and their negatives."""
+    most = max(abs(low), abs(high), 1.0)
+    powers = range(int(math.log10(most)) + 1)
+    sizes = [10.0**power for power in powers[:: len(powers) // TICKS + 1]]
+    return [value for value in (*(-size for size in reversed(sizes)), 0.0, *sizes) if low <= value <= high]
 
 
 def ticks(low: float, high: float, count: int = TICKS) -> list[float]:

@@ -120,7 +120,12 @@ def made_up(place: int, chance: random.Random, *, missing: bool = False) -> tupl
         criteria[6:13] = [_blocked(criterion) for criterion in criteria[6:13]]
     if 0.03 <= kind < 0.06:
         criteria[7] = criteria[7].model_copy(
-            update={"status": Status.INCONCLUSIVE, "points": 0.0, "message": "the machine was late"}
+            update={
+                "status": Status.INCONCLUSIVE,
+                "points": 0.0,
+                "message": "the machine was late",
+                "blocked_by": None,
+            }
         )
     return entry, _settled(entry, tuple(criteria), chance)
 
@@ -142,7 +147,12 @@ def _criterion(
 
 
 def _blocked(criterion: CriterionResult) -> CriterionResult:
-    update = {"status": Status.BLOCKED, "points": 0.0, "message": "blocked by talker-node"}
+    update = {
+        "status": Status.BLOCKED,
+        "points": 0.0,
+        "message": "blocked by talker-node",
+        "blocked_by": "talker-node",
+    }
     return criterion.model_copy(update=update)
 
 

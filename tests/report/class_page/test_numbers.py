@@ -40,24 +40,32 @@ def test_nobody_has_no_spread() -> None:
     assert spread([], 100) is None
 
 
-def test_a_criterion_costs_what_submissions_lost_by_it() -> None:
+def test_a_mistake_costs_what_was_lost_by_it_and_by_what_followed() -> None:
     run, found = made_up_run(50), lines(50)
+    judged = [result for _, result in made_up_rows(50) if result.error is None]
+    assert sum(cost.points for cost in costs(found, run.criteria)) == pytest.approx(
+        sum(c.missing for result in judged for c in result.criteria if not c.status.is_open)
+    )
     for cost in costs(found, run.criteria):
         own = [
-            next(c for c in result.criteria if c.id == cost.criterion.id)
-            for _, result in made_up_rows(50)
-            if result.error is None
+            [c for c in result.criteria if cost.criterion.id in {c.id, c.blocked_by} and not c.status.is_open]
+            for result in judged
+            if any(
+                c.id == cost.criterion.id and c.status.value in {"partial", "fail"} and c.missing
+                for c in result.criteria
+            )
         ]
-        lost = [c for c in own if c.status.value in {"partial", "fail", "blocked"}]
-        assert cost.lost == len(lost)
-        assert cost.points == pytest.approx(sum(c.max_points - c.points for c in lost))
-        assert cost.judged == len(own)
+        assert cost.points == pytest.approx(sum(c.missing for mistakes in own for c in mistakes))
+        assert len(cost.by) == len(own)
+        assert cost.judged == len(judged)
+    node = next(c for c in costs(found, run.criteria) if c.criterion.id == "talker-node")
+    assert node.points > 5 * len(node.by), "what was blocked counts where the mistake is"
 
 
 def test_what_cost_most_comes_first() -> None:
     found = most_first(costs(lines(50), made_up_run(50).criteria))
     assert [cost.points for cost in found] == sorted((cost.points for cost in found), reverse=True)
-    assert all(cost.lost for cost in found)
+    assert all(cost.by for cost in found)
 
 
 def test_the_slowest_ten_and_the_mean() -> None:

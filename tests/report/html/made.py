@@ -14,8 +14,11 @@ from grader.model.figure import (
     GraphFigure,
     Heard,
     HeardFigure,
+    Lane,
     PathFigure,
     RateFigure,
+    Stretch,
+    TimelineFigure,
 )
 from tests.report.hostile import MARKDOWN, XML
 
@@ -121,6 +124,21 @@ def way(**changes: object) -> PathFigure:
     return PathFigure.model_validate({**data, **changes})
 
 
+def timeline(*names: str) -> TimelineFigure:
+    """A talker that dies, its topic, and more lanes with these names and texts."""
+    life = Stretch(from_s=0.5, to_s=3.0, says="ended by itself: exit code 1", wrong=True)
+    sent = tuple(Stretch(from_s=1 + i / 10, to_s=1 + i / 10) for i in range(15))
+    lanes = (
+        Lane(kind="process", name="talker", stretches=(life,)),
+        Lane(kind="topic", name="/chatter", stretches=sent),
+        *(
+            Lane(kind="log", name=name, stretches=(Stretch(from_s=1, to_s=1, says=name, wrong=True),))
+            for name in names
+        ),
+    )
+    return TimelineFigure(scenario="real", length_s=6.0, lanes=lanes)
+
+
 def figures() -> Figures:
     """One of each kind, beside criteria of `tests.report.hostile`."""
     return Figures(
@@ -131,6 +149,7 @@ def figures() -> Figures:
             "launch": (way(),),
             "manifest": (rate(),),
         },
+        timelines={"real": timeline()},
         graphs={"real": graph()},
         consoles={"real": console()},
     )
@@ -150,6 +169,7 @@ def hostile_figures() -> Figures:
             "talker-node": (counter(**of(bad), texts=(bad,)), counter(**of(long), texts=(long,))),
             "listener-chatter": (heard(rows=(row, missed)), way(topic=bad)),
         },
+        timelines={"real": timeline(bad, long)},
         graphs={"real": graph(**names, edges=edges, types={e.topic: bad for e in edges}), bad: graph()},
         consoles={"real": console(bad, long, *["y" * 10_000] * 500), "package": console(RTL)},
     )
@@ -163,4 +183,5 @@ EVERY: dict[str, Callable[[], object]] = {
     "console": console,
     "code": code,
     "path": way,
+    "timeline": timeline,
 }

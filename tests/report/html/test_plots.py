@@ -81,9 +81,35 @@ def test_a_rate_has_its_dots_band_mean_and_late_stretches():
 def test_bursts_do_not_flatten_the_plot():
     gaps = (1e-6, 0.0, 1.0) * 10
     over_time, histogram = rate_plots(rate(gaps_s=gaps, mean_hz=3.0), "f")
-    assert "20 above the edge" in texts(over_time)
-    assert "10 longer, in the last bar" in texts(histogram)
+    assert "Hz (logarithmic)" in texts(over_time)
+    assert "milliseconds from message to message (logarithmic)" in texts(histogram)
+    (band,) = classed(over_time, "band")
+    assert 100 < float(band.get("y")) < 200, "the band has its place in the middle"
     assert not re.search(r"\b(inf|nan|e\+)", over_time + histogram)
+
+
+def test_one_large_value_leaves_room_to_the_others():
+    figure = counter(values=(*range(30), 32767), numbers=(), times_s=tuple(range(31)), wraps=(), wrong=(30,))
+    (plot,) = counter_plots(figure, "f")
+    assert "value (logarithmic)" in texts(plot)
+    heights = [float(y) for y in re.findall(r"M[\d.]+ ([\d.]+)h0", classed(plot, "dots")[0].get("d"))]
+    assert heights[0] - heights[29] > 40, "0 to 29 take a good part of the height"
+
+
+def test_the_end_of_a_node_is_named_where_it_was():
+    over_time, _ = rate_plots(rate(died=((7.0, "talker ended: NameError"),)), "f")
+    (line,) = classed(over_time, "died")
+    dots = [float(x) for x in re.findall(r"M([\d.]+) ", classed(over_time, "dots")[0].get("d"))]
+    assert float(line.get("x1")) > max(dots)
+    assert "talker ended: NameError" in texts(over_time)
+    assert not classed(rate_plots(rate(), "f")[0], "died")
+
+
+def test_nothing_is_drawn_before_the_first_message():
+    over_time, _ = rate_plots(rate(times_s=tuple(20.2 + 0.2 * i for i in range(30)), late=((2.0, 2.4),)), "f")
+    dots = [float(x) for x in re.findall(r"M([\d.]+) ", classed(over_time, "dots")[0].get("d"))]
+    assert min(dots) < 80, "20 s of silence before it take no room"
+    assert not classed(over_time, "late")
 
 
 def test_silence_at_the_end_is_named():
@@ -97,7 +123,7 @@ def test_no_gap_is_no_plot():
 
 
 def test_a_counter_is_a_sawtooth_with_wraps_marked_and_wrong_steps_circled_and_zoomed():
-    whole, close = counter_plots(counter(), "f2")
+    close, whole = counter_plots(counter(), "f2")
     assert classed(whole, "dots")[0].get("d").count("M") == 265
     assert len(classed(whole, "wrap-mark")) == 1
     assert "wrap 127 → 0" in texts(whole)
