@@ -34,6 +34,9 @@ ANONYMOUS = both("anonymous=True", "ros::init_options::AnonymousName")
 PUBLISHER = both("rospy.Publisher(…)", "nh.advertise<…>(…)")
 SERVICE = both("rospy.Service(…)", "nh.advertiseService(…)")
 
+WAIT_FOR_SERVICE = both("rospy.wait_for_service(…)", "ros::service::waitForService(…)")
+SERVICE_CLIENT = both("rospy.ServiceProxy(…)", "nh.serviceClient<…>(…)")
+
 
 def init(name: str, *, anonymous: bool = False) -> str:
     """Return the call that makes the program a node of this name."""
@@ -59,6 +62,11 @@ def subscriber(topic: str, python: str = "…") -> str:
 def service_call(name: str, python: str = "…") -> str:
     """Return the call that offers the service."""
     return both(f"rospy.Service('{name}', {python})", f'nh.advertiseService("{name}", callback)')
+
+
+def service_client(name: str) -> str:
+    """Return what calls the service."""
+    return both(f"rospy.ServiceProxy('{name}', <Type>)(…)", f'nh.serviceClient<…>("{name}").call(…)')
 
 
 def imports(package: str, name: str, folder: str) -> str:
