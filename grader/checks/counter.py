@@ -23,7 +23,6 @@ from grader.checks.support.counters import (
 from grader.checks.support.exit_causes import explain_early_end
 from grader.checks.support.idioms import LOOP
 from grader.checks.support.nodes import PublishedTopic
-from grader.checks.support.processes import is_flood
 from grader.checks.support.topics import cite, losses, no_message
 from grader.evidence.run import Run
 from grader.model.package import PackageFacts
@@ -42,6 +41,8 @@ class StartParams(Record):
     """The topic, with its slash: `/chatter`."""
     start: int = 0
     """The first value that the counter has to publish."""
+    rate_hz: Annotated[float, Field(gt=0)] = 10.0
+    """The nominal rate, to know a flood of messages from a counter."""
 
 
 class StepParams(Record):
@@ -100,7 +101,7 @@ def _start(first: Count, run: Run, params: StartParams) -> Verdict:
         return inconclusive(message, hint="grade again")
     hint = f"set the counter to {params.start} before the loop, and add one after publish(…), not before"
     message = f"the first value on {params.topic} is {significant(first.values[0])}, not {params.start}"
-    if first.values[0] > params.start and is_flood(run):
+    if first.values[0] > params.start and first.is_flood(run, params.rate_hz):
         why = f"{message}; but its node floods its topics, and a publisher's queue drops values of a flood"
         return inconclusive(why, hint="grade again")
     verdict = failed(message, hint=hint)
