@@ -95,6 +95,7 @@ class ArenaSession:
         self._clock_ns = 0
         self._watched: dict[str, deque[bytes]] = {}
         self._printed: dict[str, deque[str]] = {}
+        self.on_request = self.on_other_type = _ignore
 
     async def __aenter__(self) -> Self:
         argv = [self.place.ros.python, "-s", "-B", str(ARENA)]
@@ -154,9 +155,9 @@ class ArenaSession:
     def course(self, event: ScenarioEvent) -> None:
         self._writer.event("/grader/scenario", self._now_ns(), event)
 
-    def note(self, event: ActorEvent) -> None:
-        """Write down what the grader did, or learnt."""
-        self._writer.event("/grader/actor", self._now_ns(), event)
+    def note(self, event: ActorEvent, time_ns: int | None = None) -> None:
+        """Write down what the grader did, or learnt: now, or when the arena did."""
+        self._writer.event("/grader/actor", self._now_ns() if time_ns is None else time_ns, event)
 
     async def call(self, timeout_s: float, **command: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
         """Call a service: `{"data": base64}` of its response, or `{"error": why not}`."""
@@ -245,7 +246,7 @@ class ArenaSession:
         elif frame.kind == "E":
             self._event(frame)
         elif frame.kind == "S":
-            self._status(frame.fields)
+            self._status(frame.time_ns, frame.fields)
         else:
             fields = frame.fields
             number, topic, caller_id = fields.pop("id"), fields["topic"], fields["callerid"]
@@ -311,7 +312,7 @@ class ArenaSession:
             self._killed.ended(record)
         self.live.exited(name, time.monotonic())
 
-    def _status(self, fields: dict[str, Any]) -> None:
+    def _status(self, time_ns: int, fields: dict[str, Any]) -> None:
         status = fields["status"]
         if status == "ready":
             self._ready = True
@@ -323,6 +324,11 @@ class ArenaSession:
             self._answers[fields["id"]] = fields
         elif status == "left":
             self._left.add(fields["name"], fields["path"], fields["bytes"], fields["data"], self._now_ns())
+        elif status == "request":
+            self.live.active(time.monotonic())
+            self.on_request(time_ns, fields)
+        elif status == "other-type":
+            self.on_other_type(time_ns, fields)
         elif status == "graph":
             pairs = [c for c in fields["connections"] if not is_grader_node(c["subscriber"])]
             self.live.connections({c["topic"] for c in pairs}, time.monotonic())
@@ -355,6 +361,10 @@ class ArenaSession:
 
     def _why(self) -> str:
         return f"{self._failure} {self._process.last_words()}".strip() or "it did not answer"
+
+
+def _ignore(time_ns: int, fields: dict[str, Any]) -> None:
+    """In the place of who wants to know of the calls of the grader's services: when it was, and what the arena says."""
 
 
 class Killed:

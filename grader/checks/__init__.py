@@ -49,6 +49,7 @@ FAMILIES = (
     "launch_opens",
     "parameters",
     "services",
+    "calls",
     "actions",
     "connections",
     "two_copies",

@@ -35,8 +35,8 @@ class Refers:
     `process`: a start of the student's in the scenario. `launch`: a launch file that the scenario starts. `program`:
     `package/program` of another package. `message`, `service`: a type. `field`: a field's type. `sent`: a topic on
     which the scenario's probes send. `published`: a topic on which the student publishes. `set`: a parameter that the
-    scenario sets. `action`: an action to which its steps send goals. `kept`: a file that it keeps. `watched_s`: so long
-    the scenario has to last.
+    scenario sets. `action`: an action to which its steps send goals. `kept`: a file that it keeps. `served`: a service
+    that the grader offers in it. `watched_s`: so long the scenario has to last.
     """
 
     to: Literal[
@@ -51,6 +51,7 @@ class Refers:
         "set",
         "action",
         "kept",
+        "served",
         "watched_s",
     ]
 

@@ -56,8 +56,9 @@ def _outside_faults(path: KeyPath, scenario: dict[str, Any], rubric: dict[str, A
                 f'roslaunch takes the file\'s whole name: "{launch}.launch"',
             )
         yield from _of_machine((*path, "start", index, "program"), "program", start.get("program"), rubric)
-    for index, call in as_maps(scenario.get("calls")):
-        yield from _of_machine((*path, "calls", index, "type"), "service", call.get("type"), rubric)
+    for key in ("calls", "serves"):
+        for index, one in as_maps(scenario.get(key)):
+            yield from _of_machine((*path, key, index, "type"), "service", one.get("type"), rubric)
 
 
 def _of_machine(path: KeyPath, to: str, value: object, rubric: dict[str, Any]) -> Iterator[Fault]:
@@ -112,6 +113,8 @@ def _misfits(
         yield f"no step of {name} sends a goal to {value}{_instead(value, there)}"
     elif one.to == "kept" and not any(PurePosixPath(value).match(keep) for keep in _kept(scenario)):
         yield f'{name} keeps no file "{value}"{_instead(value, _kept(scenario))}; add it to its keeps'
+    elif one.to == "served" and value not in (there := _served(scenario)):
+        yield f"the grader does not offer {value} in {name}{_instead(value, there)}: add it to serves"
     elif one.to == "set" and not _is_set(value, scenario):
         there = [str(param.get("name")) for _, param in as_maps(scenario.get("params"))]
         yield f"{name} sets no parameter {value}{did_you_mean(value, there)}: add it to its params"
@@ -228,6 +231,10 @@ def _actions(scenario: dict[str, Any]) -> list[str]:
 
 def _kept(scenario: dict[str, Any]) -> list[str]:
     return [pattern for _, pattern in as_texts(scenario.get("keeps")) if pattern]
+
+
+def _served(scenario: dict[str, Any]) -> list[str]:
+    return [str(served.get("service")) for _, served in as_maps(scenario.get("serves"))]
 
 
 def _starts(scenario: dict[str, Any]) -> list[dict[str, Any]]:
