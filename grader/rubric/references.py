@@ -111,15 +111,22 @@ def _misfits(
         yield f"no probe of {name} sends on {value}{_instead(value, there)}"
     elif one.to == "action" and value not in (there := _actions(scenario)):
         yield f"no step of {name} sends a goal to {value}{_instead(value, there)}"
-    elif one.to == "kept" and not any(PurePosixPath(value).match(keep) for keep in _kept(scenario)):
-        yield f'{name} keeps no file "{value}"{_instead(value, _kept(scenario))}; add it to its keeps'
     elif one.to == "served" and value not in (there := _served(scenario)):
         yield f"the grader does not offer {value} in {name}{_instead(value, there)}: add it to serves"
-    elif one.to == "set" and not _is_set(value, scenario):
-        there = [str(param.get("name")) for _, param in as_maps(scenario.get("params"))]
-        yield f"{name} sets no parameter {value}{did_you_mean(value, there)}: add it to its params"
+    elif one.to in {"kept", "set"}:
+        yield from _not_added(one.to, value, name, scenario)
     elif one.to == "published" and (program := _only_publisher(value, starts)):
         yield f"{program} publishes on {value}, and {check.name} judges the student's messages"
+
+
+def _not_added(to: str, value: str, name: object, scenario: dict[str, Any]) -> Iterator[str]:
+    """Yield which list of the scenario lacks a file that is kept, or a parameter that is set."""
+    kept = [pattern for _, pattern in as_texts(scenario.get("keeps")) if pattern]
+    if to == "kept" and not any(PurePosixPath(value).match(pattern) for pattern in kept):
+        yield f'{name} keeps no file "{value}"{_instead(value, kept)}; add it to its keeps'
+    elif to == "set" and not _is_set(value, scenario):
+        there = [str(param.get("name")) for _, param in as_maps(scenario.get("params"))]
+        yield f"{name} sets no parameter {value}{did_you_mean(value, there)}: add it to its params"
 
 
 def _is_process(name: str, start: dict[str, Any]) -> bool:
@@ -227,10 +234,6 @@ def _actions(scenario: dict[str, Any]) -> list[str]:
         for _, step in as_maps(scenario.get("steps"))
         if "action" in step
     ]
-
-
-def _kept(scenario: dict[str, Any]) -> list[str]:
-    return [pattern for _, pattern in as_texts(scenario.get("keeps")) if pattern]
 
 
 def _served(scenario: dict[str, Any]) -> list[str]:
