@@ -73,6 +73,9 @@ TOGETHER = {
         "build-unknown-component+node-named-otherwise+launch-without-a-namespace",
         "no-default+topic-absolute",
     ),
+    "record-and-replay": (
+        "build-unknown-component+recorder-name+steps-in-cm+bag-elsewhere+node-name+backward-less+table-no-names",
+    ),
     "service-client": (
         "build-unknown-component",
         "fields-of-32-bits+error-kept-quiet",

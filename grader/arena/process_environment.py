@@ -275,6 +275,7 @@ class ProcessEnvironment:
             "script": None,
             "repairs": [],
             "stdin": False,
+            "keeps": [],
             **more,
         }
 

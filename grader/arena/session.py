@@ -19,6 +19,7 @@ from typing_extensions import Self
 from grader.arena.admission import MEMINFO, read_numbers
 from grader.arena.arena_process import ArenaProcess
 from grader.arena.control_groups import remove_groups
+from grader.arena.left_files import LeftFiles
 from grader.arena.process_environment import ProcessEnvironment
 from grader.arena.ros.wire import Frame, FrameReader
 from grader.arena.run_state import RunState
@@ -84,6 +85,7 @@ class ArenaSession:
         self._failure = ""
         self._error: Exception | None = None
         self._killed = Killed(sandboxed=place.sandbox.bubblewrap)
+        self._left = LeftFiles(place, writer)
         self._last_run = last_run
         self._on_lateness = on_lateness
         self._offset_ns = time.time_ns() - time.monotonic_ns()
@@ -322,6 +324,8 @@ class ArenaSession:
             self.live.rests(fields["name"], fields["rest"], fields["programs"], time.monotonic())
         elif status == "answer":
             self._answers[fields["id"]] = fields
+        elif status == "left":
+            self._left.add(fields["name"], fields["path"], fields["bytes"], fields["data"], self._now_ns())
         elif status == "request":
             self.live.active(time.monotonic())
             self.on_request(time_ns, fields)

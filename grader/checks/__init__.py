@@ -42,6 +42,7 @@ FAMILIES = (
     "listener",
     "logs",
     "console",
+    "files_left",
     "launch_xml",
     "launch_runs",
     "launch_params",

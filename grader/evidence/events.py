@@ -143,6 +143,7 @@ class ActorEvent(Record):
     (`interrupt` is the run's end), and so has `type`, with the line that went to its standard input in `value`.
     `goal`, `cancel` and `result` are an action's: `topic` is its name, `detail` the word for the result's status
     (`SUCCEEDED`), or why there is none. `play`: the recording `topic` was played; its messages are on their topics.
+    `left`: the process `actor` left the file `detail`, of `value` bytes; what is kept of it is an attachment.
     Of services and actions that the grader offers: `serve` is a call, or a goal, of the node `actor`, and `value` has
     the fields of its `request` and of the `response` or result, None where the service fails; a goal's state is in
     `detail`. `lookup`: the node `actor` asked the master for the service `topic`, the first time; `detail` says where
@@ -170,6 +171,7 @@ class ActorEvent(Record):
         "cancel",
         "result",
         "play",
+        "left",
         "serve",
         "lookup",
     ]

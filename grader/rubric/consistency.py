@@ -268,7 +268,10 @@ def _means(path: KeyPath, scenario: dict[str, Any]) -> Iterator[Fault]:
         elif "until" not in scenario and not (scenario.get("steps") or _has_tests(scenario)):
             yield (*path, "until"), "is missing"
         return
-    for key in ("start", "params", "probes", "calls", "serves", "steps", "until", "clock", "warp"):
+    for key in (
+        *("start", "params", "probes", "calls", "serves", "steps"),
+        *("until", "keeps", "clock", "warp"),
+    ):
         if key in scenario:
             yield (*path, key), "is not for a scenario with a recording: nothing is run"
 

@@ -432,6 +432,8 @@ class Scenario(Record):
     then on."""
     until: Annotated[Until, Field(default_factory=lambda: Until(messages={}))]
     """When the run has seen enough."""
+    keeps: tuple[Annotated[str, Field(min_length=1)], ...] = ()
+    """Patterns for files that the student's processes leave (`*.bag`, `results/*.csv`): they become evidence."""
 
     @property
     def started_later(self) -> frozenset[str]:
@@ -449,6 +451,8 @@ class Scenario(Record):
         left_out: dict[str, Any] = {"title": True}
         if not self.steps:  # before there were any, none were counted, and so it is with definitions
             left_out["steps"] = True
+        if not self.keeps:
+            left_out["keeps"] = True
         if not self.serves:
             left_out["serves"] = True
         if not any(call.definition for call in self.calls):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import PurePosixPath
 from typing import Any
 
 from grader.checks.registry import Check, Reference
@@ -112,6 +113,8 @@ def _misfits(
         yield f"no probe of {name} sends on {value}{_instead(value, there)}"
     elif one.to == "action" and value not in (there := _actions(scenario)):
         yield f"no step of {name} sends a goal to {value}{_instead(value, there)}"
+    elif one.to == "kept" and not any(PurePosixPath(value).match(keep) for keep in _kept(scenario)):
+        yield f'{name} keeps no file "{value}"{_instead(value, _kept(scenario))}; add it to its keeps'
     elif one.to == "served" and value not in (there := _served(scenario)):
         yield f"the grader does not offer {value} in {name}{_instead(value, there)}: add it to serves"
     elif one.to == "set" and not _is_set(value, scenario):
@@ -226,6 +229,10 @@ def _actions(scenario: dict[str, Any]) -> list[str]:
         for _, step in as_maps(scenario.get("steps"))
         if "action" in step
     ]
+
+
+def _kept(scenario: dict[str, Any]) -> list[str]:
+    return [pattern for _, pattern in as_texts(scenario.get("keeps")) if pattern]
 
 
 def _served(scenario: dict[str, Any]) -> list[str]:

@@ -7,6 +7,7 @@ from typing import Literal
 
 from grader.checks.registry import Check
 from grader.checks.support.exit_causes import explain_end
+from grader.checks.support.idioms import INIT, LOOP, PUBLISHER, publisher
 from grader.checks.support.nodes import plain_type
 from grader.checks.support.processes import NO_SCRIPT_HINT, early_end, lives
 from grader.checks.support.text import near_names, texts_in
@@ -63,7 +64,7 @@ def no_node(package: PackageFacts, run: Run, what: str) -> Verdict | None:
         message = f"{what}: {ended.name} ended before ({end.cause})"
         return end.verdict(unjudged, message, measured="ended")
     if not run.student_nodes():
-        hint = "call rospy.init_node(…), and run the node"
+        hint = f"call {INIT}, and run the node"
         return unjudged(f"{what}: no node was registered", measured="no node", hint=hint)
     return None
 
@@ -84,15 +85,15 @@ def no_message(
         )
         return unjudged(f"{topic} is not in {run.evidence}{seen}", measured=measured, hint=hint)
     if near:
-        hint = f"name the topic {topic} in rospy.Publisher(…)"
+        hint = f"name the topic {topic} in {PUBLISHER}"
         return of_node(f"{what}; the node publishes on {join_words(near)}", measured=measured, hint=hint)
     if absent := no_node(package, run, what) or _refused(run, topic) or misfit(run):
         return absent
     if topic in published:
-        hint = "call publish(…) inside the loop `while not rospy.is_shutdown():`"
+        hint = f"call publish(…) inside the loop `{LOOP}`"
         return of_node(f"{what}, although it is advertised", measured="no message", hint=hint)
     only = f"it publishes on {join_words(published)}; " if published else ""
-    hint = f"{only}add rospy.Publisher('{topic}', …) and publish in the loop"
+    hint = f"{only}add {publisher(topic)} and publish in the loop"
     return of_node(f"{what}: no node publishes on it", measured=measured, hint=hint)
 
 
