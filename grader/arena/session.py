@@ -325,7 +325,7 @@ class ArenaSession:
         elif status == "answer":
             self._answers[fields["id"]] = fields
         elif status == "left":
-            self._left.add(fields["name"], fields["path"], fields["bytes"], fields["data"], self._now_ns())
+            self._left.add(fields["name"], fields["path"], fields["bytes"], fields["data"], self.now_ns())
         elif status == "request":
             self.live.active(time.monotonic())
             self.on_request(time_ns, fields)
