@@ -326,11 +326,8 @@ class ArenaSession:
             self._answers[fields["id"]] = fields
         elif status == "left":
             self._left.add(fields["name"], fields["path"], fields["bytes"], fields["data"], self.now_ns())
-        elif status == "request":
-            self.live.active(time.monotonic())
-            self.on_request(time_ns, fields)
-        elif status == "other-type":
-            self.on_other_type(time_ns, fields)
+        elif status in {"request", "other-type"}:
+            self._asked(time_ns, fields)
         elif status == "graph":
             pairs = [c for c in fields["connections"] if not is_grader_node(c["subscriber"])]
             self.live.connections({c["topic"] for c in pairs}, time.monotonic())
@@ -341,6 +338,14 @@ class ArenaSession:
         elif status == "done":
             self._note_cost(fields)
             self._done = True
+
+    def _asked(self, time_ns: int, fields: dict[str, Any]) -> None:
+        """A client called a service that the grader offers, by its type or by another one."""
+        if fields["status"] == "request":
+            self.live.active(time.monotonic())
+            self.on_request(time_ns, fields)
+        else:
+            self.on_other_type(time_ns, fields)
 
     def _note_cost(self, fields: dict[str, Any]) -> None:
         """What the arena itself took: CPU seconds, and bytes of memory at its peak."""

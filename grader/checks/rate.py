@@ -15,7 +15,7 @@ from grader.checks.support.idioms import LOOP, both, loop_rate
 from grader.checks.support.lateness import NO_EXCUSE, Lateness, excused, lateness
 from grader.checks.support.nodes import PublishedTopic
 from grader.checks.support.processes import observed_until_ns
-from grader.checks.support.topics import cite, no_message, whole_until_ns
+from grader.checks.support.topics import Sender, cite, nothing_sent, sent_by, whole_until_ns
 from grader.evidence.run import Channel, Run
 from grader.model.message_rate import ROUNDING, RateBounds, Rhythm
 from grader.model.package import PackageFacts
@@ -56,6 +56,9 @@ class RateParams(Record):
     """The share of the gaps that has to lie within `gap_tolerance`."""
     min_window_s: Annotated[Positive, Refers("watched_s")] = 5.0
     """So long messages have to be seen before the rate is judged."""
+    of: Sender = "student"
+    """Whose messages count: the `student`'s nodes', those of a `program` that the scenario starts beside them, or
+    `anyone`'s."""
 
     @property
     def low_hz(self) -> float:
@@ -116,9 +119,9 @@ def rate(package: PackageFacts, run: Run, params: RateParams) -> Verdict:
     if run.clock != "real":
         message = "rates are judged in real time only, and this run was warped"
         return inconclusive(message, expected=expected, hint="give the criterion a scenario with clock: real")
-    found = judged_rhythm(run, params, run.student_channels(params.topic))
+    found = judged_rhythm(run, params, sent_by(run, params.topic, params.of))
     if found is None:
-        return no_message(package, run, params.topic).about(expected=expected)
+        return nothing_sent(package, run, params.topic, params.of).about(expected=expected)
     uneven = _uneven(found, params)
     if uneven is not None:
         why = partial(_why_late, found, params=params)
