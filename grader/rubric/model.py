@@ -125,12 +125,23 @@ class Call(Record):
 
 
 class Served(Record):
-    """A service that the grader offers, from before anything starts. Give one of `answer`, `answers` and `fails`."""
+    """A service or an action that the grader offers, from before anything starts.
 
-    service: str
+    Give `service`, and one of `answer`, `answers` and `fails`; or `action`, and what becomes of its goals.
+    """
+
+    service: str | None = None
     """The service, with its slash: `/add`."""
+    action: str | None = None
+    """The action, with its slash: `/fibonacci`."""
     type: Annotated[str, Field(pattern=TYPE_PATTERN)]
     """Of ROS's, of the student's package (`lab5/Add`), or of one of the course's."""
+    feedback: tuple[dict[str, Any], ...] = ()
+    """What is sent of each goal on its way, one after the other."""
+    result: dict[str, Any] = Field(default_factory=dict)
+    """The fields of each goal's result; those that it lacks are zero."""
+    ends: Literal["succeeded", "aborted"] = "succeeded"
+    """The state in which goals end. One that the client cancels before is preempted."""
     answer: dict[str, Any] | None = None
     """The fields of each answer; those that it lacks are zero."""
     answers: tuple[dict[str, Any], ...] = ()
@@ -141,7 +152,12 @@ class Served(Record):
     """The handout's text of a `.srv` that students write themselves: where theirs differs, their calls are refused, as
     a server of the handout's would."""
     delay_s: Annotated[float, Field(ge=0, le=STEP_S_MAX)] = 0.0
-    """How long each answer takes."""
+    """How long each answer takes; of an action, each feedback and the result."""
+
+    @property
+    def name(self) -> str:
+        """The service's or the action's."""
+        return self.service or self.action or ""
 
     @property
     def in_turn(self) -> tuple[dict[str, Any], ...]:
@@ -410,7 +426,7 @@ class Scenario(Record):
     calls: tuple[Call, ...] = ()
     """Services that the grader calls."""
     serves: tuple[Served, ...] = ()
-    """Services that the grader offers to the student's nodes."""
+    """Services and actions that the grader offers to the student's nodes."""
     steps: tuple[Step, ...] = ()
     """What the grader does, one after the other; `until` is looked at once they are over, and its times count from
     then on."""
